@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from msgspec import structs
 
 from benchmarks.cvxpy_users import Parametrised, Query, rebuilt
 from benchmarks.measured_stances import payload, question_of, request
@@ -192,7 +193,7 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
 
     def heavy(number: int, twin: int, **more: Any) -> Question:
         asked = question_of(number, twin)
-        return replace(asked, load=replace(asked.load, mass=HEAVY), **more)
+        return replace(asked, load=structs.replace(asked.load, mass=HEAVY), **more)
 
     def soon(number: int) -> None:
         # on a bad moment there is not even a plan in time

@@ -52,6 +52,7 @@ from .question import (
 )
 from .result import (
     Advice as Advice,
+    Certificate as Certificate,
     Clearance as Clearance,
     Distance as Distance,
     Finding as Finding,

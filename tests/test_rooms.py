@@ -87,7 +87,7 @@ def test_every_room_has_an_index():
     [
         ("from hand_models import Pose", ("scipy", "trimesh", "hand_models.hand", "matplotlib")),
         ("from planner import Load, Limits", ("cvxpy", "clarabel", "planner.solving")),
-        ("from service import PlanRequest", ("cvxpy", "zenoh", "planner", "hand_models.hand")),
+        ("from service import PlanRequest", ("numpy", "zenoh", "planner.solving")),
         ("from service import CruxClient", ("cvxpy", "pinocchio", "planner.solving")),
     ],
 )

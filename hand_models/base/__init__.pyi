@@ -13,6 +13,7 @@ from .distribution import (
 from .errors import (
     CruxError as CruxError,
     EmptySetError as EmptySetError,
+    InvalidFieldError as InvalidFieldError,
     InvalidInputError as InvalidInputError,
     LimitError as LimitError,
     SolverError as SolverError,
@@ -34,4 +35,14 @@ from .frames import (
 )
 from .input_files import check_file as check_file
 from .long_work import Progress as Progress, broken_off_by as broken_off_by, go_on as go_on
+from .message_fields import (
+    Acceleration as Acceleration,
+    AccelerationEntry as AccelerationEntry,
+    Coordinate as Coordinate,
+    Mass as Mass,
+    Name as Name,
+    Position as Position,
+    Strict as Strict,
+    Tension as Tension,
+)
 from .whole_files import whole_file as whole_file

@@ -11,6 +11,7 @@ from typing import Any, Self
 __all__ = [
     "CruxError",
     "EmptySetError",
+    "InvalidFieldError",
     "InvalidInputError",
     "LimitError",
     "SolverError",
@@ -65,6 +66,13 @@ class InvalidInputError(CruxError):
     """A value that no model can work with (not finite, out of range, wrong shape, unknown name)."""
 
     kind = "invalid"
+
+
+class InvalidFieldError(InvalidInputError, ValueError):
+    """A part of a request that is impossible by itself.
+
+    As a ``ValueError`` of a struct that is being decoded, msgspec says where in the message it is.
+    """
 
 
 class UnsupportedError(InvalidInputError):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
-from hand_models.base import InvalidInputError, check_positive
+from msgspec import Meta
+from msgspec.structs import force_setattr
+
+from hand_models.base import InvalidFieldError, Strict, Tension, check_positive
 
 __all__ = ["Grasp"]
 
@@ -17,8 +19,13 @@ ROUNDED: Final = 5e-4
 """How far above π an outer rotation is taken for it [rad]: π rounded to three decimals is."""
 
 
-@dataclass(frozen=True)
-class Grasp:
+OuterRotation = Annotated[
+    float,
+    Meta(ge=0.0, le=math.pi + ROUNDED, description="[rad]; what rounding puts above π is π"),
+]
+
+
+class Grasp(Strict, frozen=True):
     """How a hand takes a hold.
 
     Attributes
@@ -35,19 +42,21 @@ class Grasp:
         Whether the fingers stay straight and cling with their nails alone.
     """
 
-    outer_rotation: float = 0.0
-    closing_tension: float | None = None
+    outer_rotation: OuterRotation = 0.0
+    closing_tension: Tension | None = None
     palm: bool = True
     lateral: bool = True
-    fingernail: bool = False
+    fingernail: Annotated[
+        bool, Meta(description="fingers straight, clinging with their nails alone")
+    ] = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.outer_rotation <= math.pi + ROUNDED:
-            raise InvalidInputError(
+            raise InvalidFieldError(
                 f"must be in [0, pi] rad, got {self.outer_rotation:g}", field="outer_rotation"
             )
         if self.outer_rotation > math.pi + OPPOSED:
-            object.__setattr__(self, "outer_rotation", math.pi)
+            force_setattr(self, "outer_rotation", math.pi)
         if self.closing_tension is not None:
             check_positive(self.closing_tension, "N", "closing_tension")
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.tile import Surface
@@ -109,7 +110,7 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
             stance["joints"] = value
         elif path in ("load.mass", "load.com"):
             part = value if path == "load.mass" else tuple(value)
-            whole["load"] = replace(
+            whole["load"] = structs.replace(
                 whole.get("load", question.load), **{path.removeprefix("load."): part}
             )
         elif named is not None and value is None:
@@ -158,7 +159,7 @@ def _field(hand: HandOnHold, updates: Mapping[str, Any], field: str, value: Any)
     """Return what a field of a hand's message is called here, and its value."""
     if field.startswith("grasp."):
         grasp = updates.get("grasp", hand.grasp)
-        return "grasp", replace(grasp, **{field.removeprefix("grasp."): value})
+        return "grasp", structs.replace(grasp, **{field.removeprefix("grasp."): value})
     if field not in FIELDS:
         raise InvalidInputError("advice does not change this", field=f"stance.hands.{field}")
     name, read = FIELDS[field]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.base import InvalidInputError, Pose, turns_about
 from hand_models.hand import Grasp
@@ -138,7 +139,7 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
     """Return one hand with another grasp, if its rock can stay where it is."""
     stance = prepared.question.stance
     hand, rock = stance.hands[index], _rock(prepared, index)
-    grasp: Grasp = replace(hand.grasp, outer_rotation=turn)
+    grasp: Grasp = structs.replace(hand.grasp, outer_rotation=turn)
     size = abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT
     changes: dict[str, Any] = {hand_path(index, "grasp.outer_rotation"): turn}
     words = f"take the hold of {hand.limb} with {fingers(turn)}"

@@ -12,6 +12,7 @@ from functools import cached_property, partial
 from typing import Final, NamedTuple
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.base import Array, CruxError, InvalidInputError, SolverError, UnsupportedError
 from planner import deadline, programs
@@ -249,7 +250,9 @@ def _motion(question: Question, where: Posture | None, point: LinearisationPoint
     count = 6 if where is not None and question.load.com is None else 3
     found = []
     for x, y, z, *turning in np.vstack([np.zeros(6), np.eye(6)[:count]]).tolist():
-        load = replace(question.load, acceleration=(x, y, z), angular_acceleration=(*turning,))
+        load = structs.replace(
+            question.load, acceleration=(x, y, z), angular_acceleration=(*turning,)
+        )
         moving = replace(question, load=load)
         there = None if where is None else posture_at(moving, where.angles)
         wrench = moving.needed_wrench(None if there is None else there.weights)

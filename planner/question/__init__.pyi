@@ -3,12 +3,10 @@ from .draws import (
     drawn_hands as drawn_hands,
     drawn_quantities as drawn_quantities,
 )
+from .limits import BodyRange as BodyRange, ForceCap as ForceCap, Limits as Limits
 from .load import Load as Load, Weights as Weights
 from .question import (
     MOST_DRAWS as MOST_DRAWS,
-    BodyRange as BodyRange,
-    ForceCap as ForceCap,
-    Limits as Limits,
     Objective as Objective,
     OwnObjective as OwnObjective,
     Question as Question,

@@ -1,15 +1,29 @@
-"""What a robot weighs and carries, how it is to move, and the wrench that this takes."""
+"""What a robot weighs and carries, how it is to move, and the wrench that this takes.
+
+A load travels, so that it is here without the libraries that it is weighed with.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-import numpy as np
+from msgspec import Meta
 
-from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
-from planner.question.stance import Stance, checked_body_wrench
-from planner.robots import Payload, check_carrier, held_up
+from hand_models.base import (
+    Acceleration,
+    AccelerationEntry,
+    InvalidInputError,
+    Mass,
+    Position,
+    Strict,
+    check_positive,
+    within,
+)
+from planner.robots import Payload
+
+if TYPE_CHECKING:
+    from hand_models.base import Array
+    from planner.question.stance import Stance
 
 __all__ = ["Load", "Weights"]
 
@@ -33,9 +47,8 @@ class Weights(NamedTuple):
     payloads: Array
 
 
-@dataclass(frozen=True)
-class Load:
-    """What the body weighs and how it is to move.
+class Load(Strict, frozen=True):
+    """What the body weighs and how it is to move; by default the robot's own weight, at rest.
 
     Attributes
     ----------
@@ -52,11 +65,33 @@ class Load:
         Masses on links, beside ``mass``.
     """
 
-    mass: float | None = None
-    com: tuple[float, float, float] | None = None
-    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    angular_acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    payloads: tuple[Payload, ...] = ()
+    mass: Annotated[
+        Mass | None,
+        Meta(
+            description="of the robot with its hands [kg]; its file's by default. A mass alone is "
+            "weighed at the posture's centre of mass where joints are known"
+        ),
+    ] = None
+    com: Annotated[
+        Position | None,
+        Meta(
+            description="centre of mass in B; by default the posture's where joints are known, "
+            "else that of the robot's file"
+        ),
+    ] = None
+    acceleration: Acceleration = (0.0, 0.0, 0.0)
+    angular_acceleration: Annotated[
+        tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
+        Meta(description="in W [rad/s²]; needs the stance's joints, and no com"),
+    ] = (0.0, 0.0, 0.0)
+    payloads: Annotated[
+        tuple[Payload, ...],
+        Meta(
+            max_length=64,
+            description="masses on links or in hands, beside mass; they count in the body wrench "
+            "and in the joints' torques",
+        ),
+    ] = ()
 
     @property
     def own(self) -> bool:
@@ -80,6 +115,10 @@ class Load:
             If a number is none, or needs joints that are not known; the field is relative to the
             load.
         """
+        from hand_models.base import finite_vector
+        from planner.question.stance import checked_body_wrench
+        from planner.robots import held_up
+
         own = stance.robot.mass
         mass = own if self.mass is None else self.mass
         check_positive(mass, "kg", "mass")
@@ -103,6 +142,8 @@ class Load:
 
         Shapes (3,) each [m/s², rad/s²].
         """
+        from hand_models.base import finite_vector
+
         into_body = stance.body.rotation.T
         acceleration = finite_vector(self.acceleration, 3, "acceleration")
         angular = finite_vector(self.angular_acceleration, 3, "angular_acceleration")
@@ -117,6 +158,10 @@ class Load:
             If one is neither on the body nor in a hand of the stance; the field is relative to the
             load.
         """
+        import numpy as np
+
+        from planner.robots import check_carrier
+
         hands = {hand.limb: hand.pose for hand in stance.hands}
         body, places = stance.body.inverse(), []
         for i, payload in enumerate(self.payloads):

@@ -1,23 +1,36 @@
-"""Masses that a robot carries on its links."""
+"""Masses that a robot carries on its links.
+
+A payload travels, so that it is here without the libraries that it is weighed with.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-import pinocchio as pin
+from msgspec import Meta
 
-from hand_models.base import Array, InvalidInputError, Pose, check_positive, finite_vector, within
-from planner.robots.build import pose_of
-from planner.robots.robot import Robot
+from hand_models.base import (
+    InvalidFieldError,
+    InvalidInputError,
+    Mass,
+    Name,
+    Position,
+    Strict,
+    check_positive,
+    within,
+)
+
+if TYPE_CHECKING:
+    from hand_models.base import Array, Pose
+    from planner.robots.robot import Robot
 
 __all__ = ["Payload", "carriers", "check_carrier", "held_up"]
 
 
-@dataclass(frozen=True)
-class Payload:
-    """A mass that is fixed to a link, beside the robot's own.
+class Payload(Strict, frozen=True):
+    """A mass that is fixed to a link, or to a limb's hand, beside the robot's own.
 
     Attributes
     ----------
@@ -36,16 +49,19 @@ class Payload:
         If neither or both of ``link`` and ``limb`` are given, or a number is none.
     """
 
-    mass: float
-    link: str | None = None
-    limb: str | None = None
-    com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass: Mass
+    link: Annotated[Name | None, Meta(description="of the robot's URDF; give this or limb")] = None
+    limb: Annotated[Name | None, Meta(description="whose hand carries it")] = None
+    com: Annotated[
+        Position, Meta(description="centre of mass, in the link's frame or in H of the hand [m]")
+    ] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         check_positive(self.mass, "kg", "mass")
-        finite_vector(self.com, 3, "com")
+        if len(self.com) != 3 or not all(map(math.isfinite, self.com)):
+            raise InvalidFieldError(f"3 finite numbers are needed, got {self.com}", field="com")
         if (self.link is None) == (self.limb is None):
-            raise InvalidInputError(
+            raise InvalidFieldError(
                 "a payload is on a link or on a limb's hand: give link or limb, and not both",
                 field="link",
             )
@@ -67,6 +83,8 @@ def held_up(mass: float, place: Array, linear: Array, angular: Array) -> Array:
     angular : ndarray, shape (3,)
         α in B [rad/s²].
     """
+    import numpy as np
+
     with np.errstate(over="ignore", invalid="ignore"):
         force = mass * (linear + np.cross(angular, place))
         return np.concatenate([force, np.cross(place, force)])
@@ -80,6 +98,8 @@ def check_carrier(robot: Robot, payload: Payload) -> None:
     InvalidInputError
         The field is relative to the payload.
     """
+    import pinocchio as pin
+
     if payload.limb is not None:
         if payload.limb not in robot.chains:
             known = ", ".join(robot.limbs)
@@ -107,6 +127,10 @@ def carriers(
     """
     if not payloads:
         return []
+    import pinocchio as pin
+
+    from planner.robots.build import pose_of
+
     model, data, found, from_root = robot.model, robot.data, [], robot.root.inverse()
     pin.computeJointJacobians(model, data, robot.configuration(angles))
     for i, payload in enumerate(payloads):

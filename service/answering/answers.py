@@ -2,40 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from msgspec import UNSET
 
-from planner import Plan, Question
+from planner import Certificate, HandPlan, Plan, Question
 from service import replies
 from service.answering.hand_answers import (
+    finite,
     hand_reply,
+    listed,
+    listed_by_limb,
     placed_poses,
-    plain,
-    told,
     wrench_set_reply,
 )
 from service.requests import Detail
 
-__all__ = ["BRIEF", "Planned", "brief_plan_reply", "cut_reason", "plan_reply"]
+__all__ = ["Planned", "brief_plan_reply", "cut_reason", "plan_reply"]
 
 LONGEST: Final = 120
 """Bytes of a reason beside set-points, which have to be small whatever the reason."""
-
-BRIEF: Final = 3
-"""So many fields of a hand's set-points are told in little room: limb, tensions and winches."""
-
-WHOLE: Final = (
-    "body_wrench",
-    "load_factor",
-    "load_factor_unbounded",
-    "load_factor_status",
-    "joints",
-    "warnings",
-    "findings",
-    "time",
-)
-"""Fields of a brief reply that are left out beside set-points."""
 
 
 class Planned(NamedTuple):
@@ -81,22 +67,56 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
     model : bool
         Whether tiles carry their load laws and hands their wrench spaces.
     """
-    proof, certificate = answer.certificate, None
-    if proof is not None:
-        sets: Any = UNSET
-        if model and answer.hands is None:
-            sets = {limb: wrench_set_reply(space) for limb, space in proof.spaces.items()}
-        certificate = told(replies.Certificate, proof, wrench_spaces=sets)
-    return told(
-        replies.PlanReply,
-        answer,
+    hands, proof = answer.hands, answer.certificate
+    return replies.PlanReply(
         id=identifier,
-        hands=None if answer.hands is None else [hand_reply(h, model) for h in answer.hands],
-        certificate=certificate,
+        status=answer.status,
+        reason=answer.reason,
+        body_wrench=answer.body_wrench.tolist(),
+        utilisation=finite(answer.utilisation),
+        effort=finite(answer.effort),
+        load_factor=finite(answer.load_factor),
+        load_factor_unbounded=answer.load_factor_unbounded,
+        load_factor_status=answer.load_factor_status,
+        limiting=answer.limiting,
+        hands=None if hands is None else [hand_reply(hand, model) for hand in hands],
+        joints=listed_by_limb(answer.joints),
+        joint_torque=listed_by_limb(answer.joint_torque),
+        joint_torque_limit=listed_by_limb(answer.joint_torque_limit),
+        prices=None if answer.prices is None else list(answer.prices),
+        effort_prices=None if answer.effort_prices is None else list(answer.effort_prices),
+        certificate=None if proof is None else _certificate(proof, model and hands is None),
+        residual=listed(answer.residual),
+        path=answer.path,
+        verified=bool(answer.verified),
+        solver=answer.solver,
+        time=answer.time,
+        warnings=list(answer.warnings),
+        findings=list(answer.findings),
+        unfinished=list(answer.unfinished),
         robust=answer.robust or UNSET,
         spread=answer.spread or UNSET,
         clearance=answer.clearance or UNSET,
         advice=UNSET if answer.advice is None else list(answer.advice),
+    )
+
+
+def _certificate(proof: Certificate, model: bool) -> replies.Certificate:
+    """Return why there is no plan, with the hands' wrench spaces if ``model``."""
+    spaces = proof.spaces.items()
+    return replies.Certificate(
+        utilisation=finite(proof.utilisation),
+        direction=proof.direction.tolist(),
+        held={limb: share.tolist() for limb, share in proof.held.items()},
+        supremum=float(proof.supremum),
+        needed=float(proof.needed),
+        shortfall=listed(proof.shortfall),
+        nearest=listed(proof.nearest),
+        blocking=list(proof.blocking),
+        irreducible=None if proof.irreducible is None else list(proof.irreducible),
+        irreducible_up_to=finite(proof.irreducible_up_to),
+        sufficient=None if proof.sufficient is None else list(proof.sufficient),
+        wrench_spaces={limb: wrench_set_reply(each) for limb, each in spaces} if model else UNSET,
     )
 
 
@@ -113,21 +133,38 @@ def brief_plan_reply(
     hands : bool
         Whether it tells what the hands carry, too.
     """
-    points = [
-        (h.limb, h.tensions, h.drives[2], h.drives[0], h.drives[1], h.wrench, h.utilisation)
-        for h in answer.hands or ()
-    ]
-    most = None if hands else BRIEF
-    return told(
-        replies.BriefPlanReply,
-        answer,
+    points = None if answer.hands is None else [_set_points(h, hands) for h in answer.hands]
+    reply = replies.BriefPlanReply(
         id=identifier,
+        status=answer.status,
         reason=answer.reason if hands else cut_reason(answer.reason),
-        hands=None
-        if answer.hands is None
-        else [replies.HandSetPoints(*plain(own[:most])) for own in points],
-        **({} if hands else dict.fromkeys(WHOLE, UNSET)),
+        utilisation=finite(answer.utilisation),
+        limiting=answer.limiting,
+        hands=points,
+        verified=bool(answer.verified),
+        unfinished=list(answer.unfinished),
     )
+    if hands:
+        reply.body_wrench = answer.body_wrench.tolist()
+        reply.load_factor = finite(answer.load_factor)
+        reply.load_factor_unbounded = answer.load_factor_unbounded
+        reply.load_factor_status = answer.load_factor_status
+        reply.joints = listed_by_limb(answer.joints)
+        reply.warnings = list(answer.warnings)
+        reply.findings = list(answer.findings)
+        reply.time = answer.time
+    return reply
+
+
+def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
+    """Return what a hand is to do, and also what it carries if ``whole``."""
+    torque, current, angle = hand.drives.tolist()
+    points = replies.HandSetPoints(hand.limb, hand.tensions.tolist(), angle)
+    if whole:
+        points.motor_torque, points.motor_current = torque, current
+        points.wrench = hand.wrench.tolist()
+        points.utilisation = float(hand.utilisation)
+    return points
 
 
 def cut_reason(reason: str) -> str:

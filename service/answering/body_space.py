@@ -11,7 +11,7 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError
 from planner import COMPONENTS, BodySection, BodySpace, End, Time
 from service import replies
-from service.answering.hand_answers import placed_poses, plain, told
+from service.answering.hand_answers import finite, placed_poses
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
@@ -68,13 +68,15 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     turning = _accelerations(space, _ways("xyz", np.eye(6)[3:])) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
     ended = time.perf_counter()
-    reply = told(
-        BodySpaceReply,
-        space.plan,
-        poses=placed_poses(asked.stance),
+    planned = space.plan
+    reply = BodySpaceReply(
         id=request.id,
+        poses=placed_poses(asked.stance),
         robot=asked.stance.robot.name,
-        body_wrench=plain(space.needed),
+        status=planned.status,
+        reason=planned.reason,
+        body_wrench=space.needed.tolist(),
+        utilisation=finite(planned.utilisation),
         exact=space.exact,
         linearisation_error=error,
         error=error,
@@ -84,8 +86,8 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         angular_acceleration=turning,
         along=None if linear is None else [one for one in along if one is not None],
         time=Time(modelled - start, ended - modelled, ended - start),
-        findings=list(space.plan.findings),
-        warnings=[*space.plan.warnings, *_warnings(space, linear is not None, error)],
+        warnings=[*planned.warnings, *_warnings(space, linear is not None, error)],
+        findings=list(planned.findings),
     )
     return Explored(space, section, reply)
 
@@ -115,10 +117,14 @@ def _capability(more: End | None, pure: End | None, extent: End | None) -> repli
 
 
 def _section(section: BodySection) -> replies.BodySection:
+    reply = replies.BodySection(
+        axes=list(section.axes), others=section.others, inner=[], outer=[], gap=None, limiting=[]
+    )
     polygon = section.polygon
-    if polygon is None:
-        return told(replies.BodySection, section, inner=[], outer=[], gap=None, limiting=[])
-    return told(replies.BodySection, polygon, axes=list(section.axes), others=section.others)
+    if polygon is not None:
+        reply.inner, reply.outer = polygon.inner.tolist(), polygon.outer.tolist()
+        reply.gap, reply.limiting = finite(polygon.gap), list(polygon.limiting)
+    return reply
 
 
 def _accelerations(
@@ -139,7 +145,7 @@ def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
     if end is None:
         return None
     return replies.Acceleration(
-        direction=plain(way[-3:]),
+        direction=way[-3:].tolist(),
         acceleration=max(end.reach, 0.0),
         limiting=end.limiting,
     )

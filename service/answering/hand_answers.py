@@ -1,64 +1,61 @@
-"""From the planner's numbers to plain ones, and the hands of replies that are made of them."""
+"""From the planner's arrays to the plain numbers of replies, and the hands of these."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, TypeVar
 
 import numpy as np
-from msgspec import UNSET, Struct, UnsetType
+from msgspec import UNSET, UnsetType
 
-from hand_models.base import Pose
+from hand_models.base import Array, Pose
 from hand_models.hand import Seating
 from hand_models.wrench_spaces import WrenchSpace
 from planner import HandPlan, Stance, WristPlan
 from service import replies
 
 __all__ = [
+    "finite",
     "hand_reply",
+    "listed",
+    "listed_by_limb",
     "placed_poses",
-    "plain",
     "seating_reply",
-    "told",
     "wrench_set_reply",
     "wrist_reply",
 ]
 
-S = TypeVar("S", bound=Struct)
+
+def finite(value: float | None) -> float | None:
+    """Return a number as it travels; None where it is infinite, or there is none."""
+    return float(value) if value is not None and math.isfinite(value) else None
 
 
-def told(kind: type[S], source: object, **own: object) -> S:
-    """Return a message with an object's attributes, plain, as its fields, but for fields given."""
-    names = (name for name in kind.__struct_fields__ if name not in own and hasattr(source, name))
-    return kind(**{name: plain(getattr(source, name)) for name in names}, **own)
+def listed(array: Array | None) -> replies.Vector | None:
+    """Return an array as a list, if there is one."""
+    return None if array is None else array.tolist()
 
 
-def plain(value: Any) -> Any:
-    """Return a value as it travels: arrays and tuples as lists, without numbers of numpy's.
-
-    What is infinite does not exist.
-    """
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, (tuple, list)):
-        return [plain(each) for each in value]
-    if isinstance(value, Mapping):
-        return {name: plain(each) for name, each in value.items()}
-    return value
+def listed_by_limb(arrays: Mapping[str, Array] | None) -> dict[str, replies.Vector] | None:
+    """Return arrays by limb as lists, if there are any."""
+    return None if arrays is None else {limb: array.tolist() for limb, array in arrays.items()}
 
 
 def hand_reply(part: HandPlan, model: bool) -> replies.Hand:
     """Return a hand of a plan as a reply has it, with its wrench space if ``model``."""
-    return told(
-        replies.Hand,
-        part,
+    palm = part.palm
+    return replies.Hand(
+        limb=part.limb,
+        wrench=part.wrench.tolist(),
         fingers=part.finger_by_finger(model=model),
-        palm=told(replies.Palm, part.palm),
+        palm=replies.Palm(
+            position=palm.position.tolist(),
+            force=palm.force.tolist(),
+            moment=palm.moment.tolist(),
+            engaged=list(palm.engaged),
+            utilisation=float(palm.utilisation),
+        ),
+        utilisation=float(part.utilisation),
         seating=seating_reply(part.seating),
         wrist=wrist_reply(part.wrist),
         wrench_space=wrench_set_reply(part.space) if model else UNSET,
@@ -67,7 +64,15 @@ def hand_reply(part: HandPlan, model: bool) -> replies.Hand:
 
 def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
     """Return how a wrist is; none for one that is fixed."""
-    return told(replies.Wrist, wrist, mode="fixed" if wrist is None else "floating")
+    if wrist is None:
+        return replies.Wrist(mode="fixed")
+    return replies.Wrist(
+        mode="floating",
+        twist=wrist.twist.tolist(),
+        palm=wrist.palm,
+        rounds=wrist.rounds,
+        error=finite(wrist.error),
+    )
 
 
 def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
@@ -77,12 +82,14 @@ def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
 
 
 def _frame(pose: Pose) -> replies.PlacedFrame:
-    return replies.PlacedFrame(plain(pose.position), plain(pose.quaternion()))
+    return replies.PlacedFrame(pose.position.tolist(), pose.quaternion().tolist())
 
 
 def seating_reply(seating: Seating) -> replies.Seating:
     """Return where a hold is in H."""
-    return told(replies.Seating, seating, pose=_frame(seating.pose))
+    return replies.Seating(
+        rule=seating.rule, pose=_frame(seating.pose), backed_off=float(seating.backed_off)
+    )
 
 
 def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
@@ -93,13 +100,12 @@ def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
         np.concatenate([space.s, space.h]),
     )
     return replies.WrenchSet(
-        origin=plain(space.origin),
+        origin=space.origin.tolist(),
         generators=[
             replies.Generator(name, column)
             for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
         ],
         rows=[
-            # there are hundreds: not by name, which takes ten times as long
             replies.Row(
                 name=row.label,
                 kind=row.kind,

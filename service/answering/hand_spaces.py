@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Final
+from collections.abc import Callable, Sequence
+from typing import Final, TypeVar
 
 import numpy as np
 
-from hand_models.base import EmptySetError, InvalidInputError, LimitError
+from hand_models.base import Array, EmptySetError, InvalidInputError, LimitError
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, robustness, tension_limits
 from hand_models.hand import FINGERS, SettledHand, Tile, closing_sequence, nearby_closures
@@ -15,10 +15,9 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner import WristPlan, deadline, resting_hand
 from service import replies
 from service.answering.hand_answers import (
+    finite,
     placed_poses,
-    plain,
     seating_reply,
-    told,
     wrench_set_reply,
     wrist_reply,
 )
@@ -28,6 +27,8 @@ from service.replies import AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest
 
 __all__ = ["wrench_space"]
+
+V = TypeVar("V")
 
 KNOWN: Final = "the hand's wrench space was known"
 REACH: Final = "it was known how far the hand's set reaches"
@@ -61,55 +62,56 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     hand = resting_hand(asked, request.limb)
     settled = hand.settled
     deadline.check(KNOWN)
-    views = _views(hand.space, request.want)
-    more = {}
-    if "robust" in (request.want or ()):
-        if hand.palm is not None:
-            raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
-        more["robust"] = _robust(robustness(asked.robot.hand, settled, BOTH_WAYS))
     wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
-    places = zip(settled.tiles, settled.positions, settled.axes, strict=True)
-    return told(
-        WrenchSpaceReply,
-        wrench_set_reply(hand.space),
+    named = wrench_set_reply(hand.space)
+    reply = WrenchSpaceReply(
         id=request.id,
         poses=placed_poses(asked),
         robot=asked.robot.name,
         limb=request.limb,
         wrist=wrist_reply(wrist),
         seating=seating_reply(settled.seating),
-        contacts=[
-            replies.Contact(*tile, _stop(settled, tile), *plain((position, *axes)))
-            for tile, position, axes in places
+        contacts=_contacts(settled),
+        closing=[],
+        tension_limits=[
+            replies.TensionLimit(
+                finger=each.finger, tension=finite(each.tension), phalanx=each.phalanx
+            )
+            for each in tension_limits(settled)
         ],
-        closing=_closings(settled),
-        tension_limits=[replies.TensionLimit(*plain(each)) for each in tension_limits(settled)],
-        **views,
-        **more,
+        origin=named.origin,
+        generators=named.generators,
+        rows=named.rows,
+        vertices=None,
+        half_spaces=None,
+        dimension=None,
+        capability=None,
     )
+    _add_views(reply, hand.space, request.want)
+    if "robust" in (request.want or ()):
+        if hand.palm is not None:
+            raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
+        reply.robust = _robust(robustness(asked.robot.hand, settled, BOTH_WAYS))
+    reply.closing = _closings(settled)
+    return reply
 
 
-def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
-    """Return how each finger has closed, and how else it would."""
+def _contacts(settled: SettledHand) -> list[replies.Contact]:
+    """Return where each tile meets the rock."""
+    places = zip(settled.tiles, settled.positions.tolist(), settled.axes.tolist(), strict=True)
     return [
-        told(
-            replies.ClosingSequence,
-            closing,
-            stages=[replies.ClosingStage(*stage) for stage in closing.stages],
-            nearby=list(there.closures),
-            nearby_turn=there.turn,
+        replies.Contact(
+            finger=tile.finger,
+            phalanx=tile.phalanx,
+            contact=tile.contact,
+            stop=_stop(settled, tile),
+            position=position,
+            shear_axis=shear,
+            normal_axis=normal,
+            lateral_axis=lateral,
         )
-        for closing, there in zip(closing_sequence(settled), nearby_closures(settled), strict=True)
+        for tile, position, (shear, normal, lateral) in places
     ]
-
-
-def _robust(found: Robustness) -> replies.RobustCapability:
-    names = "worst", "tenth", "hundredth"
-    reaches = {
-        name: dict(zip(SIDES, map(plain, getattr(found, name).tolist()), strict=True))
-        for name in names
-    }
-    return told(replies.RobustCapability, found, **reaches)
 
 
 def _stop(settled: SettledHand, tile: Tile) -> str | None:
@@ -119,11 +121,46 @@ def _stop(settled: SettledHand, tile: Tile) -> str | None:
     return finger.contacts[PHALANGES.index(tile.phalanx)].stop
 
 
-def _views(space: WrenchSpace, want: Sequence[SpaceWant] | None) -> dict[str, Any]:
-    """Return what a reply says of a set at utilisation 1; None where nothing is left.
+def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
+    """Return how each finger has closed, and how else it would."""
+    return [
+        replies.ClosingSequence(
+            finger=closing.finger,
+            stages=[replies.ClosingStage(s.part, s.starts, s.ends) for s in closing.stages],
+            in_order=bool(closing.in_order),
+            closure=closing.closure,
+            nearby=list(there.closures),
+            nearby_turn=float(there.turn),
+        )
+        for closing, there in zip(closing_sequence(settled), nearby_closures(settled), strict=True)
+    ]
+
+
+def _robust(found: Robustness) -> replies.RobustCapability:
+    return replies.RobustCapability(
+        draws=found.draws,
+        without=found.without,
+        position=found.position,
+        angle=found.angle,
+        seed=found.seed,
+        worst=_by_side(found.worst),
+        tenth=_by_side(found.tenth),
+        hundredth=_by_side(found.hundredth),
+    )
+
+
+def _by_side(reaches: Array) -> dict[str, float | None]:
+    return dict(zip(SIDES, map(finite, reaches), strict=True))
+
+
+def _add_views(
+    reply: WrenchSpaceReply, space: WrenchSpace, want: Sequence[SpaceWant] | None
+) -> None:
+    """Add what a set at utilisation 1 looks like, as far as something is left of it.
 
     Parameters
     ----------
+    reply : WrenchSpaceReply
     space : WrenchSpace
     want : sequence of SpaceWant, optional
         Vertices and half-spaces that are not among them are left out. By default both are told
@@ -147,41 +184,47 @@ def _views(space: WrenchSpace, want: Sequence[SpaceWant] | None) -> dict[str, An
             f"{LESS}, or leave it out",
             field="want",
         )
-    views: dict[str, Any] = dict.fromkeys((*VIEWS, "dimension", "capability"))
-    warnings = []
+
+    def view(name: SpaceWant, candidates: Callable[[], int], found: Callable[[], V]) -> V | None:
+        """Return a view if it is told; what costs too much is refused, or left out."""
+        if want is not None and name not in want:
+            return None
+        try:
+            if (size := candidates()) > MOST:
+                raise LimitError(f"{size} candidates to go through are too many (at most {MOST})")
+            return found()
+        except LimitError as error:
+            why = f"{error.message}; {LESS}"
+        if want is not None:
+            raise LimitError(f"{name}: {why}, or leave it out", field="want")
+        reply.warnings = [*reply.warnings, f"{name} left out: {why}"]
+        return None
+
     try:
-        for view, told_of in VIEWS.items():
-            if want is not None and view not in want:
-                continue
-            try:
-                size = getattr(space.sizes(), view)
-                if size > MOST:
-                    much = f"{size} candidates to go through are too many (at most {MOST})"
-                    raise LimitError(much)
-                views[view] = told_of(space)
-            except LimitError as error:
-                why = f"{error.message}; {LESS}"
-                if want is not None:
-                    raise LimitError(f"{view}: {why}, or leave it out", field="want") from None
-                warnings.append(f"{view} left out: {why}")
-        views["dimension"] = space.dimension if space.listed else None
-        return views | {"capability": _capability(space), "warnings": warnings}
+        reply.vertices = view(
+            "vertices", lambda: space.sizes().vertices, lambda: space.vertices().tolist()
+        )
+        reply.half_spaces = view(
+            "half_spaces", lambda: space.sizes().half_spaces, lambda: _half_spaces(space)
+        )
+        reply.dimension = space.dimension if space.listed else None
+        reply.capability = _capability(space)
     except EmptySetError:
-        listed = want is None or "vertices" in want
-        return dict.fromkeys(views) | {"vertices": [] if listed else None}
+        reply.vertices = [] if want is None or "vertices" in want else None
+        reply.half_spaces = reply.dimension = reply.capability = None
+        reply.warnings = []
 
 
 def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
     deadline.check(REACH)
     faces = space.half_spaces()
-    equations = replies.HalfSpaceEquations(
-        plain(faces.equation_normals), plain(faces.equation_offsets)
+    return replies.HalfSpaces(
+        normals=faces.normals.tolist(),
+        offsets=faces.offsets.tolist(),
+        equations=replies.HalfSpaceEquations(
+            normals=faces.equation_normals.tolist(), offsets=faces.equation_offsets.tolist()
+        ),
     )
-    return told(replies.HalfSpaces, faces, equations=equations)
-
-
-VIEWS: Final = {"vertices": lambda space: plain(space.vertices()), "half_spaces": _half_spaces}
-"""What may be left out of a set, and how it is told."""
 
 
 def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
@@ -191,5 +234,7 @@ def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
         ends = space.capability(direction)
         low, high = (None, None) if ends is None else (-float(ends[0]), float(ends[1]))
         for sign, pure, way in (("+", high, direction), ("-", low, -direction)):
-            reaches[f"{sign}{axis}"] = replies.AxisCapability(pure, float(space.support(way)))
+            reaches[f"{sign}{axis}"] = replies.AxisCapability(
+                pure=pure, extent=float(space.support(way))
+            )
     return reaches

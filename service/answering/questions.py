@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Final, Literal
 
 import msgspec
@@ -13,17 +12,15 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, LimitError, Pose, within
 from hand_models.fixed_wrist import UP, approach_frame
-from hand_models.hand import Grasp, SpinyHand
+from hand_models.hand import SpinyHand
 from hand_models.parameters import Draw, ParameterTable, own_draw, own_hand
 from hand_models.tile import Surface
 from planner import (
     EARTH,
-    BodyRange,
     ForceCap,
     HandOnHold,
     Limits,
     Load,
-    Payload,
     Question,
     Stance,
     settle_each,
@@ -52,9 +49,6 @@ MOST_POINTS: Final = 40_000
 MOST_TURNED: Final = 4.0 * math.pi
 """Largest angle of a wrist that is taken for one [rad]: beyond two turns, it is in degrees."""
 
-GRASPS: Final = 64
-"""Grasps that are kept, those asked for last: most hands are asked to take their holds alike."""
-
 
 def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
     """Return what a plan request asks.
@@ -75,7 +69,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
     return Question(
         stance=stance(request.stance, robots),
         body_wrench=_array(request.body_wrench),
-        load=_load(request.load),
+        load=request.load or Load(),
         limits=_limits(request.limits),
         want=frozenset(request.want),
         objective=request.objective,
@@ -83,7 +77,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         deadline=request.deadline,
         draws=_draws(request.draws),
         explain=request.explain,
-        body_range=BodyRange(request.body_range.shift, request.body_range.tilt),
+        body_range=request.body_range,
     )
 
 
@@ -106,7 +100,7 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
         name=request.name,
         start=start,
         moves=tuple(map(Move, _placed(kind, moved, "moves"), bodies, angles)),
-        load=_load(request.load),
+        load=request.load or Load(),
         limits=_limits(request.limits),
         objective=request.objective,
         explain=request.explain,
@@ -157,22 +151,6 @@ def _joints(
     }
 
 
-def _load(message: requests.Load | None) -> Load:
-    if message is None:
-        return Load()
-    payloads = []
-    for i, each in enumerate(message.payloads):
-        with within(f"load.payloads[{i}]"):
-            payloads.append(Payload(each.mass, each.link, each.limb, each.com))
-    return Load(
-        mass=message.mass,
-        com=message.com,
-        acceleration=message.acceleration,
-        angular_acceleration=message.angular_acceleration,
-        payloads=tuple(payloads),
-    )
-
-
 def _limits(message: requests.Limits) -> Limits:
     with within("limits"):
         return Limits(
@@ -209,7 +187,7 @@ def _range(axis: requests.AxisForce) -> tuple[float, float]:
 
 def _hand(message: requests.Hand, numbers: ParameterTable, rocks: Rocks, path: str) -> HandOnHold:
     with within(path):
-        grasp, surface = _grasp(message.grasp), _surface(message.surface)
+        surface = _surface(message.surface)
         hold, hold_pose, hold_in_hand = placed(
             message.hold, numbers, rocks, anywhere=message.place is not None
         )
@@ -232,7 +210,7 @@ def _hand(message: requests.Hand, numbers: ParameterTable, rocks: Rocks, path: s
             hold_pose=hold_pose,
             hold_in_hand=hold_in_hand,
             at=at,
-            grasp=grasp,
+            grasp=message.grasp,
             wrist=message.wrist,
             tendon_preload=_array(message.tendon_preload),
             wrench=message.wrench,
@@ -268,12 +246,6 @@ def _placed(kind: SpinyHand, hands: Sequence[HandOnHold], path: str) -> list[Han
             raise outcome.within(f"{path}[{i}]")
         found[i] = replace(hands[i], pose=hands[i].pose @ outcome.seating.pose.inverse())
     return found
-
-
-@lru_cache(maxsize=GRASPS)
-def _grasp(message: requests.Grasp) -> Grasp:
-    with within("grasp"):
-        return Grasp(**msgspec.structs.asdict(message))
 
 
 def _surface(message: str | requests.Surface) -> Surface:

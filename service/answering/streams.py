@@ -8,12 +8,12 @@ import uuid
 from collections import Counter, OrderedDict
 from typing import Final, NamedTuple
 
-from msgspec.structs import astuple, replace
+from msgspec.structs import replace
 
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner import SetPoints, WrenchStream, deadline
-from service.answering.answers import BRIEF, cut_reason
-from service.answering.hand_answers import placed_poses, plain, told
+from service.answering.answers import cut_reason
+from service.answering.hand_answers import finite, placed_poses
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
@@ -90,14 +90,16 @@ class Streams:
             first = stream.set_points(stream.first)
             deadline.check(FIRST)
             named = zip(stream.limbs, map(list, stream.columns), strict=True)
-            reply = told(
-                StreamReply,
-                first,
+            reply = StreamReply(
                 id=request.id,
                 poses=placed_poses(stream.question.stance),
                 stream=identifier,
-                radius=stream.interpolates,
-                body_wrench=plain(stream.first),
+                radius=finite(stream.interpolates),
+                status=first.status,
+                reason=first.reason,
+                body_wrench=stream.first.tolist(),
+                utilisation=finite(first.utilisation),
+                gap=finite(first.gap),
                 hands=[HandColumns(limb=limb, columns=columns) for limb, columns in named],
                 took=time.perf_counter() - start,
             )
@@ -183,19 +185,38 @@ def set_points_reply(
     detail : {'set_points', 'hands', 'full'}, optional
         With the first, hands have their tensions alone; the other two are the same.
     """
-    hands = None
-    if points.tensions is not None:
-        columns = (points.tensions, points.winch_angle, points.motor_torque, points.motor_current)
-        rows = zip(stream.limbs, *plain((*columns, points.wrenches)), strict=True)
-        hands = [HandSetPoints(*row) for row in rows]
-    reply = told(
-        SetPointsReply,
-        points,
+    reply = SetPointsReply(
         stream=identifier,
-        hands=hands,
+        status=points.status,
+        reason=points.reason,
+        body_wrench=points.body_wrench.tolist(),
+        utilisation=finite(points.utilisation),
+        gap=finite(points.gap),
+        hands=_hands(stream, points),
+        verified=bool(points.verified),
+        source=points.source,
         took=time.perf_counter() - start,
     )
     return brief_set_points(reply) if detail == "set_points" else reply
+
+
+def _hands(stream: WrenchStream, points: SetPoints) -> list[HandSetPoints] | None:
+    """Return what each hand is to do; None where there is no plan."""
+    tensions, wrenches = points.tensions, points.wrenches
+    angle, torque, current = points.winch_angle, points.motor_torque, points.motor_current
+    if tensions is None or wrenches is None or angle is None or torque is None or current is None:
+        return None
+    return [
+        HandSetPoints(
+            limb=limb,
+            tensions=tensions[h].tolist(),
+            winch_angle=angle[h].tolist(),
+            motor_torque=torque[h].tolist(),
+            motor_current=current[h].tolist(),
+            wrench=wrenches[h].tolist(),
+        )
+        for h, limb in enumerate(stream.limbs)
+    ]
 
 
 def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
@@ -205,7 +226,7 @@ def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
         reason=cut_reason(whole.reason) if whole.reason else whole.reason,
         hands=None
         if whole.hands is None
-        else [HandSetPoints(*astuple(hand)[:BRIEF]) for hand in whole.hands],
+        else [HandSetPoints(h.limb, h.tensions, h.winch_angle) for h in whole.hands],
     )
 
 

@@ -28,6 +28,7 @@ from .reply import (
     ProcessHealth as ProcessHealth,
     Reply as Reply,
     StanceReply as StanceReply,
+    Vector as Vector,
 )
 from .route import RouteReply as RouteReply, RouteStage as RouteStage
 from .stream import (

@@ -14,12 +14,10 @@ from .holds import (
 from .questions import (
     Axis as Axis,
     AxisForce as AxisForce,
-    BodyRange as BodyRange,
     BodySpaceRequest as BodySpaceRequest,
     Draw as Draw,
     ForceCap as ForceCap,
     Limits as Limits,
-    Load as Load,
     PlanRequest as PlanRequest,
     RouteRequest as RouteRequest,
     SetPointsRequest as SetPointsRequest,
@@ -36,11 +34,10 @@ from .request import (
     Detail as Detail,
     Identifier as Identifier,
     Later as Later,
-    Name as Name,
     Pose as Pose,
     Query as Query,
     ReplyBytes as ReplyBytes,
     Request as Request,
     Wrench as Wrench,
 )
-from .stance import Grasp as Grasp, Hand as Hand, Place as Place, Stance as Stance
+from .stance import Hand as Hand, Place as Place, Stance as Stance

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from service.requests.request import Coordinate, Name, Pose, Strict
+from hand_models.base import Coordinate, Name, Strict
+from service.requests.request import Pose
 
 __all__ = [
     "Cylinder",

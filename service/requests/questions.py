@@ -10,21 +10,16 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from msgspec import Meta, field
 
+from hand_models.base import Coordinate, Name, Strict, Tension
+from planner import BodyRange, Load
 from service.requests.request import (
-    Acceleration,
-    AccelerationEntry,
-    Coordinate,
     Detail,
     Force,
     Identifier,
     Later,
-    Name,
     Pose,
-    Position,
     Query,
     Request,
-    Strict,
-    Tension,
     Tensions,
     Wrench,
 )
@@ -33,12 +28,10 @@ from service.requests.stance import Angles, Entries, Hand, HandEntries, Stance
 __all__ = [
     "Axis",
     "AxisForce",
-    "BodyRange",
     "BodySpaceRequest",
     "Draw",
     "ForceCap",
     "Limits",
-    "Load",
     "PlanRequest",
     "RouteRequest",
     "SetPointsRequest",
@@ -52,7 +45,6 @@ __all__ = [
 Q = TypeVar("Q", bound=Query)
 
 
-Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
 Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
 JointTorque = Annotated[float, Meta(ge=0.0, le=1e6)]
 Torques = Annotated[
@@ -95,49 +87,6 @@ Radius = Annotated[
         description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
     ),
 ]
-
-
-class Payload(Strict, frozen=True, kw_only=True):
-    """A mass that is fixed to a link, or to a limb's hand, beside the robot's own."""
-
-    mass: Mass
-    link: Annotated[Name | None, Meta(description="of the robot's URDF; give this or limb")] = None
-    limb: Annotated[Name | None, Meta(description="whose hand carries it")] = None
-    com: Annotated[
-        Position, Meta(description="centre of mass, in the link's frame or in H of the hand [m]")
-    ] = (0.0, 0.0, 0.0)
-
-
-class Load(Strict, frozen=True, kw_only=True):
-    """What the body weighs and how it is to move; by default the robot's own weight, at rest."""
-
-    mass: Annotated[
-        Mass | None,
-        Meta(
-            description="of the robot with its hands [kg]; its file's by default. A mass alone is "
-            "weighed at the posture's centre of mass where joints are known"
-        ),
-    ] = None
-    com: Annotated[
-        Position | None,
-        Meta(
-            description="centre of mass in B; by default the posture's where joints are known, "
-            "else that of the robot's file"
-        ),
-    ] = None
-    acceleration: Acceleration = (0.0, 0.0, 0.0)
-    angular_acceleration: Annotated[
-        tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
-        Meta(description="in W [rad/s²]; needs the stance's joints, and no com"),
-    ] = (0.0, 0.0, 0.0)
-    payloads: Annotated[
-        list[Payload],
-        Meta(
-            max_length=64,
-            description="masses on links or in hands, beside mass; they count in the body wrench "
-            "and in the joints' torques",
-        ),
-    ] = []
 
 
 class ForceCap(Strict, frozen=True, kw_only=True):
@@ -189,18 +138,6 @@ Draws = Annotated[
         description="over which the spread is told; by default those of draws.toml",
     ),
 ]
-
-
-class BodyRange(Strict, frozen=True, kw_only=True):
-    """How far an advice may move the body from where it is."""
-
-    shift: Annotated[
-        float, Meta(ge=0.0, le=1.0, description="along each axis of B, either way [m]")
-    ] = 0.15
-    tilt: Annotated[
-        float,
-        Meta(ge=0.0, le=1.0, description="about an axis of B, through the centre of mass [rad]"),
-    ] = 0.2
 
 
 class PlanRequest(Query, frozen=True, kw_only=True):

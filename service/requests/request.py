@@ -7,57 +7,43 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta
+
+from hand_models.base import Position, Strict
 
 __all__ = [
     "DEFAULT_DEADLINE",
     "LEAST_REPLY_BYTES",
     "LONGEST_DEADLINE",
-    "Acceleration",
-    "AccelerationEntry",
-    "Coordinate",
     "Detail",
     "Force",
     "FourTensions",
     "Identifier",
     "Later",
-    "Name",
     "Pose",
-    "Position",
     "Query",
     "ReplyBytes",
     "Request",
-    "Strict",
-    "Tension",
     "Tensions",
     "Wrench",
     "WrenchEntries",
     "WrenchEntry",
 ]
 
-Coordinate = Annotated[float, Meta(ge=-1e4, le=1e4)]
-Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="[m]")]
 QuaternionEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
 Quaternion = Annotated[
     tuple[QuaternionEntry, QuaternionEntry, QuaternionEntry, QuaternionEntry],
     Meta(description="[x, y, z, w], of norm 1 within 1e-3"),
-]
-AccelerationEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
-Acceleration = Annotated[
-    tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
-    Meta(description="in W [m/s²]"),
 ]
 WrenchEntry = Annotated[float, Meta(ge=-1e6, le=1e6)]
 WrenchEntries = tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry]
 Wrench = Annotated[
     WrenchEntries, Meta(description="[fx, fy, fz, mx, my, mz], force first [N, N·m]")
 ]
-Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
 PreloadEntry = Annotated[float, Meta(ge=0.0, le=1e4)]
 FourTensions = tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry]
 Tensions = Annotated[FourTensions, Meta(description="of a hand's tendons [N]")]
 Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
-Name = Annotated[str, Meta(max_length=64)]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
 DEFAULT_DEADLINE: Final = 10.0
 """Of a question to a service that names none, from its arrival [s]."""
@@ -79,10 +65,6 @@ Detail = Annotated[
     ),
 ]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]
-
-
-class Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A part of a request: an unknown field in it is an error."""
 
 
 class Pose(Strict, frozen=True, kw_only=True):

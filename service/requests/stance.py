@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
+from hand_models.base import Acceleration, Coordinate, Name, Position, Strict
+from hand_models.hand import Grasp
 from service.requests.holds import Hold, Rock, Surface
-from service.requests.request import (
-    Acceleration,
-    Coordinate,
-    FourTensions,
-    Name,
-    Pose,
-    Position,
-    Strict,
-    Tension,
-    WrenchEntries,
-    WrenchEntry,
-)
+from service.requests.request import FourTensions, Pose, WrenchEntries, WrenchEntry
 
 __all__ = [
     "Angles",
-    "Grasp",
     "Hand",
     "Place",
     "Stance",
 ]
 
-ROUNDED: Final = 5e-4
-"""How far above π an outer rotation may be, as π rounded to three decimals is [rad]."""
-
-OuterRotation = Annotated[
-    float,
-    Meta(ge=0.0, le=math.pi + ROUNDED, description="[rad]; what rounding puts above π is π"),
-]
 Preload = Annotated[
     FourTensions,
     Meta(
@@ -72,18 +54,6 @@ HandEntries = Annotated[
         "its parameter file hand.toml"
     ),
 ]
-
-
-class Grasp(Strict, frozen=True, kw_only=True):
-    """How a hand takes its hold."""
-
-    outer_rotation: OuterRotation = 0.0
-    closing_tension: Tension | None = None
-    palm: bool = True
-    lateral: bool = True
-    fingernail: Annotated[
-        bool, Meta(description="fingers straight, clinging with their nails alone")
-    ] = False
 
 
 class Place(Strict, frozen=True, kw_only=True):

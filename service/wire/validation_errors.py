@@ -11,6 +11,7 @@ from typing import Any, Final
 import msgspec
 from msgspec import inspect
 
+from hand_models.base import InvalidInputError
 from service.wire.places import Place, Step, field_names, places_at
 
 __all__ = ["validation_error"]
@@ -63,6 +64,10 @@ def validation_error(
     types = [place.kind for place in places]
     where = _with_keys(path, steps, document, decode)
     field = path if where is None else _dotted(where)
+    cause = error.__cause__
+    if isinstance(cause, InvalidInputError):
+        cause = cause.within(field.removeprefix("."))
+        return cause.field, cause.message
     if of_field := OF_FIELD.fullmatch(complaint):
         unknown, name = of_field.groups()
         field = f"{field}.{name}"

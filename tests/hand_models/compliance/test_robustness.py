@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models import (
     Cylinder,
@@ -37,7 +37,7 @@ from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, settled_a
 
 PULL = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 OPEN = Grasp(lateral=False, palm=False)
-CURLED = replace(PINCH, closing_tension=46.0)
+CURLED = structs.replace(PINCH, closing_tension=46.0)
 """Pulled to the joints' limits in the air: 1.75 rad of 0.05 N·m/rad on 1.945 mm is 45 N."""
 
 

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from msgspec import structs
 
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, InvalidInputError, Plane, Pose, Sphere
 from hand_models.base import BoundedStore, stores
@@ -441,7 +442,7 @@ def test_a_finger_is_laid_as_on_its_section(seed):
     """On planes of any tilt through smooth holds."""
     rng = np.random.default_rng(seed)
     placement = random_placement(rng, rough=0.0)
-    placement = placement._replace(grasp=dataclasses.replace(placement.grasp, fingernail=False))
+    placement = placement._replace(grasp=structs.replace(placement.grasp, fingernail=False))
     (settled,) = HAND.settle_each([placement])
     if isinstance(settled, InvalidInputError):
         return

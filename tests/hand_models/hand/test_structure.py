@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import strategies as st
+from msgspec import structs
 
 from hand_models import InvalidInputError
 from hand_models.base import Pose
@@ -149,7 +150,7 @@ def test_a_hand_that_presses_hard_is_not_overloaded_by_it():
 
 def test_no_plan_holds_more_than_is_published_at_its_utilisation():
     for mass in (40.0, 110.0, 200.0):
-        answer = plan(ask(on_wall(), load=replace(CALIBRATION_LOAD, mass=mass)))
+        answer = plan(ask(on_wall(), load=structs.replace(CALIBRATION_LOAD, mass=mass)))
         for hand in answer.hands:
             assert held(hand.wrench[:3]) <= answer.utilisation * LIMIT + 1e-6
 
@@ -158,7 +159,7 @@ def test_a_hand_in_the_air_neither_holds_nor_hinders():
     stance = on_wall()
     away = Pose(np.array([0.0, 0.0, 0.5]), np.eye(3))
     hands = (replace(stance.hands[0], hold_in_hand=away), *stance.hands[1:])
-    light = replace(CALIBRATION_LOAD, mass=60.0)
+    light = structs.replace(CALIBRATION_LOAD, mass=60.0)
     answer = plan(ask(replace(stance, hands=hands), load=light))
     alone = plan(ask(replace(stance, hands=stance.hands[1:]), load=light))
     assert answer.status == alone.status

@@ -1,10 +1,10 @@
 """In which order a finger's springs let it close, and at which tension each stage is over."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models import Cylinder, Grasp, InvalidInputError, Plane, Pose, Profile, Sphere
 from hand_models.finger import PHALANGES
@@ -93,8 +93,13 @@ AWAY = Pose(np.array([0.0, 0.0, 1.0]), np.eye(3))
         (BALL, Grasp(closing_tension=50.0), LEFT, "stopped hooked stopped stopped"),
         (BALL, Grasp(closing_tension=8.0), LEFT, "curled hooked curled curled"),
         (Plane(), PINCH, AWAY, "curled curled curled curled"),
-        (Plane(), replace(PINCH, closing_tension=50.0), AWAY, "stopped stopped stopped stopped"),
-        (Cylinder(0.3), replace(PINCH, fingernail=True), None, "straight " * 4),
+        (
+            Plane(),
+            structs.replace(PINCH, closing_tension=50.0),
+            AWAY,
+            "stopped stopped stopped stopped",
+        ),
+        (Cylinder(0.3), structs.replace(PINCH, fingernail=True), None, "straight " * 4),
     ],
 )
 def test_it_is_told_how_fingers_end(hold, grasp, pose, closures):

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import InvalidInputError
 from hand_models.rock import Plane
@@ -52,10 +53,10 @@ LONG = 600.0
 
 WANTED = ("load_factor", "prices")
 
-QUESTION = ask(on_wall(), *WANTED, load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
+QUESTION = ask(on_wall(), *WANTED, load=structs.replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 PRESENT = {hand.limb: np.full(4, 60.0) for hand in QUESTION.stance.hands}
 IMPOSSIBLE = ask(on_wall(Plane(), outer_rotation=0.0), *WANTED)
-TOO_HEAVY = ask(on_wall(), *WANTED, load=replace(CALIBRATION_LOAD, mass=400.0))
+TOO_HEAVY = ask(on_wall(), *WANTED, load=structs.replace(CALIBRATION_LOAD, mass=400.0))
 
 
 class Clock:
@@ -400,7 +401,7 @@ def test_whenever_the_time_is_over_what_leaves_is_verified_and_says_what_is_miss
 def test_a_search_for_floating_wrists_gives_the_best_plan_it_has_come_to(monkeypatch):
     question = questions.question(read_request("wall-300-floating"))
     # light enough to be held
-    load, wanted = replace(question.load, mass=100.0), frozenset(["load_factor"])
+    load, wanted = structs.replace(question.load, mass=100.0), frozenset(["load_factor"])
     question = replace(question, load=load, objective="min_effort", want=wanted)
     whole, last = held(question, 10**6, monkeypatch)
     seen, used, efforts = set(), [], []

@@ -8,6 +8,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 from rich.console import Console
 
 from hand_models.rock import Cylinder
@@ -30,7 +31,7 @@ from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall
 from tests.suite.helpers.stances_with_joints import at_joints
 
 STATUSES = ("infeasible", "overloaded")
-HEAVILY = replace(CALIBRATION_LOAD, mass=150.0)
+HEAVILY = structs.replace(CALIBRATION_LOAD, mass=150.0)
 
 
 @pytest.mark.parametrize("status", STATUSES)
@@ -190,7 +191,7 @@ def test_a_cap_on_a_force_is_named():
 
 def test_the_callers_own_limit_comes_first_and_is_told_if_it_alone_is_in_the_way():
     stance = on_wall()
-    limb, load = stance.hands[0].limb, replace(CALIBRATION_LOAD, mass=105.0)
+    limb, load = stance.hands[0].limb, structs.replace(CALIBRATION_LOAD, mass=105.0)
     assert plan(ask(stance, load=load)).status == "optimal"
     answer = plan(ask(stance, load=load, limits=Limits(per_hand={limb: ForceCap(20.0)})))
     own = LimitName(limb, None, None, "force_cap")

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import Pose
 from hand_models.hand import FINGERS, Grasp
@@ -47,7 +48,7 @@ def test_of_a_tendon_and_a_motor_as_strong_as_it_the_tendon_is_named():
 
 def test_what_a_hand_holds_is_told_with_what_it_would_hold_in_that_direction():
     rock = Surface.from_values({"shear_limit": 100.0})
-    answer = plan(ask(on_wall(surface=rock), load=replace(CALIBRATION_LOAD, mass=112.0)))
+    answer = plan(ask(on_wall(surface=rock), load=structs.replace(CALIBRATION_LOAD, mass=112.0)))
     assert answer.limiting.limit == "hand_load"
     hand = next(h for h in answer.hands if h.limb == answer.limiting.limb)
     force = float(np.linalg.norm(np.minimum(hand.wrench[:3], [np.inf, np.inf, 0.0])))

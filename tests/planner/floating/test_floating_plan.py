@@ -18,7 +18,7 @@ from planner.result import Plan
 from planner.solving import plan
 from service.answering import handle, questions
 from service.commands.stances import read_request
-from service.requests import Load as RequestedLoad, PlanRequest, WrenchSpaceRequest
+from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import CruxClient, PlanService, open_session, zenoh_config
 from service.wire import decode_request
 from tests.suite.helpers.checks import problems
@@ -268,7 +268,7 @@ def test_no_plan_is_dressed_up():
 
 @pytest.mark.slow
 def test_reply_over_zenoh_tells_the_wrists():
-    bundled, light = read_request("wall-300-floating"), RequestedLoad(mass=95.0)
+    bundled, light = read_request("wall-300-floating"), Load(mass=95.0)
     request = msgspec.structs.replace(bundled, load=light, want=["model"])
     with (
         open_session(zenoh_config(settings=["listen/endpoints:[]"], multicast=False)) as session,

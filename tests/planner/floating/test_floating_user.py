@@ -18,13 +18,13 @@ from planner.explanation import far_wrists
 from planner.floating import continuation
 from planner.prepare import settle_hand
 from planner.programs import solvers, stance_program
-from planner.question import Question
+from planner.question import Load, Question
 from planner.result import Plan
 from planner.solving import plan
 from service.answering.questions import question
 from service.commands.cli import run
 from service.commands.stances import read_request
-from service.requests import Load, PlanRequest
+from service.requests import PlanRequest
 from service.tables import terminal
 from tests.suite.helpers.commands import DONE, OVERLOADED
 

@@ -4,10 +4,10 @@ import msgspec
 import pytest
 
 from planner.explanation import LEAST_FACTOR
+from planner.question import Load
 from planner.solving import plan
 from service.answering.questions import question
 from service.commands.stances import read_request
-from service.requests import Load
 
 
 def factor_of(request):

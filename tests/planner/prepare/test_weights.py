@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose
@@ -77,7 +78,7 @@ def some_payloads(seed: int) -> tuple[Payload, ...]:
 def test_payloads_are_parts_of_their_links(seed: int):
     asked = random_question_with_joints(seed)
     payloads = some_payloads(seed)
-    asked = replace(asked, load=replace(asked.load, mass=None, com=None, payloads=payloads))
+    asked = replace(asked, load=structs.replace(asked.load, mass=None, com=None, payloads=payloads))
     wrench, torques = newton_euler(asked, payloads)
     where = posture(asked)
     np.testing.assert_allclose(asked.needed_wrench(where.weights), wrench, rtol=1e-9, atol=1e-9)
@@ -88,10 +89,10 @@ def test_payloads_are_parts_of_their_links(seed: int):
 @pytest.mark.parametrize("seed", range(10))
 def test_a_mass_alone_is_weighed_at_the_postures_centre_of_mass(seed: int):
     asked = random_question_with_joints(seed)
-    asked = replace(asked, load=replace(asked.load, mass=None, com=None))
+    asked = replace(asked, load=structs.replace(asked.load, mass=None, com=None))
     robot = asked.stance.robot
     own = prepare_stance(asked).wrench
-    same = replace(asked, load=replace(asked.load, mass=robot.mass))
+    same = replace(asked, load=structs.replace(asked.load, mass=robot.mass))
     np.testing.assert_array_equal(prepare_stance(same).wrench, own)
 
     rest = replace(asked, load=Load())

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.rock import Cylinder, Plane
 from planner import programs
@@ -14,7 +15,7 @@ from planner.solving import plan
 from tests.suite.helpers import peer
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall, program_data
 
-QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
+QUESTION = ask(on_wall(), load=structs.replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 
 
 def honest_outcome() -> Outcome:

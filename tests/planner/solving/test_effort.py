@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
@@ -135,7 +136,7 @@ QUESTIONS = {
     "one hand": Question(SINGLE, body_wrench=pressing_wrench(SINGLE, 90.0, 40.0)),
     "three hands": ask(
         on_wall(off=0.15, limbs=("rear_right", "rear_left", "front_left")),
-        load=replace(CALIBRATION_LOAD, mass=90.0),
+        load=structs.replace(CALIBRATION_LOAD, mass=90.0),
     ),
     "forces capped": ask(on_wall(), limits=Limits(per_hand={"front_left": ForceCap(250.0)})),
 }

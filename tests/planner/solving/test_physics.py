@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import Pose
@@ -244,7 +245,9 @@ def test_less_gravity_is_better():
 
 
 def test_accelerating_upward_is_worse_and_downward_better():
-    loads = [replace(CALIBRATION_LOAD, acceleration=(0.0, 0.0, a)) for a in (-3.0, 0.0, 1.0, 3.0)]
+    loads = [
+        structs.replace(CALIBRATION_LOAD, acceleration=(0.0, 0.0, a)) for a in (-3.0, 0.0, 1.0, 3.0)
+    ]
     assert_never_better([utilisation(ask(on_wall(), load=load)) for load in loads])
 
 
@@ -253,7 +256,7 @@ def test_farther_off_the_wall_is_never_better():
 
 
 def test_heavier_is_never_better():
-    loads = [replace(CALIBRATION_LOAD, mass=mass) for mass in (40.0, 80.0, 108.0, 150.0)]
+    loads = [structs.replace(CALIBRATION_LOAD, mass=mass) for mass in (40.0, 80.0, 108.0, 150.0)]
     assert_never_better([utilisation(ask(on_wall(), load=load)) for load in loads])
 
 
@@ -265,7 +268,7 @@ def test_fewer_hands_are_never_better():
 
 @pytest.mark.parametrize("leave", ["palm", "lateral"])
 def test_a_grasp_that_may_do_less_is_never_better(leave):
-    load = replace(CALIBRATION_LOAD, com=(0.0, 0.1, 0.0))
+    load = structs.replace(CALIBRATION_LOAD, com=(0.0, 0.1, 0.0))
     for hold in (Cylinder(0.3), Sphere(0.5)):
         full = utilisation(ask(on_wall(hold, overhang=-0.3), load=load))
         less = utilisation(ask(on_wall(hold, overhang=-0.3, **{leave: False}), load=load))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import Pose
 from hand_models.rock import Sphere
@@ -32,7 +33,7 @@ def with_one_in_the_air(limb: str, closing: float | None = None) -> Stance:
             hand,
             hold=Sphere(0.1),
             hold_in_hand=AIR,
-            grasp=replace(hand.grasp, closing_tension=closing),
+            grasp=structs.replace(hand.grasp, closing_tension=closing),
         )
         for hand in stance.hands
     ]
@@ -146,7 +147,9 @@ def limbs_named(answer: Plan) -> set[str]:
 
 def test_tensions_follow_the_cap_to_where_nothing_is_given_away():
     """Steps of an eighth are about an eighth as long: a jump would stay as it is."""
-    question = ask(with_one_in_the_air("rear_left"), load=replace(CALIBRATION_LOAD, mass=50.0))
+    question = ask(
+        with_one_in_the_air("rear_left"), load=structs.replace(CALIBRATION_LOAD, mass=50.0)
+    )
     least = peer.least_utilisation(question).fun
 
     def steps(count: int) -> float:

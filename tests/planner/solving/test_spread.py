@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 from scipy.stats import spearmanr
 
@@ -149,7 +150,7 @@ def test_floating_wrists_that_begin_at_the_usual_plan_are_no_worse_than_by_thems
     """Their searches end at a local optimum, and bracket load factors no closer than this."""
     asked = replace(asked_of("wall-300-floating"), explain=False)
     if mass is not None:
-        asked = replace(asked, load=replace(asked.load, mass=mass))
+        asked = replace(asked, load=structs.replace(asked.load, mass=mass))
     found, apart = plan(asked).spread, planned_apart(asked)
     assert found.holds == sum(each.holds for each in apart)
     for used, factor, alone in zip(found.utilisations, found.load_factors, apart, strict=True):

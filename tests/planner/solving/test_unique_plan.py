@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import InvalidInputError
 from planner.programs import solvers
@@ -16,7 +17,9 @@ from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall, program_
 def problems(count):
     """Data of random stances, and of the wall under an uneven load, within their limits."""
     rng = np.random.default_rng(5)
-    found = [program_data(ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0))))]
+    found = [
+        program_data(ask(on_wall(), load=structs.replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0))))
+    ]
     while len(found) < count:
         stance = random_stance(rng)
         try:

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, settle_hand
@@ -22,7 +23,7 @@ from tests.suite.helpers.stances import (
     random_surface,
 )
 
-QUESTION = ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
+QUESTION = ask(on_wall(), load=structs.replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 HAND, FINGER = 2, 1
 """rear_left, inner_left."""
 
@@ -207,7 +208,9 @@ def test_the_check_of_known_hands_is_made_once():
     settled = tuple(settle_hand(hand, QUESTION.stance) for hand in QUESTION.stance.hands)
     check = Check(QUESTION, HandBatch.of(settled))
     for lateral in (0.0, 0.1, -0.1):
-        answer = plan(ask(on_wall(), load=replace(CALIBRATION_LOAD, com=(0.0, lateral, 0.0))))
+        answer = plan(
+            ask(on_wall(), load=structs.replace(CALIBRATION_LOAD, com=(0.0, lateral, 0.0)))
+        )
         numbers = PlanArrays.of(answer.hands), answer.utilisation, answer.body_wrench
         assert check.problems(*numbers, answer.effort) == []
         assert check.problems(*numbers, 1.01 * answer.effort) != []

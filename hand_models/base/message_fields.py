@@ -1,0 +1,37 @@
+"""What parts of requests are made of, below the service too: strict structs, bounded numbers.
+
+Bounds are far beyond any climbing robot; they keep arithmetic finite. They hold for what travels:
+who builds a part in Python has the checks of its own class.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+__all__ = [
+    "Acceleration",
+    "AccelerationEntry",
+    "Coordinate",
+    "Mass",
+    "Name",
+    "Position",
+    "Strict",
+    "Tension",
+]
+
+Coordinate = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="[m]")]
+AccelerationEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Acceleration = Annotated[
+    tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
+    Meta(description="in W [m/s²]"),
+]
+Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
+Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
+Name = Annotated[str, Meta(max_length=64)]
+
+
+class Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A part of a request: an unknown field in it is an error."""
