@@ -2,20 +2,20 @@
 
 Nothing here is shared with the way the plan was found. The plan's own forces must balance every
 joint and tendon (`joint_balance`), which says nothing of the affine maps of Eq. 14, and motors and
-winches must fit; wrenches are summed force by force; limits are Eq. 21 itself, the plan's
-half-planes (`LimitCurves`) and the structure's published figures; balance is added up about the
-body's origin. What is different where a wrist floats is in `floating`, what nails need in `nails`,
-what joints and callers ask in `limbs`.
+winches must fit (`drives`); wrenches are summed force by force (`hands`); limits are Eq. 21 itself
+and the plan's half-planes (`tiles`), and the structure's published figures; balance is added up
+about the body's origin. What is different where a wrist floats is in `floating`, what nails need
+in `nails`, what joints and callers ask in `limbs`.
 
-All hands are checked at once, in arrays. What hangs on the hands alone is worked out when a `Check`
-is made, before there is a plan. Where numbers are not near enough to be right whatever their size,
-it is worked out by how much each is off, and how much it may be (`sentences`).
+Each of these recomputes its residuals from a plan's numbers, of all hands at once, in arrays.
+Where numbers are not near enough to be right whatever their size, it is worked out by how much
+each is off, and how much it may be.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -24,15 +24,23 @@ from hand_models.base import SKEW, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
 from planner.question import HandOnHold, Question
 from planner.result import PlanArrays
-from planner.verification.limbs import (
-    JointUse,
-    check_asked,
-    check_limbs,
-    check_passive,
-    force_use,
+from planner.verification.drives import DriveLimits
+from planner.verification.floating import recompute_floating
+from planner.verification.hands import HandLimits, check_contacts
+from planner.verification.joint_balance import JointBalance, wrenches_of
+from planner.verification.limbs import AskedLimits, JointUse, check_limbs, recompute_joints
+from planner.verification.nails import NailLimits
+from planner.verification.residuals import (
+    COUNT,
+    UTILISATION,
+    Names,
+    Recomputed,
+    Residual,
+    allowed_errors,
+    claim,
+    is_near,
 )
-from planner.verification.recomputation import Recomputing
-from planner.verification.sentences import COUNT, UTILISATION
+from planner.verification.tiles import TileLimits
 
 __all__ = ["BALANCE", "Check"]
 
@@ -41,6 +49,111 @@ BALANCE: Final = 1e-6
 
 EFFORT: Final = 1e-6
 """How far the effort may be from what the plan says, relative."""
+
+
+class SettledLimits:
+    """The limits of settled hands on their holds, whatever is asked of them.
+
+    Parameters
+    ----------
+    known : HandBatch
+    places : sequence of HandOnHold
+        Whose limbs, wrists and preloads count: the tensions (4,) to which the motors of each hand
+        have tightened its tendons if its wrist floats [N], by default the closing tension.
+    strength : float
+        What every tendon may hold [N].
+    """
+
+    def __init__(self, known: HandBatch, places: Sequence[HandOnHold], strength: float) -> None:
+        self.names = names = Names(tuple([place.limb for place in places]), known)
+        self.wound = {
+            h: known.hands[h].closing_tension
+            if place.tendon_preload is None
+            else place.tendon_preload
+            for h, place in enumerate(places)
+            if place.wrist == "floating"
+        }
+        self._balance = JointBalance(names, self.wound)
+        self._tiles, self._hands = TileLimits(names), HandLimits(names)
+        self._drives = DriveLimits(names, strength)
+        self._nails = NailLimits(names) if len(known.places.nails) else None
+        self._each = np.arange(len(places))
+
+    def recompute(
+        self, found: list[str], arrays: PlanArrays, asked: Sequence[Residual]
+    ) -> tuple[list[Residual], Recomputed, Array]:
+        """Recompute what a plan's numbers do to the hands.
+
+        Parameters
+        ----------
+        found : list of str
+            What is wrong so far; what is found on the way is appended.
+        arrays : PlanArrays
+        asked : sequence of Residual
+            What is asked of the hands beside their own limits: caps, joints.
+
+        Returns
+        -------
+        residuals : list of Residual
+        again : Recomputed
+        used : ndarray, shape (H,)
+            Utilisation of each hand.
+        """
+        each = wrenches_of(arrays.points, arrays.forces)
+        again = self._again(found, arrays)
+        nails = None if self._nails is None else self._nails.loads(arrays)
+        residuals = [
+            *self._balance.recompute(again),
+            *self._tiles.recompute(again, nails),
+            *self._drives.recompute(again, nails),
+            *self._hands.recompute(again, each),
+            *asked,
+        ]
+        if self._nails is not None and nails is not None:
+            residuals += self._nails.recompute(nails)
+        uses = [each for each in residuals if each.kind == "use"]
+        rows = np.concatenate([np.maximum.reduce(each.values, axis=1) for each in uses])
+        used = np.zeros(len(self._each))
+        np.maximum.at(used, np.concatenate([each.hand for each in uses]), rows)
+        name, said = self.names.limb, arrays.utilisations
+        return (
+            [*residuals, claim(used, said, self._each, UTILISATION, name, "utilisation")],
+            again,
+            used,
+        )
+
+    def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
+        """Recompute what is not affine in loads (T, 3) and wrenches (H, 6) of settled hands."""
+        law = self._tiles.recompute_law(arrays.half_planes, loads)
+        return [law, self._hands.recompute_held(wrenches)]
+
+    def _again(self, found: list[str], arrays: PlanArrays) -> Recomputed:
+        """Return what tensions, or where wrists go, do to the fingers; with the plan's numbers."""
+        balance, f, lateral = self._balance, arrays.tensions, arrays.loads[:, 2]
+        if not any(arrays.wrists):
+            loads, left = balance.loads(f, lateral)
+            return Recomputed(arrays, loads, left, f, loads[:, 0])
+        # the motors of hands that float stand still where they have tightened their tendons
+        wound = f.copy()
+        for h, tension in self.wound.items():
+            wound[COUNT * h : COUNT * (h + 1)] = tension
+        shear, normal, left = recompute_floating(found, self.names, balance, arrays, wound)
+        loads, (drawn, _) = np.column_stack((shear, normal, lateral)), balance.loads(wound, lateral)
+        return Recomputed(arrays, loads, left, wound, drawn[:, 0])
+
+
+KNOWN: Final[BoundedStore[Hashable, SettledLimits]] = BoundedStore("limits of settled hands", 64)
+"""Limits for checks, by the hands, limbs, wrists, strength and preloads: the last ones."""
+
+
+def _settled_limits(
+    known: HandBatch, places: Sequence[HandOnHold], strength: float
+) -> SettledLimits:
+    preloads = [place.tendon_preload for place in places]
+    told = tuple([None if preload is None else preload.tobytes() for preload in preloads])
+    names = tuple([(place.limb, place.wrist) for place in places])
+    key = known.hands, names, told, strength
+    return KNOWN.get(key, lambda: SettledLimits(known, places, strength))
 
 
 class Check:
@@ -57,6 +170,8 @@ class Check:
 
     Attributes
     ----------
+    settled : SettledLimits
+    asked : AskedLimits
     carry : ndarray, shape (6, 6 H)
         From the hands' wrenches on the rock, each in its H, to the rock's reaction in B.
     """
@@ -64,16 +179,11 @@ class Check:
     def __init__(self, question: Question, known: HandBatch, where: Posture | None = None) -> None:
         hands, stance, limits = known.hands, question.stance, question.limits
         self.question, self.where, self.known = question, where, known
-        self.limbs = tuple([place.limb for place in stance.hands])
         cap, most = limits.tendon_tension, hands[0].hand.maximum_tension
         self.strength = most if cap is None else min(most, cap)
-        self.again = _recomputing(known, stance.hands, self.strength)
-        self.floating = [h for h, place in enumerate(stance.hands) if place.wrist == "floating"]
-        self.asked = [
-            h
-            for h, place in enumerate(stance.hands)
-            if place.wrench or place.limb in question.present or place.limb in limits.per_hand
-        ]
+        self.settled = _settled_limits(known, stance.hands, self.strength)
+        self.limbs = self.settled.names.limbs
+        self.asked = AskedLimits(question, self.settled.names)
         poses = [place.pose for place in stance.hands]
         into_body = stance.body.rotation.T
         turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
@@ -82,8 +192,6 @@ class Check:
         carry[:, :3, :3] = carry[:, 3:, 3:] = turns
         carry[:, 3:, :3] = (levers @ SKEW.reshape(3, 9)).reshape(-1, 3, 3) @ turns
         self.carry = -carry.transpose(1, 0, 2).reshape(6, -1)
-
-    # Checking -----------------------------------------------------------------------------------
 
     def problems(
         self,
@@ -108,17 +216,18 @@ class Check:
         found: list[str] = []
         with np.errstate(invalid="ignore", over="ignore"):
             joints = self.joints(found, arrays.wrenches, body_wrench)
-            again = self.again.of(found, arrays, self.asked_for(found, arrays, joints))
-            if not again.near():
-                found.extend(self.again.solved(again).off(self.again.allowed(arrays)))
-            used = [float(np.abs(each.shares).max()) for each in joints.values()]
-            worst = max([float(np.maximum.reduce(again.hands)), *used])
+            asked = list(self.recompute_asked(arrays, joints))
+            residuals, _, used = self.settled.recompute(found, arrays, asked)
+            misplaced = [*self._wrists(arrays), *check_contacts(self.settled.names, arrays)]
+            if misplaced or not is_near(residuals):
+                allowed = allowed_errors(self.known, arrays)
+                for residual in residuals:
+                    found.extend(residual.off(allowed))
+                found.extend(misplaced)
+            worst = max(float(np.maximum.reduce(used)), self.idle(joints))
             if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
                 found.append(f"plan: utilisation is {worst:.8g}, not {utilisation:.8g}")
-            reaction = self.carry @ arrays.wrenches.ravel()
-            error, size = math.hypot(*(reaction - body_wrench)), math.hypot(*body_wrench)
-            if not error <= BALANCE * max(size, 1.0):
-                found.append(f"balance is off by {error:.3g} of {size:.3g}")
+            found.extend(self.unbalanced(arrays.wrenches, body_wrench))
             if effort is not None:
                 relative = float(arrays.tensions.dot(arrays.tensions)) / self.strength**2
                 own = [joints[limb].shares for limb in self.limbs if limb in joints]
@@ -134,42 +243,29 @@ class Check:
         told = dict(zip(self.limbs, wrenches, strict=True))
         return check_limbs(found, self.question, told, body_wrench, self.where)
 
-    def asked_for(
-        self, found: list[str], arrays: PlanArrays, joints: Mapping[str, JointUse]
-    ) -> Array | None:
-        """Check what a question asks of its hands; return how much of joints and caps they use."""
-        places = self.question.stance.hands
-        floats = [h for h, wrist in enumerate(arrays.wrists) if wrist is not None]
-        if floats != self.floating:
-            found.extend(
-                f"{place.limb}: the wrist is not {place.wrist}"
-                for h, place in enumerate(places)
-                if (h in floats) != (place.wrist == "floating")
-            )
-        if not (self.asked or joints):
-            return None
-        used = np.zeros(len(self.limbs))
-        allowed = self.again.allowed(arrays)
+    def idle(self, joints: Mapping[str, JointUse]) -> float:
+        """Return the largest use of the joints of limbs without a hand."""
+        alone = [use for limb, use in joints.items() if limb not in self.limbs]
+        return max([float(np.abs(use.shares).max()) for use in alone], default=0.0)
+
+    def recompute_asked(
+        self, arrays: PlanArrays, joints: Mapping[str, JointUse]
+    ) -> Iterator[Residual]:
+        """Yield the residuals of what is asked of the hands beside their own limits."""
+        yield from self.asked.recompute(arrays.tensions, arrays.wrenches)
         for h, limb in enumerate(self.limbs):
             if limb in joints:
-                used[h] = np.abs(joints[limb].shares).max()
-                check_passive(found, limb, joints[limb], float(allowed[h]))
-        for h in self.asked:
-            wrench, error = arrays.wrenches[h], float(allowed[h])
-            tensions = arrays.tensions[COUNT * h : COUNT * (h + 1)]
-            check_asked(found, self.question, places[h], wrench, tensions, error)
-            capped, _ = force_use(found, self.question, places[h], wrench, error)
-            used[h] = max([used[h], *capped])
-        return used
+                yield from recompute_joints(limb, h, joints[limb])
 
+    def unbalanced(self, wrenches: Array, body_wrench: Array) -> Iterator[str]:
+        """Yield by how much hands' wrenches (H, 6) do not balance the body, if they do not."""
+        error = self.carry @ wrenches.ravel() - body_wrench
+        off, size = math.sqrt(error.dot(error)), math.sqrt(body_wrench.dot(body_wrench))
+        if not off <= BALANCE * max(size, 1.0):
+            yield f"balance is off by {off:.3g} of {size:.3g}"
 
-KNOWN: Final[BoundedStore[Hashable, Recomputing]] = BoundedStore("recomputing", 64)
-"""What recomputes plans, by the hands, limbs, wrists, strength and preloads: the last ones."""
-
-
-def _recomputing(known: HandBatch, places: Sequence[HandOnHold], strength: float) -> Recomputing:
-    preloads = [place.tendon_preload for place in places]
-    told = tuple([None if preload is None else preload.tobytes() for preload in preloads])
-    names = tuple([(place.limb, place.wrist) for place in places])
-    key = known.hands, names, told, strength
-    return KNOWN.get(key, lambda: Recomputing(known, places, strength))
+    def _wrists(self, arrays: PlanArrays) -> Iterator[str]:
+        """Yield hands whose wrists are not what they are in the question."""
+        for place, wrist in zip(self.question.stance.hands, arrays.wrists, strict=True):
+            if (wrist is not None) != (place.wrist == "floating"):
+                yield f"{place.limb}: the wrist is not {place.wrist}"

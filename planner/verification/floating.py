@@ -21,10 +21,12 @@ from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, FingerFrame, SettledHand
 from hand_models.tendon import FingerTendon, TendonState, share_load
-from planner.result import WristPlan
+from planner.result import PlanArrays, WristPlan
+from planner.verification.joint_balance import Fingers, JointBalance
+from planner.verification.residuals import COUNT, Names, allowed_errors
 from planner.verification.rolling_contacts import Face, slip_of
 
-__all__ = ["MovedFinger", "check_finger", "check_palm"]
+__all__ = ["recompute_floating"]
 
 PLACE: Final = 1e-9
 """How far a contact may be above its phalanx, or below [m]."""
@@ -62,7 +64,64 @@ def moved(place: Array, wrist: WristPlan) -> Array:
     return np.asarray(wrist.twist[:3] + turn @ place + turn @ turn @ place / 2.0)
 
 
-def check_finger(
+def recompute_floating(
+    found: list[str], names: Names, balance: JointBalance, arrays: PlanArrays, wound: Array
+) -> tuple[Array, Array, Array]:
+    """Return what fingers of hands do of which some float; check where those and palms are.
+
+    Parameters
+    ----------
+    found : list of str
+        What is wrong so far; what cannot be is appended.
+    names : Names
+    balance : JointBalance
+    arrays : PlanArrays
+    wound : ndarray, shape (F,)
+        Tensions to which winches have drawn the tendons [N].
+
+    Returns
+    -------
+    shear, normal : ndarray, shape (T,)
+        Of each tile [N]; of nails zero.
+    left : ndarray, shape (F, 3)
+        What is left of each joint's balance [N·m].
+    """
+    known, allowed = names.known, allowed_errors(names.known, arrays)
+    places = known.places
+    fingers = Fingers(*(part.copy() for part in balance.fingers(wound)))
+    unknown: list[int] = []
+    for h, wrist in enumerate(arrays.wrists):
+        if wrist is None:
+            continue
+        hand, limb = known.hands[h], names.limbs[h]
+        for i, name in enumerate(FINGERS):
+            finger = COUNT * h + i
+            own = np.flatnonzero(places.finger == finger)
+            fingers.points[own], fingers.axes[own] = arrays.points[own], arrays.axes[own]
+            planned = arrays.loads[own], arrays.points[own], arrays.axes[own]
+            there = _check_finger(
+                found,
+                f"{limb}: {name}",
+                hand,
+                i,
+                (*planned, float(arrays.tensions[finger])),
+                wrist,
+                (float(wound[finger]), fingers.shear[own]),
+                float(allowed[h]),
+            )
+            fingers.shear[own], fingers.joints[finger] = there.shear, there.joints
+            if there.torques is None:
+                unknown.append(finger)
+            else:
+                fingers.torques[finger] = there.torques
+        _check_palm(found, limb, hand, arrays.palms[h], wrist, float(allowed[h]))
+    normal, left = balance.solved(fingers)
+    told = places.phalanges[unknown]
+    normal[told], left[unknown] = arrays.loads[told, 1], 0.0
+    return fingers.shear, normal, left
+
+
+def _check_finger(
     found: list[str],
     name: str,
     hand: SettledHand,
@@ -199,7 +258,7 @@ def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristP
     return found
 
 
-def check_palm(
+def _check_palm(
     found: list[str],
     limb: str,
     hand: SettledHand,

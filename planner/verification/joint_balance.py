@@ -11,12 +11,13 @@ its spines engaged and the share φ_t of them that did. Moments are taken about 
 H, of the forces where the plan has them, each axis a row (a × p, −a) that is multiplied by a wrench
 (F, M) about the origin of H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for a joint
 at (x, z) of its plane. Nothing here is shared with the way settled hands find their affine maps
-(Eq. 14); only where something is off, the balance is solved for what would be right.
+(Eq. 14): the balance is solved as it stands, once for hands at rest, whose loads are affine in
+tensions.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Collection, Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -25,24 +26,18 @@ from numpy.typing import NDArray
 from hand_models.base import SKEW, Array
 from hand_models.finger import PHALANGES, STOPS
 from hand_models.hand import HandModel
-from planner.prepare import KEPT, NONE, NOTHING, HandBatch, TileIndex
+from planner.prepare import NONE, NOTHING, TileIndex
+from planner.verification.residuals import COUNT, Names, Recomputed, Residual
 
-__all__ = ["LEVER", "Fingers", "JointBalance", "tendons_of", "wrenches_of"]
+__all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
 
 JOINTS: Final = len(PHALANGES)
 
 SIDES: Final = np.array([{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in STOPS])
 """Which way a joint presses on the limit at which it stands, by code of `STOPS`."""
 
-LEVER: Final = 5e-4
-"""Loads whose balance is off by no more than a force at this lever are off by no more than it [m].
-
-That is with the shears' own error, as if all acted a metre out. Normals lie farther from their
-joints, but each takes the errors of those beyond it.
-"""
-
-NOWHERE: Final = np.zeros(0)
-"""Of no joints."""
+STOP: Final = 1e-6
+"""How much torque a joint's stop may seem to pull, by rounding [N·m]."""
 
 BEFORE: Final = np.tri(JOINTS, k=-1)
 """Of each joint, the phalanges before it."""
@@ -60,7 +55,6 @@ def wrenches_of(points: Array, forces: Array) -> Array:
     return np.concatenate((forces, moments), axis=1)
 
 
-@lru_cache(maxsize=KEPT)
 def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array, Array]:
     """Return what the tendons of hands do, all of one model whose tiles all touch.
 
@@ -83,9 +77,9 @@ def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array,
     left[places.phalanges], left[places.bases] = local, 1.0
     gain[places.phalanges] = local * model.shear_gain
     gain[places.bases] = model.shear_gain[0]
-    engaged[places.phalanges] = local * (np.array(model.engagement) - model.shear_gain)
-    engaged[places.bases] = model.base_engagement - model.shear_gain[0]
-    return local * model.pulley_radii, left, gain, engaged
+    engaged[places.phalanges] = local * np.array(model.engagement)
+    engaged[places.bases] = model.base_engagement
+    return local * model.pulley_radii, left, gain, engaged - gain
 
 
 class Fingers(NamedTuple):
@@ -111,11 +105,13 @@ class Fingers(NamedTuple):
 
 
 class JointBalance:
-    """The balance of the fingers of settled hands.
+    """The balance of the fingers of settled hands, and what their tendons and stops cannot do.
 
     Parameters
     ----------
-    known : HandBatch
+    names : Names
+    floating : collection of int
+        Hands whose wrists float, whose tendons may be slackened.
 
     Attributes
     ----------
@@ -125,24 +121,38 @@ class JointBalance:
         Joints that stand at a limit, of fingers that touch rock.
     """
 
-    def __init__(self, known: HandBatch) -> None:
+    def __init__(self, names: Names, floating: Collection[int] = ()) -> None:
+        known = names.known
         hands, places, touch = known.hands, known.places, known.touch
-        self._known, body = known, hands[0].hand
+        self._names, self._known, body = names, known, hands[0].hand
         self._pull, _, gain, engaged = tendons_of(places, body)
-        closing = np.array([hand.closing_tension for hand in hands])
-        self._shear = engaged * closing.take(places.hand) * known.engagement
+        self._closing = np.array(known.closing_tensions)
+        self._shear = engaged * self._closing.take(places.hand) * known.engagement
         self._gain = gain * known.engagement
         self._rest = known.bends * -np.array(body.finger.joint_stiffness)
         self._rest -= body.finger.joint_preload
-        self._planes = _planes_of(body, tuple([hand.grasp.outer_rotation for hand in hands]))
-        directions = np.empty((*known.angles.shape, 2))
-        np.cos(known.angles, out=directions[:, :, 0])
-        np.sin(known.angles, out=directions[:, :, 1])
+        frames = [frame for hand in hands for frame in body.frames(hand.grasp.outer_rotation)]
+        along = np.array([frame.along for frame in frames])
+        across = along[:, [1, 0, 2]] * [-1.0, 1.0, 0.0]
+        # the proximal joints' axes as rows for wrenches; what is added per metre along and inward
+        outward = np.cross(across, [frame.joint for frame in frames])
+        self._first_axes = np.hstack([outward, -across])[:, None]
+        self._turns = np.zeros((len(frames), 2, 6))
+        self._turns[:, 0, 2], self._turns[:, 1, :3] = -1.0, along
+        directions = np.stack((np.cos(known.angles), np.sin(known.angles)), axis=2)
         self._joints = body.finger.joint_spacing * BEFORE @ directions
-        self._axes = self._axes_of(self._joints)
+        # friction holds the tendon of a finger that draws a tile or a nail along rock
+        drawing = [
+            i
+            for i, holds in enumerate(touch.holding)
+            if holds and body.finger.friction > 0.0 and i // COUNT not in floating
+        ]
+        self._drawing = np.array(drawing, dtype=np.intp)
+        self._hand_of_finger = np.arange(len(hands)).repeat(COUNT)
 
         self.held: NDArray[np.bool_] | None = None
         self.stop_fingers = self.stop_joints = NONE
+        self._sides = np.zeros(0)
         if len(touch.touching) < len(places.hand):
             self._bears = touch.contacts[places.phalanges] != NOTHING
             alone = ~self._bears.any(axis=1, keepdims=True)
@@ -151,31 +161,61 @@ class JointBalance:
             self.stop_fingers, self.stop_joints = sides.nonzero()
             self._sides = sides[self.stop_fingers, self.stop_joints]
 
-    def shears(self, tensions: Array) -> Array:
-        """Return the shear of each tile at tensions (F,) of the tendons, shape (T,); of nails 0."""
-        found = tensions.take(self._known.places.finger)
-        found *= self._gain
-        found += self._shear
-        return found
+        # two tensions tell all, as shears, normals and balances are affine in them
+        rest, loaded = (self.fingers(np.full(len(self._pull), f)) for f in (0.0, 1.0))
+        (normal, left), (slope, change) = self.solved(rest), self.solved(loaded)
+        self._at_zero, self._per_newton = np.zeros((2, len(normal), 3))
+        self._at_zero[:, :2] = np.column_stack((rest.shear, normal))
+        self._per_newton[:, :2] = np.column_stack((loaded.shear - rest.shear, slope - normal))
+        self._left_at_zero, self._left_per_newton = left, change - left
 
-    def left(self, tensions: Array, wrenches: Array) -> Array:
-        """Return what is left of each joint's balance, closing it, shape (F, 3) [N·m].
+    def loads(self, tensions: Array, lateral: Array) -> tuple[Array, Array]:
+        """Return what tensions (F,) of tendons do to hands at rest.
 
         Parameters
         ----------
         tensions : ndarray, shape (F,)
-        wrenches : ndarray, shape (T + …, 6)
-            Of each tile on the rock about the origin of H, first those of the tiles.
+            [N]
+        lateral : ndarray, shape (T,)
+            Loads of the tiles, which no tendon changes [N].
+
+        Returns
+        -------
+        loads : ndarray, shape (T, 3)
+            Of each tile [N]; shear and normal of nails zero.
+        left : ndarray, shape (F, 3)
+            What is left of each joint's balance, closing it [N·m].
         """
-        found = self._pull * tensions[:, None]
-        found += self._rest
-        found -= _turned(self._axes, wrenches.take(self._known.places.phalanges, 0))
-        return found
+        loads = self._per_newton * tensions.take(self._known.places.finger)[:, None]
+        loads += self._at_zero
+        loads[:, 2] = lateral
+        return loads, self._left_at_zero + self._left_per_newton * tensions[:, None]
+
+    def recompute(self, again: Recomputed) -> Iterator[Residual]:
+        """Yield what loads leave of the balance, of tendons that pull and of joints' stops."""
+        names, (shear, normal, _) = self._names, again.loads.T
+        told, tensions, hands = again.arrays.loads, again.arrays.tensions, self._hand_of_finger
+        off = told[:, :2] - again.loads[:, :2]
+        if len(self._known.places.nails):
+            off[self._known.places.nails] = 0.0
+        text = " carries {:.6g}, {:.6g} N, not what the plan says"
+        of_tile = self._known.places.hand
+        yield Residual("zero", off, of_tile, names.tile, text, (shear, normal))
+        tension = names.of_fingers("tension", np.arange(len(hands)))
+        yield Residual("least", tensions, hands, tension, " is {:g} N", (tensions,))
+        if len(self._drawing):
+            own = hands[self._drawing]
+            slack = tensions[self._drawing] - self._closing[own]
+            text = " would stick, slackened {:.3g} N"
+            name = names.of_fingers("tendon", self._drawing)
+            yield Residual("least", slack, own, name, text, (-slack,))
+        if len(self.stop_fingers):
+            stops, text = self.stops(again.left), " would leave its stop"
+            own, name = hands[self.stop_fingers], names.of_fingers("a joint", self.stop_fingers)
+            yield Residual("least", stops, own, name, text, error=STOP)
 
     def stops(self, left: Array) -> Array:
         """Return how each joint that stands at a limit presses on it, shape (k,) [N·m]."""
-        if not len(self.stop_fingers):
-            return NOWHERE
         return np.asarray(left[self.stop_fingers, self.stop_joints] * self._sides)
 
     def solved(self, fingers: Fingers) -> tuple[Array, Array]:
@@ -186,7 +226,7 @@ class JointBalance:
         normal : ndarray, shape (T,)
             Of each tile [N]; of nails zero.
         left : ndarray, shape (F, 3)
-            As of `left`.
+            What is left of each joint's balance, closing it [N·m].
 
         Raises
         ------
@@ -216,35 +256,15 @@ class JointBalance:
     def fingers(self, tensions: Array) -> Fingers:
         """Return the fingers at rest, with their tendons' tensions (F,)."""
         known = self._known
+        shear = self._shear + self._gain * tensions.take(known.places.finger)
         torques = self._pull * tensions[:, None] + self._rest
-        return Fingers(self.shears(tensions), torques, self._joints, known.points, known.axes)
+        return Fingers(shear, torques, self._joints, known.points, known.axes)
 
     def _axes_of(self, joints: Array) -> Array:
         """Return the joints' axes where these are, as rows for wrenches, shape (F, 3, 6)."""
-        axes, turns = self._planes
-        return np.asarray(joints @ turns + axes)
+        return np.asarray(joints @ self._turns + self._first_axes)
 
 
 def _turned(axes: Array, wrenches: Array) -> Array:
     """Return what wrenches of each finger's phalanges turn its joints with, shape (F, 3) [N·m]."""
     return np.asarray(np.add.reduce(axes * (OUTWARD @ wrenches), axis=2))
-
-
-@lru_cache(maxsize=KEPT)
-def _planes_of(hand: HandModel, rotations: tuple[float, ...]) -> tuple[Array, Array]:
-    """Return the planes of the fingers of hands of one model turned so far.
-
-    Returns
-    -------
-    axes : ndarray, shape (F, 1, 6)
-        The proximal joints' axes, as rows for wrenches about the origin of H.
-    turns : ndarray, shape (F, 2, 6)
-        What is added to those per metre along the finger and into the rock.
-    """
-    frames = [frame for rotation in rotations for frame in hand.frames(rotation)]
-    axes, turns = np.zeros((len(frames), 1, 6)), np.zeros((len(frames), 2, 6))
-    for axis, turn, frame in zip(axes[:, 0], turns, frames, strict=True):
-        across = np.cross([0.0, 0.0, 1.0], frame.along)
-        axis[:3], axis[3:] = np.cross(across, frame.joint), -across
-        turn[0, 2], turn[1, :3] = -1.0, frame.along
-    return axes, turns

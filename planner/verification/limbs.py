@@ -6,22 +6,20 @@ the Jacobians and the Newton–Euler pass that the program's rows are made of.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
 import scipy
 
-from hand_models.base import Array
-from hand_models.hand import FINGERS
+from hand_models.base import Array, Indices
 from planner.prepare import BALL, Posture
-from planner.question import HandOnHold, Question
+from planner.question import ForceCap, Question
 from planner.robots import LimbTorques, LinkTree
+from planner.verification.residuals import COUNT, Names, Residual
 
-__all__ = ["ARM", "JointUse", "check_asked", "check_limbs", "check_passive", "force_use"]
-
-NOTHING: Final = np.zeros(0)
-"""Of a hand without a cap."""
+__all__ = ["AskedLimits", "JointUse", "check_limbs", "recompute_joints"]
 
 TORQUE: Final = 1e-6
 """Largest disagreement of a joint's torque, relative to the largest of its limb or 1 N·m."""
@@ -109,14 +107,14 @@ def check_limbs(
     return uses
 
 
-def check_passive(found: list[str], limb: str, use: JointUse, allowed: float) -> None:
-    """Check that joints without a motor bear nothing.
-
-    ``allowed``: the error that the hand's loads may have [N].
-    """
-    for name, torque in use.passive.items():
-        if not abs(torque) <= allowed * ARM:
-            found.append(f"{limb}: joint {name} has no motor, and bears {torque:.6g} N·m")
+def recompute_joints(limb: str, h: int, use: JointUse) -> Iterator[Residual]:
+    """Yield what the joints of hand h use of their torque, and bear without a motor."""
+    hand, torques = np.array([h]), np.array([*use.passive.values()])
+    yield Residual("use", np.concatenate((use.shares, -use.shares))[None], hand)
+    if use.passive:
+        each, names = hand.repeat(len(torques)), [f"{limb}: joint {name}" for name in use.passive]
+        text = " has no motor, and bears {:.6g} N·m"
+        yield Residual("zero", torques / ARM, each, names.__getitem__, text, (torques,))
 
 
 def _limits(question: Question, limb: str) -> Array:
@@ -186,63 +184,103 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
                 found.append(f"{limb}: its joints are not at the angles that were given")
 
 
-def force_use(
-    found: list[str], question: Question, place: HandOnHold, wrench: Array, allowed: float
-) -> tuple[Array, Array]:
-    """Check the cap on a hand's force, by its wrench.
+class _Cap(NamedTuple):
+    """A cap on a hand's force: rows of utilisations, and of what may not be below zero.
 
-    Without a direction, the utilisation of its rows must be no less than that of the force itself.
-
-    Returns
-    -------
-    used : ndarray
-        Utilisation along each direction that is capped.
-    none : ndarray
-        The force along each direction in which there may be none [N].
+    Attributes
+    ----------
+    hand : ndarray of int, shape (1,)
+    use, none : ndarray, shape (…, 3)
+    axes : tuple of str
+        Names of the axes of the latter, along which there may be no force.
+    ball : bool
+        Whether it is on the force's size, which the rows are no more than.
     """
-    cap = question.limits.per_hand.get(place.limb)
-    if cap is None:
-        return NOTHING, NOTHING
-    force = wrench[:3]
+
+    hand: Indices
+    use: Array
+    none: Array
+    axes: tuple[str, ...]
+    ball: bool
+
+
+def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
+    stance, hand = question.stance, np.array([h])
     if not isinstance(cap.largest_force, tuple):
-        along, size = BALL @ force, float(np.linalg.norm(force))
-        if not size <= along.max() + allowed:
-            found.append(f"{place.limb}: the hand exerts {size:.6g} N, more than its rows say")
-        return along / cap.largest_force, NOTHING
-    if cap.frame != "hand":
-        force = place.pose.rotation @ force
+        return _Cap(hand, BALL / cap.largest_force, np.zeros((0, 3)), (), ball=True)
+    turn = np.eye(3) if cap.frame == "hand" else stance.hands[h].pose.rotation
     if cap.frame == "body":
-        force = question.stance.body.rotation.T @ force
+        turn = stance.body.rotation.T @ turn
     ends = np.array(cap.largest_force)
-    both, barred = np.column_stack([force, force]), ends == 0.0
-    none = both * [-1.0, 1.0]
-    for axis in (barred & ~(none <= allowed)).any(axis=1).nonzero()[0].tolist():
-        found.append(
-            f"{place.limb}: {force[axis]:.6g} N along {'xyz'[axis]} of the {cap.frame}, of none"
-        )
-    return both[~barred] / ends[~barred], none[barred]
+    axis, end = (ends != 0.0).nonzero()
+    barred, side = (ends == 0.0).nonzero()
+    none = turn[barred] * np.where(side == 0, 1.0, -1.0)[:, None]
+    axes = tuple(f"{'xyz'[i]} of the {cap.frame}" for i in barred.tolist())
+    return _Cap(hand, turn[axis] / ends[axis, end][:, None], none, axes, ball=False)
 
 
-def check_asked(
-    found: list[str],
-    question: Question,
-    place: HandOnHold,
-    wrench: Array,
-    tensions: Array,
-    allowed: float,
-) -> None:
-    """Check what is asked of a hand: given components of its wrench, small changes of tensions."""
-    for j, value in enumerate(place.wrench or ()):
-        if value is not None and not abs(wrench[j] - value) <= allowed:
-            found.append(
-                f"{place.limb}: component {j + 1} of the wrench is {wrench[j]:.6g}, not {value:.6g}"
+class AskedLimits:
+    """What a question asks of its hands: caps on forces, given wrenches, small changes of tensions.
+
+    Parameters
+    ----------
+    question : Question
+    names : Names
+    """
+
+    def __init__(self, question: Question, names: Names) -> None:
+        hands, limits, present = question.stance.hands, question.limits, question.present
+        self._names = names
+        self._caps = [
+            _cap_of(question, h, limits.per_hand[place.limb])
+            for h, place in enumerate(hands)
+            if place.limb in limits.per_hand
+        ]
+        given = [
+            (h, j, value)
+            for h, place in enumerate(hands)
+            for j, value in enumerate(place.wrench or ())
+            if value is not None
+        ]
+        self._given = [np.array(own) for own in zip(*given, strict=True)]
+        most = limits.tension_change
+        self._most = math.inf if most is None else most
+        self._present = {
+            h: np.asarray(present[place.limb])
+            for h, place in enumerate(hands)
+            if place.limb in present
+        }
+
+    def recompute(self, tensions: Array, wrenches: Array) -> Iterator[Residual]:
+        """Yield what tensions (F,) and wrenches (H, 6) leave of what is asked."""
+        for cap in self._caps:
+            force, limb = wrenches[cap.hand[0], :3], self._names.limb_of(cap.hand)
+            yield Residual("use", (cap.use @ force)[None], cap.hand)
+            for along, axis in zip(cap.none @ force, cap.axes, strict=True):
+                text, left = f"{{:.6g}} N along {axis}, of none", along[None]
+                yield Residual("least", left, cap.hand, limb, text, (np.abs(left),))
+        yield from self.recompute_sizes(wrenches)
+        if self._given:
+            hand, j, value = self._given
+            own, limb = wrenches[hand, j], self._names.limb_of(hand)
+            text = "component {} of the wrench is {:.6g}, not {:.6g}"
+            yield Residual("zero", own - value, hand, limb, text, (j + 1, own, value))
+        for h, present in self._present.items():
+            fingers = np.arange(COUNT * h, COUNT * (h + 1))
+            name, text = (
+                self._names.of_fingers("tension", fingers),
+                " changes by {:.6g} N, more than",
             )
-    most, present = question.limits.tension_change, question.present.get(place.limb)
-    if most is None or present is None:
-        return
-    for name, tension, before in zip(FINGERS, tensions, present, strict=True):
-        change = tension - before
-        if not abs(change) <= most + allowed:
-            found.append(
-                f"{place.limb}: tension of {name} changes by {change:.6g} N, more than {most:g}"
-            )
+            change, hand = tensions[fingers] - present, np.full(COUNT, h)
+            for left in (self._most - change, self._most + change):
+                yield Residual("least", left, hand, name, f"{text} {self._most:g}", (change,))
+
+    def recompute_sizes(self, wrenches: Array) -> Iterator[Residual]:
+        """Yield what rows say of forces that are capped in all directions, beyond their size."""
+        for cap in self._caps:
+            if cap.ball:
+                force, limb = wrenches[cap.hand, :3], self._names.limb_of(cap.hand)
+                size = np.linalg.norm(force, axis=1)
+                left = (force @ BALL.T).max(axis=1) - size
+                text = "the hand exerts {:.6g} N, more than its rows say"
+                yield Residual("least", left, cap.hand, limb, text, (size,), affine=False)

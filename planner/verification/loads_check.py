@@ -1,36 +1,35 @@
-"""The check of one stance's plans, for one body wrench after the other: `check`, prepared.
+"""The check of a stance's loads, for one body wrench after the other.
 
 Every load of a hand with a fixed wrist is affine in what its plan chooses: tensions, lateral
-reactions, nails' pulls, the palm's loads. For a stance that stays, the check's own numbers are
-worked out once, without loads and for each newton of one: what must be zero, and is so for these,
-is zero for all loads. A plan is then checked by one matrix, and by what is not affine: Eq. 21's
-curve, and the force that a hand holds.
+reactions, nails' pulls, the palm's loads; and so is most of what the check of plans recomputes
+(`Residual.affine`). For a stance that stays, these residuals are tabulated without loads and for
+each newton of one: what is zero for these is zero for all loads. A plan is then checked by one
+matrix, and by the residuals that are not affine.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from itertools import accumulate, pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS, NAIL
-from planner.prepare import BALL
 from planner.result import LoadRecovery, PlanArrays
-from planner.verification.check import BALANCE, Check
-from planner.verification.joint_balance import LEVER
-from planner.verification.limbs import ARM, JointUse, force_use
-from planner.verification.recomputation import LimitCurves, held_by
-from planner.verification.sentences import LOAD, NEAR, SIGNED, STOP, STOPS, UTILISATION
+from planner.verification.check import Check
+from planner.verification.hands import check_contacts
+from planner.verification.residuals import LOAD, NEAR, UTILISATION
 
 __all__ = ["LoadsCheck"]
 
-FILL: Final = {6: np.inf, 7: np.inf, 8: -np.inf, 9: -np.inf}
-"""Numbers, by their place among all, of which a hand that has fewer has none that are wrong."""
+KINDS: Final = ("load", "palm", "wrench", "zero", "least", "error", "use")
+"""Kinds of numbers, in their order: those that something is computed of, then residuals.
+
+An ``error`` is a least value whose error is not that of the loads, over that error.
+"""
 
 most = np.maximum.reduce
 
@@ -58,109 +57,70 @@ class LoadsCheck:
     def __init__(
         self, check: Check, reader: LoadRecovery, columns: Sequence[tuple[str, ...]]
     ) -> None:
-        known, question = check.known, check.question
         self._check, self._reader, self._columns = check, reader, columns
+        self._size = max(map(len, columns))
+        # what a load may add to a number that is zero: so much each, and as much without any
+        self._negligible = 0.5 * NEAR / (1.0 + self._size)
         self.wrong: list[str] = []
         self.idle = 0.0
-        places = question.stance.hands
-        self._given = [
-            (i, j, value)
-            for i, place in enumerate(places)
-            for j, value in enumerate(place.wrench or ())
-            if value is not None
-        ]
-        caps = [question.limits.per_hand.get(place.limb) for place in places]
-        self._capped = [
-            i
-            for i, cap in enumerate(caps)
-            if cap is not None and not isinstance(cap.largest_force, tuple)
-        ]
-        size = max(map(len, columns))
-        self._stack([self._numbers(y) for y in np.eye(size + 1, size, k=-1)])
-        carries = check.carry.reshape(6, len(places), 6).transpose(1, 0, 2)
-        self._body = np.hstack([*(carries @ self._matrix[:, self._wrench])])
-        self._from_rest = check.carry @ self._constant[:, self._wrench].ravel()
-        touching = known.touch.touching
-        shares = self._by_hand(known.engagement[touching, None], known.places.hand[touching], 1.0)
-        of_tile = np.repeat(np.arange(len(places)), shares.shape[1])
-        self._curves = LimitCurves([hand.surface for hand in known.hands], of_tile, shares.ravel())
+        rest, *loaded = [self._numbers(y) for y in np.eye(self._size + 1, self._size, k=-1)]
+        parts = []
+        for i, (kind, values, hand) in enumerate(rest):
+            slopes = [each[i][1] - values for each in loaded]
+            rows = np.stack([values, *slopes], axis=-1).reshape(-1, self._size + 1)
+            owner = hand.repeat(len(rows) // len(hand)) if len(hand) else hand
+            kept = self._matters(kind, rows)
+            parts.append((kind, rows[kept], owner[kept]))
+        parts.sort(key=lambda part: KINDS.index(part[0]))
+        sizes = [sum(len(rows) for kind, rows, _ in parts if kind == each) for each in KINDS]
+        ends = np.cumsum([0, *sizes]).tolist()
+        self._of = dict(zip(KINDS, map(slice, ends[:-1], ends[1:]), strict=True))
+        # a matrix of each hand, filled up to the most rows that one has, and where its rows go
+        rows, owner = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
+        counts = np.bincount(owner, minlength=len(columns))
+        table = np.zeros((len(columns), counts.max(), self._size + 1))
+        self._index = np.empty(len(rows), dtype=np.intp)
+        for h, count in enumerate(counts.tolist()):
+            table[h, :count] = rows[owner == h]
+            self._index[owner == h] = h * counts.max() + np.arange(count)
+        self._constant, self._matrix = table[:, :, 0].copy(), table[:, :, 1:].copy()
 
-    # Rows ---------------------------------------------------------------------------------------
-
-    def _numbers(self, y: Array) -> list[tuple[Array, Indices]]:
-        """Return the check's numbers of loads, the same y of each hand, and whose each is.
-
-        Shear, normal and lateral load of each tile on rock; loads of palms; wrenches on the rock;
-        what hands hold along `HELD`; what may not be below zero; what presses on joints' stops;
-        what is used of half-planes, and of all other limits.
-        """
-        check, known, question = self._check, self._check.known, self._check.question
-        arrays = self._reader.read([y[: len(names)] for names in self._columns])[0]
+    def _numbers(self, y: Array) -> list[tuple[str, Array, Indices]]:
+        """Return the check's numbers of loads, the same y of each hand: kind, values and whose."""
+        check, question = self._check, self._check.question
+        arrays = self._arrays = self._reader.read([y[: len(names)] for names in self._columns])[0]
         assert question.body_wrench is not None
         joints = check.joints(self.wrong, arrays.wrenches, question.body_wrench)
-        again = check.again.of([], arrays, check.asked_for([], arrays, joints))
+        self.idle = check.idle(joints)
+        asked = list(check.recompute_asked(arrays, joints))
+        residuals, again, _ = check.settled.recompute(self.wrong, arrays, asked)
         named = np.array([y * (np.arange(len(y)) < len(names)) for names in self._columns])
-        error = max(again.error, LEVER * float(np.abs(self.loads_of(arrays) - named).max()))
-        # each load adds an error in proportion to it, and that without loads
-        if not 2.0 * (1.0 + len(y)) * error <= NEAR or any(again.contacts()):
+        off = [r.values for r in residuals if r.kind == "zero" and not r.affine]
+        off.append(self.loads_of(arrays) - named)
+        near = np.abs(np.concatenate(off, axis=None)).max() <= self._negligible
+        if not near or any(check_contacts(check.settled.names, arrays)):
             self.wrong.append("what loads do to the hands")
-
-        fingers, tiles, palms = again.shares
-        touching, owners = known.touch.touching, again.owners()
-        each, on_rock = owners["hands"], known.places.hand[touching]
-        kinds = zip(again.signed(), SIGNED, strict=True)
-        signs = [(values, owners[whose]) for values, (_, whose) in kinds]
-        stops = signs.pop(STOPS)
-        used = [
-            (fingers, owners["fingers"]),
-            (palms, each),
-            (again.along / known.hands[0].hand.structure.hand_load, each),
-            (again.nails.used, owners["nails"]),
+        each = np.arange(len(self._columns))
+        return [
+            ("load", again.loads, check.known.places.hand),
+            ("palm", arrays.palms, each),
+            ("wrench", arrays.wrenches, each),
+            *(
+                (r.kind, r.values, r.hand)
+                if r.error is None
+                else ("error", r.values / r.error, r.hand)
+                for r in residuals
+                if r.affine
+            ),
         ]
-        for h, place in enumerate(question.stance.hands):
-            capped, none = force_use([], question, place, again.wrenches[h], math.inf)
-            use = joints.pop(place.limb, JointUse(capped[:0], {}))
-            passive = np.array([*use.passive.values()]) / ARM
-            used.append((np.concatenate((capped, use.shares, -use.shares))[None], each[[h]]))
-            signs.append((np.concatenate((-none, passive, -passive))[None], each[[h]]))
-        self.idle = max((float(np.abs(use.shares).max()) for use in joints.values()), default=0.0)
-        parts = [
-            *([(own, on_rock)] for own in arrays.loads[touching].T),
-            [(arrays.palms[:, ::2], each)],
-            [(again.wrenches, each)],
-            [(again.along, each)],
-            signs,
-            [stops],
-            [(tiles[touching] / known.engagement[touching, None], on_rock)],
-            used,
-        ]
-        return [_flat(part) for part in parts]
 
-    def _stack(self, numbers: Sequence[Sequence[tuple[Array, Indices]]]) -> None:
-        """Put the numbers without loads, and per newton, into a matrix of each hand.
-
-        It is filled up with rows that are never wrong.
-        """
-        parts = []
-        for i, (rest, hand) in enumerate(numbers[0]):
-            slopes = [loaded[i][0] - rest for loaded in numbers[1:]]
-            parts.append(self._by_hand(np.column_stack([rest, *slopes]), hand, FILL.get(i, 0.0)))
-        rows = np.concatenate(parts, axis=1)
-        self._constant, self._matrix = rows[:, :, 0].copy(), rows[:, :, 1:].copy()
-        ends = accumulate((part.shape[1] for part in parts), initial=0)
-        slices = [slice(*pair) for pair in pairwise(ends)]
-        self._shear, self._normal, self._lateral, palm, self._wrench, self._held = slices[:6]
-        self._signs, self._stops, self._planes, others = slices[6:]
-        self._carried, self._used = slice(0, palm.stop), slice(self._planes.start, others.stop)
-
-    def _by_hand(self, rows: Array, hand: Indices, missing: float) -> Array:
-        """Return rows (n, k) as those of each hand, shape (hands, most, k), filled up."""
-        counts = np.bincount(hand, minlength=len(self._columns))
-        found = np.zeros((len(counts), counts.max(), rows.shape[1]))
-        found[:, :, 0] = missing
-        for h, count in enumerate(counts):
-            found[h, :count] = rows[hand == h]
-        return found
+    def _matters(self, kind: str, rows: Array) -> NDArray[np.bool_]:
+        """Return for which rows (n, 1 + m) of numbers there may be loads that they refuse."""
+        if KINDS.index(kind) < KINDS.index("zero"):
+            return np.ones(len(rows), dtype=bool)
+        changing = np.abs(rows[:, 1:]).max(axis=1, initial=0.0) > self._negligible
+        at_zero = {"zero": np.abs(rows[:, 0]), "use": rows[:, 0]}.get(kind, -rows[:, 0])
+        return np.asarray(changing | ~(at_zero <= self._negligible))
 
     def loads_of(self, arrays: PlanArrays) -> Array:
         """Return the loads (hands, m) of a plan's numbers, by their names."""
@@ -171,7 +131,7 @@ class LoadsCheck:
             "lateral": np.add.reduceat(arrays.loads[:, 2], first),
             NAIL: arrays.loads[np.array(ends) - 1, 0],
         }
-        found = np.zeros((len(self._columns), max(map(len, self._columns))))
+        found = np.zeros((len(self._columns), self._size))
         for h, (row, names, palm) in enumerate(
             zip(found, self._columns, arrays.palms, strict=True)
         ):
@@ -181,8 +141,6 @@ class LoadsCheck:
                 by_name |= {f"{name}/{kind}": own[i] for i, name in enumerate(FINGERS)}
             row[: len(names)] = [by_name[name] for name in names]
         return found
-
-    # Checking -----------------------------------------------------------------------------------
 
     def fault(
         self, loads: Array, wrenches: Array, utilisation: float, body_wrench: Array
@@ -200,53 +158,29 @@ class LoadsCheck:
         body_wrench : ndarray, shape (6,)
             In B.
         """
-        found = (self._matrix @ loads[:, :, None])[:, :, 0]
-        found += self._constant
-        own, used = found[:, self._wrench], found[:, self._used]
-        largest = max(1.0, float(most(np.abs(found[:, self._carried]), axis=None)))
-        allowed = LOAD * largest
-        size = math.sqrt(float(body_wrench @ body_wrench))
-        off = self._body @ loads.ravel()
-        off += self._from_rest
-        off -= body_wrench
-        again = max(float(most(used, axis=None)), 0.0, self.idle)
         if self.wrong:
             return self.wrong[0]
+        table = (self._matrix @ loads[:, :, None])[:, :, 0]
+        table += self._constant
+        found, of = table.take(self._index), self._of
+        own = found[of["wrench"]].reshape(-1, 6)
+        carried = np.abs(found[: of["palm"].stop])
+        allowed = LOAD * max(1.0, float(most(carried)))
+        again = max(float(most(found[of["use"]], initial=0.0)), self.idle)
         # each in terms that are false where a number is not finite
-        if not math.sqrt(float(off @ off)) <= BALANCE * max(size, 1.0):
-            return "the balance"
+        for words in self._check.unbalanced(own, body_wrench):
+            return words
         if not float(most(np.abs(own - wrenches), axis=None)) <= allowed:
             return "a hand's wrench"
-        signs, stops = found[:, self._signs], found[:, self._stops]
-        if not ((signs >= -allowed).all() and (stops >= -STOP).all()):
+        if not ((found[of["least"]] >= -allowed).all() and (found[of["error"]] >= -1.0).all()):
             return "a load of the wrong sign"
         if not abs(again - utilisation) <= UTILISATION * max(1.0, again):
             return "the utilisation"
-        if not (held_by(own[:, :3]) <= most(found[:, self._held], axis=1) + allowed).all():
-            return "what a hand holds"
-        for h, i, value in self._given:
-            if not abs(own[h, i] - value) <= allowed:
-                return "a wrench that is given"
-        for h in self._capped:
-            if not np.linalg.norm(own[h, :3]) <= (BALL @ own[h, :3]).max() + allowed:
-                return "a force that is capped"
-        return self._outside(found, allowed)
-
-    def _outside(self, found: Array, allowed: float) -> str | None:
-        """Say whether a tile is outside Eq. 21's surface, though within its half-planes."""
-        shear, normal = found[:, self._shear].ravel(), found[:, self._normal].ravel()
-        lateral = found[:, self._lateral].ravel()
-        inside = self._curves.excess(shear, normal, lateral, UTILISATION) <= allowed
-        if not inside.all():
-            # beyond its half-planes a tile may be outside the surface, too
-            used = most(found[:, self._planes].reshape(len(inside), -1), axis=1)
-            if (used[~inside] <= 1.0).any():
-                return "a tile's limit curve"
+        if not (np.abs(found[of["zero"]]) <= allowed).all():
+            return "a load or a wrench that is given"
+        tiles, settled = found[of["load"]].reshape(-1, 3), self._check.settled
+        curved = settled.recompute_curved(self._arrays, tiles, own)
+        for residual in (*curved, *self._check.asked.recompute_sizes(own)):
+            if not np.minimum.reduce(residual.values) >= -allowed:
+                return next(residual.off(np.full(len(own), allowed)))
         return None
-
-
-def _flat(parts: Sequence[tuple[Array, Indices]]) -> tuple[Array, Indices]:
-    """Return numbers (n, …) of hands (n,) one after another, and whose each is."""
-    values = [own.ravel() for own, _ in parts]
-    hands = [hand.repeat(own.size // max(len(own), 1)) for own, hand in parts]
-    return np.concatenate(values), np.concatenate(hands)

@@ -5,16 +5,18 @@ P across a nail follows from the balance about its pin; A along it is a load of 
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.hand import FINGERS, NAIL
-from planner.prepare import CONTACTS, NONE, HandBatch
+from planner.prepare import CONTACTS
 from planner.result import PlanArrays
+from planner.verification.residuals import COUNT, Names, Residual
 
-__all__ = ["NO_NAILS", "NailLoads", "Nails"]
+__all__ = ["NailLimits", "NailLoads"]
 
 
 class NailLoads(NamedTuple):
@@ -22,73 +24,57 @@ class NailLoads(NamedTuple):
 
     Attributes
     ----------
-    fingers : ndarray of int, shape (k,)
-        Whose they are, counted through all hands.
-    far : ndarray, shape (3,)
-        How far the pin of a straight finger is from its joints [m].
+    tiles, fingers : ndarray of int, shape (k,)
+        Which of the tiles they are, and whose, counted through all hands.
     angles : ndarray, shape (k,)
         How far each has turned, by where it hooks [rad].
     opening : ndarray, shape (k, 3)
-        What keeps the joints of its finger from closing, over those [N].
+        What keeps the joints of its finger from closing [N·m].
     turning : ndarray, shape (k,)
-        What is left of the balance about its pin, over its arm [N].
+        What is left of the balance about its pin [N·m].
     reach : ndarray, shape (k,)
-        That arm [m].
-    pressed : ndarray, shape (k,)
-        How hard it presses on the rock [N].
+        The arm of that [m].
+    pressed, aside : ndarray, shape (k,)
+        How hard it presses on the rock, and its force along it in the finger's plane [N].
     dragged : ndarray, shape (k,)
-        Its force along the rock [N].
-    within : ndarray, shape (k,)
-        What friction bears beyond that [N].
-    grips : ndarray, shape (k, 3)
-        How hard it presses, and what friction bears beyond its force in the finger's plane, one way
-        and the other: affine in the loads [N].
+        Its whole force along the rock [N].
     used : ndarray, shape (k, 2)
         Utilisations by shear of its finger, and by what its tip bears.
     """
 
+    tiles: Indices
     fingers: Indices
-    far: Array
     angles: Array
     opening: Array
     turning: Array
     reach: Array
     pressed: Array
+    aside: Array
     dragged: Array
-    within: Array
-    grips: Array
     used: Array
 
 
-NO_NAILS: Final = NailLoads(NONE, *np.zeros((8, 0)), *np.zeros((2, 0, 3)))
-"""Those of hands of which no nail hooks."""
-
-
-class Nails:
-    """The nails of settled hands that hook.
+class NailLimits:
+    """The nails of settled hands that hook: balance, friction and strength.
 
     Parameters
     ----------
-    known : HandBatch
-
-    Attributes
-    ----------
-    tiles, fingers : ndarray of int, shape (k,)
-        Which of the tiles they are, and whose.
+    names : Names
     """
 
-    def __init__(self, known: HandBatch) -> None:
-        self.tiles = np.flatnonzero(known.touch.contacts == CONTACTS[NAIL])
-        self.fingers = known.places.finger[self.tiles]
+    def __init__(self, names: Names) -> None:
+        known, self._names = names.known, names
+        self._tiles = np.flatnonzero(known.touch.contacts == CONTACTS[NAIL])
+        self._fingers = known.places.finger[self._tiles]
         body = known.hands[0].hand
         self._nail, self._model, structure = body.nail, body.finger, body.structure
         self._strengths = np.array([-structure.finger_shear, structure.fingertip_force])
         radii = np.array(self._model.pulley_radii)
         # from the base outward, each pulley leaves less of the tension; the pin's is the last
         loss = 1.0 - self._model.friction
-        self._local = np.empty((len(self.tiles), len(radii) + 1))
+        self._local = np.empty((len(self._tiles), len(radii) + 1))
         frames, outs = [], []
-        for local, finger in zip(self._local, self.fingers.tolist(), strict=True):
+        for local, finger in zip(self._local, self._fingers.tolist(), strict=True):
             h, i = divmod(finger, len(FINGERS))
             hand = known.hands[h]
             local[:] = loss ** (np.arange(len(local)) + FINGERS[i].startswith("outer"))
@@ -103,29 +89,44 @@ class Nails:
 
     def loads(self, arrays: PlanArrays) -> NailLoads:
         """Return what a plan's forces do to them."""
-        nail, force = self._nail, arrays.forces[self.tiles]
-        arm = arrays.points[self.tiles] - self._joints - self._far[0] * self._along
+        nail, force = self._nail, arrays.forces[self._tiles]
+        arm = arrays.points[self._tiles] - self._joints - self._far[0] * self._along
         x, z = (arm * self._along).sum(axis=1), arm[:, 2]
         along, into = (force * self._along).sum(axis=1), force[:, 2]
         angles, reach = np.arctan2(z, x), np.hypot(x, z)
-        pulls = self._local * self._pulls * arrays.tensions[self.fingers, None]
+        pulls = self._local * self._pulls * arrays.tensions[self._fingers, None]
         about_pin = x * into - z * along
         opening = np.outer(into, self._far) + about_pin[:, None]
         opening -= pulls[:, :-1] - self._model.joint_preload
-        turning = pulls[:, -1] - nail.preload - nail.stiffness * angles - about_pin
         pressed = -(force * self._outs).sum(axis=1)
-        dragged = np.linalg.norm(force + pressed[:, None] * self._outs, axis=1)
-        aside, held = (force * self._sideways).sum(axis=1), nail.friction * pressed
         return NailLoads(
-            fingers=self.fingers,
-            far=self._far,
+            tiles=self._tiles,
+            fingers=self._fingers,
             angles=angles,
-            opening=opening / self._far,
-            turning=turning / reach,
+            opening=opening,
+            turning=pulls[:, -1] - nail.preload - nail.stiffness * angles - about_pin,
             reach=reach,
             pressed=pressed,
-            dragged=dragged,
-            within=held - dragged,
-            grips=np.column_stack([pressed, held - aside, held + aside]),
+            aside=(force * self._sideways).sum(axis=1),
+            dragged=np.linalg.norm(force + pressed[:, None] * self._outs, axis=1),
             used=np.column_stack([along, into]) / self._strengths,
         )
+
+    def recompute(self, nails: NailLoads) -> Iterator[Residual]:
+        """Yield what is left of balance and friction, and what is used of fingers' strength."""
+        hand = self._fingers // COUNT
+        name = self._names.of_fingers(NAIL, self._fingers)
+        turning, text = nails.turning / nails.reach, " is out of balance by {:.3g} N·m"
+        yield Residual("zero", turning, hand, name, text, (nails.turning,))
+        opening, text = (
+            nails.opening / self._far,
+            " lets a joint of its finger close, by {:.3g} N·m",
+        )
+        yield Residual("least", opening, hand, name, text, (-nails.opening,))
+        held, pressed = self._nail.friction * nails.pressed, nails.pressed
+        text = " would slip: {:.3g} N along rock pressed with {:.3g} N"
+        grips = np.column_stack([pressed, held - nails.aside, held + nails.aside])
+        numbers = nails.dragged, pressed
+        yield Residual("least", grips, hand, name, text, numbers)
+        yield Residual("least", held - nails.dragged, hand, name, text, numbers, affine=False)
+        yield Residual("use", nails.used, hand)

@@ -75,7 +75,7 @@ def gently(tension: float, hold, closing_tension: float) -> tuple[Question, tupl
     ("tension", "hold", "closing_tension", "words"),
     [
         (24.0, Cylinder(0.3), 37.0, "dragged backwards"),
-        (28.0, Cylinder(0.3), 37.0, "is pulled off with"),
+        (28.0, Cylinder(0.3), 37.0, "is pulled off"),
         (33.0, Cylinder(0.08), 37.0, "leave its stop"),
     ],
 )

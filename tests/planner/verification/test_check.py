@@ -11,8 +11,8 @@ from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, settle_hand
 from planner.result import Plan, PlanArrays
 from planner.solving import plan
-from planner.verification import Check, recomputation
-from planner.verification.recomputation import LimitCurves
+from planner.verification import Check, hands as hand_limits
+from planner.verification.tiles import LimitCurves
 from tests.suite.helpers.checks import problems
 from tests.suite.helpers.hands import changed_hand
 from tests.suite.helpers.stances import (
@@ -85,7 +85,11 @@ TAMPERED = {
     "normal of the base tile": (("loads",), at((BASE, 1), more(0.01)), "not what the plan says"),
     "lateral": (("loads",), at((TILE, 2), more(0.01)), "force and loads disagree"),
     "no load": (("loads",), at((TILE, 0), none), "not what the plan says"),
-    "infinite load": (("loads",), at((TILE, 1), lambda n: float("inf")), "loads disagree"),
+    "infinite load": (
+        ("loads",),
+        at((TILE, 1), lambda n: float("inf")),
+        "force and loads disagree",
+    ),
     "shear axis": (("axes",), at((TILE, 0), lambda a: -a), "force and loads disagree"),
     "normal axis": (("axes",), at((TILE, 1, 1), more(0.01)), "force and loads disagree"),
     "force x": (("forces",), at((TILE, 0), more(0.01)), "force and loads disagree"),
@@ -160,7 +164,7 @@ def test_half_planes_that_promise_more_than_the_limit_curve_are_found():
 
 
 def test_rows_that_promise_more_than_a_hand_holds_are_found(monkeypatch):
-    monkeypatch.setattr(recomputation, "HELD", 0.5 * recomputation.HELD)
+    monkeypatch.setattr(hand_limits, "HELD", 0.5 * hand_limits.HELD)
     assert any("more than its rows say" in each for each in complaints(honest()))
 
 

@@ -1,0 +1,115 @@
+"""Palms, and hands as a whole: forces and their sums, what a hand holds, contacts as planned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array
+from hand_models.hand import HELD
+from planner.result import PlanArrays
+from planner.verification.residuals import UTILISATION, Names, Recomputed, Residual, claim
+
+__all__ = ["HandLimits", "check_contacts"]
+
+PULLING: Final = np.array([np.inf, np.inf, 0.0])
+"""Of a hand's force, what does not press."""
+
+PALM_SIGNS: Final = np.array([-1.0, 1.0])
+"""Which way a palm shears and presses along x and z."""
+
+
+class HandLimits:
+    """What palms and whole hands bear, and whether their wrenches are the sums of forces.
+
+    Parameters
+    ----------
+    names : Names
+    """
+
+    def __init__(self, names: Names) -> None:
+        known = names.known
+        self._names, self._known = names, known
+        self._each = np.arange(len(known.hands))
+        self._palm_shares = PALM_SIGNS / known.palm_limits
+        self._hand_load = known.hands[0].hand.structure.hand_load
+
+    def recompute(self, again: Recomputed, each: Array) -> Iterator[Residual]:
+        """Yield what forces leave of their sums, and use of palms and hands.
+
+        ``each``: the wrenches of all forces, shape (T + H, 6).
+        """
+        told, names, own = again.arrays, self._names, self._each
+        tiles, palms = len(told.loads), told.palms
+        off = told.forces[:tiles] - (told.loads[:, None] @ told.axes)[:, 0]
+        text = ": force and loads disagree"
+        yield Residual("zero", off, self._known.places.hand, names.tile, text)
+        wrenches = np.add.reduceat(each[:tiles], self._known.places.first)
+        wrenches += each[tiles:]
+        wrenches[:, 3:] += told.palm_moments
+        text = "the wrench is not the sum of its tiles' and palm's forces"
+        yield Residual("zero", wrenches - told.wrenches, own, names.limb, text)
+        text = "the palm cannot exert {:.6g}, {:.6g}, {:.6g} N"
+        numbers = palms[:, 0], palms[:, 1], palms[:, 2]
+        yield Residual("zero", palms[:, 1], own, names.limb, text, numbers)
+        pressing = palms[:, ::2]
+        yield Residual("least", pressing * PALM_SIGNS, own, names.limb, text, numbers)
+        used, said = pressing * self._palm_shares, told.palm_utilisations
+        yield Residual("use", used, own)
+        most = np.maximum.reduce(used, axis=1)
+        yield claim(most, said, own, UTILISATION, names.limb, "palm: utilisation")
+        along = told.wrenches[:, :3] @ HELD.T
+        yield Residual("use", along / self._hand_load, own)
+        yield self.recompute_held(told.wrenches, along)
+
+    def recompute_held(self, wrenches: Array, along: Array | None = None) -> Residual:
+        """Return what rows say that hands hold, beyond what they do: across and away from rock.
+
+        Of wrenches (H, 6) on the rock [N]; ``along``: the rows, if they are known.
+        """
+        forces = wrenches[:, :3]
+        along = forces @ HELD.T if along is None else along
+        held = np.minimum(forces, PULLING)
+        size = np.sqrt(np.add.reduce(held * held, axis=1))
+        left, text = np.maximum.reduce(along, axis=1) - size, "the hand holds {:.6g} N, more than "
+        name = self._names.limb
+        return Residual(
+            "least", left, self._each, name, text + "its rows say", (size,), affine=False
+        )
+
+
+def check_contacts(names: Names, arrays: PlanArrays) -> Iterator[str]:
+    """Yield what carries a load that cannot, and contacts that are not as the plan says."""
+    known, limbs, palms = names.known, names.limbs, arrays.palms
+    for own, told in ((known.points, arrays.points), (known.axes, arrays.axes)):
+        if not (told is own or np.array_equal(told, own)):
+            hands = np.concatenate((known.places.hand, np.arange(len(palms))))
+            elsewhere = (told != own).reshape(len(own), -1).any(axis=1)
+            for i in np.flatnonzero(elsewhere).tolist():
+                if arrays.wrists[hands[i]] is None:
+                    yield f"{names.tile(i)} is elsewhere, or turned"
+    for t in known.touch.idle.tolist():
+        if arrays.forces[t].any():
+            yield f"{names.tile(t)} carries a load but touches nothing"
+    shares, said = known.engagement, arrays.engagement
+    if said is not shares:
+        for t in np.flatnonzero(said != shares).tolist():
+            yield f"{names.tile(t)}: {shares[t]:.6g} of its spines hold, not {said[t]:.6g}"
+    for h, hand in enumerate(known.hands):
+        engaged, told_engaged = hand.palm.engaged, arrays.engaged[h]
+        if not (engaged and told_engaged) and palms[h].any():
+            yield f"{limbs[h]}: the palm carries a load but touches nothing"
+        if engaged != told_engaged:
+            touching = f"{list(engaged)}, not {list(told_engaged)}"
+            yield f"{limbs[h]}: the palm touches with tiles {touching}"
+        if hand.tiles != arrays.tiles[h]:
+            for t, (tile, each) in enumerate(
+                zip(hand.tiles, arrays.tiles[h], strict=True), int(known.places.first[h])
+            ):
+                if tile != each:
+                    if each.contact == "none" and arrays.forces[t].any():
+                        yield f"{names.tile(t)} carries a load but touches nothing"
+                    planned = f"the plan has {' '.join(each)}"
+                    yield f"{names.tile(t)} touches with {tile.contact}; {planned}"

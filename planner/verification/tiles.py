@@ -1,0 +1,170 @@
+"""Loads of tiles against the law of their spines on rock (Eqs. 20, 21), recomputed.
+
+Whether a load is outside the law's surface is computed from the law that a surface declares, and
+not by the half-planes that a plan is made of; by these only what the plan says is used of a tile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.tile import HalfPlane, Surface
+from planner.verification.nails import NailLoads
+from planner.verification.residuals import LOAD, UTILISATION, Names, Recomputed, Residual, claim
+
+__all__ = ["LimitCurves", "TileLimits"]
+
+SMALL: Final = 1e-300
+"""In place of a load that is zero, where something is divided by it [N]."""
+
+SIDES: Final = np.array([1.0, -1.0])
+"""Of a lateral load."""
+
+
+class LimitCurves:
+    """The limit surfaces of some tiles, each on its own rock.
+
+    The same surface as `Surface.strength`, written in the load itself instead of its direction:
+    with a the load in the tile's plane and r its size, cos φ = a / r and cos θ = T / a, so that
+
+        f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)] = f_s(φ) [1 − (1 − λ(φ)) (a − T) / r].
+
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+        Some of them, in any order.
+    of_tile : ndarray of int, shape (n,)
+        Which of them each tile has.
+    shares : ndarray, shape (n,) or ()
+        Part of each tile's spines that are on the rock: that of a whole tile's strength.
+    """
+
+    def __init__(self, surfaces: Sequence[Surface], of_tile: Indices, shares: Array) -> None:
+        numbers = [_numbers(surface) for surface in surfaces]
+        of_each = np.array(numbers).T.take(of_tile, 1)
+        of_each[[0, 2]] *= shares
+        # f_s, and 1 − λ: at φ = 0, and what they lose up to φ_max; −1 / φ_max; γ
+        self._flat, self._loss, (self._per_radian, self._gain) = np.split(of_each, [2, 4])
+
+    def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
+        """Return how far loads are beyond their surfaces, pressing ones in the tiles' planes [N].
+
+        Parameters
+        ----------
+        shear, normal, lateral : ndarray, shape (n,)
+            The last of either sign. Shear below zero is Coulomb friction's, not the spines'.
+        relative : float
+            Part of its strength by which a load may exceed it.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Negative inside.
+        """
+        shear = np.maximum(shear, 0.0)
+        along = np.hypot(shear, lateral)
+        pull = np.minimum(normal, 0.0)
+        # pressed, a tile holds what it does in its own plane, and more by the gain
+        size = np.hypot(along, pull)
+        ratio = np.minimum(np.arctan2(pull, along) * self._per_radian, 1.0)
+        straight, aside = self._flat - self._loss * ratio
+        strength = straight * (1.0 - aside * ((along - shear) / (size + SMALL)))
+        return np.asarray(size - self._gain * (normal - pull) - (1.0 + relative) * strength)
+
+
+def _numbers(surface: Surface) -> tuple[float, ...]:
+    """Return f_s and 1 − λ at φ = 0, what they lose up to φ_max, −1 / φ_max, γ."""
+    share = surface.lateral_limit / surface.shear_limit
+    return (
+        surface.shear_limit,
+        1.0 - share,
+        surface.shear_limit - surface.pull_off_limit,
+        share * (surface.lateral_pull_off_ratio - 1.0),
+        -1.0 / surface.pull_off_angle,
+        surface.compression_gain,
+    )
+
+
+class TileLimits:
+    """What tiles bear: friction, the law's surface, and what a plan's half-planes say is used.
+
+    Parameters
+    ----------
+    names : Names
+    """
+
+    def __init__(self, names: Names) -> None:
+        known = names.known
+        surfaces, self._of = [hand.surface for hand in known.hands], known.places.hand
+        self._names, self._known = names, known
+        self._framed = bool(known.touch.framed.any())
+        # tiles that touch nothing use nothing of their limits
+        shares = np.where(known.touch.away, 1.0, known.engagement)
+        self._per_share = (known.touch.touches / shares)[:, None]
+        self._curves = LimitCurves(surfaces, self._of, shares)
+        self._lateral = np.array([each.lateral_limit for each in surfaces])[self._of, None]
+        self._planes: tuple[tuple[tuple[HalfPlane, ...], ...], Array] = (), np.zeros(0)
+
+    def recompute(self, again: Recomputed, nails: NailLoads | None) -> Iterator[Residual]:
+        """Yield what loads leave of friction, of frames that only rest on rock, and of the law.
+
+        ``nails``: what those do that hook, of which the plan says what is used, too.
+        """
+        known, name, told = self._known, self._names.tile, again.arrays
+        shear, normal, _ = again.loads.T
+        bases, pressed = known.places.bases, normal.copy()
+        pressed[bases] = known.engagement[bases] * normal[bases + 1]
+        backwards = " is pulled off or dragged backwards: {:.3g} N along, {:.3g} N across"
+        rubs, across = shear + known.friction * pressed, (shear, normal)
+        yield Residual("least", rubs, self._of, name, backwards, across)
+        if self._framed:
+            text, pressed = ": its bare frame would be pulled off", normal * known.touch.framed
+            yield Residual("least", pressed, self._of, name, text)
+        planes = self._used(told.half_planes, again.loads) * self._per_share
+        yield Residual("use", planes, self._of)
+        used = np.maximum.reduce(planes, axis=1)
+        if nails is not None:
+            used[nails.tiles] = np.maximum.reduce(nails.used, axis=1)
+        used, said = np.maximum(used, 0.0), told.tile_utilisations
+        yield claim(used, said, self._of, UTILISATION, name, ": utilisation")
+        yield self.recompute_law(told.half_planes, again.loads)
+
+    def recompute_law(
+        self, half_planes: tuple[tuple[HalfPlane, ...], ...], loads: Array
+    ) -> Residual:
+        """Return how far loads (T, 3) are within the law's surface [N]; zero beyond half-planes.
+
+        There a tile may be outside the surface, too, and the plan says that it is overloaded.
+        """
+        inside = -self._curves.excess(loads[:, 0], loads[:, 1], loads[:, 2], UTILISATION)
+        if not np.minimum.reduce(inside) >= -LOAD:
+            sides = loads[:, 2:] / self._lateral * SIDES
+            used = np.hstack([self._used(half_planes, loads), sides]) * self._per_share
+            inside[(used.max(axis=1) > 1.0) | self._known.touch.away] = 0.0
+        text = " is beyond its limit curve"
+        return Residual("least", inside, self._of, self._names.tile, text, affine=False)
+
+    def _used(self, half_planes: tuple[tuple[HalfPlane, ...], ...], loads: Array) -> Array:
+        """Return what loads use of half-planes, if all spines held, shape (T, 2 p)."""
+        known, table = self._planes
+        if known != half_planes:
+            table = planes_of(half_planes).take(self._of, 0)
+            self._planes = half_planes, table
+        return np.asarray((table @ loads[:, :, None])[:, :, 0])
+
+
+def planes_of(pieces: tuple[tuple[HalfPlane, ...], ...]) -> Array:
+    """Return hands' half-planes over their capacities, shape (H, 2 p, 3).
+
+    For lateral loads of either sign; zero where a hand has fewer than others.
+    """
+    found = np.zeros((len(pieces), 2 * max(map(len, pieces)), 3))
+    for rows, own in zip(found, pieces, strict=True):
+        for k, plane in enumerate(own):
+            row = np.array([plane.a_shear, plane.a_normal, plane.a_lateral]) / plane.capacity
+            rows[2 * k], rows[2 * k + 1] = row, row * [1.0, 1.0, -1.0]
+    return found
