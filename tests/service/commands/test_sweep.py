@@ -180,6 +180,23 @@ def test_a_sweep_ends_with_its_processes(tmp_path: Path) -> None:
 
 WIDE = ["--vary", "load.mass=60:140:30", "--vary", "body.position.0=-0.06:0.06:40"]
 
+STOPPING = """
+import itertools, threading
+from service.bulk.tables import CsvTable
+from service.sweeping import evaluation
+
+CsvTable.seconds = 0.0  # rows are kept at once
+answered = evaluation.answered
+
+def first(questions, pool, form):
+    yield from itertools.islice(answered(questions, pool, form), 400)
+    print("400 are answered", flush=True)
+    threading.Event().wait()
+
+evaluation.answered = first
+"""
+"""What makes a sweep stop after 400 points, and stay until it is killed."""
+
 
 def manifest(folder: Path) -> dict:
     path = folder / "sweep.csv.manifest.json"
@@ -194,12 +211,15 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
     whole, folder = tmp_path / "whole", tmp_path / "broken"
     assert run(["sweep", "wall-300", *WIDE, "-o", str(whole), "--json"]) == DONE
     summary = result(capfd)
-    process = begun("sweep", "wall-300", *WIDE, "-o", str(folder), "--workers", "2")
-    until(lambda: sum(part["rows"] for part in manifest(folder)["parts"]), process)
+    process = begun(
+        "sweep", "wall-300", *WIDE, "-o", str(folder), "--workers", "2", before=STOPPING
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"400 are answered\n"
     process.kill()
     ended(process)
     done = sum(part["rows"] for part in manifest(folder)["parts"])
-    assert 0 < done < 1200
+    assert 0 < done <= 400
     assert not manifest(folder)["complete"]
     # a row that is cut off, as a kill in the middle of writing leaves it
     with (folder / "sweep.csv").open("ab") as file:

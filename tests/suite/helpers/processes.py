@@ -19,10 +19,10 @@ PROC = Path("/proc")
 watched = pytest.mark.skipif(not (PROC / "self/stat").exists(), reason="needs /proc")
 
 
-def begun(*arguments: str, **more: object) -> subprocess.Popen[bytes]:
-    """A command that has just been started."""
+def begun(*arguments: str, before: str = "", **more: object) -> subprocess.Popen[bytes]:
+    """A command that has just been started, in a process that runs some code before it."""
     return subprocess.Popen(
-        [sys.executable, "-c", "from service.commands import main; main()", *arguments],
+        [sys.executable, "-c", f"{before}\nfrom service.commands import main; main()", *arguments],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
         start_new_session=True,
