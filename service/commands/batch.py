@@ -5,24 +5,18 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from hand_models.base import CruxError, InvalidInputError
-from service.commands.options import (
-    dask_option,
-    hand_option,
-    json_option,
-    robot_option,
-    workers_option,
-)
+from service.commands.options import Own, Workers, json_option, own_options, workers_options
 from service.processes import Interrupted
 from service.tables import (
     BAD_INPUT,
@@ -40,11 +34,10 @@ from service.tables import (
 from service.wire import REQUEST_KINDS, Answer
 
 if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
     from planner import RobotFile
     from service.bulk import Asked, Column, Question, Sink, Table, Tally
 
-__all__ = ["answer_rest", "batch", "complain", "exit_status", "place", "writing_answers"]
+__all__ = ["answer_rest", "batch", "complain", "exit_status", "new_sink", "writing_answers"]
 
 WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
@@ -69,27 +62,23 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
     is_flag=True,
     help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
 )
-@workers_option
-@dask_option
+@workers_options
 @click.option(
     "--explain/--no-explain",
     default=None,
     help="Whether it is proven and named what is in the way where a stance is overloaded or "
     "infeasible. By default replies do as their requests say, and tables leave it out.",
 )
-@hand_option
-@robot_option
+@own_options
 @json_option
 def batch(
     requests: str,
     file: Path | None,
     columns: str | None,
     resume: bool,
-    workers: int | None,
-    dask: str | None,
+    parallel: Workers,
     explain: bool | None,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: Own,
     as_json: bool,
 ) -> int:
     """Answer many plan requests: one a line in, one reply, row or error out, in order.
@@ -103,7 +92,7 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
-    from service.bulk import Lines, ReplyLines, Rows, evaluate, new_manifest, table_at
+    from service.bulk import Lines, evaluate, table_at
 
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
@@ -115,24 +104,19 @@ def batch(
         write_alone(file)
     begun = perf_counter()
     with closing(Lines(requests)) as lines:
-        if kind is None:
-            with writing_answers(file):
-                sink: Sink = ReplyLines(file, as_json, resume, lines)
-        else:
-            assert file is not None
-            explain = bool(explain)
-            chosen = _columns(columns, robot, explain)
-            now = new_manifest([each.name for each in chosen], explain, hand, robot)
-            with writing_answers(file):
-                sink = Rows(kind.opened(file, chosen, now, resume, lines))
+        explain = explain if kind is None else bool(explain)
+        choose = partial(_columns, columns, own.robot, bool(explain))
+        sink = new_sink(
+            file, lines, choose, own, explained=bool(explain), resume=resume, shown=as_json
+        )
         before = sink.tally.count
-        on, workers = place(dask, workers, lines.count - before)
+        on, workers = parallel.place(lines.count - before)
         answers = partial(
             evaluate,
             on=on,
             workers=workers,
-            hand=hand,
-            robot=robot,
+            hand=own.hand,
+            robot=own.robot,
             folder=Path() if requests == "-" else Path(requests).parent,
             explain=explain,
             columns=sink.columns,
@@ -152,30 +136,49 @@ def writing_answers(file: Path | None) -> AbstractContextManager[None]:
     return nullcontext() if file is None else writing(file, "-o")
 
 
-def place(dask: str | None, workers: int | None, left: int) -> tuple[str, int | None]:
-    """Return where so many questions are answered, and by how many processes.
+def new_sink(
+    file: Path | None,
+    asked: Asked,
+    columns: Callable[[], Sequence[Column]],
+    own: Own,
+    *,
+    explained: bool,
+    resume: bool,
+    shown: bool = False,
+) -> Sink:
+    """Return where answers go: rows of a table or lines of a file, or lines on standard output.
 
     Parameters
     ----------
-    dask : str or None
-        As `--dask`.
-    workers : int or None
-        As `--workers`.
-    left : int
-        Questions, each as dear as a plan.
+    file : Path or None
+    asked : Asked
+        All questions.
+    columns : callable
+        Returns the columns of a table.
+    own : Own
+        What a table is of.
+    explained : bool
+        Whether a table is of explained plans.
+    resume : bool
+        Whether what the file answers is kept.
+    shown : bool, optional
+        Whether replies go to standard output where there is no file.
     """
-    from service.bulk import LOCAL
-    from service.processes import worth
+    from service.bulk import ReplyLines, Rows, new_manifest, table_at
 
-    if dask is not None:
-        return (LOCAL if dask == "local" else dask), workers
-    count = worth(left, workers)
-    return ("here", None) if count == 1 else ("processes", count)
+    kind = None if file is None else table_at(file)
+    if file is None or kind is None:
+        with writing_answers(file):
+            return ReplyLines(file, shown, resume, asked)
+    chosen = columns()
+    now = new_manifest([each.name for each in chosen], explained, *own)
+    with writing_answers(file):
+        return Rows(kind.opened(file, chosen, now, resume, asked))
 
 
 def answer_rest(
     asked: Asked,
-    answers: Callable[[Iterator[Question]], Generator[Answer, None, None]],
+    answers: Callable[[Iterator[Any]], Generator[Answer, None, None]],
     sink: Sink,
     file: Path | None,
     title: str,
@@ -313,18 +316,22 @@ def _summary(tally: Tally, elapsed: float) -> dict[str, object]:
 
 
 def _print(tally: Tally, before: int, elapsed: float, file: Path | None) -> None:
-    from service.tables import console, table_of
+    from service.tables import console, name, number, print_rows
 
     out = console()
-    table = table_of("answer", numbers=("requests", "median ms", "longest ms"))
-    for status in (*EXIT_STATUS, "failed"):
-        times = tally.middle_and_longest(status)
-        shown = ["-" if time is None else f"{1e3 * time:.1f}" for time in times]
-        table.add_row(status, str(tally.statuses[status]), *shown)
-    for kind, count in sorted(tally.kinds.items()):
-        table.add_row(f"error: {kind}", str(count), "-", "-")
+    rows: list[tuple[object, ...]] = [
+        (status, tally.statuses[status], *tally.middle_and_longest(status))
+        for status in (*EXIT_STATUS, "failed")
+    ]
+    rows += [(f"error: {kind}", count, None, None) for kind, count in sorted(tally.kinds.items())]
+    columns = (
+        name("answer", "0"),
+        number("requests", "1"),
+        number("median ms", "2", ".1f", scale=1e3),
+        number("longest ms", "3", ".1f", scale=1e3),
+    )
     if verbosity() >= 0:
-        out.print(table)
+        print_rows(rows, columns, out)
     done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""

@@ -14,15 +14,14 @@ import click
 import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, whole_file
-from service.commands.batch import place
 from service.commands.options import (
     FiniteRange,
-    dask_option,
+    OutputFile,
+    Workers,
     hand_option,
     json_option,
-    output_in,
     plot_option,
-    workers_option,
+    workers_options,
 )
 from service.processes import Interrupted
 from service.tables import progress, say, write_alone, writing
@@ -59,6 +58,8 @@ PLANS: Final = 15
 DEAR: Final = 40
 """Trials as which one counts whose seat is searched for."""
 
+DEGREE: Final = 180.0 / math.pi
+
 UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 """Of the file."""
 
@@ -68,9 +69,8 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(OUTPUT),
     required=True,
-    callback=output_in(OUTPUT),
     metavar="JSON",
     help="Where the holds go, the best first, in metres and radians.",
 )
@@ -114,8 +114,7 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
     metavar="N",
     help="Of the best N tell also what is left where the hand is a little elsewhere.",
 )
-@workers_option
-@dask_option
+@workers_options
 @hand_option
 @plot_option("Draw the rock there, and on it the largest pull-off at each point.")
 @json_option
@@ -128,8 +127,7 @@ def holds(
     surface: str,
     seat: Literal["rest", "best"],
     robust: int,
-    workers: int | None,
-    dask: str | None,
+    parallel: Workers,
     hand: ParameterTable | None,
     picture: Path | None,
     as_json: bool,
@@ -176,7 +174,7 @@ def holds(
     scattered: dict[int, Outcome] = {}
     best: list[Pair] = []
     broken: Interrupted | CruxError | None = None
-    on, count = place(dask, workers, PLANS * (DEAR if seat == "best" else 1) * len(trials))
+    on, count = parallel.place(PLANS * (DEAR if seat == "best" else 1) * len(trials))
     try:
         with HoldTrials(mesh, surface, numbers, seat=seat, on=on, workers=count) as tried:
             _keep(f"trying {len(trials):,} places", trials, tried.each(trials), outcomes)
@@ -319,6 +317,10 @@ def _draw(mesh: Any, trials: list[Trial], found: list[Pair], path: Path, name: s
         )
 
 
+def _finite(value: float) -> str:
+    return f"{value:.1f}" if math.isfinite(value) else "-"
+
+
 def _print(
     trials: list[Trial],
     found: list[Pair],
@@ -329,25 +331,19 @@ def _print(
 ) -> None:
     """Print the best holds, and why hands cannot be at other places."""
     from hand_models.fixed_wrist import AT_BORDER
-    from service.tables import table_of
+    from service.tables import name, number, print_rows
 
-    numbers = ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "99 in 100")
-    table = table_of("x, y, z mm", numbers=numbers)
-    for trial, each in found[:SHOWN]:
-        left = [
-            "-" if values is None or not math.isfinite(values[0]) else f"{values[0]:.1f}"
-            for values in (each.tenth, each.hundredth)
-        ]
-        table.add_row(
-            ", ".join(f"{1e3 * value:z.0f}" for value in trial.point),
-            f"{math.degrees(trial.wrist_angle):.0f}",
-            f"{math.degrees(trial.outer_rotation):.0f}",
-            f"{each.support[0]:z.1f}",
-            f"{each.pure:.1f}" if math.isfinite(each.pure) else "-",
-            f"{each.support[1:].min():z.1f}",
-            *left,
-        )
-    out.print(table)
+    columns = (
+        name("x, y, z mm", "0.point", lambda at: ", ".join(f"{1e3 * x:z.0f}" for x in at)),
+        number("wrist °", "0.wrist_angle", ".0f", scale=DEGREE),
+        number("outer °", "0.outer_rotation", ".0f", scale=DEGREE),
+        number("pull N", "1.support.0", "z.1f"),
+        number("alone", "1.pure", _finite),
+        number("shear N", lambda row: row[1].support[1:].min(), "z.1f"),
+        number("9 in 10", "1.tenth.0", _finite),
+        number("99 in 100", "1.hundredth.0", _finite),
+    )
+    print_rows(found[:SHOWN], columns, out)
     points = len({trial.point for trial in trials})
     pulled = sum(each.support[0] > 0.0 for _, each in found)
     out.print(

@@ -16,11 +16,10 @@ import msgspec
 from service.commands.options import (
     PICTURES,
     FiniteRange,
-    asked,
-    hand_option,
+    OutputFile,
+    Own,
     json_option,
-    output_in,
-    robot_option,
+    own_options,
     stance_argument,
     timeout_option,
     wait_option,
@@ -42,9 +41,6 @@ from service.wire import DEFAULT_ROBOT, UNREACHABLE, ServiceError, service_key
 
 if TYPE_CHECKING:
     import zenoh
-
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
 
 __all__ = ["demo", "query", "schema", "serve"]
 
@@ -85,8 +81,7 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command()
 @zenoh_options
-@hand_option
-@robot_option
+@own_options
 @click.option(
     "--workers",
     type=click.IntRange(1, 256),
@@ -110,8 +105,7 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @json_option
 def serve(
     config: zenoh.Config,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: Own,
     workers: int | None,
     seconds: float,
     metrics_port: int | None,
@@ -137,7 +131,7 @@ def serve(
     closed(config)
     endpoints = listening(config)
     with ended_in_time(open_session(config)) as session:
-        service = PlanService(session, robot, hand, workers=workers, seconds=seconds)
+        service = PlanService(session, own.robot, own.hand, workers=workers, seconds=seconds)
         if metrics_port is not None:
             service.serve_metrics(metrics_port)
         if service.has_rival():
@@ -200,16 +194,14 @@ def _leave(*_: object) -> None:
 @zenoh_options
 @timeout_option
 @wait_option
-@hand_option
-@robot_option
+@own_options
 @json_option
 def query(
     stance: str,
     config: zenoh.Config,
     timeout: float | None,
     wait: float | None,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: Own,
     as_json: bool,
 ) -> int:
     """Ask a running service for a plan.
@@ -218,7 +210,7 @@ def query(
     """
     from service.serving import CruxClient
 
-    request = with_extras(asked(read_request(stance), hand, robot), whole=not as_json)
+    request = with_extras(own.asked(read_request(stance)), whole=not as_json)
     start_zenoh_log()
     name = request.stance.robot or DEFAULT_ROBOT
     with CruxClient(config, name, timeout=timeout, wait=wait) as client:
@@ -231,30 +223,27 @@ def query(
     "-o",
     "--output",
     "picture",
-    type=click.Path(path_type=Path),
-    callback=output_in(*PICTURES),
+    type=OutputFile(*PICTURES),
     default="crux-demo.png",
     show_default=True,
     metavar="FILE",
     help="Where the picture goes.",
 )
-@hand_option
-@robot_option
+@own_options
 @json_option
-def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as_json: bool) -> int:
+def demo(picture: Path, own: Own, as_json: bool) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer.
 
     A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
     """
     from service import answering
-    from service.answering import robots_of
     from service.serving import CruxClient, PlanService
     from service.tables import console
 
-    request = with_extras(asked(read_request(DEMO_STANCE), hand, robot))
+    request = with_extras(own.asked(read_request(DEMO_STANCE)))
     start_zenoh_log()
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with open_session(config) as session, PlanService(session, robot, workers=1) as service:
+    with open_session(config) as session, PlanService(session, own.robot, workers=1) as service:
         client = CruxClient(session, service.robot, timeout=PATIENCE)
         try:
             reply = client.plan(request)
@@ -265,7 +254,7 @@ def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as
             stance = msgspec.structs.replace(request.stance, joints=None)
             request = msgspec.structs.replace(request, stance=stance)
             reply = client.plan(request)
-    draw_plan(answering.planned(request, robots_of(robot)), picture)
+    draw_plan(answering.planned(request, own.robots), picture)
     status = show(reply, as_json)
     if not as_json:
         console().print(f"picture: {picture}", markup=False)

@@ -12,19 +12,18 @@ import msgspec
 
 from hand_models.base import InvalidInputError
 from service.commands.options import (
-    asked,
-    draws_option,
-    explain_option,
-    hand_option,
+    Own,
+    Wanted,
     json_option,
+    own_options,
     plot_option,
-    robot_option,
     spread_option,
     stance_argument,
+    wanted_options,
     with_extras,
 )
 from service.commands.stances import Given, read_with_text
-from service.requests import Draw, PlanRequest, Want
+from service.requests import PlanRequest, Want
 from service.tables import (
     EXIT_STATUS,
     FAILED,
@@ -38,8 +37,6 @@ from service.tables import (
 )
 
 if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
     from service.answering import Planned, Robots
     from service.replies import PlanReply
 
@@ -71,46 +68,38 @@ ADVICE_SECONDS: Final = 30.0
     metavar="DIR",
     help="Write what would make it hold there, each advice as a STANCE of its own.",
 )
-@draws_option
-@explain_option
-@hand_option
-@robot_option
+@wanted_options
+@own_options
 @json_option
 def plan(
     stance: str,
     picture: Path | None,
     robust: bool,
-    spread: bool,
     clearance: bool,
     advice_folder: Path | None,
-    draws: list[Draw] | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    wanted: Wanted,
+    own: Own,
     as_json: bool,
 ) -> int:
     """Make one plan, without the network."""
     from planner import deadline
     from service import answering
-    from service.answering import robots_of
     from service.replies import BriefPlanReply, PlanReply
 
-    extras: list[Want] = ["robust"] if robust else []
-    extras += ["spread"] if spread or draws else []
-    extras += ["clearance"] if clearance else []
-    extras += ["advice"] if advice_folder is not None else []
+    options: dict[Want, bool] = {
+        "robust": robust,
+        "clearance": clearance,
+        "advice": advice_folder is not None,
+    }
     request, given = read_with_text(stance)
-    plain = request = asked(request, hand, robot)
-    if draws:
-        request = msgspec.structs.replace(request, draws=draws)
-    if unexplained:
-        request = msgspec.structs.replace(request, explain=False)
-    request = with_extras(request, *extras, whole=not as_json)
+    plain = own.asked(request)
+    extras = [want for want, given_too in options.items() if given_too]
+    request = with_extras(wanted.of(plain), *extras, whole=not as_json)
     if advice_folder is not None and request.detail not in (None, "full"):
         raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
-    robots = robots_of(robot)
+    robots = own.robots
     brief = not as_json and verbosity() < 0
-    wanted = "advice" in request.want
+    advised = "advice" in request.want
     if not as_json:
         # which a person reads later than the plan
         request = msgspec.structs.replace(request, want=[w for w in request.want if w != "advice"])
@@ -124,9 +113,9 @@ def plan(
             draw_plan(answer, picture)
     if not as_json:
         _print(answer, bare, brief)
-        if wanted or (not brief and answer.reply.status in OVER):
+        if advised or (not brief and answer.reply.status in OVER):
             # --advice is looked for as long as it takes
-            seconds = None if wanted else ADVICE_SECONDS
+            seconds = None if advised else ADVICE_SECONDS
             started = None if request.deadline is None else begun
             with deadline.within(request.deadline or seconds, started=started):
                 answer = _with_advice(answer, brief)

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 from hand_models.base import InvalidInputError, Pose
 from hand_models.parameters import scan_table
 from hand_models.scans import ENDINGS, UNITS, UPS
-from service.commands.options import json_option, output_in, plot_option
+from service.commands.options import OutputFile, json_option, plot_option
 from service.tables import progress, say, writing
 
 if TYPE_CHECKING:
@@ -56,9 +56,8 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     "-o",
     "--output",
     "output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(OUTPUT),
     required=True,
-    callback=output_in(OUTPUT),
     metavar="PLY",
     help="Where the triangles go.",
 )
@@ -286,38 +285,40 @@ def _print_rock(
     warnings: list[str],
 ) -> None:
     """Print how many points and triangles there are, how large the rock is, and what is open."""
-    from service.tables import table_of
+    from service.tables import in_order, print_rows
 
-    table = table_of("")
-    table.show_header = False
-    table.add_column("", justify="right")
-    table.add_column("", overflow="fold")
-    table.add_row("points read", f"{made.read:,}", "")
-    table.add_row("dropped", f"{made.dropped:,}", "not finite")
-    if made.outliers:
-        table.add_row("outliers", f"{made.outliers:,}", "dropped, far from their neighbours")
-    table.add_row("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart")
-    table.add_row("triangles", f"{len(made.faces):,}", "the file's own" if made.kept else "")
-    table.add_row("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z")
-    table.add_row("up", up, "of the file's axes" + (", assumed" if assumed else ""))
-    view = ", ".join(f"{number:z.2f}" for number in made.pose.rotation[:, 2])
+    view = ", ".join(f"{size:z.2f}" for size in made.pose.rotation[:, 2])
     whence = "z up"
     if _assumed(scan):
         whence += ", assumed: " + ("from the file's origin" if scan.faces is None else "from above")
-    table.add_row("view", view, whence)
-    for name, what, sizes in (
-        ("holes", "wider", [each.width for each in made.holes]),
-        ("steps", "higher", [each.height for each in made.steps]),
-    ):
-        named = ", ".join(f"{1e3 * size:.0f}" for size in sizes[:NAMED])
-        more = ", …" if len(sizes) > NAMED else ""
-        told = f"{what} than {1e3 * hole:g} mm" + (f": {named}{more} mm" if named else "")
-        table.add_row(name, str(len(sizes)), told)
-    out.print(table)
+    rows = [
+        ("points read", f"{made.read:,}", ""),
+        ("dropped", f"{made.dropped:,}", "not finite"),
+        ("outliers", f"{made.outliers:,}", "dropped, far from their neighbours"),
+        ("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart"),
+        ("triangles", f"{len(made.faces):,}", "the file's own" if made.kept else ""),
+        ("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z"),
+        ("up", up, "of the file's axes" + (", assumed" if assumed else "")),
+        ("view", view, whence),
+        ("holes", *_sizes("wider", [each.width for each in made.holes], hole)),
+        ("steps", *_sizes("higher", [each.height for each in made.steps], hole)),
+    ]
+    if not made.outliers:
+        del rows[2]
+    print_rows(rows, in_order([""], [""], [""]), out, heads=False)
     out.print(f"pose {_pose(made.pose)}", markup=False, soft_wrap=True)
     for warning in warnings:
         out.print(f"warning: {warning}", markup=False)
     out.print(str(output), markup=False, soft_wrap=True)
+
+
+def _sizes(what: str, sizes: list[float], hole: float) -> tuple[str, str]:
+    """Return how many holes or steps there are, and how large the first of them."""
+    named = ", ".join(f"{1e3 * size:.0f}" for size in sizes[:NAMED])
+    more = ", …" if len(sizes) > NAMED else ""
+    return str(len(sizes)), f"{what} than {1e3 * hole:g} mm" + (
+        f": {named}{more} mm" if named else ""
+    )
 
 
 def _pose(pose: Pose) -> str:

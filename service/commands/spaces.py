@@ -9,10 +9,10 @@ import click
 import msgspec
 
 from service.commands.options import (
-    asked,
-    hand_option,
+    Own,
     json_option,
     limb_option,
+    own_options,
     plot_option,
     robot_option,
     stance_argument,
@@ -56,13 +56,13 @@ def wrench_space(
     """Show what one hand can carry."""
     from planner import floating_wrist, hand_space, survey
     from service import answering
-    from service.answering import robots_of
     from service.replies import RobustCapability
     from service.tables import console, print_robust, print_survey, print_wrench_space, survey_json
 
     limb, hand = limb_and_hand
-    robots = robots_of(robot)
-    plan = asked(read_request(stance), hand, robot)
+    own = Own(hand, robot)
+    robots = own.robots
+    plan = own.asked(read_request(stance))
     request = WrenchSpaceRequest(v=1, stance=plan.stance, limb=limb)
     reply = answering.wrench_space(request, robots)
     if robust:
@@ -129,8 +129,7 @@ def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[Axis]
 )
 @click.option("--pure", is_flag=True, help="With the other components zero.")
 @plot_option("Draw it there, and the largest accelerations in two planes.")
-@hand_option
-@robot_option
+@own_options
 @json_option
 def body_space(
     stance: str,
@@ -138,8 +137,7 @@ def body_space(
     projection: bool,
     pure: bool,
     picture: Path | None,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: Own,
     as_json: bool,
 ) -> int:
     """Show what the body can bear: which wrenches, and which accelerations."""
@@ -147,9 +145,9 @@ def body_space(
 
     if projection and pure:
         raise click.UsageError("give --projection or --pure, not both")
-    from service.answering import explore, robots_of
+    from service.answering import explore
 
-    plan = asked(read_request(stance), hand, robot)
+    plan = own.asked(read_request(stance))
     request = about_the_same(
         BodySpaceRequest,
         plan,
@@ -158,7 +156,7 @@ def body_space(
         others="free" if projection else "zero" if pure else "needed",
     )
     with waiting(f"exploring {stance}", plan):
-        found = explore(request, robots_of(robot))
+        found = explore(request, own.robots)
         if picture is not None:
             from planner import plot_body_space
 

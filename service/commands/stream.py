@@ -14,10 +14,9 @@ import msgspec
 from hand_models.base import InvalidInputError, UnsupportedError
 from service.commands.options import (
     FiniteRange,
-    asked,
-    hand_option,
+    Own,
     json_option,
-    robot_option,
+    own_options,
     stance_argument,
 )
 from service.commands.stances import read_request
@@ -25,8 +24,7 @@ from service.requests import PlanRequest, StreamRequest, Wrench, about_the_same
 from service.tables import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, remark, say
 
 if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile, WrenchStream
+    from planner import WrenchStream
     from service.replies import ErrorReply, SetPointsReply
 
 __all__ = ["stream"]
@@ -50,16 +48,9 @@ HANDS_A_LINE: Final = 4
     show_default=True,
     help="Of interpolations along a force; along a moment a tenth of it, per metre [N].",
 )
-@hand_option
-@robot_option
+@own_options
 @json_option
-def stream(
-    stance: str,
-    radius: float,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
-    as_json: bool,
-) -> int:
+def stream(stance: str, radius: float, own: Own, as_json: bool) -> int:
     """Give set-points for one body wrench after another: one a line in, one a line out.
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first
@@ -70,15 +61,15 @@ def stream(
     Exit status: 2 where a line was bad, or else 1 where one failed, or else 3 where one is
     overloaded or infeasible.
     """
-    from service.answering import opened, robots_of, set_points_reply
+    from service.answering import opened, set_points_reply
 
     if stance == "-":
         raise InvalidInputError(
             "standard input has the body wrenches; name a file or a bundled stance", field="STANCE"
         )
-    request = _declared(asked(read_request(stance), hand, robot), radius)
+    request = _declared(own.asked(read_request(stance)), radius)
     worst = DONE
-    with opened(request, robots_of(robot)) as source:
+    with opened(request, own.robots) as source:
         if not as_json:
             _say_columns(source)
         for number, line in enumerate(sys.stdin.buffer, start=1):

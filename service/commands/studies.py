@@ -171,17 +171,16 @@ def print_study(result: StudyResult, files: Sequence[Path], out: Console) -> Non
 
 
 def _print_claims(result: StudyResult, out: Console) -> None:
-    from rich.markup import escape
+    """Print which claims hold."""
+    from service.tables import print_rows, text
 
-    from service.tables import table_of
-
-    table = table_of("")
-    for name in ("claim", "claimed", "got"):
-        table.add_column(name, overflow="fold")
-    for claim in result.claims:
-        cells = (escape(claim.claim), _cell(claim.claimed), _cell(claim.got))
-        table.add_row(_verdict(claim), *cells, style=None if claim.holds else "bold")
-    out.print(table)
+    columns = (
+        text("", _verdict),
+        text("claim"),
+        text("claimed", form=_shown),
+        text("got", form=_shown),
+    )
+    print_rows(result.claims, columns, out, style=lambda claim: "" if claim.holds else "bold")
     held = sum(claim.holds for claim in result.claims)
     out.print(f"{held} of {len(result.claims)} claims hold", markup=False)
     if any(claim.role == "calibration" for claim in result.claims):
@@ -189,12 +188,11 @@ def _print_claims(result: StudyResult, out: Console) -> None:
 
 
 def _verdict(claim: Claim) -> str:
+    """Return whether a claim holds, in a word."""
     if not claim.holds:
         return "missed"
     return "fitted" if claim.role == "calibration" else "holds"
 
 
-def _cell(value: str | float) -> str:
-    from rich.markup import escape
-
-    return escape(value) if isinstance(value, str) else f"{value:.4g}"
+def _shown(value: str | float) -> str:
+    return value if isinstance(value, str) else f"{value:.4g}"

@@ -12,14 +12,13 @@ from hand_models.base import InvalidInputError
 from service.commands.batch import answer_rest, writing_answers
 from service.commands.options import (
     FiniteRange,
-    asked,
-    dask_option,
+    Own,
+    Workers,
     folder_option,
-    hand_option,
     json_option,
-    robot_option,
+    own_options,
     stance_argument,
-    workers_option,
+    workers_options,
 )
 from service.commands.stances import read_request
 from service.processes import Interrupted
@@ -36,9 +35,7 @@ from service.tables import (
 )
 
 if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
-    from service.sweeping import Design, PointRows, Sweep
+    from service.sweeping import Design, Sweep
 
 __all__ = ["sweep"]
 
@@ -80,11 +77,9 @@ PICTURE: Final = "sweep.png"
     is_flag=True,
     help="Go on where this sweep was broken off: points that the table of DIR has are kept.",
 )
-@workers_option
-@dask_option
+@workers_options
 @folder_option("Where the table and the picture go.")
-@hand_option
-@robot_option
+@own_options
 @json_option
 def sweep(
     stance: str,
@@ -94,11 +89,9 @@ def sweep(
     over: str | None,
     tolerance: float,
     resume: bool,
-    workers: int | None,
-    dask: str | None,
+    parallel: Workers,
     folder: Path,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: Own,
     as_json: bool,
 ) -> int:
     """Plan a stance over varied fields: a table, a picture, and where it stops holding.
@@ -111,51 +104,43 @@ def sweep(
     Exit status: 0 whatever holds, 2 bad input, also where no point can be answered for it, 1 where
     a point failed or was lost.
     """
-    from service.answering import robots_of
-    from service.bulk import new_manifest
-    from service.sweeping import (
-        Design,
-        PointRows,
-        Variation,
-        about,
-        columns_of,
-        has_borders,
-        plot_sweep,
-    )
+    from service.sweeping import Design, PointRows, Variation, asking, plot_sweep, with_borders
     from service.tables import console, print_sweep
 
     if seed is not None and samples is None:
         raise InvalidInputError("is of samples: give --samples, too", field="--seed")
-    request = asked(read_request(stance), hand, robot)
+    request = own.asked(read_request(stance))
     try:
         chosen = [Variation.parse(each, sampled=samples is not None) for each in variations]
-        design = Design.of(request, chosen, samples, seed or 0, robots_of(robot))
+        design = Design.of(request, chosen, samples, seed or 0, own.robots)
     except InvalidInputError as error:
         where = "--vary" if error.field is None else f"--vary {error.field}"
         raise InvalidInputError(error.message, field=where) from None
     given = click.get_current_context().get_parameter_source("tolerance")
-    if given is ParameterSource.COMMANDLINE and not has_borders(design):
+    if given is ParameterSource.COMMANDLINE and design.number is None:
         raise InvalidInputError("is of one number that varies alone", field="--tolerance")
     pair = _pair(over, design)
     with filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    files = {"table": folder / TABLE, "picture": folder / PICTURE}
-    write_alone(files["table"], folder)
-    with writing_answers(files["table"]):
-        columns = [each.name for each in columns_of(design)]
-        begun = new_manifest(columns, False, hand, robot, about(request, design, seed or 0))
-        sink = PointRows(design, files["table"], begun, resume)
-    result = _answered(design, sink, files["table"], stance, workers, dask, robot, tolerance)
+    table, picture = folder / TABLE, folder / PICTURE
+    write_alone(table, folder)
+    with writing_answers(table):
+        sink = PointRows(request, design, seed or 0, table, resume, *own)
+    ask = asking(sink.asked.count - sink.tally.count, parallel.workers, own.robot, parallel.dask)
+    answer_rest(sink.asked, ask, sink, table, f"sweeping {stance}", "points")
+    try:
+        result = with_borders(design, sink.points, own.robot, tolerance)
+    except Interrupted:
+        raise Interrupted(f"all points are answered in {table}; --resume goes on") from None
     with filling_folder():
-        plot_sweep(result, files["picture"], Path(stance).stem, pair)
+        plot_sweep(result, picture, Path(stance).stem, pair)
     if as_json:
-        say(result.summary() | {"files": {name: str(file) for name, file in files.items()}})
+        say(result.summary() | {"files": {"table": str(table), "picture": str(picture)}})
     else:
         out = console()
         if verbosity() >= 0:
             print_sweep(result, out)
-        for name, file in files.items():
-            out.print(f"{name}: {file}", markup=False, soft_wrap=True)
+        out.print(f"table: {table}\npicture: {picture}", markup=False, soft_wrap=True)
     return _status(result)
 
 
@@ -170,30 +155,6 @@ def _pair(over: str | None, design: Design) -> tuple[str, str] | None:
             f"two different ones of {', '.join(paths)} are wanted, got {over}", field="--over"
         )
     return first, second
-
-
-def _answered(
-    design: Design,
-    sink: PointRows,
-    table: Path,
-    stance: str,
-    workers: int | None,
-    dask: str | None,
-    robot: RobotFile | None,
-    tolerance: float,
-) -> Sweep:
-    """Return the sweep: of points that the table does not have yet, and of its borders."""
-    from service.bulk import LOCAL
-    from service.sweeping import Points, asking, swept
-
-    asked = Points(design)
-    on = LOCAL if dask == "local" else dask
-    with asking(asked.count - sink.tally.count, workers, robot, on) as ask:
-        answer_rest(asked, ask, sink, table, f"sweeping {stance}", "points")
-        try:
-            return swept(design, sink.points, ask, tolerance)
-        except Interrupted:
-            raise Interrupted(f"all points are answered in {table}; --resume goes on") from None
 
 
 def _status(result: Sweep) -> int:
