@@ -116,13 +116,19 @@ class Limits:
         by_limb = torque if isinstance(torque, Mapping) else {"": torque}
         for limb, given in by_limb.items():
             each = given if isinstance(given, tuple) else (given,)
-            wrong = [most for most in each if not (most == 0.0 or LEAST <= most < math.inf)]
-            if wrong or not any(each):
-                raise InvalidInputError(
-                    f"must be at least {LEAST:g} N·m, or in a list 0 for a joint without a motor "
-                    f"(not all of a limb), got {', '.join(f'{most:g}' for most in wrong or each)}",
-                    field="joint_torque" + (f".{limb}" if limb else ""),
-                )
+            idle = 0.0 if isinstance(given, tuple) else LEAST
+            wrong = [most for most in each if not (most == idle or LEAST <= most < math.inf)]
+            if wrong:
+                raise _no_torque(wrong, "joint_torque" + (f".{limb}" if limb else ""))
+
+
+def _no_torque(given: Sequence[float], field: str) -> InvalidInputError:
+    """Return the error about the most that joints may bear."""
+    return InvalidInputError(
+        f"must be at least {LEAST:g} N·m, or in a list 0 for a joint without a motor "
+        f"(not all of a limb), got {', '.join(f'{most:g}' for most in given)}",
+        field=field,
+    )
 
 
 Objective = Literal["max_margin", "min_effort"]
@@ -286,6 +292,8 @@ class Question:
                         f"{count} joints need {count} figures, got {len(most)}",
                         field=f"limits.joint_torque.{limb}",
                     )
+                if isinstance(most, tuple) and not any(most):
+                    raise _no_torque(most, f"limits.joint_torque.{limb}")
 
     def needed_wrench(self, weights: Weights | None = None) -> Array:
         """Return the body wrench that is planned for, shape (6,) [N, N·m].
