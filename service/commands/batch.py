@@ -11,35 +11,18 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
+import planner
 from hand_models.base import CruxError, InvalidInputError
-from service.commands.options import Own, Workers, json_option, own_options, workers_options
-from service.processes import Interrupted
-from service.tables import (
-    BAD_INPUT,
-    DONE,
-    EXIT_STATUS,
-    FAILED,
-    OVERLOADED,
-    bulk_progress,
-    note,
-    say,
-    verbosity,
-    write_alone,
-    writing,
-)
-from service.wire import REQUEST_KINDS, Answer
-
-if TYPE_CHECKING:
-    from planner import RobotFile
-    from service.bulk import Asked, Column, Question, Sink, Table, Tally
+from service import bulk, processes, tables, wire
+from service.commands import options
 
 __all__ = ["answer_rest", "batch", "complain", "exit_status", "new_sink", "writing_answers"]
 
-WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
+WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables.DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
 
 
@@ -62,23 +45,23 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
     is_flag=True,
     help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
 )
-@workers_options
+@options.workers_options
 @click.option(
     "--explain/--no-explain",
     default=None,
     help="Whether it is proven and named what is in the way where a stance is overloaded or "
     "infeasible. By default replies do as their requests say, and tables leave it out.",
 )
-@own_options
-@json_option
+@options.own_options
+@options.json_option
 def batch(
     requests: str,
     file: Path | None,
     columns: str | None,
     resume: bool,
-    parallel: Workers,
+    parallel: options.Workers,
     explain: bool | None,
-    own: Own,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Answer many plan requests: one a line in, one reply, row or error out, in order.
@@ -92,18 +75,16 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
-    from service.bulk import Lines, evaluate, table_at
-
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
-    kind = None if file is None else table_at(file)
+    kind = None if file is None else bulk.table_at(file)
     if columns is not None and kind is None:
         raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field="--columns")
     if file is not None:
         _check_output(file, requests, resume, kind)
-        write_alone(file)
+        tables.write_alone(file)
     begun = perf_counter()
-    with closing(Lines(requests)) as lines:
+    with closing(bulk.Lines(requests)) as lines:
         explain = explain if kind is None else bool(explain)
         choose = partial(_columns, columns, own.robot, bool(explain))
         sink = new_sink(
@@ -112,7 +93,7 @@ def batch(
         before = sink.tally.count
         on, workers = parallel.place(lines.count - before)
         answers = partial(
-            evaluate,
+            bulk.evaluate,
             on=on,
             workers=workers,
             hand=own.hand,
@@ -127,25 +108,25 @@ def batch(
     if not as_json:
         _print(sink.tally, before, elapsed, file)
     elif file is not None:
-        say(_summary(sink.tally, elapsed) | {"file": str(file)})
+        tables.say(_summary(sink.tally, elapsed) | {"file": str(file)})
     return exit_status(sink.tally)
 
 
 def writing_answers(file: Path | None) -> AbstractContextManager[None]:
     """Turn what goes wrong in writing answers into one line, if they go to a file."""
-    return nullcontext() if file is None else writing(file, "-o")
+    return nullcontext() if file is None else tables.writing(file, "-o")
 
 
 def new_sink(
     file: Path | None,
-    asked: Asked,
-    columns: Callable[[], Sequence[Column]],
-    own: Own,
+    asked: bulk.Asked,
+    columns: Callable[[], Sequence[bulk.Column]],
+    own: options.Own,
     *,
     explained: bool,
     resume: bool,
     shown: bool = False,
-) -> Sink:
+) -> bulk.Sink:
     """Return where answers go: rows of a table or lines of a file, or lines on standard output.
 
     Parameters
@@ -164,22 +145,20 @@ def new_sink(
     shown : bool, optional
         Whether replies go to standard output where there is no file.
     """
-    from service.bulk import ReplyLines, Rows, new_manifest, table_at
-
-    kind = None if file is None else table_at(file)
+    kind = None if file is None else bulk.table_at(file)
     if file is None or kind is None:
         with writing_answers(file):
-            return ReplyLines(file, shown, resume, asked)
+            return bulk.ReplyLines(file, shown, resume, asked)
     chosen = columns()
-    now = new_manifest([each.name for each in chosen], explained, *own)
+    now = bulk.new_manifest([each.name for each in chosen], explained, *own)
     with writing_answers(file):
-        return Rows(kind.opened(file, chosen, now, resume, asked))
+        return bulk.Rows(kind.opened(file, chosen, now, resume, asked))
 
 
 def answer_rest(
-    asked: Asked,
-    answers: Callable[[Iterator[Any]], Generator[Answer, None, None]],
-    sink: Sink,
+    asked: bulk.Asked,
+    answers: Callable[[Iterator[Any]], Generator[wire.Answer, None, None]],
+    sink: bulk.Sink,
     file: Path | None,
     title: str,
     noun: str,
@@ -208,11 +187,11 @@ def answer_rest(
     begun, before = perf_counter(), sink.tally.count
     due: deque[bytes] = deque()
 
-    def ask() -> Iterator[Question]:
+    def ask() -> Iterator[bulk.Question]:
         # now there is somewhere to work: until then what was there has stayed
         open_sink()
         for question in islice(asked.questions(), before, None):
-            due.append(question.payload if isinstance(question, Answer) else question)
+            due.append(question.payload if isinstance(question, wire.Answer) else question)
             yield question
 
     opened = False
@@ -230,7 +209,7 @@ def answer_rest(
 
     try:
         with ExitStack() as stack:
-            tell = stack.enter_context(bulk_progress(title))
+            tell = stack.enter_context(tables.progress(title, counted=True))
             stack.enter_context(writing_answers(file))
             found = stack.enter_context(closing(answers(ask())))
             if before == asked.count:
@@ -242,15 +221,15 @@ def answer_rest(
                 rate = (done - before) / (perf_counter() - begun)
                 words = ", ".join(filter(None, (f"{rate:.0f}/s", sink.tally.errors)))
                 tell(done, asked.count, words)
-    except Interrupted:
-        raise Interrupted(kept()) from None
+    except processes.Interrupted:
+        raise processes.Interrupted(kept()) from None
     except InvalidInputError:
         raise
     except CruxError as error:
         raise CruxError(f"{error.message}; {kept()}") from None
 
 
-def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | None) -> None:
+def _check_output(file: Path, requests: str, resume: bool, kind: type[bulk.Table] | None) -> None:
     """Refuse a file for answers that is the requests' own, or that nothing can be resumed in."""
     try:
         if kind is None and file.is_dir():
@@ -266,19 +245,18 @@ def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | N
         return
 
 
-def _columns(wanted: str | None, robot: RobotFile | None, explained: bool) -> tuple[Column, ...]:
+def _columns(
+    wanted: str | None, robot: planner.RobotFile | None, explained: bool
+) -> tuple[bulk.Column, ...]:
     """Return the columns of a table about a robot."""
-    from planner import RobotFile
-    from service.bulk import chosen_columns
-
-    limbs = (RobotFile.bundled() if robot is None else robot).limbs
+    limbs = (planner.RobotFile.bundled() if robot is None else robot).limbs
     try:
-        return chosen_columns(wanted, limbs, explained)
+        return bulk.chosen_columns(wanted, limbs, explained)
     except InvalidInputError as error:
         raise InvalidInputError(error.message, field="--columns") from None
 
 
-def complain(tally: Tally, where: Callable[[int], str], noun: str) -> None:
+def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
     """Name the first question that is bad input, and how many more are.
 
     Parameters
@@ -294,44 +272,45 @@ def complain(tally: Tally, where: Callable[[int], str], noun: str) -> None:
         index, error = tally.first_bad
         field = "" if error.field is None else f"{error.field}: "
         more = f"; {tally.bad - 1} more {noun} are bad input" if tally.bad > 1 else ""
-        note(f"{where(index)}: {field}{error.message}{more}")
+        tables.note(f"{where(index)}: {field}{error.message}{more}")
 
 
-def exit_status(tally: Tally, statuses: Mapping[str, int] = EXIT_STATUS) -> int:
+def exit_status(tally: bulk.Tally, statuses: Mapping[str, int] = tables.EXIT_STATUS) -> int:
     """Return the worst of what the requests alone would have, by their statuses."""
-    found = [statuses.get(status, FAILED) for status in tally.statuses]
-    found += [BAD_INPUT if kind in REQUEST_KINDS else FAILED for kind in tally.kinds]
-    return min(found, key=WORST_FIRST.index, default=DONE)
+    found = [statuses.get(status, tables.FAILED) for status in tally.statuses]
+    found += [
+        tables.BAD_INPUT if kind in wire.REQUEST_KINDS else tables.FAILED for kind in tally.kinds
+    ]
+    return min(found, key=WORST_FIRST.index, default=tables.DONE)
 
 
-def _summary(tally: Tally, elapsed: float) -> dict[str, object]:
+def _summary(tally: bulk.Tally, elapsed: float) -> dict[str, object]:
     middle, longest = tally.middle_and_longest()
     return {
         "v": 1,
         "requests": tally.count,
-        **{status: tally.statuses[status] for status in (*EXIT_STATUS, "failed")},
+        **{status: tally.statuses[status] for status in (*tables.EXIT_STATUS, "failed")},
         "errors": dict(tally.kinds),
         "time": {"median": middle, "longest": longest, "elapsed": elapsed},
     }
 
 
-def _print(tally: Tally, before: int, elapsed: float, file: Path | None) -> None:
-    from service.tables import console, name, number, print_rows
+def _print(tally: bulk.Tally, before: int, elapsed: float, file: Path | None) -> None:
 
-    out = console()
+    out = tables.console()
     rows: list[tuple[object, ...]] = [
         (status, tally.statuses[status], *tally.middle_and_longest(status))
-        for status in (*EXIT_STATUS, "failed")
+        for status in (*tables.EXIT_STATUS, "failed")
     ]
     rows += [(f"error: {kind}", count, None, None) for kind, count in sorted(tally.kinds.items())]
     columns = (
-        name("answer", "0"),
-        number("requests", "1"),
-        number("median ms", "2", ".1f", scale=1e3),
-        number("longest ms", "3", ".1f", scale=1e3),
+        tables.name("answer", "0"),
+        tables.number("requests", "1"),
+        tables.number("median ms", "2", ".1f", scale=1e3),
+        tables.number("longest ms", "3", ".1f", scale=1e3),
     )
-    if verbosity() >= 0:
-        print_rows(rows, columns, out)
+    if tables.verbosity() >= 0:
+        tables.print_rows(rows, columns, out)
     done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""

@@ -12,15 +12,13 @@ import click
 import msgspec
 from click.shell_completion import CompletionItem
 
+import planner
 from hand_models.base import InvalidInputError
-from service.commands.stances import bundled, limbs_of
-from service.requests import Draw, PlanRequest, RouteRequest, Want
-from service.serving import TIMEOUT
+from service import answering, bulk, processes, requests, serving
+from service.commands import stances
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner import RobotFile
-    from service.answering import Robots
 
 __all__ = [
     "PICTURES",
@@ -48,13 +46,13 @@ __all__ = [
     "workers_options",
 ]
 
-R = TypeVar("R", PlanRequest, RouteRequest)
+R = TypeVar("R", requests.PlanRequest, requests.RouteRequest)
 Command = Callable[..., Any]
 
 PICTURES: Final = (".png", ".pdf", ".svg")
 TABLES: Final = (".csv", ".parquet", ".json", ".jsonl")
 HAND_FILE: Final = ".toml"
-EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
+EXTRAS: Final[tuple[requests.Want, ...]] = ("load_factor", "prices")
 """What the command line asks for besides the plan."""
 
 LONGEST: Final = 1e6
@@ -117,8 +115,6 @@ class InputFile(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return what the file says."""
-        from service import answering
-
         return getattr(answering, self._reader)(super().convert(value, param, ctx))
 
 
@@ -158,20 +154,16 @@ class Own(NamedTuple):
     """Numbers of a hand and a robot of the caller's own; None for those that are bundled."""
 
     hand: ParameterTable | None
-    robot: RobotFile | None
+    robot: planner.RobotFile | None
 
     def asked(self, request: R) -> R:
         """Return a request for this hand and this robot."""
-        from service.answering import with_hand, with_robot
-
-        return with_robot(with_hand(request, self.hand), self.robot)
+        return answering.with_robot(answering.with_hand(request, self.hand), self.robot)
 
     @property
-    def robots(self) -> Robots:
+    def robots(self) -> answering.Robots:
         """The robots that may be asked about."""
-        from service.answering import robots_of
-
-        return robots_of(self.robot)
+        return answering.robots_of(self.robot)
 
 
 class Workers(NamedTuple):
@@ -182,12 +174,9 @@ class Workers(NamedTuple):
 
     def place(self, plans: int) -> tuple[str, int | None]:
         """Return where questions worth so many plans are answered, and by how many processes."""
-        from service.bulk import LOCAL
-        from service.processes import worth
-
         if self.dask is not None:
-            return (LOCAL if self.dask == "local" else self.dask), self.workers
-        count = worth(plans, self.workers)
+            return (bulk.LOCAL if self.dask == "local" else self.dask), self.workers
+        count = processes.worth(plans, self.workers)
         return ("here", None) if count == 1 else ("processes", count)
 
 
@@ -195,7 +184,7 @@ class Wanted(NamedTuple):
     """What is asked besides a plan: the spread over draws, and no explanation."""
 
     spread: bool
-    draws: list[Draw] | None
+    draws: list[requests.Draw] | None
     unexplained: bool
 
     def of(self, request: R) -> R:
@@ -208,7 +197,9 @@ class Wanted(NamedTuple):
         )
 
 
-def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> PlanRequest:
+def with_extras(
+    request: requests.PlanRequest, *further: requests.Want, whole: bool = True
+) -> requests.PlanRequest:
     """Return a request that wants what the command line shows besides the plan, and more, too.
 
     ``whole``: whether a person reads the reply, who gets all of it.
@@ -230,9 +221,8 @@ def _read_hand(
         raise click.BadParameter(
             f"{paths[0]}: no such file; a FILE with numbers of a hand is wanted, not a LIMB"
         )
-    from service.answering import read_hand
 
-    return read_hand(paths[0])
+    return answering.read_hand(paths[0])
 
 
 def _limb_and_hand(
@@ -251,10 +241,8 @@ def _limb_and_hand(
 def _check_dask(_: click.Context, __: click.Parameter, address: str | None) -> str | None:
     """Refuse what is no address of a scheduler."""
     if address not in (None, "local"):
-        from service.bulk import check_address
-
         try:
-            check_address(address)
+            bulk.check_address(address)
         except InvalidInputError:
             raise InvalidInputError(
                 f"must be local, or tcp://HOST:PORT of a Dask scheduler, got {address!r}",
@@ -287,16 +275,20 @@ def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[Compl
     """Complete the limbs that hold on in the stance, as far as it is given and can be read."""
     # what stands before an option that lacks its value is not yet told apart
     given = [context.params.get("stance"), *context.args]
-    return beginning_so(limbs_of(next(filter(None, given), None)), files=True)(context, _, begun)
+    return beginning_so(stances.limbs_of(next(filter(None, given), None)), files=True)(
+        context, _, begun
+    )
 
 
-stance_argument = click.argument("stance", shell_complete=beginning_so(bundled(), files=True))
+stance_argument = click.argument(
+    "stance", shell_complete=beginning_so(stances.bundled(), files=True)
+)
 routes_argument = click.argument(
     "routes",
     nargs=-1,
     required=True,
     metavar="ROUTE...",
-    shell_complete=beginning_so(bundled(RouteRequest), files=True),
+    shell_complete=beginning_so(stances.bundled(requests.RouteRequest), files=True),
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 hand_option = click.option(
@@ -349,7 +341,7 @@ wanted_options = asked_for(Wanted, "wanted", draws_option, explain_option)
 timeout_option = click.option(
     "--timeout",
     type=FiniteRange(0.01, LONGEST),
-    help=f"[s]; by default {TIMEOUT:g}, or what the deadline of the request takes.",
+    help=f"[s]; by default {serving.TIMEOUT:g}, or what the deadline of the request takes.",
 )
 wait_option = click.option(
     "--wait",

@@ -9,46 +9,23 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 import msgspec
 
+import planner
 from hand_models.base import CruxError, InvalidInputError
+from service import answering, bulk, requests, tables, wire
+from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_sink
-from service.commands.options import (
-    Own,
-    Wanted,
-    Workers,
-    json_option,
-    own_options,
-    routes_argument,
-    spread_option,
-    wanted_options,
-    workers_options,
-)
-from service.commands.stances import read_route
-from service.tables import (
-    EXIT_STATUS,
-    FAILED,
-    OVERLOADED,
-    filling_folder,
-    progress,
-    say,
-    verbosity,
-    write_alone,
-)
-from service.wire import ROUTE, Answer, Format, encode_error
-
-if TYPE_CHECKING:
-    from service.requests import RouteRequest
 
 __all__ = ["route"]
 
 LINES, CSV, PARQUET = ENDINGS = (".jsonl", ".csv", ".parquet")
 LISTED: Final = " or ".join(ENDINGS)
 
-STATUSES: Final = EXIT_STATUS | {"unreachable": OVERLOADED}
+STATUSES: Final = tables.EXIT_STATUS | {"unreachable": tables.OVERLOADED}
 
 PLANS: Final = 50
 """As which a route counts where it is asked whether processes are worth it."""
@@ -63,7 +40,7 @@ SHOWN: Final = 100
 
 
 @click.command()
-@routes_argument
+@options.routes_argument
 @click.option(
     "-o",
     "--output",
@@ -78,18 +55,18 @@ SHOWN: Final = 100
     is_flag=True,
     help="Go on where many routes were broken off: what the file answers is not asked again.",
 )
-@workers_options
-@spread_option
-@wanted_options
-@own_options
-@json_option
+@options.workers_options
+@options.spread_option
+@options.wanted_options
+@options.own_options
+@options.json_option
 def route(
     routes: tuple[str, ...],
     output: Path,
     resume: bool,
-    parallel: Workers,
-    wanted: Wanted,
-    own: Own,
+    parallel: options.Workers,
+    wanted: options.Wanted,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Evaluate climbs: every stance, and every one with a limb in the air.
@@ -114,29 +91,33 @@ def route(
             raise InvalidInputError(f"needs -o FILE that ends in {LISTED}", field=option)
     if output.exists() and not output.is_dir():
         raise InvalidInputError(f"{output}: is no folder", field="-o")
-    request = wanted.of(own.asked(read_route(routes[0])))
+    request = wanted.of(own.asked(stances.read_route(routes[0])))
     return _one(request, output, parallel.workers, own, as_json)
 
 
-def _one(request: RouteRequest, folder: Path, workers: int | None, own: Own, as_json: bool) -> int:
+def _one(
+    request: requests.RouteRequest,
+    folder: Path,
+    workers: int | None,
+    own: options.Own,
+    as_json: bool,
+) -> int:
     """Evaluate a route in all detail."""
-    from planner import evaluate, summary, write_report
-    from service import answering
-    from service.tables import console, print_route
-
     climb = answering.route(request, own.robots)
-    with filling_folder():
+    with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    write_alone(folder / "route", folder)
-    with progress(f"planning {climb.name}") as tell:
-        result = evaluate(climb, workers, tell)
-    with filling_folder():
-        files = write_report(result, folder)
+    tables.write_alone(folder / "route", folder)
+    with tables.progress(f"planning {climb.name}") as tell:
+        result = planner.evaluate(climb, workers, tell)
+    with tables.filling_folder():
+        files = planner.write_report(result, folder)
     if as_json:
-        say(summary(result) | {"files": {name: str(path) for name, path in files.items()}})
+        tables.say(
+            planner.summary(result) | {"files": {name: str(path) for name, path in files.items()}}
+        )
     else:
-        print_route(result, files, console())
-    return STATUSES.get(result.status, FAILED)
+        tables.print_route(result, files, tables.console())
+    return STATUSES.get(result.status, tables.FAILED)
 
 
 class _Routes:
@@ -160,24 +141,26 @@ class _Routes:
         If a folder has none, or one is standard input, which is read once.
     """
 
-    def __init__(self, sources: Sequence[str], own: Own) -> None:
+    def __init__(self, sources: Sequence[str], own: options.Own) -> None:
         self.names = [name for source in sources for name in _files(source)]
         self.count = len(self.names)
         self._own = own
 
     def __iter__(self) -> Iterator[bytes]:
-        return (each.payload if isinstance(each, Answer) else each for each in self.questions())
+        return (
+            each.payload if isinstance(each, wire.Answer) else each for each in self.questions()
+        )
 
-    def questions(self) -> Iterator[bytes | Answer]:
+    def questions(self) -> Iterator[bytes | wire.Answer]:
         """Yield routes, or what is wrong with their files."""
         for name in self.names:
             known = name[-LONGEST:]
             try:
-                request = self._own.asked(read_route(name))
+                request = self._own.asked(stances.read_route(name))
                 request = msgspec.structs.replace(request, id=request.id or known)
-                yield Format.JSON.encode(request)
+                yield wire.Format.JSON.encode(request)
             except CruxError as error:
-                yield encode_error(error, Format.JSON, known)
+                yield wire.encode_error(error, wire.Format.JSON, known)
 
 
 def _files(source: str) -> list[str]:
@@ -196,40 +179,38 @@ def _many(
     routes: _Routes,
     file: Path,
     resume: bool,
-    parallel: Workers,
-    wanted: Wanted,
-    own: Own,
+    parallel: options.Workers,
+    wanted: options.Wanted,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Evaluate any number of routes, and keep what they come to."""
-    from service.bulk import evaluate, route_columns
-
     if any(os.path.abspath(name) == os.path.abspath(file) for name in routes.names):
         raise InvalidInputError(f"{file}: is one of the routes", field="-o")
-    write_alone(file)
+    tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == LINES and file.exists() and not file.is_file():
         raise InvalidInputError(f"{file}: is no file", field="-o")
     sink = new_sink(
-        file, routes, route_columns, own, explained=not wanted.unexplained, resume=resume
+        file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )
     before = sink.tally.count
     on, workers = parallel.place(PLANS * (routes.count - before))
     answers = partial(
-        evaluate,
+        bulk.evaluate,
         on=on,
         workers=workers,
         robot=own.robot,
         explain=False if wanted.unexplained else None,
         columns=sink.columns,
-        kind=ROUTE,
+        kind=wire.ROUTE,
     )
     answer_rest(routes, answers, sink, file, "planning routes", "routes")
     elapsed = perf_counter() - begun
     complain(sink.tally, routes.names.__getitem__, "routes")
     if as_json:
         told = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
-        say({"v": 1, "routes": routes.count, **told, "file": str(file)})
+        tables.say({"v": 1, "routes": routes.count, **told, "file": str(file)})
     else:
         _print(file, routes, before, elapsed)
     return exit_status(sink.tally, STATUSES)
@@ -237,20 +218,20 @@ def _many(
 
 def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
     """Print what each route came to, and where that is."""
-    from service.tables import console, name, number, print_rows, text
+    from service.tables import name
 
-    out = console()
+    out = tables.console()
     columns = (
         name("status", lambda row: row["status"] or f"error: {row['error_kind']}"),
         name("crux", lambda row: " ".join(filter(None, map(row.get, CRUX))) or None),
-        number("move", "crux_move"),
-        number("util", "utilisation", lambda value: f"{float(value):.2f}"),
-        number("load factor", "load_factor", lambda value: f"{float(value):.2f}"),
-        text("route"),
+        tables.number("move", "crux_move"),
+        tables.number("util", "utilisation", lambda value: f"{float(value):.2f}"),
+        tables.number("load factor", "load_factor", lambda value: f"{float(value):.2f}"),
+        tables.text("route"),
     )
-    if verbosity() >= 0:
+    if tables.verbosity() >= 0:
         named = zip(routes.names, islice(_rows(file), SHOWN), strict=False)
-        print_rows([row | {"route": route} for route, row in named], columns, out)
+        tables.print_rows([row | {"route": route} for route, row in named], columns, out)
         if routes.count > SHOWN:
             out.print(f"and {routes.count - SHOWN} more", markup=False)
     known = f", {before} were answered before" if before else ""
@@ -260,8 +241,6 @@ def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
 
 def _rows(file: Path) -> Iterator[dict[str, Any]]:
     """Yield what a file tells of each route, whatever form it has."""
-    from service.bulk import Row, route_columns, row_of
-
     if file.suffix.lower() == PARQUET:
         from pyarrow import parquet
 
@@ -271,9 +250,11 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             for row in csv.DictReader(stream):
                 yield {name: value or None for name, value in row.items()}
     else:
-        names = [column.name for column in route_columns()]
+        names = [column.name for column in bulk.route_columns()]
         with file.open("rb") as lines:
             for line in lines:
-                told = row_of(Answer(line, Format.JSON.value), Format.JSON, names).payload
-                values = msgspec.msgpack.decode(told, type=Row).values
+                told = bulk.row_of(
+                    wire.Answer(line, wire.Format.JSON.value), wire.Format.JSON, names
+                ).payload
+                values = msgspec.msgpack.decode(told, type=bulk.Row).values
                 yield dict(zip(names[1:], values, strict=True))

@@ -3,39 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 from click.core import ParameterSource
 
 from hand_models.base import InvalidInputError
+from service import processes, sweeping, tables
+from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
-from service.commands.options import (
-    FiniteRange,
-    Own,
-    Workers,
-    folder_option,
-    json_option,
-    own_options,
-    stance_argument,
-    workers_options,
-)
-from service.commands.stances import read_request
-from service.processes import Interrupted
-from service.sweeping import TOLERANCE
-from service.tables import (
-    BAD_INPUT,
-    DONE,
-    FAILED,
-    filling_folder,
-    note,
-    say,
-    verbosity,
-    write_alone,
-)
-
-if TYPE_CHECKING:
-    from service.sweeping import Design, Sweep
 
 __all__ = ["sweep"]
 
@@ -44,7 +20,7 @@ PICTURE: Final = "sweep.png"
 
 
 @click.command()
-@stance_argument
+@options.stance_argument
 @click.option(
     "--vary",
     "variations",
@@ -67,8 +43,8 @@ PICTURE: Final = "sweep.png"
 )
 @click.option(
     "--tolerance",
-    type=FiniteRange(1e-9, 0.5),
-    default=TOLERANCE,
+    type=options.FiniteRange(1e-9, 0.5),
+    default=sweeping.TOLERANCE,
     show_default=True,
     help="Of where it stops holding, if one number varies: a share of the range.",
 )
@@ -77,10 +53,10 @@ PICTURE: Final = "sweep.png"
     is_flag=True,
     help="Go on where this sweep was broken off: points that the table of DIR has are kept.",
 )
-@workers_options
-@folder_option("Where the table and the picture go.")
-@own_options
-@json_option
+@options.workers_options
+@options.folder_option("Where the table and the picture go.")
+@options.own_options
+@options.json_option
 def sweep(
     stance: str,
     variations: tuple[str, ...],
@@ -89,9 +65,9 @@ def sweep(
     over: str | None,
     tolerance: float,
     resume: bool,
-    parallel: Workers,
+    parallel: options.Workers,
     folder: Path,
-    own: Own,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Plan a stance over varied fields: a table, a picture, and where it stops holding.
@@ -104,15 +80,14 @@ def sweep(
     Exit status: 0 whatever holds, 2 bad input, also where no point can be answered for it, 1 where
     a point failed or was lost.
     """
-    from service.sweeping import Design, PointRows, Variation, asking, plot_sweep, with_borders
-    from service.tables import console, print_sweep
-
     if seed is not None and samples is None:
         raise InvalidInputError("is of samples: give --samples, too", field="--seed")
-    request = own.asked(read_request(stance))
+    request = own.asked(stances.read_request(stance))
     try:
-        chosen = [Variation.parse(each, sampled=samples is not None) for each in variations]
-        design = Design.of(request, chosen, samples, seed or 0, own.robots)
+        chosen = [
+            sweeping.Variation.parse(each, sampled=samples is not None) for each in variations
+        ]
+        design = sweeping.Design.of(request, chosen, samples, seed or 0, own.robots)
     except InvalidInputError as error:
         where = "--vary" if error.field is None else f"--vary {error.field}"
         raise InvalidInputError(error.message, field=where) from None
@@ -120,31 +95,35 @@ def sweep(
     if given is ParameterSource.COMMANDLINE and design.number is None:
         raise InvalidInputError("is of one number that varies alone", field="--tolerance")
     pair = _pair(over, design)
-    with filling_folder():
+    with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     table, picture = folder / TABLE, folder / PICTURE
-    write_alone(table, folder)
+    tables.write_alone(table, folder)
     with writing_answers(table):
-        sink = PointRows(request, design, seed or 0, table, resume, *own)
-    ask = asking(sink.asked.count - sink.tally.count, parallel.workers, own.robot, parallel.dask)
+        sink = sweeping.PointRows(request, design, seed or 0, table, resume, *own)
+    ask = sweeping.asking(
+        sink.asked.count - sink.tally.count, parallel.workers, own.robot, parallel.dask
+    )
     answer_rest(sink.asked, ask, sink, table, f"sweeping {stance}", "points")
     try:
-        result = with_borders(design, sink.points, own.robot, tolerance)
-    except Interrupted:
-        raise Interrupted(f"all points are answered in {table}; --resume goes on") from None
-    with filling_folder():
-        plot_sweep(result, picture, Path(stance).stem, pair)
+        result = sweeping.with_borders(design, sink.points, own.robot, tolerance)
+    except processes.Interrupted:
+        raise processes.Interrupted(
+            f"all points are answered in {table}; --resume goes on"
+        ) from None
+    with tables.filling_folder():
+        sweeping.plot_sweep(result, picture, Path(stance).stem, pair)
     if as_json:
-        say(result.summary() | {"files": {"table": str(table), "picture": str(picture)}})
+        tables.say(result.summary() | {"files": {"table": str(table), "picture": str(picture)}})
     else:
-        out = console()
-        if verbosity() >= 0:
-            print_sweep(result, out)
+        out = tables.console()
+        if tables.verbosity() >= 0:
+            tables.print_sweep(result, out)
         out.print(f"table: {table}\npicture: {picture}", markup=False, soft_wrap=True)
     return _status(result)
 
 
-def _pair(over: str | None, design: Design) -> tuple[str, str] | None:
+def _pair(over: str | None, design: sweeping.Design) -> tuple[str, str] | None:
     """Return the paths that the picture is over, checked before anything is planned."""
     if over is None:
         return None
@@ -157,11 +136,11 @@ def _pair(over: str | None, design: Design) -> tuple[str, str] | None:
     return first, second
 
 
-def _status(result: Sweep) -> int:
+def _status(result: sweeping.Sweep) -> int:
     """Return the exit status, and tell what it is about where that is not told yet."""
     if not all(row.answered for row in result.rows):
-        return FAILED
+        return tables.FAILED
     if all(row.error is not None for row in result.rows):
-        note(f"no point can be answered: {result.rows[0].complaint}")
-        return BAD_INPUT
-    return DONE
+        tables.note(f"no point can be answered: {result.rows[0].complaint}")
+        return tables.BAD_INPUT
+    return tables.DONE

@@ -23,7 +23,6 @@ from .terminal import (
     EXIT_STATUS as EXIT_STATUS,
     FAILED as FAILED,
     OVERLOADED as OVERLOADED,
-    bulk_progress as bulk_progress,
     draw_plan as draw_plan,
     filling_folder as filling_folder,
     note as note,

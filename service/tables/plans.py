@@ -11,17 +11,8 @@ from typing import Any, Final
 from rich.console import Console
 from rich.markup import escape
 
-from planner import Clearance, LimitName, RobustLoadFactor, Spread, TensionPath, constraint_words
-from service.replies import (
-    AXES,
-    AxisCapability,
-    Certificate,
-    ClosingSequence,
-    Hand,
-    PlanReply,
-    RobustCapability,
-    WrenchSpaceReply,
-)
+import planner
+from service import replies
 from service.tables.layout import (
     in_colour,
     in_order,
@@ -47,7 +38,10 @@ JOINTS_A_LINE: Final = 7
 
 HANDS: Final = (
     name("hand", "limb"),
-    *(number(axis, f"wrench.{i}", partial(short, digits=i // 3)) for i, axis in enumerate(AXES)),
+    *(
+        number(axis, f"wrench.{i}", partial(short, digits=i // 3))
+        for i, axis in enumerate(replies.AXES)
+    ),
     number("hand\nutil", "utilisation", partial(short, digits=2)),
     number("palm\nshear", "palm.force.0", partial(short, digits=0), scale=-1.0),
     number("palm\npress", "palm.force.2", partial(short, digits=0)),
@@ -95,10 +89,10 @@ CARRIES: Final[Mapping[str, str]] = {
 
 
 def print_plan(
-    reply: PlanReply,
+    reply: replies.PlanReply,
     out: Console,
     *,
-    without_palm: PlanReply | None = None,
+    without_palm: replies.PlanReply | None = None,
     brief: bool = False,
 ) -> None:
     """Print a plan, but for the advice.
@@ -112,7 +106,7 @@ def print_plan(
     brief : bool, optional
         Whether its status and reason are all.
     """
-    spread = reply.spread if isinstance(reply.spread, Spread) else None
+    spread = reply.spread if isinstance(reply.spread, planner.Spread) else None
     out.print("   ".join(_first_line(reply, spread)))
     if spread is not None:
         out.print(spread_sentence(spread), markup=False)
@@ -129,9 +123,9 @@ def print_plan(
         out.print(_path_sentence(reply.path), markup=False)
     if without_palm is not None:
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
-    if isinstance(reply.robust, RobustLoadFactor):
+    if isinstance(reply.robust, planner.RobustLoadFactor):
         out.print(robust_sentence(reply.robust), markup=False)
-    if isinstance(reply.clearance, Clearance):
+    if isinstance(reply.clearance, planner.Clearance):
         _print_clearance(reply.clearance, out)
     if reply.hands is not None:
         _print_hands(reply.hands, out)
@@ -147,7 +141,7 @@ def print_plan(
         _print_certificate(reply.certificate, reply.body_wrench, out)
 
 
-def _first_line(reply: PlanReply, spread: Spread | None) -> Iterator[str]:
+def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iterator[str]:
     """Yield what is most to be known of a plan; intervals of it in place of lesser things."""
     yield in_colour(reply.status, reply.status.upper())
     used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
@@ -163,7 +157,7 @@ def _first_line(reply: PlanReply, spread: Spread | None) -> Iterator[str]:
         yield f"{1e3 * reply.time.total:.0f} ms"
 
 
-def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
+def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
     """Print what one hand can carry."""
     seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
     out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
@@ -192,7 +186,7 @@ def print_wrench_space(reply: WrenchSpaceReply, out: Console) -> None:
     _print_capability(reply.capability, out)
 
 
-def print_robust(robust: RobustCapability, out: Console) -> None:
+def print_robust(robust: replies.RobustCapability, out: Console) -> None:
     """Print what is left of each component where the hand is a little elsewhere."""
     title = (
         f"what is left of that at {robust.draws} places "
@@ -208,8 +202,8 @@ def _print_ends(
 ) -> None:
     """Print the least and the most of each component, from how far sets reach either way."""
     heads = [f"{what}{end}" for what in reaches for end in ("least", "most")]
-    rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in AXES]
-    for row, axis in zip(rows, AXES, strict=True):
+    rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in replies.AXES]
+    for row, axis in zip(rows, replies.AXES, strict=True):
         for ways in reaches.values():
             back = ways[f"-{axis}"]
             row += [None if back is None else -back, ways[f"+{axis}"]]
@@ -226,7 +220,7 @@ def _print_floating(palm: str, error: float, out: Console) -> None:
     )
 
 
-def _print_capability(capability: Mapping[str, AxisCapability], out: Console) -> None:
+def _print_capability(capability: Mapping[str, replies.AxisCapability], out: Console) -> None:
     """Print the least and the most of each component, and those of it alone if there are any."""
     with_pure = any(end.pure is not None for end in capability.values())
     reaches: dict[str, Mapping[str, float | None]] = {
@@ -238,12 +232,12 @@ def _print_capability(capability: Mapping[str, AxisCapability], out: Console) ->
     out.print("least, most: with whatever else the hand can carry")
     if with_pure:
         out.print("pure: with every other component zero; -: none")
-    ends = [capability[f"{sign}{AXES[0]}"].pure for sign in "+-"]
+    ends = [capability[f"{sign}{replies.AXES[0]}"].pure for sign in "+-"]
     if any(end is None or round(end, 2) < 0.0 for end in ends):
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
 
 
-def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console) -> None:
+def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out: Console) -> None:
     """Print what is missing, what could be held instead, and what is in the way."""
     if proof.shortfall is not None and proof.nearest is not None:
         where = "at any utilisation"
@@ -254,13 +248,13 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
             ("nearest held", *proof.nearest),
             ("missing", *proof.shortfall),
         )
-        columns = in_order([""], AXES, form="z.1f")
+        columns = in_order([""], replies.AXES, form="z.1f")
         print_rows(rows, columns, out, f"body wrenches {where}, in B [N, N·m]")
     if proof.irreducible:
         title = "these leave no balance, each needed for that; others may be in the way, too"
         alike = [(*names, ", ".join(of) or "-") for names, of in _alike(proof.irreducible).items()]
         print_rows(alike, in_order(("hand", "limit"), texts=["of"]), out, title)
-        words = {each.limit: constraint_words(each) for each in proof.irreducible}
+        words = {each.limit: planner.constraint_words(each) for each in proof.irreducible}
         for limit, said in words.items():
             out.print(f"{limit}: {said}", markup=False)
         if proof.sufficient is not None:
@@ -268,7 +262,7 @@ def _print_certificate(proof: Certificate, needed: Sequence[float], out: Console
             out.print(_sufficient_sentence(proof.sufficient), markup=False)
 
 
-def _sufficient_sentence(names: Sequence[LimitName]) -> str:
+def _sufficient_sentence(names: Sequence[planner.LimitName]) -> str:
     """Say which limits, taken away alone, would do."""
     if not names:
         return "no single one of them, taken away alone, would do"
@@ -280,7 +274,7 @@ def _sufficient_sentence(names: Sequence[LimitName]) -> str:
     return f"{which}, taken away alone, would let it be held: {told}"
 
 
-def _alike(names: Iterable[LimitName]) -> dict[tuple[str, str], list[str]]:
+def _alike(names: Iterable[planner.LimitName]) -> dict[tuple[str, str], list[str]]:
     """Return limits by limb and kind, in their order, with what of the limb each is of."""
     alike: dict[tuple[str, str], list[str]] = {}
     for each in names:
@@ -291,7 +285,7 @@ def _alike(names: Iterable[LimitName]) -> dict[tuple[str, str], list[str]]:
     return alike
 
 
-def _print_closing(reply: WrenchSpaceReply, out: Console) -> None:
+def _print_closing(reply: replies.WrenchSpaceReply, out: Console) -> None:
     """Print what of each finger touches, and when it stopped moving."""
     kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
 
@@ -309,7 +303,7 @@ def _print_closing(reply: WrenchSpaceReply, out: Console) -> None:
     print_rows(rows, columns, out, title)
 
 
-def _nearby_sentence(closing: ClosingSequence) -> str:
+def _nearby_sentence(closing: replies.ClosingSequence) -> str:
     """Say how else a finger would end."""
     ends = f", or {', '.join(closing.nearby)}" if closing.nearby else ""
     return (
@@ -318,7 +312,7 @@ def _nearby_sentence(closing: ClosingSequence) -> str:
     )
 
 
-def _path_sentence(path: TensionPath) -> str:
+def _path_sentence(path: planner.TensionPath) -> str:
     """Say what the way from the present tensions is like."""
     used = path.utilisation_at_present
     there = "no balance" if used is None else f"utilisation {used:.3f}"
@@ -326,7 +320,7 @@ def _path_sentence(path: TensionPath) -> str:
     return f"from the present tensions ({there}): changes up to {path.largest_change:.1f} N, {way}"
 
 
-def _load_factor(reply: PlanReply) -> str:
+def _load_factor(reply: replies.PlanReply) -> str:
     if reply.load_factor_unbounded:
         return "unbounded"
     if reply.load_factor is None:
@@ -334,7 +328,7 @@ def _load_factor(reply: PlanReply) -> str:
     return f"{reply.load_factor:.3f}"
 
 
-def _print_hands(hands: Sequence[Hand], out: Console) -> None:
+def _print_hands(hands: Sequence[replies.Hand], out: Console) -> None:
     """Print what each hand carries, where floating ones go, and what each finger does."""
     print_rows(hands, HANDS, out, "wrench on the rock, in H [N, N·m], and the palm's part")
     floating = [hand for hand in hands if hand.wrist.twist is not None]
@@ -382,7 +376,7 @@ def _print_joints(
     print_rows(rows, columns, out, title, padding=0)
 
 
-def _print_clearance(clearance: Clearance, out: Console) -> None:
+def _print_clearance(clearance: planner.Clearance, out: Console) -> None:
     """Print the least distances, and what was not measured."""
     pairs = ("link_rock", "link_link", "hand_hand", "hand_body", "body_rock")
     near = {pair.replace("_", " "): getattr(clearance, pair) for pair in pairs}
