@@ -8,7 +8,7 @@ from typing import Final
 import click
 from click.core import ParameterSource
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, within
 from service import processes, sweeping, tables
 from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
@@ -94,17 +94,18 @@ def sweep(
     given = click.get_current_context().get_parameter_source("tolerance")
     if given is ParameterSource.COMMANDLINE and design.number is None:
         raise InvalidInputError("is of one number that varies alone", field="--tolerance")
-    pair = _pair(over, design)
+    pair = None if over is None else over.split(",")
+    if pair is not None:
+        with within("--over"):
+            design.places_of(pair)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     table, picture = folder / TABLE, folder / PICTURE
     tables.write_alone(table, folder)
     with writing_answers(table):
         sink = sweeping.PointRows(request, design, seed or 0, table, resume, *own)
-    ask = sweeping.asking(
-        sink.asked.count - sink.tally.count, parallel.workers, own.robot, parallel.dask
-    )
-    answer_rest(sink.asked, ask, sink, table, f"sweeping {stance}", "points")
+    ask = sweeping.asking(sink.count - sink.tally.count, parallel.workers, own.robot, parallel.dask)
+    answer_rest(sink, ask, sink, table, f"sweeping {stance}", "points")
     try:
         result = sweeping.with_borders(design, sink.points, own.robot, tolerance)
     except processes.Interrupted:
@@ -121,19 +122,6 @@ def sweep(
             tables.print_sweep(result, out)
         out.print(f"table: {table}\npicture: {picture}", markup=False, soft_wrap=True)
     return _status(result)
-
-
-def _pair(over: str | None, design: sweeping.Design) -> tuple[str, str] | None:
-    """Return the paths that the picture is over, checked before anything is planned."""
-    if over is None:
-        return None
-    paths = [each.path for each in design.variations]
-    first, _, second = over.partition(",")
-    if first == second or not {first, second} <= {*paths}:
-        raise InvalidInputError(
-            f"two different ones of {', '.join(paths)} are wanted, got {over}", field="--over"
-        )
-    return first, second
 
 
 def _status(result: sweeping.Sweep) -> int:

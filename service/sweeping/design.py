@@ -130,6 +130,21 @@ class Design:
         place, *others = self.varying
         return None if others or not self.variations[place].numbers else place
 
+    def places_of(self, over: Sequence[str]) -> list[int]:
+        """Return the places of two variations by their paths.
+
+        Raises
+        ------
+        InvalidInputError
+            If there are none, or they are the same.
+        """
+        paths = [each.path for each in self.variations]
+        if len(over) != 2 or over[0] == over[1] or not {*over} <= {*paths}:
+            raise InvalidInputError(
+                f"two different ones of {', '.join(paths)} are wanted, got {','.join(over)}"
+            )
+        return [paths.index(path) for path in over]
+
     def payload(self, point: Point, form: Format = Format.MSGPACK) -> bytes:
         """Return the encoded request at a point."""
         varied: list[Steps] = []

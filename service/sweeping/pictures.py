@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hand_models.base import Array, InvalidInputError, whole_file
+from hand_models.base import Array, whole_file
 from service.sweeping.rows import Row, State
 from service.sweeping.sweep import Sweep
 from service.sweeping.variation import Value, word_of
@@ -67,7 +67,7 @@ LOOKS: Final[dict[State, Look]] = {
 """From the best to the worst."""
 
 
-def plot_sweep(sweep: Sweep, path: Path, title: str, over: tuple[str, str] | None = None) -> None:
+def plot_sweep(sweep: Sweep, path: Path, title: str, over: Sequence[str] | None = None) -> None:
     """Draw a sweep.
 
     A grid over one number is drawn as curves of utilisation and load factor, over a number and
@@ -82,7 +82,7 @@ def plot_sweep(sweep: Sweep, path: Path, title: str, over: tuple[str, str] | Non
     path : Path
         PNG, PDF or SVG.
     title : str
-    over : tuple of str, optional
+    over : sequence of str, optional
         Paths of the two variations over which it is drawn instead.
 
     Raises
@@ -95,13 +95,7 @@ def plot_sweep(sweep: Sweep, path: Path, title: str, over: tuple[str, str] | Non
     numbers = [i for i in varying if design.variations[i].numbers]
     ordered = [*numbers, *(i for i in varying if i not in numbers)]
     if over is not None:
-        paths = [each.path for each in design.variations]
-        if over[0] == over[1] or not {*over} <= {*paths}:
-            raise InvalidInputError(
-                f"must be two different ones of {', '.join(paths)}, got {', '.join(over)}",
-                field="over",
-            )
-        figure = _maps(sweep, paths.index(over[0]), paths.index(over[1]))
+        figure = _maps(sweep, *design.places_of(over))
     elif len(varying) == 1 or (len(varying) == 2 and len(numbers) == 1 and not sampled):
         figure = _plots(
             sweep, [(ordered[0], "utilisation"), (ordered[0], "load factor")], ordered[1:]

@@ -190,30 +190,8 @@ def write_rows(design: Design, rows: Iterable[Row], path: Path) -> None:
         writer.writerows(row.cells for row in rows)
 
 
-class Questions:
-    """The encoded request at each point of a design.
-
-    Parameters
-    ----------
-    design : Design
-
-    Attributes
-    ----------
-    count : int
-    """
-
-    def __init__(self, design: Design) -> None:
-        self._design = design
-        self.count = len(design.points)
-
-    def __iter__(self) -> Iterator[bytes]:
-        return map(self._design.payload, self._design.points)
-
-    questions = __iter__
-
-
 class PointRows(Rows):
-    """Rows of points, in a file that grows with them.
+    """Rows of points, in a file that grows with them, and the questions that they answer.
 
     Parameters
     ----------
@@ -230,7 +208,8 @@ class PointRows(Rows):
 
     Attributes
     ----------
-    asked : Questions
+    count : int
+        How many points there are.
     points : list of Row
         Those of the points that are answered.
 
@@ -252,15 +231,15 @@ class PointRows(Rows):
         hand: ParameterTable | None,
         robot: RobotFile | None,
     ) -> None:
-        columns, self.asked, self._design = columns_of(design), Questions(design), design
-        count = f"{len(design.points)} of seed {seed}" if design.sampled else "none"
+        columns, self._design, self.count = columns_of(design), design, len(design.points)
+        count = f"{self.count} of seed {seed}" if design.sampled else "none"
         about = {
             "stance": bulk.digest_of(msgspec.json.encode(request)),
             "--samples": count,
             "--vary": " ".join(each.text(sampled=design.sampled) for each in design.variations),
         }
         begun = bulk.new_manifest([each.name for each in columns], False, hand, robot, about)
-        table = CsvTable.opened(path, columns, begun, resume, self.asked)
+        table = CsvTable.opened(path, columns, begun, resume, self)
         super().__init__(table)
         try:
             known = zip(design.points, table.whole_rows(), strict=False)
@@ -272,6 +251,12 @@ class PointRows(Rows):
                 f"{path}: its rows are not those that were written; begin anew without it",
                 field="--resume",
             )
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Yield the encoded request at each point."""
+        return map(self._design.payload, self._design.points)
+
+    questions = __iter__
 
     def row(self, payload: bytes) -> bulk.Row:
         """Return the cells of the point that is next."""
