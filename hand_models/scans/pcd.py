@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -90,6 +91,18 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
             f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of its header are to be whole numbers: {path}",
             field="file",
         ) from None
+    kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", NOWHERE)
+    if len(kinds) != len(sizes) or not {*kinds} <= {b"F", b"I", b"U"}:
+        raise InvalidInputError(
+            f"TYPE of its header is to be F, I or U of each field, got {_words(kinds)}: {path}",
+            field="file",
+        )
+    if len(pose) != len(NOWHERE):
+        raise InvalidInputError(
+            "VIEWPOINT of its header is to be seven numbers, a place and a quaternion [w, x, y, z]"
+            f", got {_words(pose)}: {path}",
+            field="file",
+        )
     if min(sizes + counts + rows) < 0:
         raise InvalidInputError(f"a number of its header is below zero: {path}", field="file")
     if not 0 < sum(counts) <= MOST_COLUMNS:
@@ -117,3 +130,8 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
             f"{path}",
             field="file",
         )
+
+
+def _words(values: Sequence[bytes | float]) -> str:
+    """Return what a line of a header says after its name."""
+    return " ".join(str(each, "ascii", "replace") for each in values if isinstance(each, bytes))

@@ -116,6 +116,13 @@ def read_scan(
     _check_numbers(raw.points, read, path)
     scale, turn = _scale(raw.points, unit, width), UPS[up]
     check_digits(raw.points, scale, path)
+    if not np.ptp(raw.points, axis=0).any():
+        place = ", ".join(f"{x:g}" for x in raw.points[0])
+        raise InvalidInputError(
+            f"all {len(raw.points):,} points of {path} are equal, ({place}); a scan has points at "
+            "different places",
+            field="file",
+        )
 
     def placed(point: ArrayLike, field: str) -> Array:
         return np.asarray(scale * turn @ finite_vector(point, 3, field))

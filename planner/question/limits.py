@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from hand_models.base import InvalidFieldError, InvalidInputError, Strict, check_positive
 
-__all__ = ["BodyRange", "ForceCap", "Limits"]
+__all__ = ["BodyRange", "ForceCap", "Limits", "no_torque"]
 
 Frame = Literal["hand", "body", "world"]
 
@@ -118,13 +118,19 @@ class Limits:
         by_limb = torque if isinstance(torque, Mapping) else {"": torque}
         for limb, given in by_limb.items():
             each = given if isinstance(given, tuple) else (given,)
-            wrong = [most for most in each if not (most == 0.0 or LEAST <= most < math.inf)]
-            if wrong or not any(each):
-                raise InvalidInputError(
-                    f"must be at least {LEAST:g} N·m, or in a list 0 for a joint without a motor "
-                    f"(not all of a limb), got {', '.join(f'{most:g}' for most in wrong or each)}",
-                    field="joint_torque" + (f".{limb}" if limb else ""),
-                )
+            idle = 0.0 if isinstance(given, tuple) else LEAST
+            wrong = [most for most in each if not (most == idle or LEAST <= most < math.inf)]
+            if wrong:
+                raise no_torque(wrong, "joint_torque" + (f".{limb}" if limb else ""))
+
+
+def no_torque(given: Sequence[float], field: str) -> InvalidInputError:
+    """Return the error about the most that joints may bear."""
+    return InvalidInputError(
+        f"must be at least {LEAST:g} N·m, or in a list 0 for a joint without a motor "
+        f"(not all of a limb), got {', '.join(f'{most:g}' for most in given)}",
+        field=field,
+    )
 
 
 class BodyRange(Strict, frozen=True):

@@ -162,6 +162,8 @@ class Question:
                         f"{count} joints need {count} figures, got {len(most)}",
                         field=f"limits.joint_torque.{limb}",
                     )
+                if isinstance(most, tuple) and not any(most):
+                    raise no_torque(most, f"limits.joint_torque.{limb}")
 
     def bare(self) -> Question:
         """Return the same question for the least utilisation, without extras and deadline."""

@@ -5,48 +5,24 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
 import click
 
+import planner
 from hand_models.base import CruxError, InvalidInputError
-from service.commands.options import (
-    dask_option,
-    hand_option,
-    json_option,
-    robot_option,
-    workers_option,
-)
-from service.processes import Interrupted
-from service.tables import (
-    BAD_INPUT,
-    DONE,
-    EXIT_STATUS,
-    FAILED,
-    OVERLOADED,
-    bulk_progress,
-    note,
-    say,
-    verbosity,
-    write_alone,
-    writing,
-)
-from service.wire import REQUEST_KINDS, Answer
+from service import bulk, processes, tables, wire
+from service.commands import options
 
-if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
-    from service.bulk import Asked, Column, Question, Sink, Table, Tally
+__all__ = ["answer_rest", "batch", "complain", "exit_status", "new_sink", "writing_answers"]
 
-__all__ = ["answer_rest", "batch", "complain", "exit_status", "place", "writing_answers"]
-
-WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
+WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables.DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
 
 
@@ -69,27 +45,23 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
     is_flag=True,
     help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
 )
-@workers_option
-@dask_option
+@options.workers_options
 @click.option(
     "--explain/--no-explain",
     default=None,
     help="Whether it is proven and named what is in the way where a stance is overloaded or "
     "infeasible. By default replies do as their requests say, and tables leave it out.",
 )
-@hand_option
-@robot_option
-@json_option
+@options.own_options
+@options.json_option
 def batch(
     requests: str,
     file: Path | None,
     columns: str | None,
     resume: bool,
-    workers: int | None,
-    dask: str | None,
+    parallel: options.Workers,
     explain: bool | None,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Answer many plan requests: one a line in, one reply, row or error out, in order.
@@ -103,36 +75,29 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
-    from service.bulk import Lines, ReplyLines, Rows, evaluate, new_manifest, table_at
-
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
-    kind = None if file is None else table_at(file)
+    kind = None if file is None else bulk.table_at(file)
     if columns is not None and kind is None:
         raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field="--columns")
     if file is not None:
         _check_output(file, requests, resume, kind)
-        write_alone(file)
+        tables.write_alone(file)
     begun = perf_counter()
-    with closing(Lines(requests)) as lines:
-        if kind is None:
-            with writing_answers(file):
-                sink: Sink = ReplyLines(file, as_json, resume, lines)
-        else:
-            assert file is not None
-            explain = bool(explain)
-            chosen = _columns(columns, robot, explain)
-            now = new_manifest([each.name for each in chosen], explain, hand, robot)
-            with writing_answers(file):
-                sink = Rows(kind.opened(file, chosen, now, resume, lines))
+    with closing(bulk.Lines(requests)) as lines:
+        explain = explain if kind is None else bool(explain)
+        choose = partial(_columns, columns, own.robot, bool(explain))
+        sink = new_sink(
+            file, lines, choose, own, explained=bool(explain), resume=resume, shown=as_json
+        )
         before = sink.tally.count
-        on, workers = place(dask, workers, lines.count - before)
+        on, workers = parallel.place(lines.count - before)
         answers = partial(
-            evaluate,
+            bulk.evaluate,
             on=on,
             workers=workers,
-            hand=hand,
-            robot=robot,
+            hand=own.hand,
+            robot=own.robot,
             folder=Path() if requests == "-" else Path(requests).parent,
             explain=explain,
             columns=sink.columns,
@@ -143,40 +108,57 @@ def batch(
     if not as_json:
         _print(sink.tally, before, elapsed, file)
     elif file is not None:
-        say(_summary(sink.tally, elapsed) | {"file": str(file)})
+        tables.say(_summary(sink.tally, elapsed) | {"file": str(file)})
     return exit_status(sink.tally)
 
 
 def writing_answers(file: Path | None) -> AbstractContextManager[None]:
     """Turn what goes wrong in writing answers into one line, if they go to a file."""
-    return nullcontext() if file is None else writing(file, "-o")
+    return nullcontext() if file is None else tables.writing(file, "-o")
 
 
-def place(dask: str | None, workers: int | None, left: int) -> tuple[str, int | None]:
-    """Return where so many questions are answered, and by how many processes.
+def new_sink(
+    file: Path | None,
+    asked: bulk.Asked,
+    columns: Callable[[], Sequence[bulk.Column]],
+    own: options.Own,
+    *,
+    explained: bool,
+    resume: bool,
+    shown: bool = False,
+) -> bulk.Sink:
+    """Return where answers go: rows of a table or lines of a file, or lines on standard output.
 
     Parameters
     ----------
-    dask : str or None
-        As `--dask`.
-    workers : int or None
-        As `--workers`.
-    left : int
-        Questions, each as dear as a plan.
+    file : Path or None
+    asked : Asked
+        All questions.
+    columns : callable
+        Returns the columns of a table.
+    own : Own
+        What a table is of.
+    explained : bool
+        Whether a table is of explained plans.
+    resume : bool
+        Whether what the file answers is kept.
+    shown : bool, optional
+        Whether replies go to standard output where there is no file.
     """
-    from service.bulk import LOCAL
-    from service.processes import worth
-
-    if dask is not None:
-        return (LOCAL if dask == "local" else dask), workers
-    count = worth(left, workers)
-    return ("here", None) if count == 1 else ("processes", count)
+    kind = None if file is None else bulk.table_at(file)
+    if file is None or kind is None:
+        with writing_answers(file):
+            return bulk.ReplyLines(file, shown, resume, asked)
+    chosen = columns()
+    now = bulk.new_manifest([each.name for each in chosen], explained, *own)
+    with writing_answers(file):
+        return bulk.Rows(kind.opened(file, chosen, now, resume, asked))
 
 
 def answer_rest(
-    asked: Asked,
-    answers: Callable[[Iterator[Question]], Generator[Answer, None, None]],
-    sink: Sink,
+    asked: bulk.Asked,
+    answers: Callable[[Iterator[Any]], Generator[wire.Answer, None, None]],
+    sink: bulk.Sink,
     file: Path | None,
     title: str,
     noun: str,
@@ -205,11 +187,11 @@ def answer_rest(
     begun, before = perf_counter(), sink.tally.count
     due: deque[bytes] = deque()
 
-    def ask() -> Iterator[Question]:
+    def ask() -> Iterator[bulk.Question]:
         # now there is somewhere to work: until then what was there has stayed
         open_sink()
         for question in islice(asked.questions(), before, None):
-            due.append(question.payload if isinstance(question, Answer) else question)
+            due.append(question.payload if isinstance(question, wire.Answer) else question)
             yield question
 
     opened = False
@@ -227,7 +209,7 @@ def answer_rest(
 
     try:
         with ExitStack() as stack:
-            tell = stack.enter_context(bulk_progress(title))
+            tell = stack.enter_context(tables.progress(title, counted=True))
             stack.enter_context(writing_answers(file))
             found = stack.enter_context(closing(answers(ask())))
             if before == asked.count:
@@ -239,15 +221,15 @@ def answer_rest(
                 rate = (done - before) / (perf_counter() - begun)
                 words = ", ".join(filter(None, (f"{rate:.0f}/s", sink.tally.errors)))
                 tell(done, asked.count, words)
-    except Interrupted:
-        raise Interrupted(kept()) from None
+    except processes.Interrupted:
+        raise processes.Interrupted(kept()) from None
     except InvalidInputError:
         raise
     except CruxError as error:
         raise CruxError(f"{error.message}; {kept()}") from None
 
 
-def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | None) -> None:
+def _check_output(file: Path, requests: str, resume: bool, kind: type[bulk.Table] | None) -> None:
     """Refuse a file for answers that is the requests' own, or that nothing can be resumed in."""
     try:
         if kind is None and file.is_dir():
@@ -263,19 +245,18 @@ def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | N
         return
 
 
-def _columns(wanted: str | None, robot: RobotFile | None, explained: bool) -> tuple[Column, ...]:
+def _columns(
+    wanted: str | None, robot: planner.RobotFile | None, explained: bool
+) -> tuple[bulk.Column, ...]:
     """Return the columns of a table about a robot."""
-    from planner import RobotFile
-    from service.bulk import chosen_columns
-
-    limbs = (RobotFile.bundled() if robot is None else robot).limbs
+    limbs = (planner.RobotFile.bundled() if robot is None else robot).limbs
     try:
-        return chosen_columns(wanted, limbs, explained)
+        return bulk.chosen_columns(wanted, limbs, explained)
     except InvalidInputError as error:
         raise InvalidInputError(error.message, field="--columns") from None
 
 
-def complain(tally: Tally, where: Callable[[int], str], noun: str) -> None:
+def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
     """Name the first question that is bad input, and how many more are.
 
     Parameters
@@ -291,40 +272,45 @@ def complain(tally: Tally, where: Callable[[int], str], noun: str) -> None:
         index, error = tally.first_bad
         field = "" if error.field is None else f"{error.field}: "
         more = f"; {tally.bad - 1} more {noun} are bad input" if tally.bad > 1 else ""
-        note(f"{where(index)}: {field}{error.message}{more}")
+        tables.note(f"{where(index)}: {field}{error.message}{more}")
 
 
-def exit_status(tally: Tally, statuses: Mapping[str, int] = EXIT_STATUS) -> int:
+def exit_status(tally: bulk.Tally, statuses: Mapping[str, int] = tables.EXIT_STATUS) -> int:
     """Return the worst of what the requests alone would have, by their statuses."""
-    found = [statuses.get(status, FAILED) for status in tally.statuses]
-    found += [BAD_INPUT if kind in REQUEST_KINDS else FAILED for kind in tally.kinds]
-    return min(found, key=WORST_FIRST.index, default=DONE)
+    found = [statuses.get(status, tables.FAILED) for status in tally.statuses]
+    found += [
+        tables.BAD_INPUT if kind in wire.REQUEST_KINDS else tables.FAILED for kind in tally.kinds
+    ]
+    return min(found, key=WORST_FIRST.index, default=tables.DONE)
 
 
-def _summary(tally: Tally, elapsed: float) -> dict[str, object]:
+def _summary(tally: bulk.Tally, elapsed: float) -> dict[str, object]:
     middle, longest = tally.middle_and_longest()
     return {
         "v": 1,
         "requests": tally.count,
-        **{status: tally.statuses[status] for status in (*EXIT_STATUS, "failed")},
+        **{status: tally.statuses[status] for status in (*tables.EXIT_STATUS, "failed")},
         "errors": dict(tally.kinds),
         "time": {"median": middle, "longest": longest, "elapsed": elapsed},
     }
 
 
-def _print(tally: Tally, before: int, elapsed: float, file: Path | None) -> None:
-    from service.tables import console, table_of
+def _print(tally: bulk.Tally, before: int, elapsed: float, file: Path | None) -> None:
 
-    out = console()
-    table = table_of("answer", numbers=("requests", "median ms", "longest ms"))
-    for status in (*EXIT_STATUS, "failed"):
-        times = tally.middle_and_longest(status)
-        shown = ["-" if time is None else f"{1e3 * time:.1f}" for time in times]
-        table.add_row(status, str(tally.statuses[status]), *shown)
-    for kind, count in sorted(tally.kinds.items()):
-        table.add_row(f"error: {kind}", str(count), "-", "-")
-    if verbosity() >= 0:
-        out.print(table)
+    out = tables.console()
+    rows: list[tuple[object, ...]] = [
+        (status, tally.statuses[status], *tally.middle_and_longest(status))
+        for status in (*tables.EXIT_STATUS, "failed")
+    ]
+    rows += [(f"error: {kind}", count, None, None) for kind, count in sorted(tally.kinds.items())]
+    columns = (
+        tables.name("answer", "0"),
+        tables.number("requests", "1"),
+        tables.number("median ms", "2", ".1f", scale=1e3),
+        tables.number("longest ms", "3", ".1f", scale=1e3),
+    )
+    if tables.verbosity() >= 0:
+        tables.print_rows(rows, columns, out)
     done = tally.count - before
     rate = done / elapsed if elapsed > 0.0 else 0.0
     known = f", {before} were answered before" if before else ""

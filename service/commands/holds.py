@@ -14,28 +14,18 @@ import click
 import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, whole_file
-from service.commands.batch import place
-from service.commands.options import (
-    FiniteRange,
-    dask_option,
-    hand_option,
-    json_option,
-    output_in,
-    plot_option,
-    workers_option,
-)
-from service.processes import Interrupted
-from service.tables import progress, say, write_alone, writing
+from service import processes, tables
+from service.commands import options
 
 if TYPE_CHECKING:
     import numpy as np
     from rich.console import Console
 
-    from hand_models.fixed_wrist import FoundHold, Trial
+    from hand_models import fixed_wrist
     from hand_models.parameters import ParameterTable
 
-    Outcome = FoundHold | InvalidInputError
-    Pair = tuple[Trial, FoundHold]
+    Outcome = fixed_wrist.FoundHold | InvalidInputError
+    Pair = tuple[fixed_wrist.Trial, fixed_wrist.FoundHold]
 
 __all__ = ["holds"]
 
@@ -59,6 +49,8 @@ PLANS: Final = 15
 DEAR: Final = 40
 """Trials as which one counts whose seat is searched for."""
 
+DEGREE: Final = 180.0 / math.pi
+
 UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 """Of the file."""
 
@@ -68,9 +60,8 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=options.OutputFile(OUTPUT),
     required=True,
-    callback=output_in(OUTPUT),
     metavar="JSON",
     help="Where the holds go, the best first, in metres and radians.",
 )
@@ -91,7 +82,7 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 @click.option(
     "--outer-rotation",
     "rotations",
-    type=FiniteRange(0.0, math.pi + 5e-4),
+    type=options.FiniteRange(0.0, math.pi + 5e-4),
     multiple=True,
     default=(0.0, math.pi),
     show_default="0 and π",
@@ -114,11 +105,10 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
     metavar="N",
     help="Of the best N tell also what is left where the hand is a little elsewhere.",
 )
-@workers_option
-@dask_option
-@hand_option
-@plot_option("Draw the rock there, and on it the largest pull-off at each point.")
-@json_option
+@options.workers_options
+@options.hand_option
+@options.plot_option("Draw the rock there, and on it the largest pull-off at each point.")
+@options.json_option
 def holds(
     rock: Path,
     output: Path,
@@ -128,8 +118,7 @@ def holds(
     surface: str,
     seat: Literal["rest", "best"],
     robust: int,
-    workers: int | None,
-    dask: str | None,
+    parallel: options.Workers,
     hand: ParameterTable | None,
     picture: Path | None,
     as_json: bool,
@@ -140,20 +129,17 @@ def holds(
     the mean normal of the rock under its palm. Holds are sorted by how far they reach in the
     pull-off. Each has a `place` for a request's hand whose hold is this rock.
     """
-    from hand_models.fixed_wrist import grid_of_trials
-    from hand_models.parameters import hand_table, own_hand
+    from hand_models import fixed_wrist, parameters
     from hand_models.rock import Mesh, read_mesh
     from hand_models.tile import Surface
-    from service.processes import HoldTrials
-    from service.tables import console
 
     Surface.named(surface)
-    write_alone(output)
-    numbers = hand_table() if hand is None else own_hand(hand)
+    tables.write_alone(output)
+    numbers = parameters.hand_table() if hand is None else parameters.own_hand(hand)
     mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
     radius = 0.5 * numbers.scalar("palm", "length")
-    with progress("laying the grid") as tell:
-        trials = grid_of_trials(
+    with tables.progress("laying the grid") as tell:
+        trials = fixed_wrist.grid_of_trials(
             mesh,
             spacing,
             angles,
@@ -169,22 +155,22 @@ def holds(
             field="--spacing",
         )
     # before the work is done
-    with writing(output, "--output"):
+    with tables.writing(output, "--output"):
         TemporaryFile(dir=output.parent).close()
 
     outcomes: dict[int, Outcome] = {}
     scattered: dict[int, Outcome] = {}
     best: list[Pair] = []
-    broken: Interrupted | CruxError | None = None
-    on, count = place(dask, workers, PLANS * (DEAR if seat == "best" else 1) * len(trials))
+    broken: processes.Interrupted | CruxError | None = None
+    on, count = parallel.place(PLANS * (DEAR if seat == "best" else 1) * len(trials))
     try:
-        with HoldTrials(mesh, surface, numbers, seat=seat, on=on, workers=count) as tried:
+        with processes.HoldTrials(mesh, surface, numbers, seat=seat, on=on, workers=count) as tried:
             _keep(f"trying {len(trials):,} places", trials, tried.each(trials), outcomes)
             best = _sorted(trials, outcomes)[:robust]
             again = [trial for trial, _ in best]
             title = f"scattering the best {len(best)}"
             _keep(title, again, tried.each(again, robust=True), scattered)
-    except (Interrupted, CruxError) as error:
+    except (processes.Interrupted, CruxError) as error:
         if not outcomes:
             raise
         broken = error
@@ -207,7 +193,7 @@ def holds(
         "warnings": list(mesh.oddities),
         "holds": [_entry(trial, each) for trial, each in found],
     }
-    with writing(output, "--output"), whole_file(output) as part:
+    with tables.writing(output, "--output"), whole_file(output) as part:
         part.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
     if broken is not None:
         kept = (
@@ -216,33 +202,33 @@ def holds(
         )
         if isinstance(broken, CruxError):
             raise CruxError(f"{broken.message}; {kept}")
-        raise Interrupted(kept)
+        raise processes.Interrupted(kept)
     if picture is not None:
         _draw(mesh, trials, found, picture, rock.name)
     if as_json:
         told = {name: value for name, value in result.items() if name != "refusals"}
-        say({**told, "holds": len(found), "file": str(output)})
+        tables.say({**told, "holds": len(found), "file": str(output)})
     else:
-        _print(trials, found, refused, mesh.oddities, output, console())
+        _print(trials, found, refused, mesh.oddities, output, tables.console())
 
 
 def _keep(
     title: str,
-    trials: Sequence[Trial],
+    trials: Sequence[fixed_wrist.Trial],
     tried: Generator[tuple[int, Outcome], None, None],
     outcomes: dict[int, Outcome],
 ) -> None:
     """Keep what comes of each place at once, in case that the rest is broken off."""
     if not trials:
         return
-    with progress(title) as tell, closing(tried) as found:
+    with tables.progress(title) as tell, closing(tried) as found:
         tell(0, len(trials))
         for i, each in found:
             outcomes[i] = each
             tell(len(outcomes), len(trials))
 
 
-def _sorted(trials: Sequence[Trial], outcomes: Mapping[int, Outcome]) -> list[Pair]:
+def _sorted(trials: Sequence[fixed_wrist.Trial], outcomes: Mapping[int, Outcome]) -> list[Pair]:
     """Return the trials whose hands hold something, the largest pull-off first."""
     pairs = [
         (trials[i], each)
@@ -258,7 +244,9 @@ def _reason(error: InvalidInputError) -> str:
     return " ".join("…" if any(map(str.isdigit, word)) else word for word in words.split())
 
 
-def _refusals(trials: Sequence[Trial], outcomes: Mapping[int, Outcome]) -> list[dict[str, Any]]:
+def _refusals(
+    trials: Sequence[fixed_wrist.Trial], outcomes: Mapping[int, Outcome]
+) -> list[dict[str, Any]]:
     """Return the points where hands cannot be, and in how many trials there for which reason."""
     found: dict[tuple[float, float, float], Counter[str]] = {}
     for i, each in sorted(outcomes.items()):
@@ -267,16 +255,16 @@ def _refusals(trials: Sequence[Trial], outcomes: Mapping[int, Outcome]) -> list[
     return [{"point": point, "reasons": dict(reasons)} for point, reasons in found.items()]
 
 
-def _entry(trial: Trial, found: FoundHold) -> dict[str, Any]:
+def _entry(trial: fixed_wrist.Trial, found: fixed_wrist.FoundHold) -> dict[str, Any]:
     """Return a hold as JSON has it."""
-    from hand_models.fixed_wrist import WAYS
+    from hand_models import fixed_wrist
 
     def by_way(values: np.ndarray | None) -> dict[str, float | None] | None:
         if values is None:
             return None
         return {
             way: value if math.isfinite(value) else None
-            for way, value in zip(WAYS, values.tolist(), strict=True)
+            for way, value in zip(fixed_wrist.WAYS, values.tolist(), strict=True)
         }
 
     return {
@@ -300,7 +288,9 @@ def _entry(trial: Trial, found: FoundHold) -> dict[str, Any]:
     }
 
 
-def _draw(mesh: Any, trials: list[Trial], found: list[Pair], path: Path, name: str) -> None:
+def _draw(
+    mesh: Any, trials: list[fixed_wrist.Trial], found: list[Pair], path: Path, name: str
+) -> None:
     import numpy as np
 
     from hand_models.scans import plot_holds
@@ -313,14 +303,18 @@ def _draw(mesh: Any, trials: list[Trial], found: list[Pair], path: Path, name: s
     )
     points, values = np.array(list(most)).reshape(-1, 3), np.array(list(most.values()))
     best = [each.pose for _, each in found[:SHOWN]]
-    with writing(path):
+    with tables.writing(path):
         plot_holds(
             mesh.triangles, points, values, none.reshape(-1, 3), best, path, f"holds on {name}"
         )
 
 
+def _finite(value: float) -> str:
+    return f"{value:.1f}" if math.isfinite(value) else "-"
+
+
 def _print(
-    trials: list[Trial],
+    trials: list[fixed_wrist.Trial],
     found: list[Pair],
     refused: Counter[str],
     oddities: Sequence[str],
@@ -329,25 +323,19 @@ def _print(
 ) -> None:
     """Print the best holds, and why hands cannot be at other places."""
     from hand_models.fixed_wrist import AT_BORDER
-    from service.tables import table_of
+    from service.tables import name
 
-    numbers = ("wrist °", "outer °", "pull N", "alone", "shear N", "9 in 10", "99 in 100")
-    table = table_of("x, y, z mm", numbers=numbers)
-    for trial, each in found[:SHOWN]:
-        left = [
-            "-" if values is None or not math.isfinite(values[0]) else f"{values[0]:.1f}"
-            for values in (each.tenth, each.hundredth)
-        ]
-        table.add_row(
-            ", ".join(f"{1e3 * value:z.0f}" for value in trial.point),
-            f"{math.degrees(trial.wrist_angle):.0f}",
-            f"{math.degrees(trial.outer_rotation):.0f}",
-            f"{each.support[0]:z.1f}",
-            f"{each.pure:.1f}" if math.isfinite(each.pure) else "-",
-            f"{each.support[1:].min():z.1f}",
-            *left,
-        )
-    out.print(table)
+    columns = (
+        name("x, y, z mm", "0.point", lambda at: ", ".join(f"{1e3 * x:z.0f}" for x in at)),
+        tables.number("wrist °", "0.wrist_angle", ".0f", scale=DEGREE),
+        tables.number("outer °", "0.outer_rotation", ".0f", scale=DEGREE),
+        tables.number("pull N", "1.support.0", "z.1f"),
+        tables.number("alone", "1.pure", _finite),
+        tables.number("shear N", lambda row: row[1].support[1:].min(), "z.1f"),
+        tables.number("9 in 10", "1.tenth.0", _finite),
+        tables.number("99 in 100", "1.hundredth.0", _finite),
+    )
+    tables.print_rows(found[:SHOWN], columns, out)
     points = len({trial.point for trial in trials})
     pulled = sum(each.support[0] > 0.0 for _, each in found)
     out.print(

@@ -13,38 +13,11 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 import msgspec
 
-from service.commands.options import (
-    PICTURES,
-    FiniteRange,
-    asked,
-    hand_option,
-    json_option,
-    output_in,
-    robot_option,
-    stance_argument,
-    timeout_option,
-    wait_option,
-    with_extras,
-)
-from service.commands.stances import read_request
-from service.processes import kill_children
-from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
-from service.serving import (
-    MODES,
-    ended_in_time,
-    listening,
-    open_session,
-    start_zenoh_log,
-    zenoh_config,
-)
-from service.tables import draw_plan, note, remark, say, show, verbosity
-from service.wire import DEFAULT_ROBOT, UNREACHABLE, ServiceError, service_key
+from service import answering, processes, requests, serving, tables, wire
+from service.commands import options, stances
 
 if TYPE_CHECKING:
     import zenoh
-
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
 
 __all__ = ["demo", "query", "schema", "serve"]
 
@@ -65,7 +38,7 @@ DEMO_STANCE: Final = "wall-300-joints"
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a click command zenoh's flags, and pass it their ``config``."""
 
-    @click.option("-m", "--mode", type=click.Choice(MODES), help="Zenoh session mode.")
+    @click.option("-m", "--mode", type=click.Choice(serving.MODES), help="Zenoh session mode.")
     @click.option("-e", "--connect", multiple=True, metavar="ENDPOINT", help="Connect to it.")
     @click.option("-l", "--listen", multiple=True, metavar="ENDPOINT", help="Listen on it.")
     @click.option(
@@ -77,7 +50,7 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def with_config(no_multicast_scouting: bool, **given: Any) -> Any:
         names = ("mode", "connect", "listen", "file", "settings")
         flags = {name: given.pop(name) for name in names}
-        config = zenoh_config(**flags, multicast=not no_multicast_scouting)
+        config = serving.zenoh_config(**flags, multicast=not no_multicast_scouting)
         return command(config=config, **given)
 
     return with_config
@@ -85,8 +58,7 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command()
 @zenoh_options
-@hand_option
-@robot_option
+@options.own_options
 @click.option(
     "--workers",
     type=click.IntRange(1, 256),
@@ -95,8 +67,8 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option(
     "--deadline",
     "seconds",
-    type=FiniteRange(0.0, min_open=True, max=LONGEST_DEADLINE),
-    default=DEFAULT_DEADLINE,
+    type=options.FiniteRange(0.0, min_open=True, max=requests.LONGEST_DEADLINE),
+    default=requests.DEFAULT_DEADLINE,
     show_default=True,
     metavar="SECONDS",
     help="Of a question that names none, from its arrival.",
@@ -107,11 +79,10 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     help="Give Prometheus its text over HTTP on this port of this machine.",
 )
 @click.option("--log-format", type=click.Choice(["text", "json"]), default="text")
-@json_option
+@options.json_option
 def serve(
     config: zenoh.Config,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: options.Own,
     workers: int | None,
     seconds: float,
     metrics_port: int | None,
@@ -127,32 +98,33 @@ def serve(
     stop = _StopSignal()
     # a client that does not read stops one of these for as long as zenoh waits for it
     os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)
-    from service.serving import JsonLines, LogThread, PlanService, closed, exposed
 
-    handler = LogThread()
+    handler = serving.LogThread()
     form = logging.Formatter("crux: %(levelname)s: %(message)s")
-    handler.setFormatter(JsonLines() if log_format == "json" else form)
-    logging.basicConfig(handlers=[handler], level=LEVELS[verbosity()])
-    start_zenoh_log()
-    closed(config)
-    endpoints = listening(config)
-    with ended_in_time(open_session(config)) as session:
-        service = PlanService(session, robot, hand, workers=workers, seconds=seconds)
+    handler.setFormatter(serving.JsonLines() if log_format == "json" else form)
+    logging.basicConfig(handlers=[handler], level=LEVELS[tables.verbosity()])
+    serving.start_zenoh_log()
+    serving.closed(config)
+    endpoints = serving.listening(config)
+    with serving.ended_in_time(serving.open_session(config)) as session:
+        service = serving.PlanService(
+            session, own.robot, own.hand, workers=workers, seconds=seconds
+        )
         if metrics_port is not None:
             service.serve_metrics(metrics_port)
         if service.has_rival():
-            note(
-                f"another service already answers {service_key(service.robot, '…')}: queries may "
-                "reach either; --no-multicast-scouting keeps services apart"
+            tables.note(
+                f"another service already answers {wire.service_key(service.robot, '…')}: queries "
+                "may reach either; --no-multicast-scouting keeps services apart"
             )
         with service:
             stop.waits_for()
             if as_json:
-                say({"v": 1, "keys": service.keys, "listen": endpoints})
+                tables.say({"v": 1, "keys": service.keys, "listen": endpoints})
             where = ", ".join(endpoints) or "no address"
-            remark(f"serving {', '.join(service.keys)}; listening on {where}")
-            if open_to := exposed(config):
-                note(
+            tables.remark(f"serving {', '.join(service.keys)}; listening on {where}")
+            if open_to := serving.exposed(config):
+                tables.note(
                     f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh tells "
                     "of this session (@/**); access control is zenoh's (-c FILE)"
                 )
@@ -190,40 +162,36 @@ class _StopSignal:
 def _leave(*_: object) -> None:
     try:
         # one may be in the middle of being started
-        kill_children()
+        processes.kill_children()
     finally:
         os._exit(0)
 
 
 @click.command()
-@stance_argument
+@options.stance_argument
 @zenoh_options
-@timeout_option
-@wait_option
-@hand_option
-@robot_option
-@json_option
+@options.timeout_option
+@options.wait_option
+@options.own_options
+@options.json_option
 def query(
     stance: str,
     config: zenoh.Config,
     timeout: float | None,
     wait: float | None,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Ask a running service for a plan.
 
     It has to serve the robot that the stance or --robot names.
     """
-    from service.serving import CruxClient
-
-    request = with_extras(asked(read_request(stance), hand, robot), whole=not as_json)
-    start_zenoh_log()
-    name = request.stance.robot or DEFAULT_ROBOT
-    with CruxClient(config, name, timeout=timeout, wait=wait) as client:
+    request = options.with_extras(own.asked(stances.read_request(stance)), whole=not as_json)
+    serving.start_zenoh_log()
+    name = request.stance.robot or wire.DEFAULT_ROBOT
+    with serving.CruxClient(config, name, timeout=timeout, wait=wait) as client:
         reply = client.plan(request)
-    return show(reply, as_json)
+    return tables.show(reply, as_json)
 
 
 @click.command()
@@ -231,52 +199,46 @@ def query(
     "-o",
     "--output",
     "picture",
-    type=click.Path(path_type=Path),
-    callback=output_in(*PICTURES),
+    type=options.OutputFile(*options.PICTURES),
     default="crux-demo.png",
     show_default=True,
     metavar="FILE",
     help="Where the picture goes.",
 )
-@hand_option
-@robot_option
-@json_option
-def demo(picture: Path, hand: ParameterTable | None, robot: RobotFile | None, as_json: bool) -> int:
+@options.own_options
+@options.json_option
+def demo(picture: Path, own: options.Own, as_json: bool) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer.
 
     A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
     """
-    from service import answering
-    from service.answering import robots_of
-    from service.serving import CruxClient, PlanService
-    from service.tables import console
-
-    request = with_extras(asked(read_request(DEMO_STANCE), hand, robot))
-    start_zenoh_log()
-    config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
-    with open_session(config) as session, PlanService(session, robot, workers=1) as service:
-        client = CruxClient(session, service.robot, timeout=PATIENCE)
+    request = options.with_extras(own.asked(stances.read_request(DEMO_STANCE)))
+    serving.start_zenoh_log()
+    config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
+    with (
+        serving.open_session(config) as session,
+        serving.PlanService(session, own.robot, workers=1) as service,
+    ):
+        client = serving.CruxClient(session, service.robot, timeout=PATIENCE)
         try:
             reply = client.plan(request)
-        except ServiceError as error:
-            if error.kind != UNREACHABLE:
+        except wire.ServiceError as error:
+            if error.kind != wire.UNREACHABLE:
                 raise
-            remark(f"planned without joints: {error.message}")
+            tables.remark(f"planned without joints: {error.message}")
             stance = msgspec.structs.replace(request.stance, joints=None)
             request = msgspec.structs.replace(request, stance=stance)
             reply = client.plan(request)
-    draw_plan(answering.planned(request, robots_of(robot)), picture)
-    status = show(reply, as_json)
+    tables.draw_plan(answering.planned(request, own.robots), picture)
+    status = tables.show(reply, as_json)
     if not as_json:
-        console().print(f"picture: {picture}", markup=False)
+        tables.console().print(f"picture: {picture}", markup=False)
     return status
 
 
 @click.command()
-@json_option
+@options.json_option
 def schema(as_json: bool) -> None:
     """Print the JSON Schema of every message."""
-    from service.wire import schema as message_schema
-
-    text = msgspec.json.encode(message_schema())
+    text = msgspec.json.encode(wire.schema())
     click.echo(text if as_json else msgspec.json.format(text))

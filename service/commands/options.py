@@ -1,38 +1,39 @@
-"""Options that commands share: own hands and robots, pictures, folders, JSON."""
+"""Options that commands share, as typed values: files that are read, and options of one purpose."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 import click
 import msgspec
 from click.shell_completion import CompletionItem
 
+import planner
 from hand_models.base import InvalidInputError
-from service.commands.stances import bundled, limbs_of
-from service.requests import Draw, PlanRequest, RouteRequest, Want
-from service.serving import TIMEOUT
+from service import answering, bulk, processes, requests, serving
+from service.commands import stances
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner import RobotFile
 
 __all__ = [
     "PICTURES",
     "FiniteRange",
-    "asked",
+    "OutputFile",
+    "Own",
+    "Wanted",
+    "Workers",
+    "asked_for",
     "beginning_so",
-    "dask_option",
-    "draws_option",
-    "explain_option",
     "folder_option",
     "hand_option",
     "json_option",
     "limb_option",
-    "output_in",
+    "own_options",
     "plot_option",
     "robot_option",
     "routes_argument",
@@ -40,20 +41,25 @@ __all__ = [
     "stance_argument",
     "timeout_option",
     "wait_option",
+    "wanted_options",
     "with_extras",
-    "workers_option",
+    "workers_options",
 ]
 
-R = TypeVar("R", PlanRequest, RouteRequest)
+R = TypeVar("R", requests.PlanRequest, requests.RouteRequest)
+Command = Callable[..., Any]
 
 PICTURES: Final = (".png", ".pdf", ".svg")
 TABLES: Final = (".csv", ".parquet", ".json", ".jsonl")
 HAND_FILE: Final = ".toml"
-EXTRAS: Final[tuple[Want, ...]] = ("load_factor", "prices")
+EXTRAS: Final[tuple[requests.Want, ...]] = ("load_factor", "prices")
 """What the command line asks for besides the plan."""
 
 LONGEST: Final = 1e6
 """Of what may be waited for [s]; the longest deadline of a request."""
+
+
+# Types of values ----------------------------------------------------------------------------------
 
 
 class FiniteRange(click.FloatRange):
@@ -69,14 +75,131 @@ class FiniteRange(click.FloatRange):
         return number
 
 
-def asked(request: R, hand: ParameterTable | None, robot: RobotFile | None) -> R:
-    """Return a request for a hand and a robot of the caller's own."""
-    from service.answering import with_hand, with_robot
+class OutputFile(click.Path):
+    """A file that is written, refused before any work is done if that cannot be.
 
-    return with_robot(with_hand(request, hand), robot)
+    Parameters
+    ----------
+    *endings : str
+        Those that are valid.
+    """
+
+    def __init__(self, *endings: str) -> None:
+        super().__init__(path_type=Path, dir_okay=endings == PICTURES)
+        self._endings = endings
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path, or refuse it."""
+        path = Path(str(super().convert(value, param, ctx)))
+        if path.suffix.lower() not in self._endings:
+            several = f"valid endings are {', '.join(self._endings)}"
+            valid = several if len(self._endings) > 1 else f"must end in {self._endings[0]}"
+            self.fail(f"{path}: {valid}", param, ctx)
+        if not path.parent.is_dir():
+            self.fail(f"{path}: no such folder", param, ctx)
+        return path
 
 
-def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> PlanRequest:
+class InputFile(click.Path):
+    """A file that is read as something of `service.answering` while options are.
+
+    Parameters
+    ----------
+    reader : str
+        The function of that room that reads it.
+    """
+
+    def __init__(self, reader: str) -> None:
+        super().__init__(path_type=Path)
+        self._reader = reader
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return what the file says."""
+        return getattr(answering, self._reader)(super().convert(value, param, ctx))
+
+
+# Options that commands have in common -------------------------------------------------------------
+
+
+def asked_for(
+    kind: Any, name: str, *options: Callable[[Command], Command]
+) -> Callable[[Command], Command]:
+    """Return a decorator that adds options to a command, and passes them as one value.
+
+    Parameters
+    ----------
+    kind : type
+        Of the value, a named tuple; its fields are named as the options.
+    name : str
+        Of the command's parameter.
+    *options : callable
+        In the order in which help shows them.
+    """
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def called(**given: Any) -> Any:
+            fields = {field: given.pop(field) for field in kind._fields}
+            return command(**given, **{name: kind(**fields)})
+
+        made: Command = called
+        for option in reversed(options):
+            made = option(made)
+        return made
+
+    return decorate
+
+
+class Own(NamedTuple):
+    """Numbers of a hand and a robot of the caller's own; None for those that are bundled."""
+
+    hand: ParameterTable | None
+    robot: planner.RobotFile | None
+
+    def asked(self, request: R) -> R:
+        """Return a request for this hand and this robot."""
+        return answering.with_robot(answering.with_hand(request, self.hand), self.robot)
+
+    @property
+    def robots(self) -> answering.Robots:
+        """The robots that may be asked about."""
+        return answering.robots_of(self.robot)
+
+
+class Workers(NamedTuple):
+    """Where many questions are answered."""
+
+    workers: int | None
+    dask: str | None
+
+    def place(self, plans: int) -> tuple[str, int | None]:
+        """Return where questions worth so many plans are answered, and by how many processes."""
+        if self.dask is not None:
+            return (bulk.LOCAL if self.dask == "local" else self.dask), self.workers
+        count = processes.worth(plans, self.workers)
+        return ("here", None) if count == 1 else ("processes", count)
+
+
+class Wanted(NamedTuple):
+    """What is asked besides a plan: the spread over draws, and no explanation."""
+
+    spread: bool
+    draws: list[requests.Draw] | None
+    unexplained: bool
+
+    def of(self, request: R) -> R:
+        """Return a request that asks for it."""
+        more: dict[str, Any] = {"draws": self.draws} if self.draws else {}
+        if self.spread or self.draws:
+            more["want"] = list(dict.fromkeys([*request.want, "spread"]))
+        return msgspec.structs.replace(
+            request, **more, **({"explain": False} if self.unexplained else {})
+        )
+
+
+def with_extras(
+    request: requests.PlanRequest, *further: requests.Want, whole: bool = True
+) -> requests.PlanRequest:
     """Return a request that wants what the command line shows besides the plan, and more, too.
 
     ``whole``: whether a person reads the reply, who gets all of it.
@@ -86,27 +209,10 @@ def with_extras(request: PlanRequest, *further: Want, whole: bool = True) -> Pla
     return msgspec.structs.replace(request, want=list(want), **more)
 
 
-def output_in(
-    *endings: str,
-) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
-    """Return what refuses a file that cannot be written, before any work is done."""
-    valid = f"valid endings are {', '.join(endings)}"
-    if len(endings) == 1:
-        valid = f"must end in {endings[0]}"
-
-    def check(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
-        if path is not None and path.suffix.lower() not in endings:
-            raise click.BadParameter(f"{path}: {valid}")
-        if path is not None and not path.parent.is_dir():
-            raise click.BadParameter(f"{path}: no such folder")
-        return path
-
-    return check
-
-
 def _read_hand(
     _: click.Context, __: click.Parameter, paths: tuple[Path, ...]
 ) -> ParameterTable | None:
+    """Return the numbers of the one file of a hand that may be given."""
     if not paths:
         return None
     if len(paths) > 1:
@@ -115,42 +221,41 @@ def _read_hand(
         raise click.BadParameter(
             f"{paths[0]}: no such file; a FILE with numbers of a hand is wanted, not a LIMB"
         )
-    from service.answering import read_hand
 
-    return read_hand(paths[0])
-
-
-def _read_draws(_: click.Context, __: click.Parameter, path: Path | None) -> list[Draw] | None:
-    if path is None:
-        return None
-    from service.answering import read_draws
-
-    return read_draws(path)
-
-
-def _read_robot(_: click.Context, __: click.Parameter, path: Path | None) -> RobotFile | None:
-    if path is None:
-        return None
-    from service.answering import read_robot
-
-    return read_robot(path)
+    return answering.read_hand(paths[0])
 
 
 def _limb_and_hand(
-    _: click.Context, __: click.Parameter, given: tuple[str, ...]
+    context: click.Context, option: click.Parameter, given: tuple[str, ...]
 ) -> tuple[str, ParameterTable | None]:
     """Tell the limb, which the contract calls a hand, from the file of one."""
-    files = [value for value in given if value.endswith(HAND_FILE)]
+    files = tuple(Path(value) for value in given if value.endswith(HAND_FILE))
     limbs = [value for value in given if not value.endswith(HAND_FILE)]
     if len(limbs) != 1 or len(files) > 1:
         raise click.BadParameter(
             f"one LIMB and at most one FILE that ends in {HAND_FILE}, got {', '.join(given)}"
         )
-    if not files:
-        return limbs[0], None
-    from service.answering import read_hand
+    return limbs[0], _read_hand(context, option, files)
 
-    return limbs[0], read_hand(Path(files[0]))
+
+def _check_dask(_: click.Context, __: click.Parameter, address: str | None) -> str | None:
+    """Refuse what is no address of a scheduler."""
+    if address not in (None, "local"):
+        try:
+            bulk.check_address(address)
+        except InvalidInputError:
+            raise InvalidInputError(
+                f"must be local, or tcp://HOST:PORT of a Dask scheduler, got {address!r}",
+                field="--dask",
+            ) from None
+    return address
+
+
+def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
+    """Refuse a folder that is named as a table or a picture is."""
+    if path.suffix.lower() in (*TABLES, *PICTURES) and not path.is_dir():
+        raise click.BadParameter(f"{path}: names a folder, into which several files go")
+    return path
 
 
 def beginning_so(
@@ -170,16 +275,20 @@ def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[Compl
     """Complete the limbs that hold on in the stance, as far as it is given and can be read."""
     # what stands before an option that lacks its value is not yet told apart
     given = [context.params.get("stance"), *context.args]
-    return beginning_so(limbs_of(next(filter(None, given), None)), files=True)(context, _, begun)
+    return beginning_so(stances.limbs_of(next(filter(None, given), None)), files=True)(
+        context, _, begun
+    )
 
 
-stance_argument = click.argument("stance", shell_complete=beginning_so(bundled(), files=True))
+stance_argument = click.argument(
+    "stance", shell_complete=beginning_so(stances.bundled(), files=True)
+)
 routes_argument = click.argument(
     "routes",
     nargs=-1,
     required=True,
     metavar="ROUTE...",
-    shell_complete=beginning_so(bundled(RouteRequest), files=True),
+    shell_complete=beginning_so(stances.bundled(requests.RouteRequest), files=True),
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else.")
 hand_option = click.option(
@@ -189,24 +298,6 @@ hand_option = click.option(
     callback=_read_hand,
     metavar="FILE",
     help="TOML with numbers of a hand of your own; all others are the bundled hand's.",
-)
-explain_option = click.option(
-    "--no-explain",
-    "unexplained",
-    is_flag=True,
-    help="Leave out the proof of what is in the way where a stance is overloaded or infeasible.",
-)
-spread_option = click.option(
-    "--spread",
-    is_flag=True,
-    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
-)
-draws_option = click.option(
-    "--draws",
-    type=click.Path(path_type=Path),
-    callback=_read_draws,
-    metavar="FILE",
-    help="TOML with draws of your own, over which the spread is told; --spread is then meant.",
 )
 limb_option = click.option(
     "--hand",
@@ -221,15 +312,36 @@ limb_option = click.option(
 )
 robot_option = click.option(
     "--robot",
-    type=click.Path(path_type=Path),
-    callback=_read_robot,
+    type=InputFile("read_robot"),
     metavar="FILE",
     help="TOML that describes a robot of your own, and names its URDF.",
 )
+own_options = asked_for(Own, "own", hand_option, robot_option)
+
+explain_option = click.option(
+    "--no-explain",
+    "unexplained",
+    is_flag=True,
+    help="Leave out the proof of what is in the way where a stance is overloaded or infeasible.",
+)
+spread_option = click.option(
+    "--spread",
+    is_flag=True,
+    help="And how far utilisation and load factor spread over what is not known of hand and rock.",
+)
+draws_option = click.option(
+    "--draws",
+    type=InputFile("read_draws"),
+    metavar="FILE",
+    help="TOML with draws of your own, over which the spread is told; --spread is then meant.",
+)
+wanted_options = asked_for(Wanted, "wanted", draws_option, explain_option)
+"""Beside `spread_option`."""
+
 timeout_option = click.option(
     "--timeout",
     type=FiniteRange(0.01, LONGEST),
-    help=f"[s]; by default {TIMEOUT:g}, or what the deadline of the request takes.",
+    help=f"[s]; by default {serving.TIMEOUT:g}, or what the deadline of the request takes.",
 )
 wait_option = click.option(
     "--wait",
@@ -237,63 +349,37 @@ wait_option = click.option(
     metavar="SECONDS",
     help="Wait so long for a service that is not there yet.",
 )
-
-workers_option = click.option(
-    "--workers", type=click.IntRange(min=1), help="Processes; by default as many as are worth it."
+workers_options = asked_for(
+    Workers,
+    "parallel",
+    click.option(
+        "--workers",
+        type=click.IntRange(min=1),
+        help="Processes; by default as many as are worth it.",
+    ),
+    click.option(
+        "--dask",
+        metavar="ADDRESS",
+        callback=_check_dask,
+        help="Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
+        "machine's own.",
+    ),
 )
 
 
-def _place(_: click.Context, __: click.Parameter, address: str | None) -> str | None:
-    """Refuse what is no address of a scheduler."""
-    if address not in (None, "local"):
-        from service.bulk import check_address
-
-        try:
-            check_address(address)
-        except InvalidInputError:
-            raise InvalidInputError(
-                f"must be local, or tcp://HOST:PORT of a Dask scheduler, got {address!r}",
-                field="--dask",
-            ) from None
-    return address
-
-
-dask_option = click.option(
-    "--dask",
-    metavar="ADDRESS",
-    callback=_place,
-    help="Plan on the Dask cluster whose scheduler is at tcp://HOST:PORT; local is one of this "
-    "machine's own.",
-)
-
-
-def plot_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def plot_option(text: str) -> Callable[[Command], Command]:
     """Return an option that names a picture, which is passed on as ``picture``."""
-    return click.option(
-        "--plot",
-        "picture",
-        type=click.Path(path_type=Path),
-        callback=output_in(*PICTURES),
-        metavar="FILE",
-        help=text,
-    )
+    return click.option("--plot", "picture", type=OutputFile(*PICTURES), metavar="FILE", help=text)
 
 
-def _folder_in(_: click.Context, __: click.Parameter, path: Path) -> Path:
-    """Refuse a folder that is named as a table or a picture is."""
-    if path.suffix.lower() in (*TABLES, *PICTURES) and not path.is_dir():
-        raise click.BadParameter(f"{path}: names a folder, into which several files go")
-    return path
-
-
-def folder_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def folder_option(text: str) -> Callable[[Command], Command]:
     """Return an option that names where files go, which is passed on as ``folder``."""
     return click.option(
         "-o",
         "--output",
         "folder",
         type=click.Path(path_type=Path, file_okay=False),
-        callback=_folder_in,
+        callback=_check_folder,
         required=True,
         metavar="DIR",
         help=text,

@@ -5,43 +5,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 import msgspec
 
+import planner
 from hand_models.base import InvalidInputError
-from service.commands.options import (
-    asked,
-    draws_option,
-    explain_option,
-    hand_option,
-    json_option,
-    plot_option,
-    robot_option,
-    spread_option,
-    stance_argument,
-    with_extras,
-)
-from service.commands.stances import Given, read_with_text
-from service.requests import Draw, PlanRequest, Want
-from service.tables import (
-    EXIT_STATUS,
-    FAILED,
-    draw_plan,
-    filling_folder,
-    say,
-    tell_solver,
-    verbosity,
-    waiting,
-    working,
-)
-
-if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
-    from service.answering import Planned, Robots
-    from service.replies import PlanReply
+from service import answering, replies, requests, tables
+from service.commands import options, stances
 
 __all__ = ["plan"]
 
@@ -53,14 +25,14 @@ ADVICE_SECONDS: Final = 30.0
 
 
 @click.command()
-@stance_argument
-@plot_option("Draw it there.")
+@options.stance_argument
+@options.plot_option("Draw it there.")
 @click.option(
     "--robust",
     is_flag=True,
     help="And the least load factor where every hand is a little elsewhere.",
 )
-@spread_option
+@options.spread_option
 @click.option(
     "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
 )
@@ -71,134 +43,114 @@ ADVICE_SECONDS: Final = 30.0
     metavar="DIR",
     help="Write what would make it hold there, each advice as a STANCE of its own.",
 )
-@draws_option
-@explain_option
-@hand_option
-@robot_option
-@json_option
+@options.wanted_options
+@options.own_options
+@options.json_option
 def plan(
     stance: str,
     picture: Path | None,
     robust: bool,
-    spread: bool,
     clearance: bool,
     advice_folder: Path | None,
-    draws: list[Draw] | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    wanted: options.Wanted,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Make one plan, without the network."""
-    from planner import deadline
-    from service import answering
-    from service.answering import robots_of
-    from service.replies import BriefPlanReply, PlanReply
-
-    extras: list[Want] = ["robust"] if robust else []
-    extras += ["spread"] if spread or draws else []
-    extras += ["clearance"] if clearance else []
-    extras += ["advice"] if advice_folder is not None else []
-    request, given = read_with_text(stance)
-    plain = request = asked(request, hand, robot)
-    if draws:
-        request = msgspec.structs.replace(request, draws=draws)
-    if unexplained:
-        request = msgspec.structs.replace(request, explain=False)
-    request = with_extras(request, *extras, whole=not as_json)
+    further: dict[requests.Want, bool] = {
+        "robust": robust,
+        "clearance": clearance,
+        "advice": advice_folder is not None,
+    }
+    request, given = stances.read_with_text(stance)
+    plain = own.asked(request)
+    extras = [want for want, chosen in further.items() if chosen]
+    request = options.with_extras(wanted.of(plain), *extras, whole=not as_json)
     if advice_folder is not None and request.detail not in (None, "full"):
         raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
-    robots = robots_of(robot)
-    brief = not as_json and verbosity() < 0
-    wanted = "advice" in request.want
+    robots = own.robots
+    brief = not as_json and tables.verbosity() < 0
+    advised = "advice" in request.want
     if not as_json:
         # which a person reads later than the plan
         request = msgspec.structs.replace(request, want=[w for w in request.want if w != "advice"])
     begun = perf_counter()
-    with waiting(f"planning {stance}", request):
-        with deadline.within(request.deadline):
+    with tables.waiting(f"planning {stance}", request):
+        with planner.deadline.within(request.deadline):
             answer = answering.planned(request, robots)
             full = request.detail in (None, "full") and not brief
             bare = _without_palms(request, robots) if full else None
         if picture is not None:
-            draw_plan(answer, picture)
+            tables.draw_plan(answer, picture)
     if not as_json:
         _print(answer, bare, brief)
-        if wanted or (not brief and answer.reply.status in OVER):
+        if advised or (not brief and answer.reply.status in OVER):
             # --advice is looked for as long as it takes
-            seconds = None if wanted else ADVICE_SECONDS
+            seconds = None if advised else ADVICE_SECONDS
             started = None if request.deadline is None else begun
-            with deadline.within(request.deadline or seconds, started=started):
+            with planner.deadline.within(request.deadline or seconds, started=started):
                 answer = _with_advice(answer, brief)
     written: list[Path] = []
     if advice_folder is not None:
-        assert isinstance(answer.reply, PlanReply)  # of a whole request
+        assert isinstance(answer.reply, replies.PlanReply)  # of a whole request
         written = _write_advice(plain, answer.reply, advice_folder, given)
-    if isinstance(answer.reply, BriefPlanReply):
-        say(answer.reply)
+    if isinstance(answer.reply, replies.BriefPlanReply):
+        tables.say(answer.reply)
     elif as_json:
         without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
-        say(msgspec.to_builtins(answer.reply) | without)
+        tables.say(msgspec.to_builtins(answer.reply) | without)
     else:
         _print_files(written, answer.reply)
-    return EXIT_STATUS.get(answer.reply.status, FAILED)
+    return tables.EXIT_STATUS.get(answer.reply.status, tables.FAILED)
 
 
-def _print(answer: Planned, without_palm: PlanReply | None, brief: bool) -> None:
+def _print(answer: answering.Planned, without_palm: replies.PlanReply | None, brief: bool) -> None:
     """Print a plan for a person, to be read at once."""
-    from service.replies import PlanReply
-    from service.tables import console, print_plan
-
-    assert isinstance(answer.reply, PlanReply)  # as a person is given
-    print_plan(answer.reply, console(), without_palm=without_palm, brief=brief)
-    tell_solver(answer.reply)
+    assert isinstance(answer.reply, replies.PlanReply)  # as a person is given
+    tables.print_plan(answer.reply, tables.console(), without_palm=without_palm, brief=brief)
+    tables.tell_solver(answer.reply)
     sys.stdout.flush()
 
 
-def _with_advice(answer: Planned, brief: bool) -> Planned:
+def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
     """Look for what would make a stance hold, or hold more, and print that."""
-    from service import answering
-    from service.replies import PlanReply
-    from service.tables import console, print_advice
-
     better = "hold" if answer.reply.status in OVER else "be better"
-    with working(f"looking for what would {better}"):
+    with tables.working(f"looking for what would {better}"):
         found = answering.with_advice(answer)
-    assert isinstance(found.reply, PlanReply)  # as a person is given
-    assert isinstance(answer.reply, PlanReply)
+    assert isinstance(found.reply, replies.PlanReply)  # as a person is given
+    assert isinstance(answer.reply, replies.PlanReply)
     if not brief:
-        out = console()
+        out = tables.console()
         for warning in found.reply.warnings[len(answer.reply.warnings) :]:
             out.print(f"warning: {warning}", markup=False)
-        print_advice(found.reply, out)
+        tables.print_advice(found.reply, out)
     return found
 
 
-def _print_files(files: list[Path], reply: PlanReply) -> None:
+def _print_files(files: list[Path], reply: replies.PlanReply) -> None:
     """Print which advice is in which file."""
-    from service.tables import console, words_of
-
-    out = console()
+    out = tables.console()
     holding = reply.status == "optimal"
     for file, advice in zip(files, reply.advice or (), strict=False):
-        told = words_of(advice, holding=holding)
+        told = tables.words_of(advice, holding=holding)
         out.print(f"{file}: {told}", markup=False, soft_wrap=True)
 
 
 def _write_advice(
-    request: PlanRequest, reply: PlanReply, folder: Path, given: Given[PlanRequest]
+    request: requests.PlanRequest,
+    reply: replies.PlanReply,
+    folder: Path,
+    given: stances.Given[requests.PlanRequest],
 ) -> list[Path]:
     """Write each advice as a request whose plan gives what it promises, and none of another.
 
     All but what it changes stays as it was ``given``, and scans in their files. Returns their
     paths.
     """
-    from service import answering
-
     if given.files is not None:
         request = given.files.named(request, given.request, folder)
     written = []
-    with filling_folder():
+    with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
         for old in folder.glob("advice-*.json"):
             if old.stem.removeprefix("advice-").isdecimal():
@@ -211,19 +163,17 @@ def _write_advice(
     return written
 
 
-def _without_palms(request: PlanRequest, robots: Robots) -> PlanReply | None:
+def _without_palms(
+    request: requests.PlanRequest, robots: answering.Robots
+) -> replies.PlanReply | None:
     """Return how much could be carried if no palm did; None if the time is over before."""
-    from planner import DeadlineError
-    from service import answering
-    from service.replies import PlanReply
-
     replace = msgspec.structs.replace
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
     stance = replace(request.stance, hands=hands)
     alone = replace(request, stance=stance, want=["load_factor"], draws=[], explain=False)
     try:
         reply = answering.plan(alone, robots)
-    except DeadlineError:
+    except planner.DeadlineError:
         return None
-    assert isinstance(reply, PlanReply)  # of a whole request
+    assert isinstance(reply, replies.PlanReply)  # of a whole request
     return reply

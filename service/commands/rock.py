@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
+from hand_models import parameters, scans
 from hand_models.base import InvalidInputError, Pose
-from hand_models.parameters import scan_table
-from hand_models.scans import ENDINGS, UNITS, UPS
-from service.commands.options import json_option, output_in, plot_option
-from service.tables import progress, say, writing
+from service import tables
+from service.commands import options
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from hand_models.scans import Scan, ScannedRock
 
 __all__ = ["rock"]
 
 OUTPUT: Final = ".ply"
+
+NUMBERS: Final = parameters.scan_table()
 
 STEEP: Final = 0.9
 """Vertical part of a view from which on the rock is ground, or a roof."""
@@ -50,21 +50,20 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     return numbers
 
 
-@click.command(epilog=f"FILE ends in {', '.join(ENDINGS)}.")
+@click.command(epilog=f"FILE ends in {', '.join(scans.ENDINGS)}.")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "-o",
     "--output",
     "output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=options.OutputFile(OUTPUT),
     required=True,
-    callback=output_in(OUTPUT),
     metavar="PLY",
     help="Where the triangles go.",
 )
 @click.option(
     "--unit",
-    type=click.Choice(list(UNITS)),
+    type=click.Choice(list(scans.UNITS)),
     default="m",
     show_default=True,
     help="Of the file's numbers.",
@@ -82,7 +81,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
 )
 @click.option(
     "--up",
-    type=click.Choice(list(UPS)),
+    type=click.Choice(list(scans.UPS)),
     default="z",
     show_default=True,
     help="The file's axis that points up; of a wall that was seen along z another is to be given.",
@@ -111,12 +110,12 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     "--spacing",
     type=float,
     help="Keep one point a square of that side across the view [m]; by default half the points' "
-    f"median distance, or as much more as leaves {scan_table().scalar('mesh', 'vertices'):,.0f}.",
+    f"median distance, or as much more as leaves {NUMBERS.scalar('mesh', 'vertices'):,.0f}.",
 )
 @click.option(
     "--hole",
     type=float,
-    default=scan_table().scalar("mesh", "hole"),
+    default=NUMBERS.scalar("mesh", "hole"),
     show_default=True,
     help="The widest hole, and the highest step, that is bridged [m].",
 )
@@ -130,11 +129,10 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
 @click.option(
     "--neighbours",
     type=int,
-    help="Whose mean distance that is; by default "
-    f"{scan_table().scalar('outliers', 'neighbours'):g}.",
+    help=f"Whose mean distance that is; by default {NUMBERS.scalar('outliers', 'neighbours'):g}.",
 )
-@plot_option("Draw the rock there, as the scanner saw it.")
-@json_option
+@options.plot_option("Draw the rock there, as the scanner saw it.")
+@options.json_option
 def rock(
     file: Path,
     output: Path,
@@ -151,31 +149,28 @@ def rock(
     The triangles are in a frame on the rock, z into it along the view and x up, which is a hold's
     own; the table tells its pose in the file's axes, turned so that z is up, in metres.
     """
-    from hand_models.scans import drop_outliers, mesh_scan, plot_rock, read_scan, write_rock
-    from service.tables import console
-
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
     if neighbours is not None and std_ratio is None:
         raise InvalidInputError("is of outliers, which --std-ratio drops", field="neighbours")
     if output.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself", field="--output")
-    with progress(f"meshing {file.name}") as tell:
-        scan = read_scan(file, **reading)
+    with tables.progress(f"meshing {file.name}") as tell:
+        scan = scans.read_scan(file, **reading)
         if std_ratio is not None:
-            scan = drop_outliers(scan, std_ratio, neighbours=neighbours)
-        made = mesh_scan(scan, spacing=spacing, hole=hole, tell=tell)
-        with writing(output, "--output"):
-            write_rock(made, output)
+            scan = scans.drop_outliers(scan, std_ratio, neighbours=neighbours)
+        made = scans.mesh_scan(scan, spacing=spacing, hole=hole, tell=tell)
+        with tables.writing(output, "--output"):
+            scans.write_rock(made, output)
         if picture is not None:
-            with writing(picture):
-                plot_rock(made, picture, file.name)
+            with tables.writing(picture):
+                scans.plot_rock(made, picture, file.name)
         warnings = _warnings(scan, made, hole, spacing)
     source = click.get_current_context().get_parameter_source("up")
     assumed = source is not ParameterSource.COMMANDLINE
     if as_json:
         told = {"up": reading["up"], "up_assumed": assumed, "view_assumed": _assumed(scan)}
-        say(_summary(made) | told | {"warnings": warnings, "file": str(output)})
+        tables.say(_summary(made) | told | {"warnings": warnings, "file": str(output)})
         return
     closed = scan.faces is not None and scan.shown() is None
     if assumed and not closed and abs(float(made.pose.rotation[2, 2])) >= STEEP:
@@ -184,15 +179,15 @@ def rock(
             f"with {reading['up']} up this is ground, or a roof; of a wall that was seen along "
             f"{reading['up']}, tell with --up which axis points up",
         )
-    _print_rock(scan, made, hole, reading["up"], assumed, output, console(), warnings)
+    _print_rock(scan, made, hole, reading["up"], assumed, output, tables.console(), warnings)
 
 
-def _assumed(scan: Scan) -> bool:
+def _assumed(scan: scans.Scan) -> bool:
     """Whether nothing tells from where the rock was seen, nor do its triangles."""
     return scan.assumed and scan.view is None and (scan.faces is None or scan.shown() is None)
 
 
-def _summary(made: ScannedRock) -> dict[str, Any]:
+def _summary(made: scans.ScannedRock) -> dict[str, Any]:
     """Return what came out as JSON has it; the pose is in the form of a request's."""
     return {
         "read": made.read,
@@ -218,16 +213,18 @@ def _summary(made: ScannedRock) -> dict[str, Any]:
     }
 
 
-def _warnings(scan: Scan, made: ScannedRock, hole: float, spacing: float | None) -> list[str]:
+def _warnings(
+    scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: float | None
+) -> list[str]:
     """Return what may not be meant, and its cause where that can be told."""
     found = []
     if made.turned:
         found.append(
             "the triangles showed their backs to that view, and were turned over: is it meant?"
         )
-    open_, table = len(made.holes) + len(made.steps), scan_table()
-    pieces = made.covered < table.scalar("mesh", "least_covered")
-    if pieces or open_ > table.scalar("mesh", "many_holes"):
+    open_ = len(made.holes) + len(made.steps)
+    pieces = made.covered < NUMBERS.scalar("mesh", "least_covered")
+    if pieces or open_ > NUMBERS.scalar("mesh", "many_holes"):
         found.append(
             f"{open_} holes and steps, and gaps over {100.0 * (1.0 - made.covered):.0f} % of the "
             f"outline, leave hands little to hold{_advice(scan, made, hole, spacing)}"
@@ -237,20 +234,18 @@ def _warnings(scan: Scan, made: ScannedRock, hole: float, spacing: float | None)
         "out cells that have no height"
         for each in made.filled
     ]
-    if not made.filled and made.extent.max() > table.scalar("scan", "largest"):
+    if not made.filled and made.extent.max() > NUMBERS.scalar("scan", "largest"):
         found.append(_why_large(made))
     return found
 
 
-def _advice(scan: Scan, made: ScannedRock, hole: float, spacing: float | None) -> str:
+def _advice(scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: float | None) -> str:
     """Return what was tried and helps against many holes, in words."""
-    from hand_models.scans import remedy
-
     if made.kept:
         return ": fill them where the triangles were made"
-    found = remedy(scan, made, hole, spacing=spacing)
+    found = scans.remedy(scan, made, hole, spacing=spacing)
     if found is None:
-        widest = scan_table().scalar("mesh", "widest_bridge")
+        widest = NUMBERS.scalar("mesh", "widest_bridge")
         return (
             f"; neither dropping stray points nor a --hole up to {widest:g} helps: "
             "rock is to be scanned more closely, or from another side"
@@ -259,25 +254,23 @@ def _advice(scan: Scan, made: ScannedRock, hole: float, spacing: float | None) -
     return f": {how} {found.value:g}, {found.left} holes and steps are left"
 
 
-def _why_large(made: ScannedRock) -> str:
+def _why_large(made: scans.ScannedRock) -> str:
     """Return why rock may be larger than a hold may be, in words."""
     import numpy as np
 
-    from hand_models.scans import too_large
-
-    size, largest = float(made.extent.max()), scan_table().scalar("scan", "largest")
+    size, largest = float(made.extent.max()), NUMBERS.scalar("scan", "largest")
     bulk = float(np.ptp(np.percentile(made.vertices, BULK, axis=0), axis=0).max())
     if bulk <= largest:
         return (
             f"{size:.4g} m across, and a hold may be {largest:g} m; {BULK[1] - BULK[0]:g} in a "
             f"hundred points are within {bulk:.3g} m: drop the stray ones (--std-ratio)"
         )
-    return too_large(size)
+    return scans.too_large(size)
 
 
 def _print_rock(
-    scan: Scan,
-    made: ScannedRock,
+    scan: scans.Scan,
+    made: scans.ScannedRock,
     hole: float,
     up: str,
     assumed: bool,
@@ -286,38 +279,38 @@ def _print_rock(
     warnings: list[str],
 ) -> None:
     """Print how many points and triangles there are, how large the rock is, and what is open."""
-    from service.tables import table_of
-
-    table = table_of("")
-    table.show_header = False
-    table.add_column("", justify="right")
-    table.add_column("", overflow="fold")
-    table.add_row("points read", f"{made.read:,}", "")
-    table.add_row("dropped", f"{made.dropped:,}", "not finite")
-    if made.outliers:
-        table.add_row("outliers", f"{made.outliers:,}", "dropped, far from their neighbours")
-    table.add_row("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart")
-    table.add_row("triangles", f"{len(made.faces):,}", "the file's own" if made.kept else "")
-    table.add_row("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z")
-    table.add_row("up", up, "of the file's axes" + (", assumed" if assumed else ""))
-    view = ", ".join(f"{number:z.2f}" for number in made.pose.rotation[:, 2])
+    view = ", ".join(f"{size:z.2f}" for size in made.pose.rotation[:, 2])
     whence = "z up"
     if _assumed(scan):
         whence += ", assumed: " + ("from the file's origin" if scan.faces is None else "from above")
-    table.add_row("view", view, whence)
-    for name, what, sizes in (
-        ("holes", "wider", [each.width for each in made.holes]),
-        ("steps", "higher", [each.height for each in made.steps]),
-    ):
-        named = ", ".join(f"{1e3 * size:.0f}" for size in sizes[:NAMED])
-        more = ", …" if len(sizes) > NAMED else ""
-        told = f"{what} than {1e3 * hole:g} mm" + (f": {named}{more} mm" if named else "")
-        table.add_row(name, str(len(sizes)), told)
-    out.print(table)
+    rows = [
+        ("points read", f"{made.read:,}", ""),
+        ("dropped", f"{made.dropped:,}", "not finite"),
+        ("outliers", f"{made.outliers:,}", "dropped, far from their neighbours"),
+        ("kept", f"{len(made.vertices):,}", f"{1e3 * made.spacing:.3g} mm apart"),
+        ("triangles", f"{len(made.faces):,}", "the file's own" if made.kept else ""),
+        ("extent", " × ".join(f"{size:.3f}" for size in made.extent), "m along x, y, z"),
+        ("up", up, "of the file's axes" + (", assumed" if assumed else "")),
+        ("view", view, whence),
+        ("holes", *_sizes("wider", [each.width for each in made.holes], hole)),
+        ("steps", *_sizes("higher", [each.height for each in made.steps], hole)),
+    ]
+    if not made.outliers:
+        del rows[2]
+    tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
     out.print(f"pose {_pose(made.pose)}", markup=False, soft_wrap=True)
     for warning in warnings:
         out.print(f"warning: {warning}", markup=False)
     out.print(str(output), markup=False, soft_wrap=True)
+
+
+def _sizes(what: str, sizes: list[float], hole: float) -> tuple[str, str]:
+    """Return how many holes or steps there are, and how large the first of them."""
+    named = ", ".join(f"{1e3 * size:.0f}" for size in sizes[:NAMED])
+    more = ", …" if len(sizes) > NAMED else ""
+    return str(len(sizes)), f"{what} than {1e3 * hole:g} mm" + (
+        f": {named}{more} mm" if named else ""
+    )
 
 
 def _pose(pose: Pose) -> str:

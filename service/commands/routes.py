@@ -9,52 +9,23 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 import msgspec
 
+import planner
 from hand_models.base import CruxError, InvalidInputError
-from service.commands.batch import answer_rest, complain, exit_status, place, writing_answers
-from service.commands.options import (
-    asked,
-    dask_option,
-    draws_option,
-    explain_option,
-    hand_option,
-    json_option,
-    robot_option,
-    routes_argument,
-    spread_option,
-    workers_option,
-)
-from service.commands.stances import read_route
-from service.tables import (
-    EXIT_STATUS,
-    FAILED,
-    OVERLOADED,
-    filling_folder,
-    progress,
-    say,
-    verbosity,
-    write_alone,
-)
-from service.wire import ROUTE, Answer, Format, encode_error
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
-    from service.bulk import Sink
-    from service.requests import Draw, RouteRequest
+from service import answering, bulk, requests, tables, wire
+from service.commands import options, stances
+from service.commands.batch import answer_rest, complain, exit_status, new_sink
 
 __all__ = ["route"]
 
 LINES, CSV, PARQUET = ENDINGS = (".jsonl", ".csv", ".parquet")
 LISTED: Final = " or ".join(ENDINGS)
 
-STATUSES: Final = EXIT_STATUS | {"unreachable": OVERLOADED}
+STATUSES: Final = tables.EXIT_STATUS | {"unreachable": tables.OVERLOADED}
 
 PLANS: Final = 50
 """As which a route counts where it is asked whether processes are worth it."""
@@ -62,12 +33,14 @@ PLANS: Final = 50
 LONGEST: Final = 256
 """Of an ``id``."""
 
+CRUX: Final = ("crux_phase", "crux_limb")
+
 SHOWN: Final = 100
 """Routes that a person is shown."""
 
 
 @click.command()
-@routes_argument
+@options.routes_argument
 @click.option(
     "-o",
     "--output",
@@ -82,25 +55,18 @@ SHOWN: Final = 100
     is_flag=True,
     help="Go on where many routes were broken off: what the file answers is not asked again.",
 )
-@workers_option
-@dask_option
-@spread_option
-@draws_option
-@explain_option
-@hand_option
-@robot_option
-@json_option
+@options.workers_options
+@options.spread_option
+@options.wanted_options
+@options.own_options
+@options.json_option
 def route(
     routes: tuple[str, ...],
     output: Path,
     resume: bool,
-    workers: int | None,
-    dask: str | None,
-    spread: bool,
-    draws: list[Draw] | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    parallel: options.Workers,
+    wanted: options.Wanted,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Evaluate climbs: every stance, and every one with a limb in the air.
@@ -112,58 +78,46 @@ def route(
     Exit status of many: the worst of theirs, as of crux batch.
     """
     if output.suffix.lower() in ENDINGS:
-        for option, asked_for in (("--spread", spread), ("--draws", draws is not None)):
+        for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
                 raise InvalidInputError("is told of one route: needs -o DIR", field=option)
-        return _many(routes, output, resume, workers, dask, unexplained, hand, robot, as_json)
+        return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
     if len(routes) > 1 or Path(routes[0]).is_dir():
         raise InvalidInputError(
             f"{output}: many routes need a file that ends in {LISTED}", field="-o"
         )
-    for option, given in (("--resume", resume), ("--dask", dask is not None)):
+    for option, given in (("--resume", resume), ("--dask", parallel.dask is not None)):
         if given:
             raise InvalidInputError(f"needs -o FILE that ends in {LISTED}", field=option)
     if output.exists() and not output.is_dir():
         raise InvalidInputError(f"{output}: is no folder", field="-o")
-    spread = spread or draws is not None
-    return _one(routes[0], output, workers, spread, draws, unexplained, hand, robot, as_json)
+    request = wanted.of(own.asked(stances.read_route(routes[0])))
+    return _one(request, output, parallel.workers, own, as_json)
 
 
 def _one(
-    source: str,
+    request: requests.RouteRequest,
     folder: Path,
     workers: int | None,
-    spread: bool,
-    draws: list[Draw] | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Evaluate a route in all detail."""
-    from planner import evaluate, summary, write_report
-    from service import answering
-    from service.answering import robots_of
-    from service.tables import console, print_route
-
-    request = asked(read_route(source), hand, robot)
-    if spread:
-        request = msgspec.structs.replace(request, want=["spread"], draws=draws or request.draws)
-    if unexplained:
-        request = msgspec.structs.replace(request, explain=False)
-    climb = answering.route(request, robots_of(robot))
-    with filling_folder():
+    climb = answering.route(request, own.robots)
+    with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    write_alone(folder / "route", folder)
-    with progress(f"planning {climb.name}") as tell:
-        result = evaluate(climb, workers, tell)
-    with filling_folder():
-        files = write_report(result, folder)
+    tables.write_alone(folder / "route", folder)
+    with tables.progress(f"planning {climb.name}") as tell:
+        result = planner.evaluate(climb, workers, tell)
+    with tables.filling_folder():
+        files = planner.write_report(result, folder)
     if as_json:
-        say(summary(result) | {"files": {name: str(path) for name, path in files.items()}})
+        tables.say(
+            planner.summary(result) | {"files": {name: str(path) for name, path in files.items()}}
+        )
     else:
-        print_route(result, files, console())
-    return STATUSES.get(result.status, FAILED)
+        tables.print_route(result, files, tables.console())
+    return STATUSES.get(result.status, tables.FAILED)
 
 
 class _Routes:
@@ -173,8 +127,7 @@ class _Routes:
     ----------
     sources : sequence of str
         As `read_route` takes them, and folders.
-    hand : ParameterTable or None
-    robot : RobotFile or None
+    own : Own
 
     Attributes
     ----------
@@ -188,26 +141,26 @@ class _Routes:
         If a folder has none, or one is standard input, which is read once.
     """
 
-    def __init__(
-        self, sources: Sequence[str], hand: ParameterTable | None, robot: RobotFile | None
-    ) -> None:
+    def __init__(self, sources: Sequence[str], own: options.Own) -> None:
         self.names = [name for source in sources for name in _files(source)]
         self.count = len(self.names)
-        self._asked = partial(asked, hand=hand, robot=robot)
+        self._own = own
 
     def __iter__(self) -> Iterator[bytes]:
-        return (each.payload if isinstance(each, Answer) else each for each in self.questions())
+        return (
+            each.payload if isinstance(each, wire.Answer) else each for each in self.questions()
+        )
 
-    def questions(self) -> Iterator[bytes | Answer]:
+    def questions(self) -> Iterator[bytes | wire.Answer]:
         """Yield routes, or what is wrong with their files."""
         for name in self.names:
             known = name[-LONGEST:]
             try:
-                request: RouteRequest = self._asked(read_route(name))
+                request = self._own.asked(stances.read_route(name))
                 request = msgspec.structs.replace(request, id=request.id or known)
-                yield Format.JSON.encode(request)
+                yield wire.Format.JSON.encode(request)
             except CruxError as error:
-                yield encode_error(error, Format.JSON, known)
+                yield wire.encode_error(error, wire.Format.JSON, known)
 
 
 def _files(source: str) -> list[str]:
@@ -223,51 +176,41 @@ def _files(source: str) -> list[str]:
 
 
 def _many(
-    sources: Sequence[str],
+    routes: _Routes,
     file: Path,
     resume: bool,
-    workers: int | None,
-    dask: str | None,
-    unexplained: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    parallel: options.Workers,
+    wanted: options.Wanted,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Evaluate any number of routes, and keep what they come to."""
-    from service.bulk import ReplyLines, Rows, evaluate, new_manifest, route_columns, table_at
-
-    kind = table_at(file)
-    routes = _Routes(sources, hand, robot)
     if any(os.path.abspath(name) == os.path.abspath(file) for name in routes.names):
         raise InvalidInputError(f"{file}: is one of the routes", field="-o")
-    write_alone(file)
+    tables.write_alone(file)
     begun = perf_counter()
-    with writing_answers(file):
-        if kind is None:
-            if file.exists() and not file.is_file():
-                raise InvalidInputError(f"{file}: is no file", field="-o")
-            sink: Sink = ReplyLines(file, False, resume, routes)
-        else:
-            columns = route_columns()
-            now = new_manifest([each.name for each in columns], not unexplained, hand, robot)
-            sink = Rows(kind.opened(file, columns, now, resume, routes))
+    if file.suffix.lower() == LINES and file.exists() and not file.is_file():
+        raise InvalidInputError(f"{file}: is no file", field="-o")
+    sink = new_sink(
+        file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
+    )
     before = sink.tally.count
-    on, workers = place(dask, workers, PLANS * (routes.count - before))
+    on, workers = parallel.place(PLANS * (routes.count - before))
     answers = partial(
-        evaluate,
+        bulk.evaluate,
         on=on,
         workers=workers,
-        robot=robot,
-        explain=False if unexplained else None,
+        robot=own.robot,
+        explain=False if wanted.unexplained else None,
         columns=sink.columns,
-        kind=ROUTE,
+        kind=wire.ROUTE,
     )
     answer_rest(routes, answers, sink, file, "planning routes", "routes")
     elapsed = perf_counter() - begun
     complain(sink.tally, routes.names.__getitem__, "routes")
     if as_json:
         told = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
-        say({"v": 1, "routes": routes.count, **told, "file": str(file)})
+        tables.say({"v": 1, "routes": routes.count, **told, "file": str(file)})
     else:
         _print(file, routes, before, elapsed)
     return exit_status(sink.tally, STATUSES)
@@ -275,42 +218,29 @@ def _many(
 
 def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
     """Print what each route came to, and where that is."""
-    from service.tables import console
+    from service.tables import name
 
-    out = console()
-    if verbosity() >= 0:
-        _print_table(file, routes, out)
+    out = tables.console()
+    columns = (
+        name("status", lambda row: row["status"] or f"error: {row['error_kind']}"),
+        name("crux", lambda row: " ".join(filter(None, map(row.get, CRUX))) or None),
+        tables.number("move", "crux_move"),
+        tables.number("util", "utilisation", lambda value: f"{float(value):.2f}"),
+        tables.number("load factor", "load_factor", lambda value: f"{float(value):.2f}"),
+        tables.text("route"),
+    )
+    if tables.verbosity() >= 0:
+        named = zip(routes.names, islice(_rows(file), SHOWN), strict=False)
+        tables.print_rows([row | {"route": route} for route, row in named], columns, out)
+        if routes.count > SHOWN:
+            out.print(f"and {routes.count - SHOWN} more", markup=False)
     known = f", {before} were answered before" if before else ""
     out.print(f"{routes.count - before} routes in {elapsed:.1f} s{known}", markup=False)
     out.print(f"written: {file}", markup=False, soft_wrap=True)
 
 
-def _print_table(file: Path, routes: _Routes, out: Console) -> None:
-    from rich.markup import escape
-
-    from service.tables import table_of
-
-    table = table_of("status", "crux", numbers=("move", "util", "load factor"), words=("route",))
-    for name, row in zip(routes.names, islice(_rows(file), SHOWN), strict=False):
-        numbers = (_number(row[part]) for part in ("utilisation", "load_factor"))
-        error = f"error: {row['error_kind']}"
-        crux = " ".join(filter(None, (row["crux_phase"], row["crux_limb"])))
-        move = row["crux_move"]
-        shown = (row["status"] or error, crux or "-", "-" if move is None else str(move))
-        table.add_row(*shown, *numbers, escape(name))
-    out.print(table)
-    if routes.count > SHOWN:
-        out.print(f"and {routes.count - SHOWN} more", markup=False)
-
-
-def _number(value: Any) -> str:
-    return "-" if value is None else f"{float(value):.2f}"
-
-
 def _rows(file: Path) -> Iterator[dict[str, Any]]:
     """Yield what a file tells of each route, whatever form it has."""
-    from service.bulk import Row, route_columns, row_of
-
     if file.suffix.lower() == PARQUET:
         from pyarrow import parquet
 
@@ -320,9 +250,11 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             for row in csv.DictReader(stream):
                 yield {name: value or None for name, value in row.items()}
     else:
-        names = [column.name for column in route_columns()]
+        names = [column.name for column in bulk.route_columns()]
         with file.open("rb") as lines:
             for line in lines:
-                told = row_of(Answer(line, Format.JSON.value), Format.JSON, names).payload
-                values = msgspec.msgpack.decode(told, type=Row).values
+                told = bulk.row_of(
+                    wire.Answer(line, wire.Format.JSON.value), wire.Format.JSON, names
+                ).payload
+                values = msgspec.msgpack.decode(told, type=bulk.Row).values
                 yield dict(zip(names[1:], values, strict=True))

@@ -8,30 +8,20 @@ from typing import TYPE_CHECKING, get_args
 import click
 import msgspec
 
-from service.commands.options import (
-    asked,
-    hand_option,
-    json_option,
-    limb_option,
-    plot_option,
-    robot_option,
-    stance_argument,
-)
-from service.commands.stances import read_request
-from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest, about_the_same
-from service.tables import DONE, EXIT_STATUS, FAILED, OVERLOADED, progress, say, waiting, writing
+import planner
+from service import answering, replies, requests, tables
+from service.commands import options, stances
 
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
-    from planner import RobotFile
 
 __all__ = ["body_space", "wrench_space"]
 
 
 @click.command("wrench-space")
-@stance_argument
-@limb_option
-@plot_option("Draw it there.")
+@options.stance_argument
+@options.limb_option
+@options.plot_option("Draw it there.")
 @click.option(
     "--search",
     "per_axis",
@@ -42,47 +32,40 @@ __all__ = ["body_space", "wrench_space"]
 @click.option(
     "--robust", is_flag=True, help="And the least of it where the hand is a little elsewhere."
 )
-@robot_option
-@json_option
+@options.robot_option
+@options.json_option
 def wrench_space(
     stance: str,
     limb_and_hand: tuple[str, ParameterTable | None],
     picture: Path | None,
     per_axis: int | None,
     robust: bool,
-    robot: RobotFile | None,
+    robot: planner.RobotFile | None,
     as_json: bool,
 ) -> int:
     """Show what one hand can carry."""
-    from planner import floating_wrist, hand_space, survey
-    from service import answering
-    from service.answering import robots_of
-    from service.replies import RobustCapability
-    from service.tables import console, print_robust, print_survey, print_wrench_space, survey_json
-
     limb, hand = limb_and_hand
-    robots = robots_of(robot)
-    plan = asked(read_request(stance), hand, robot)
-    request = WrenchSpaceRequest(v=1, stance=plan.stance, limb=limb)
+    own = options.Own(hand, robot)
+    robots = own.robots
+    plan = own.asked(stances.read_request(stance))
+    request = requests.WrenchSpaceRequest(v=1, stance=plan.stance, limb=limb)
     reply = answering.wrench_space(request, robots)
     if robust:
         alone = msgspec.structs.replace(request, want=["robust"])
         reply.robust = answering.wrench_space(alone, robots).robust
     found = None
     if per_axis is not None:
-        wrist = floating_wrist(answering.stance(request.stance, robots), limb)
-        with progress(f"{per_axis}^6 poses of {limb}") as tell:
-            found = survey(wrist, per_axis, tell)
+        wrist = planner.floating_wrist(answering.stance(request.stance, robots), limb)
+        with tables.progress(f"{per_axis}^6 poses of {limb}") as tell:
+            found = planner.survey(wrist, per_axis, tell)
     if picture is not None:
-        from planner import plot_wrench_space
-
         drawn = answering.stance(request.stance, robots)
-        settled, space = hand_space(drawn, limb)
+        settled, space = planner.hand_space(drawn, limb)
         shown, preload = space if reply.capability else None, None
         if reply.wrist.mode == "floating":
-            preload = floating_wrist(drawn, limb).hand.preload
-        with writing(picture):
-            plot_wrench_space(
+            preload = planner.floating_wrist(drawn, limb).hand.preload
+        with tables.writing(picture):
+            planner.plot_wrench_space(
                 settled,
                 shown,
                 picture,
@@ -91,29 +74,30 @@ def wrench_space(
                 outlined=reply.vertices is None,
             )
     if as_json:
-        searched = {} if found is None else {"search": survey_json(found)}
-        say(msgspec.to_builtins(reply) | searched)
+        searched = {} if found is None else {"search": tables.survey_json(found)}
+        tables.say(msgspec.to_builtins(reply) | searched)
     else:
-        print_wrench_space(reply, console())
-        if isinstance(reply.robust, RobustCapability) and reply.capability:
-            print_robust(reply.robust, console())
+        tables.print_wrench_space(reply, tables.console())
+        if isinstance(reply.robust, replies.RobustCapability) and reply.capability:
+            tables.print_robust(reply.robust, tables.console())
         if found is not None:
-            print_survey(found, console())
-    return DONE if reply.capability else OVERLOADED
+            tables.print_survey(found, tables.console())
+    return tables.DONE if reply.capability else tables.OVERLOADED
 
 
-def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[Axis]:
-    names = [name.strip() for name in given.split(",")]
-    axes = [axis for name in names for axis in get_args(Axis) if axis == name]
+def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[requests.Axis]:
+    """Return two different axes of a wrench."""
+    known, names = get_args(requests.Axis), [name.strip() for name in given.split(",")]
+    axes = [axis for name in names for axis in known if axis == name]
     if len(names) != 2 or len(axes) != 2 or axes[0] == axes[1]:
         raise click.BadParameter(
-            f"two different ones of {', '.join(get_args(Axis))} are wanted, as fx,fz; got {given}"
+            f"two different ones of {', '.join(known)} are wanted, as fx,fz; got {given}"
         )
     return axes
 
 
 @click.command("body-space")
-@stance_argument
+@options.stance_argument
 @click.option(
     "--axes",
     default="fx,fz",
@@ -128,44 +112,37 @@ def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[Axis]
     help="Whatever the other components; as asked for by default.",
 )
 @click.option("--pure", is_flag=True, help="With the other components zero.")
-@plot_option("Draw it there, and the largest accelerations in two planes.")
-@hand_option
-@robot_option
-@json_option
+@options.plot_option("Draw it there, and the largest accelerations in two planes.")
+@options.own_options
+@options.json_option
 def body_space(
     stance: str,
-    axes: list[Axis],
+    axes: list[requests.Axis],
     projection: bool,
     pure: bool,
     picture: Path | None,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Show what the body can bear: which wrenches, and which accelerations."""
-    from service.tables import console, print_body_space
-
     if projection and pure:
         raise click.UsageError("give --projection or --pure, not both")
-    from service.answering import explore, robots_of
 
-    plan = asked(read_request(stance), hand, robot)
-    request = about_the_same(
-        BodySpaceRequest,
+    plan = own.asked(stances.read_request(stance))
+    request = requests.about_the_same(
+        requests.BodySpaceRequest,
         plan,
         id=plan.id,
         axes=axes,
         others="free" if projection else "zero" if pure else "needed",
     )
-    with waiting(f"exploring {stance}", plan):
-        found = explore(request, robots_of(robot))
+    with tables.waiting(f"exploring {stance}", plan):
+        found = answering.explore(request, own.robots)
         if picture is not None:
-            from planner import plot_body_space
-
-            with writing(picture):
-                plot_body_space(found.space, found.section, picture, stance)
+            with tables.writing(picture):
+                planner.plot_body_space(found.space, found.section, picture, stance)
     if as_json:
-        say(found.reply)
+        tables.say(found.reply)
     else:
-        print_body_space(found.reply, console())
-    return EXIT_STATUS.get(found.reply.status, FAILED)
+        tables.print_body_space(found.reply, tables.console())
+    return tables.EXIT_STATUS.get(found.reply.status, tables.FAILED)

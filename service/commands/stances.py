@@ -10,22 +10,19 @@ from codecs import BOM_UTF8
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Generic, NamedTuple, TypeVar
+from typing import Final, Generic, NamedTuple, TypeVar
 
 import msgspec
 
 from hand_models.base import InvalidInputError
-from service.requests import PlanRequest, Request, RouteRequest
+from service import answering, requests, wire
 
 __all__ = ["Given", "bundled", "limbs_of", "read_request", "read_route", "read_with_text"]
 
 LIMBS: Final = ("front_right", "rear_right", "rear_left", "front_left")
 """Of the bundled robot."""
 
-R = TypeVar("R", bound=Request)
-
-if TYPE_CHECKING:
-    from service.answering import MeshFiles
+R = TypeVar("R", bound=requests.Request)
 
 
 class Given(NamedTuple, Generic[R]):
@@ -42,16 +39,16 @@ class Given(NamedTuple, Generic[R]):
 
     text: bytes
     request: R
-    files: MeshFiles | None
+    files: answering.MeshFiles | None
 
 
-def bundled(kind: type[Request] = PlanRequest) -> tuple[str, ...]:
+def bundled(kind: type[requests.Request] = requests.PlanRequest) -> tuple[str, ...]:
     """Return the names of the bundled stances, or of the bundled routes."""
     files = [file.name for file in _folder(kind).iterdir()]
     return tuple(sorted(name.removesuffix(".json") for name in files if name.endswith(".json")))
 
 
-def read_request(source: str) -> PlanRequest:
+def read_request(source: str) -> requests.PlanRequest:
     """Return the plan request that a command was given.
 
     Parameters
@@ -67,19 +64,23 @@ def read_request(source: str) -> PlanRequest:
     return read_with_text(source)[0]
 
 
-def read_with_text(source: str) -> tuple[PlanRequest, Given[PlanRequest]]:
+def read_with_text(source: str) -> tuple[requests.PlanRequest, Given[requests.PlanRequest]]:
     """Return what `read_request` does, and how it was written."""
-    return _read(source, PlanRequest, "STANCE", "stance")
+    return _read(source, requests.PlanRequest, "STANCE", "stance")
 
 
-def read_route(source: str) -> RouteRequest:
+def read_route(source: str) -> requests.RouteRequest:
     """Return the route that a command was given; as `read_request`."""
-    return _read(source, RouteRequest, "ROUTE", "route")[0]
+    return _read(source, requests.RouteRequest, "ROUTE", "route")[0]
 
 
 def limbs_of(source: str | None) -> tuple[str, ...]:
     """Return the limbs that hold on in a stance; the bundled robot's where that cannot be told."""
-    path = _folder(PlanRequest) / f"{source}.json" if source in bundled() else Path(source or "")
+    path = (
+        _folder(requests.PlanRequest) / f"{source}.json"
+        if source in bundled()
+        else Path(source or "")
+    )
     try:
         asked = msgspec.json.decode(path.read_bytes())
         return tuple(str(hand["limb"]) for hand in asked["stance"]["hands"])
@@ -92,9 +93,9 @@ def _text(path: Path) -> bytes:
     return path.read_bytes().removeprefix(BOM_UTF8)
 
 
-def _folder(kind: type[Request]) -> Traversable:
+def _folder(kind: type[requests.Request]) -> Traversable:
     folder = resources.files("service") / "examples"
-    return folder / "routes" if kind is RouteRequest else folder
+    return folder / "routes" if kind is requests.RouteRequest else folder
 
 
 def _read(source: str, kind: type[R], field: str, noun: str) -> tuple[R, Given[R]]:
@@ -118,9 +119,6 @@ def _read(source: str, kind: type[R], field: str, noun: str) -> tuple[R, Given[R
 
 def _decoded(text: bytes, kind: type[R], folder: Path) -> tuple[R, Given[R]]:
     """Return a request with its scans, and how it was written; its files are in a folder."""
-    from service.answering import MeshFiles
-    from service.wire import decode_request
-
-    files = MeshFiles(folder)
-    request = decode_request(text, kind)
+    files = answering.MeshFiles(folder)
+    request = wire.decode_request(text, kind)
     return files.whole(request), Given(text, request, files)

@@ -6,32 +6,19 @@ import sys
 import textwrap
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 import msgspec
 
+import planner
 from hand_models.base import InvalidInputError, UnsupportedError
-from service.commands.options import (
-    FiniteRange,
-    asked,
-    hand_option,
-    json_option,
-    robot_option,
-    stance_argument,
-)
-from service.commands.stances import read_request
-from service.requests import PlanRequest, StreamRequest, Wrench, about_the_same
-from service.tables import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, remark, say
-
-if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile, WrenchStream
-    from service.replies import ErrorReply, SetPointsReply
+from service import answering, replies, requests, tables, wire
+from service.commands import options, stances
 
 __all__ = ["stream"]
 
-WORST_FIRST: Final = (BAD_INPUT, FAILED, OVERLOADED, DONE)
+WORST_FIRST: Final = (tables.BAD_INPUT, tables.FAILED, tables.OVERLOADED, tables.DONE)
 """Exit statuses: that of a stream is the worst of its lines'."""
 
 WIDTH: Final = 100
@@ -42,24 +29,17 @@ HANDS_A_LINE: Final = 4
 
 
 @click.command()
-@stance_argument
+@options.stance_argument
 @click.option(
     "--radius",
-    type=FiniteRange(min=0.0, min_open=True, max=1e4),
+    type=options.FiniteRange(min=0.0, min_open=True, max=1e4),
     default=30.0,
     show_default=True,
     help="Of interpolations along a force; along a moment a tenth of it, per metre [N].",
 )
-@hand_option
-@robot_option
-@json_option
-def stream(
-    stance: str,
-    radius: float,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
-    as_json: bool,
-) -> int:
+@options.own_options
+@options.json_option
+def stream(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
     """Give set-points for one body wrench after another: one a line in, one a line out.
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first
@@ -70,15 +50,13 @@ def stream(
     Exit status: 2 where a line was bad, or else 1 where one failed, or else 3 where one is
     overloaded or infeasible.
     """
-    from service.answering import opened, robots_of, set_points_reply
-
     if stance == "-":
         raise InvalidInputError(
             "standard input has the body wrenches; name a file or a bundled stance", field="STANCE"
         )
-    request = _declared(asked(read_request(stance), hand, robot), radius)
-    worst = DONE
-    with opened(request, robots_of(robot)) as source:
+    request = _declared(own.asked(stances.read_request(stance)), radius)
+    worst = tables.DONE
+    with answering.opened(request, own.robots) as source:
         if not as_json:
             _say_columns(source)
         for number, line in enumerate(sys.stdin.buffer, start=1):
@@ -88,52 +66,48 @@ def stream(
             try:
                 points = source.set_points(_body_wrench(line))
             except InvalidInputError as error:
-                worst = BAD_INPUT
+                worst = tables.BAD_INPUT
                 if as_json:
-                    say(_refused(error, number))
+                    tables.say(_refused(error, number))
                 else:
-                    note(f"line {number}: {error}")
+                    tables.note(f"line {number}: {error}")
                 continue
-            reply = set_points_reply(stance, source, points, start)
+            reply = answering.set_points_reply(stance, source, points, start)
             if as_json:
-                say(reply)
+                tables.say(reply)
             else:
                 _say_line(reply)
-            statuses = (worst, EXIT_STATUS.get(reply.status, FAILED))
+            statuses = (worst, tables.EXIT_STATUS.get(reply.status, tables.FAILED))
             worst = min(statuses, key=WORST_FIRST.index)
     return worst
 
 
-def _declared(plan: PlanRequest, radius: float) -> StreamRequest:
+def _declared(plan: requests.PlanRequest, radius: float) -> requests.StreamRequest:
     """Return the declaration of a plan request's stance."""
     if plan.objective != "max_margin":
         raise UnsupportedError(
             f"{plan.objective} is not for streams; valid is max_margin", field="objective"
         )
-    return about_the_same(StreamRequest, plan, radius=radius)
+    return requests.about_the_same(requests.StreamRequest, plan, radius=radius)
 
 
-def _body_wrench(line: bytes) -> Wrench:
+def _body_wrench(line: bytes) -> requests.Wrench:
     """Return the body wrench of a line of JSON."""
-    from service.wire import MalformedError
-
     try:
-        wrench: Wrench = msgspec.json.decode(line, type=Wrench)
+        wrench: requests.Wrench = msgspec.json.decode(line, type=requests.Wrench)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         wanted = "six finite numbers up to 1e6 as [fx, fy, fz, mx, my, mz] are wanted"
-        raise MalformedError(f"{wanted}: {error}") from None
+        raise wire.MalformedError(f"{wanted}: {error}") from None
     return wrench
 
 
-def _refused(error: InvalidInputError, number: int) -> ErrorReply:
+def _refused(error: InvalidInputError, number: int) -> replies.ErrorReply:
     """Return what is said in place of a line's set-points."""
-    from service.replies import ErrorDetail, ErrorReply
-
     field = f"line {number}" if error.field is None else f"line {number}: {error.field}"
-    return ErrorReply(error=ErrorDetail(error.kind, field, error.message))
+    return replies.ErrorReply(error=replies.ErrorDetail(error.kind, field, error.message))
 
 
-def _say_columns(stream: WrenchStream) -> None:
+def _say_columns(stream: planner.WrenchStream) -> None:
     """Write the header, and on standard error what the lines have in common."""
     from hand_models.hand import FINGERS
 
@@ -142,7 +116,7 @@ def _say_columns(stream: WrenchStream) -> None:
     if radius is not None:
         how = f"mixed within {radius:g} N, {radius / 10.0:g} N·m of"
     centre = ", ".join(f"{round(part, 1) + 0.0:.1f}" for part in stream.first)
-    remark(
+    tables.remark(
         f"plans are {how} the first centre [{centre}] N, N·m; "
         f"a hand's tensions are those of {', '.join(FINGERS)}"
     )
@@ -157,7 +131,7 @@ def _say_cells(head: str, cells: Sequence[str]) -> None:
         click.echo(f"{head if k == 0 else ' ' * len(head)}{row}".rstrip())
 
 
-def _say_line(reply: SetPointsReply) -> None:
+def _say_line(reply: replies.SetPointsReply) -> None:
     """Write set-points in one line: each hand's four tensions, in whole newtons."""
     if reply.hands is None or reply.utilisation is None or reply.gap is None:
         head = f"{reply.status:<10} {'-':>6} {'-':>5} {reply.source:<12} "

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+import planner
 from hand_models.base import InvalidInputError
-from service.commands.options import beginning_so, folder_option, hand_option, json_option
-from service.tables import filling_folder, progress, say, write_alone
+from service import answering, tables
+from service.commands import options, stances
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from hand_models.experiments import Claim, StudyResult
+    from hand_models import experiments, studies
     from hand_models.parameters import ParameterTable
-    from hand_models.studies import Study
+
 
 __all__ = ["NAMES", "chosen_study", "print_study", "study", "sweep_options"]
 
@@ -86,7 +87,7 @@ def sweep_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def chosen_study(name: str, **options: Any) -> str | Study:
+def chosen_study(name: str, **wanted: Any) -> str | studies.Study:
     """Return a study by its name, or a sweep of what the options ask for.
 
     Raises
@@ -94,7 +95,7 @@ def chosen_study(name: str, **options: Any) -> str | Study:
     InvalidInputError
         If a study other than the sweep is given options.
     """
-    given = {key: value for key, value in options.items() if value not in (None, ())}
+    given = {key: value for key, value in wanted.items() if value not in (None, ())}
     if name not in NAMES:
         raise InvalidInputError(f"{name!r}: valid are {', '.join(NAMES)}", field="NAME")
     if name != SWEEP or not given:
@@ -102,62 +103,59 @@ def chosen_study(name: str, **options: Any) -> str | Study:
             option = "--measure" if "measures" in given else f"--{min(given)}"
             raise InvalidInputError(f"only the study {SWEEP} takes it, not {name}", field=option)
         return _measurements() if name == MEASURE else name
-    from hand_models.experiments import Conditions, Sweep
+
+    from hand_models import experiments
 
     of_rock = {key: given.pop(key) for key in ("diameter", "tension", "surface") if key in given}
     if "measures" in given:
         given["measures"] = tuple(dict.fromkeys(given["measures"]))
-    return Sweep(conditions=replace(Conditions.of_fig16()[0], **of_rock), **given)
+    return experiments.Sweep(
+        conditions=replace(experiments.Conditions.of_fig16()[0], **of_rock), **given
+    )
 
 
-def _measurements() -> Study:
+def _measurements() -> studies.Study:
     """Return the study of measurements, over all bundled stances whose wrists are fixed."""
-    from planner import MeasurementStudy
-    from service.answering import question
-    from service.commands.stances import bundled, read_request
-
-    asked = {name: question(read_request(name)) for name in bundled()}
+    asked = {name: answering.question(stances.read_request(name)) for name in stances.bundled()}
     fixed = {
         name: each
         for name, each in asked.items()
         if all(hand.wrist == "fixed" for hand in each.stance.hands)
     }
-    return MeasurementStudy(fixed)
+    return planner.MeasurementStudy(fixed)
 
 
 @click.command(epilog=f"NAME is one of {', '.join(NAMES)}.")
-@click.argument("name", shell_complete=beginning_so(NAMES))
-@folder_option("Where result.json and the pictures go.")
+@click.argument("name", shell_complete=options.beginning_so(NAMES))
+@options.folder_option("Where result.json and the pictures go.")
 @sweep_options
-@hand_option
-@json_option
+@options.hand_option
+@options.json_option
 def study(
-    name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **options: Any
+    name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **wanted: Any
 ) -> None:
     """Run an experiment of the paper again, and hold its claims against the model.
 
     The study sweep has no claims: it draws what the test gripper holds over any two of its numbers.
     The exit status is 0 whatever the claims say.
     """
-    from hand_models.parameters import own_hand
-    from hand_models.studies import as_json as study_json, run_study
-    from service.tables import console
+    from hand_models import parameters, studies
 
-    chosen = chosen_study(name, **options)
-    numbers = None if hand is None else own_hand(hand)
+    chosen = chosen_study(name, **wanted)
+    numbers = None if hand is None else parameters.own_hand(hand)
     line = None if as_json else f"study {name}: started; it may take minutes"
-    with filling_folder():
+    with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    write_alone(folder / "result.json", folder)
-    with filling_folder(), progress(name, line=line) as tell:
-        result, files = run_study(chosen, folder, tell, numbers)
+    tables.write_alone(folder / "result.json", folder)
+    with tables.filling_folder(), tables.progress(name, line=line) as tell:
+        result, files = studies.run_study(chosen, folder, tell, numbers)
     if as_json:
-        say(study_json(result) | {"files": [str(path) for path in files]})
+        tables.say(studies.as_json(result) | {"files": [str(path) for path in files]})
     else:
-        print_study(result, files, console())
+        print_study(result, files, tables.console())
 
 
-def print_study(result: StudyResult, files: Sequence[Path], out: Console) -> None:
+def print_study(result: experiments.StudyResult, files: Sequence[Path], out: Console) -> None:
     """Print what was claimed, what came out, and where the files are."""
     out.print(f"{result.name}: {result.title}", style="bold", markup=False)
     for line in result.data.get("summary", ()):
@@ -170,31 +168,29 @@ def print_study(result: StudyResult, files: Sequence[Path], out: Console) -> Non
         out.print(str(path), markup=False, soft_wrap=True)
 
 
-def _print_claims(result: StudyResult, out: Console) -> None:
-    from rich.markup import escape
-
-    from service.tables import table_of
-
-    table = table_of("")
-    for name in ("claim", "claimed", "got"):
-        table.add_column(name, overflow="fold")
-    for claim in result.claims:
-        cells = (escape(claim.claim), _cell(claim.claimed), _cell(claim.got))
-        table.add_row(_verdict(claim), *cells, style=None if claim.holds else "bold")
-    out.print(table)
+def _print_claims(result: experiments.StudyResult, out: Console) -> None:
+    """Print which claims hold."""
+    columns = (
+        tables.text("", _verdict),
+        tables.text("claim"),
+        tables.text("claimed", form=_shown),
+        tables.text("got", form=_shown),
+    )
+    tables.print_rows(
+        result.claims, columns, out, style=lambda claim: "" if claim.holds else "bold"
+    )
     held = sum(claim.holds for claim in result.claims)
     out.print(f"{held} of {len(result.claims)} claims hold", markup=False)
     if any(claim.role == "calibration" for claim in result.claims):
         out.print("fitted: a parameter was calibrated to the claim", markup=False)
 
 
-def _verdict(claim: Claim) -> str:
+def _verdict(claim: experiments.Claim) -> str:
+    """Return whether a claim holds, in a word."""
     if not claim.holds:
         return "missed"
     return "fitted" if claim.role == "calibration" else "holds"
 
 
-def _cell(value: str | float) -> str:
-    from rich.markup import escape
-
-    return escape(value) if isinstance(value, str) else f"{value:.4g}"
+def _shown(value: str | float) -> str:
+    return value if isinstance(value, str) else f"{value:.4g}"

@@ -3,42 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 from click.core import ParameterSource
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, within
+from service import processes, sweeping, tables
+from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
-from service.commands.options import (
-    FiniteRange,
-    asked,
-    dask_option,
-    folder_option,
-    hand_option,
-    json_option,
-    robot_option,
-    stance_argument,
-    workers_option,
-)
-from service.commands.stances import read_request
-from service.processes import Interrupted
-from service.sweeping import TOLERANCE
-from service.tables import (
-    BAD_INPUT,
-    DONE,
-    FAILED,
-    filling_folder,
-    note,
-    say,
-    verbosity,
-    write_alone,
-)
-
-if TYPE_CHECKING:
-    from hand_models.parameters import ParameterTable
-    from planner import RobotFile
-    from service.sweeping import Design, PointRows, Sweep
 
 __all__ = ["sweep"]
 
@@ -47,7 +20,7 @@ PICTURE: Final = "sweep.png"
 
 
 @click.command()
-@stance_argument
+@options.stance_argument
 @click.option(
     "--vary",
     "variations",
@@ -70,8 +43,8 @@ PICTURE: Final = "sweep.png"
 )
 @click.option(
     "--tolerance",
-    type=FiniteRange(1e-9, 0.5),
-    default=TOLERANCE,
+    type=options.FiniteRange(1e-9, 0.5),
+    default=sweeping.TOLERANCE,
     show_default=True,
     help="Of where it stops holding, if one number varies: a share of the range.",
 )
@@ -80,12 +53,10 @@ PICTURE: Final = "sweep.png"
     is_flag=True,
     help="Go on where this sweep was broken off: points that the table of DIR has are kept.",
 )
-@workers_option
-@dask_option
-@folder_option("Where the table and the picture go.")
-@hand_option
-@robot_option
-@json_option
+@options.workers_options
+@options.folder_option("Where the table and the picture go.")
+@options.own_options
+@options.json_option
 def sweep(
     stance: str,
     variations: tuple[str, ...],
@@ -94,11 +65,9 @@ def sweep(
     over: str | None,
     tolerance: float,
     resume: bool,
-    workers: int | None,
-    dask: str | None,
+    parallel: options.Workers,
     folder: Path,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
+    own: options.Own,
     as_json: bool,
 ) -> int:
     """Plan a stance over varied fields: a table, a picture, and where it stops holding.
@@ -111,96 +80,55 @@ def sweep(
     Exit status: 0 whatever holds, 2 bad input, also where no point can be answered for it, 1 where
     a point failed or was lost.
     """
-    from service.answering import robots_of
-    from service.bulk import new_manifest
-    from service.sweeping import (
-        Design,
-        PointRows,
-        Variation,
-        about,
-        columns_of,
-        has_borders,
-        plot_sweep,
-    )
-    from service.tables import console, print_sweep
-
     if seed is not None and samples is None:
         raise InvalidInputError("is of samples: give --samples, too", field="--seed")
-    request = asked(read_request(stance), hand, robot)
+    request = own.asked(stances.read_request(stance))
     try:
-        chosen = [Variation.parse(each, sampled=samples is not None) for each in variations]
-        design = Design.of(request, chosen, samples, seed or 0, robots_of(robot))
+        chosen = [
+            sweeping.Variation.parse(each, sampled=samples is not None) for each in variations
+        ]
+        design = sweeping.Design.of(request, chosen, samples, seed or 0, own.robots)
     except InvalidInputError as error:
         where = "--vary" if error.field is None else f"--vary {error.field}"
         raise InvalidInputError(error.message, field=where) from None
     given = click.get_current_context().get_parameter_source("tolerance")
-    if given is ParameterSource.COMMANDLINE and not has_borders(design):
+    if given is ParameterSource.COMMANDLINE and design.number is None:
         raise InvalidInputError("is of one number that varies alone", field="--tolerance")
-    pair = _pair(over, design)
-    with filling_folder():
+    pair = None if over is None else over.split(",")
+    if pair is not None:
+        with within("--over"):
+            design.places_of(pair)
+    with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    files = {"table": folder / TABLE, "picture": folder / PICTURE}
-    write_alone(files["table"], folder)
-    with writing_answers(files["table"]):
-        columns = [each.name for each in columns_of(design)]
-        begun = new_manifest(columns, False, hand, robot, about(request, design, seed or 0))
-        sink = PointRows(design, files["table"], begun, resume)
-    result = _answered(design, sink, files["table"], stance, workers, dask, robot, tolerance)
-    with filling_folder():
-        plot_sweep(result, files["picture"], Path(stance).stem, pair)
+    table, picture = folder / TABLE, folder / PICTURE
+    tables.write_alone(table, folder)
+    with writing_answers(table):
+        sink = sweeping.PointRows(request, design, seed or 0, table, resume, *own)
+    ask = sweeping.asking(sink.count - sink.tally.count, parallel.workers, own.robot, parallel.dask)
+    answer_rest(sink, ask, sink, table, f"sweeping {stance}", "points")
+    try:
+        result = sweeping.with_borders(design, sink.points, own.robot, tolerance)
+    except processes.Interrupted:
+        raise processes.Interrupted(
+            f"all points are answered in {table}; --resume goes on"
+        ) from None
+    with tables.filling_folder():
+        sweeping.plot_sweep(result, picture, Path(stance).stem, pair)
     if as_json:
-        say(result.summary() | {"files": {name: str(file) for name, file in files.items()}})
+        tables.say(result.summary() | {"files": {"table": str(table), "picture": str(picture)}})
     else:
-        out = console()
-        if verbosity() >= 0:
-            print_sweep(result, out)
-        for name, file in files.items():
-            out.print(f"{name}: {file}", markup=False, soft_wrap=True)
+        out = tables.console()
+        if tables.verbosity() >= 0:
+            tables.print_sweep(result, out)
+        out.print(f"table: {table}\npicture: {picture}", markup=False, soft_wrap=True)
     return _status(result)
 
 
-def _pair(over: str | None, design: Design) -> tuple[str, str] | None:
-    """Return the paths that the picture is over, checked before anything is planned."""
-    if over is None:
-        return None
-    paths = [each.path for each in design.variations]
-    first, _, second = over.partition(",")
-    if first == second or not {first, second} <= {*paths}:
-        raise InvalidInputError(
-            f"two different ones of {', '.join(paths)} are wanted, got {over}", field="--over"
-        )
-    return first, second
-
-
-def _answered(
-    design: Design,
-    sink: PointRows,
-    table: Path,
-    stance: str,
-    workers: int | None,
-    dask: str | None,
-    robot: RobotFile | None,
-    tolerance: float,
-) -> Sweep:
-    """Return the sweep: of points that the table does not have yet, and of its borders."""
-    from service.bulk import LOCAL
-    from service.sweeping import Points, asking, swept
-
-    asked = Points(design)
-    on = LOCAL if dask == "local" else dask
-    with asking(asked.count - sink.tally.count, workers, robot, on) as ask:
-        answer_rest(asked, ask, sink, table, f"sweeping {stance}", "points")
-        try:
-            return swept(design, sink.points, ask, tolerance)
-        except Interrupted:
-            raise Interrupted(f"all points are answered in {table}; --resume goes on") from None
-
-
-def _status(result: Sweep) -> int:
+def _status(result: sweeping.Sweep) -> int:
     """Return the exit status, and tell what it is about where that is not told yet."""
     if not all(row.answered for row in result.rows):
-        return FAILED
+        return tables.FAILED
     if all(row.error is not None for row in result.rows):
-        note(f"no point can be answered: {result.rows[0].complaint}")
-        return BAD_INPUT
-    return DONE
+        tables.note(f"no point can be answered: {result.rows[0].complaint}")
+        return tables.BAD_INPUT
+    return tables.DONE

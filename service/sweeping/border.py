@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 import msgspec
 
-from service.sweeping.evaluation import Row
+from service.sweeping.design import Design
+from service.sweeping.rows import Row
 
-__all__ = ["TOLERANCE", "Along", "Border", "Held", "border_in_words", "borders", "held"]
+__all__ = ["TOLERANCE", "Border", "Held", "borders", "held"]
 
 TOLERANCE: Final = 1e-3
 """Of a border, over the range that varies."""
@@ -40,14 +41,18 @@ class Border(msgspec.Struct, frozen=True):
     tolerance: float
     plans: int
 
-
-class Along(NamedTuple):
-    """A number that varies: its place in points, its path, its unit, and if it is a whole one."""
-
-    place: int
-    path: str
-    unit: str | None
-    whole: bool
+    @property
+    def words(self) -> str:
+        """The border in one sentence; the value told is on the side that holds."""
+        towards = "up to" if self.fails > self.holds else "from"
+        unit = "" if self.unit is None else f" {self.unit}"
+        whole = self.tolerance >= 1.0 and self.holds.is_integer() and self.fails.is_integer()
+        digits = 0 if whole else max(0, 1 - math.floor(math.log10(self.tolerance)))
+        return (
+            f"holds {towards} {self.path} = {self.holds:.{digits}f}{unit}; at "
+            f"{self.fails:.{digits}f} it does not "
+            f"(to {self.tolerance:.2g}{unit}, {self.plans} more plans)"
+        )
 
 
 class Held(NamedTuple):
@@ -61,58 +66,65 @@ class Held(NamedTuple):
 
 
 def borders(
-    rows: Sequence[Row], along: Along, tolerance: float, plan: Callable[[float], Row]
-) -> list[Border]:
-    """Return every border over one variable that two neighbouring points show.
+    design: Design, rows: Sequence[Row], tolerance: float, plan: Callable[[float], Row]
+) -> Iterator[Border]:
+    """Yield every border that two neighbouring points show, if one number varies alone.
 
     Parameters
     ----------
+    design : Design
     rows : sequence of Row
-        In the order of the variable.
-    along : Along
-        What varies.
+        Of its points.
     tolerance : float
-        In its unit.
+        Over the range of the number.
     plan : callable
         Plans at one more value.
     """
-    found = []
-    for before, after in itertools.pairwise(rows):
-        if "error" in (before.state, after.state) or before.holds == after.holds:
-            continue
-        first, last = (before, after) if before.holds else (after, before)
-        found.append(_narrowed(first, last, along, tolerance, plan))
-    return found
+    place = design.number
+    if place is None:
+        return
+    ordered = sorted(rows, key=lambda row: at(row, place))
+    tolerance *= at(ordered[-1], place) - at(ordered[0], place)
+    variation, target = design.variations[place], design.targets[place]
+    for pair in itertools.pairwise(ordered):
+        if "error" not in (pair[0].state, pair[1].state) and pair[0].holds != pair[1].holds:
+            holds, fails = sorted(pair, key=lambda row: not row.holds)
+            holds, fails, plans = _narrowed(holds, fails, place, target.whole, tolerance, plan)
+            ends = at(holds, place), at(fails, place)
+            reached = max(tolerance, abs(ends[1] - ends[0]))
+            yield Border(variation.path, target.unit, *ends, reached, plans)
 
 
 def _narrowed(
-    held: Row, failed: Row, along: Along, tolerance: float, plan: Callable[[float], Row]
-) -> Border:
-    """Return a border between two points: by interpolation, and every third time bisection."""
-    plans, place = 0, along.place
-    enough = max(tolerance, 1.0) if along.whole else tolerance
-    while (gap := abs(_at(failed, place) - _at(held, place))) > enough:
-        low, high = sorted((_at(held, place), _at(failed, place)))
+    holds: Row,
+    fails: Row,
+    place: int,
+    whole: bool,
+    tolerance: float,
+    plan: Callable[[float], Row],
+) -> tuple[Row, Row, int]:
+    """Return two rows that are closer: by interpolation, and every third time bisection."""
+    enough = max(tolerance, 1.0) if whole else tolerance
+    for plans in itertools.count():
+        low, high = sorted((at(holds, place), at(fails, place)))
+        if high - low <= enough:
+            break
         value = 0.5 * (low + high)
-        estimate = crossing(held, failed, place) if plans % 3 < 2 else None
+        estimate = crossing(holds, fails, place) if plans % 3 < 2 else None
         if estimate is not None:
             # a little beyond it, so that the next plan is likely to be on the other side
-            step = math.copysign(0.45 * tolerance, value - estimate)
-            value = min(max(estimate + step, low + 0.05 * gap), high - 0.05 * gap)
-        if along.whole:
-            value = min(max(round(value), low + 1), high - 1)
-        row = plan(value)
-        plans += 1
+            beyond = estimate + math.copysign(0.45 * tolerance, value - estimate)
+            least = 0.05 * (high - low)
+            value = min(max(beyond, low + least), high - least)
+        row = plan(min(max(round(value), low + 1), high - 1) if whole else value)
         if row.state == "error":
-            break
-        held, failed = (row, failed) if row.holds else (held, row)
-    ends = _at(held, place), _at(failed, place)
-    reached = max(tolerance, abs(ends[1] - ends[0]))
-    return Border(along.path, along.unit, *ends, reached, plans)
+            return holds, fails, plans + 1
+        holds, fails = (row, fails) if row.holds else (holds, row)
+    return holds, fails, plans
 
 
-def held(rows: Sequence[Row], place: int) -> list[Held]:
-    """Return where rows hold, in the order of a variable, by interpolation between them.
+def held(rows: Sequence[Row], place: int) -> Iterator[Held]:
+    """Yield where rows hold, in the order of a variable, by interpolation between them.
 
     Parameters
     ----------
@@ -121,47 +133,30 @@ def held(rows: Sequence[Row], place: int) -> list[Held]:
     place : int
         Of that variable in their points.
     """
-    found: list[Held] = []
-    low: float | None = None
-    inside = False
-    for i, row in enumerate(rows):
-        if row.holds and not inside:
-            inside, low = True, None if i == 0 else between(row, rows[i - 1], place)
-        elif not row.holds and inside:
-            inside = False
-            found.append(Held(low, between(rows[i - 1], row, place)))
-    return [*found, Held(low, None)] if inside else found
+    groups = [list(group) for _, group in itertools.groupby(rows, lambda row: row.holds)]
+    for before, group, after in zip([None, *groups], groups, [*groups[1:], None], strict=False):
+        if group[0].holds:
+            low = None if before is None else _between(group[0], before[-1], place)
+            yield Held(low, None if after is None else _between(group[-1], after[0], place))
 
 
-def between(held: Row, failed: Row, place: int) -> float:
+def _between(holds: Row, fails: Row, place: int) -> float:
     """Return where utilisation passes its cap between two points, halfway if it is not known."""
-    estimate = crossing(held, failed, place)
-    return 0.5 * (_at(held, place) + _at(failed, place)) if estimate is None else estimate
+    estimate = crossing(holds, fails, place)
+    return 0.5 * (at(holds, place) + at(fails, place)) if estimate is None else estimate
 
 
-def crossing(held: Row, failed: Row, place: int) -> float | None:
+def crossing(holds: Row, fails: Row, place: int) -> float | None:
     """Return where utilisation over its cap passes 1 by linear interpolation; None if unknown."""
-    if held.margin is None or failed.margin is None or not failed.margin > held.margin:
+    if holds.margin is None or fails.margin is None or not fails.margin > holds.margin:
         return None
-    share = (1.0 - held.margin) / (failed.margin - held.margin)
-    start = _at(held, place)
-    return start + min(max(share, 0.0), 1.0) * (_at(failed, place) - start)
+    share = (1.0 - holds.margin) / (fails.margin - holds.margin)
+    start = at(holds, place)
+    return start + min(max(share, 0.0), 1.0) * (at(fails, place) - start)
 
 
-def _at(row: Row, place: int) -> float:
+def at(row: Row, place: int) -> float:
+    """Return the number that varies in a row."""
     value = row.point[place]
     assert isinstance(value, (int, float))
     return float(value)
-
-
-def border_in_words(border: Border) -> str:
-    """Return a border in one sentence; the value told is on the side that holds."""
-    towards = "up to" if border.fails > border.holds else "from"
-    unit = "" if border.unit is None else f" {border.unit}"
-    whole = border.tolerance >= 1.0 and border.holds.is_integer() and border.fails.is_integer()
-    digits = 0 if whole else max(0, 1 - math.floor(math.log10(border.tolerance)))
-    values = [f"{value:.{digits}f}" for value in (border.holds, border.fails)]
-    return (
-        f"holds {towards} {border.path} = {values[0]}{unit}; at {values[1]} it does not "
-        f"(to {border.tolerance:.2g}{unit}, {border.plans} more plans)"
-    )

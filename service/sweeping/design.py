@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import msgspec
 import numpy as np
@@ -26,6 +27,8 @@ Point = tuple[Value, ...]
 """A value of each variation."""
 
 MOST_POINTS: Final = 100_000
+
+CAP: Final[Steps] = ("limits", "utilisation")
 
 
 @dataclass(frozen=True)
@@ -85,28 +88,26 @@ class Design:
         """
         if not variations:
             raise InvalidInputError("something must vary", field="variations")
+        count = math.prod(len(each.values) for each in variations) if samples is None else samples
+        if not 1 <= count <= MOST_POINTS:
+            raise LimitError(f"{count:,} points; from 1 to {MOST_POINTS:,} are asked at once")
         asked = msgspec.structs.replace(
             request,
             detail="hands",
             want=["load_factor"],
-            draws=[],
             explain=False,
             id=None,
             max_reply_bytes=None,
         )
-        paths = Paths(msgspec.json.decode(msgspec.json.encode(asked)))
+        paths = Paths.into(asked)
         targets = tuple(paths.target(each.path) for each in variations)
         _check_apart(variations, targets)
-        count = math.prod(len(each.values) for each in variations) if samples is None else samples
-        if not 1 <= count <= MOST_POINTS:
-            raise LimitError(f"{count:,} points; from 1 to {MOST_POINTS:,} are asked at once")
-        whole = tuple(map(_whole_numbers, variations, targets))
-        points = (
-            tuple(itertools.product(*(each.values for each in whole)))
-            if samples is None
-            else _hypercube(whole, targets, samples, seed)
-        )
-        design = cls(whole, targets, points, samples is not None, paths)
+        varied = tuple(map(_whole_numbers, variations, targets))
+        if samples is None:
+            points = tuple(itertools.product(*(each.values for each in varied)))
+        else:
+            points = tuple(_hypercube(varied, targets, samples, seed))
+        design = cls(varied, targets, points, samples is not None, paths)
         design._check_values(robots)
         return design
 
@@ -123,64 +124,78 @@ class Design:
         """The places of the variations with more than one value; the first if there is none."""
         return [i for i, each in enumerate(self.variations) if len(each.values) > 1] or [0]
 
+    @property
+    def number(self) -> int | None:
+        """The place of the one number that varies alone; None where it does not."""
+        place, *others = self.varying
+        return None if others or not self.variations[place].numbers else place
+
+    def places_of(self, over: Sequence[str]) -> list[int]:
+        """Return the places of two variations by their paths.
+
+        Raises
+        ------
+        InvalidInputError
+            If there are none, or they are the same.
+        """
+        paths = [each.path for each in self.variations]
+        if len(over) != 2 or over[0] == over[1] or not {*over} <= {*paths}:
+            raise InvalidInputError(
+                f"two different ones of {', '.join(paths)} are wanted, got {','.join(over)}"
+            )
+        return [paths.index(path) for path in over]
+
     def payload(self, point: Point, form: Format = Format.MSGPACK) -> bytes:
         """Return the encoded request at a point."""
-        document = self._paths.document
         varied: list[Steps] = []
         for target, value in zip(self.targets, point, strict=True):
             for steps in target.steps:
-                put(document, steps, value)
-                varied.append(steps)
-        self._paths.follow(document, varied)
-        return form.encode(document)
+                put(self._paths.document, steps, value)
+            varied += target.steps
+        self._paths.follow(varied)
+        return form.encode(self._paths.document)
 
     def cap(self, point: Point) -> float:
         """Return the utilisation up to which a point holds."""
         for target, value in zip(self.targets, point, strict=True):
             if target.steps == (CAP,) and isinstance(value, (int, float)):
                 return float(value)
-        limits: dict[str, Any] = self._paths.document.get("limits", {})
-        return float(limits.get("utilisation", 1.0))
+        return float(self._paths.document["limits"]["utilisation"])
 
     def _check_values(self, robots: Robots | None) -> None:
         """Refuse values that no request can have: of a range its ends tell, of words the names."""
+        from service.answering import question, robots_of
+
         first = tuple(each.values[0] for each in self.variations)
         for i, each in enumerate(self.variations):
-            for value in (each.values[0], each.last) if each.ranged else each.values:
+            for value in (each.values[0], each.values[-1]) if each.ranged else each.values:
                 point = (*first[:i], value, *first[i + 1 :])
                 asked = decode_request(self.payload(point, Format.JSON), PlanRequest)
-                if isinstance(value, str):
-                    _check_word(asked, self.targets[i], robots)
+                if not isinstance(value, str):
+                    continue
+                try:
+                    question(asked, robots or robots_of(None))
+                except InvalidInputError as error:
+                    # whatever else is wrong is an error at its point
+                    if f".{error.field}" in map(_dotted, self.targets[i].steps):
+                        raise
 
 
-CAP: Final[Steps] = ("limits", "utilisation")
-
-
-def _check_word(asked: PlanRequest, target: Target, robots: Robots | None) -> None:
-    """Refuse a name that nothing has, as of a surface; whatever else is wrong is told later."""
-    from service.answering import question, robots_of
-
-    try:
-        question(asked, robots_of(None) if robots is None else robots)
-    except InvalidInputError as error:
-        fields = [
-            "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
-            for steps in target.steps
-        ]
-        if f".{error.field}" in fields:
-            raise
+def _dotted(steps: Steps) -> str:
+    """Return steps as the field of an error has them, after a dot."""
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
 
 
 def _check_apart(variations: Sequence[Variation], targets: Sequence[Target]) -> None:
     """Refuse a value that would be set twice."""
-    met: list[tuple[Steps, str]] = []
-    for variation, target in zip(variations, targets, strict=True):
-        for steps in target.steps:
-            for other, path in met:
-                shared = min(len(steps), len(other))
-                if steps[:shared] == other[:shared]:
-                    raise InvalidInputError(f"varies what {path} varies, too", field=variation.path)
-        met += [(steps, variation.path) for steps in target.steps]
+    ends = [
+        (steps, each.path)
+        for each, target in zip(variations, targets, strict=True)
+        for steps in target.steps
+    ]
+    for (first, path), (steps, again) in itertools.combinations(ends, 2):
+        if all(map(operator.eq, first, steps)):
+            raise InvalidInputError(f"varies what {path} varies, too", field=again)
 
 
 def _whole_numbers(variation: Variation, target: Target) -> Variation:
@@ -198,28 +213,22 @@ def _whole_numbers(variation: Variation, target: Target) -> Variation:
 
 def _hypercube(
     variations: Sequence[Variation], targets: Sequence[Target], count: int, seed: int
-) -> tuple[Point, ...]:
+) -> Iterator[Point]:
+    """Yield points of a Latin hypercube over the values."""
     from scipy.stats import qmc
 
     generator = np.random.default_rng(seed)
-    drawn = qmc.LatinHypercube(d=len(variations), seed=generator).random(count)
-    columns = [
-        list(_spread(variation, target, shares.tolist()))
-        for variation, target, shares in zip(variations, targets, drawn.T, strict=True)
-    ]
-    return tuple(zip(*columns, strict=True))
+    for shares in qmc.LatinHypercube(d=len(variations), seed=generator).random(count).tolist():
+        yield tuple(map(_value_at, variations, targets, shares))
 
 
-def _spread(variation: Variation, target: Target, shares: Sequence[float]) -> Iterator[Value]:
-    """Yield the values of a variation at shares of it in [0, 1)."""
-    low, high = variation.values[0], variation.last
-    for share in shares:
-        if not variation.ranged:
-            yield variation.values[int(share * len(variation.values))]
-            continue
-        assert isinstance(low, (int, float))
-        assert isinstance(high, (int, float))
-        if target.whole:
-            yield int(low) + int(share * (int(high) - int(low) + 1))
-        else:
-            yield low + share * (high - low)
+def _value_at(variation: Variation, target: Target, share: float) -> Value:
+    """Return the value of a variation at a share of it in [0, 1)."""
+    if not variation.ranged:
+        return variation.values[int(share * len(variation.values))]
+    low, high = variation.values[0], variation.values[-1]
+    assert isinstance(low, (int, float))
+    assert isinstance(high, (int, float))
+    if target.whole:
+        return int(low) + int(share * (int(high) - int(low) + 1))
+    return low + share * (high - low)

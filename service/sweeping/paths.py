@@ -1,14 +1,15 @@
 """Paths into a plan request: which numbers or words they mean, and what would be valid there.
 
-A request is a document here, of plain lists and dicts. What lies on a path and is left out of the
-document is put there with its default, and a surface's preset is replaced by its numbers.
+A request is a document here, of plain lists and dicts in which every field has its value or its
+default. What a path leads through and is left out is put there, and a surface's preset is replaced
+by its numbers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 from msgspec import inspect
@@ -32,14 +33,22 @@ FIXED: Final = frozenset(
 )
 """Fields of a request that are no part of what is asked about."""
 
-SURFACE: Final = "surface"
 FORCES: Final = ("pull_off_limit", "lateral_limit", "shear_scatter")
 """Numbers of a preset that its parameter file gives over its shear limit."""
 
+HANDS: Final[Steps] = ("stance", "hands")
+BY_LIMB: Final[tuple[Steps, ...]] = (
+    ("stance", "joints"),
+    ("limits", "joint_torque"),
+    ("limits", "per_hand"),
+    ("present",),
+)
+KEYED: Final = (inspect.StructType, inspect.DictType)
+LISTED: Final = (inspect.ListType, inspect.TupleType, inspect.VarTupleType)
 
-@dataclass(frozen=True)
-class Target:
-    """What a path means.
+
+class Target(NamedTuple):
+    """A place that a path means.
 
     Attributes
     ----------
@@ -71,6 +80,14 @@ class Paths:
     document: dict[str, Any]
     presets: dict[Steps, str] = field(default_factory=dict)
 
+    @classmethod
+    def into(cls, request: PlanRequest) -> Paths:
+        """Return paths into a request, without its draws."""
+        document = _filled(request)
+        del document["draws"]
+        document["stance"].setdefault("gravity", list(EARTH))
+        return cls(document)
+
     def target(self, path: str) -> Target:
         """Return what a path means.
 
@@ -87,172 +104,114 @@ class Paths:
         names = path.replace("[", ".").replace("]", "").split(".")
         if names[0] in _fields(Stance):
             names.insert(0, "stance")
-        found: list[tuple[Steps, list[Place]]] = []
-        self._walk(path, (), names, self.document, places_at(PlanRequest, ()), found)
+        found: list[tuple[Steps, list[Place]]] = [((), places_at(PlanRequest, ()))]
+        for name in names:
+            found = [each for end in found for each in self._entered(path, name, *end)]
         for steps, places in found:
-            self._check_end(path, steps, places)
-        places = found[0][1]
-        units = {place.units for place in places if isinstance(place.kind, NUMBERS)}
-        unit = next(iter(units)) if len(units) == 1 else self._own_unit(found[0][0])
-        kinds = [type(place.kind) for place in places]
+            if all(isinstance(each.kind, (*KEYED, *LISTED, inspect.NoneType)) for each in places):
+                known = ", ".join(self._listed(steps, places, _at(self.document, steps)))
+                more = f"; give one of its entries: {known}" if known else ""
+                raise InvalidInputError(f"is no number or word{more}", field=path)
+        steps, places = found[0]
+        kinds = {type(each.kind): each.units for each in places}
+        units = kinds.get(inspect.FloatType) or kinds.get(inspect.IntType) or self._own_unit(steps)
         whole = inspect.IntType in kinds and inspect.FloatType not in kinds
         return Target(
-            tuple(steps for steps, _ in found), unit[0] if len(unit) == 1 else None, whole
+            tuple(each for each, _ in found), units[0] if len(units) == 1 else None, whole
         )
 
-    def _walk(
-        self,
-        path: str,
-        done: Steps,
-        rest: Sequence[str],
-        value: Any,
-        places: list[Place],
-        found: list[tuple[Steps, list[Place]]],
-    ) -> None:
-        if not rest:
-            found.append((done, places))
-            return
-        name, *after = rest
-        if done[-1:] == (SURFACE,) and isinstance(value, str):
-            value = self._expanded(done, value)
-        places = _meant(places, value)
-        where = ".".join(map(str, self._told(done))) or "a request"
-        if not isinstance(value, (dict, list)):
-            told = f"is {value!r} in the request" if places else "is a number or a word"
-            raise InvalidInputError(f"{where} {told}, without entries", field=path)
-        entries = self._entries(value, places, done)
-        if isinstance(value, list):
-            known = {str(i): i for i in range(len(value))} | {
-                entry["limb"]: i for i, entry in enumerate(value) if _is_hand(entry, done)
-            }
-        else:
-            known = {key: key for key in entries}
-        if not entries:
-            raise InvalidInputError(
-                f"{where} has no entries in the request; give there what is to vary", field=path
-            )
-        if name == EVERY and (isinstance(value, list) or _free_keys(places)):
-            chosen = list(dict.fromkeys(known.values()))
-        elif name in known:
-            chosen = [known[name]]
-        else:
-            every = [EVERY] if isinstance(value, list) or _free_keys(places) else []
-            listed = ", ".join([*entries, *every])
-            if not done:
-                listed += f"; and of the stance {', '.join(_fields(Stance))}"
-            raise InvalidInputError(f"{where} has no {name!r}; known are {listed}", field=path)
-        for step in chosen:
-            into = entered(places, None if _free_keys(places) else step)
-            if any(isinstance(place.kind, inspect.AnyType) for place in places):
-                into = places
-            steps = (*done, step)
-            if after:
-                self._open(path, value, step, places, into, steps)
-            inner = value[step] if _has(value, step) else None
-            self._walk(path, steps, after, inner, into, found)
-
-    def _expanded(self, steps: Steps, name: str) -> dict[str, Any]:
-        """Put a preset's numbers in place of its name."""
-        preset = Preset.named(name)
-        numbers = {key: getattr(preset, key) for key in _fields(Surface)}
-        put(self.document, steps, numbers)
-        self.presets[steps] = name
-        return numbers
-
-    def _own_unit(self, steps: Steps) -> tuple[str, ...]:
-        """Return the unit that an entry of a hand names itself."""
-        entry = _at(self.document, steps[:4]) if steps[:2] == HAND else None
-        unit = entry.get("unit") if isinstance(entry, dict) else None
-        return (unit,) if isinstance(unit, str) and steps[4:5] == ("value",) else ()
-
-    def follow(self, document: dict[str, Any], varied: Iterable[Steps]) -> None:
+    def follow(self, varied: Iterable[Steps]) -> None:
         """Let a preset's other forces follow its shear limit, as in its parameter file."""
         given = set(varied)
         for steps, name in self.presets.items():
-            numbers = _at(document, steps)
             preset = Preset.named(name)
-            share = numbers["shear_limit"] / preset.shear_limit
+            share = _at(self.document, steps)["shear_limit"] / preset.shear_limit
             for key in FORCES:
                 if (*steps, key) not in given:
-                    put(document, (*steps, key), share * getattr(preset, key))
+                    put(self.document, (*steps, key), share * getattr(preset, key))
 
-    def _open(
-        self,
-        path: str,
-        value: Any,
-        step: str | int,
-        places: list[Place],
-        into: list[Place],
-        steps: Steps,
-    ) -> None:
-        """Put what a path leads through into the document, if it is not there."""
-        if _has(value, step) and value[step] is not None:
-            return
-        where = ".".join(map(str, self._told(steps)))
-        if not any(isinstance(place.kind, (*COMPOUND, inspect.AnyType)) for place in into):
-            raise InvalidInputError(f"{where} is a number or a word, without entries", field=path)
-        default = _default(places, step)
-        if steps == ("stance", "gravity"):
-            default = list(EARTH)
-        if default is None and any(
-            isinstance(place.kind, (inspect.StructType, inspect.DictType)) for place in into
-        ):
-            default = {}
-        if default is None:
+    def _entered(
+        self, path: str, name: str, steps: Steps, places: list[Place]
+    ) -> list[tuple[Steps, list[Place]]]:
+        """Return the entries of a name or index, or all of them, with what may stand there."""
+        value = self._opened(path, steps, places)
+        places = _meant(places, value)
+        listed = self._listed(steps, places, value)
+        words = self._words(steps)
+        if not listed:
             raise InvalidInputError(
-                f"{where} has no value in the request, of which an entry could vary: give it there",
+                f"{words} has no entries in the request; give there what is to vary", field=path
+            )
+        free = any(isinstance(each.kind, inspect.DictType) for each in places)
+        several = [EVERY] if free or isinstance(value, list) else []
+        known: dict[str, str | int] = {key: key for key in listed}
+        if isinstance(value, list):
+            known = {
+                key: i
+                for keys in (listed, map(str, range(len(value))))
+                for i, key in enumerate(keys)
+            }
+        if name not in (*known, *several):
+            more = "" if steps else f"; and of the stance {', '.join(_fields(Stance))}"
+            raise InvalidInputError(
+                f"{words} has no {name!r}; known are {', '.join(listed + several)}{more}",
                 field=path,
             )
-        value[step] = default
+        anything = any(isinstance(each.kind, inspect.AnyType) for each in places)
+        return [
+            ((*steps, step), places if anything else entered(places, None if free else step))
+            for step in (dict.fromkeys(known.values()) if name in several else [known[name]])
+        ]
 
-    def _check_end(self, path: str, steps: Steps, places: list[Place]) -> None:
-        """Refuse what is no single number or word."""
-        if any(not isinstance(place.kind, COMPOUND) for place in _without_null(places)):
-            return
+    def _opened(self, path: str, steps: Steps, places: list[Place]) -> Any:
+        """Return the value that a path leads through; put there, if it is left out."""
         value = _at(self.document, steps)
-        entries = self._entries(value, _meant(places, value), steps)
-        known = f"; give one of its entries: {', '.join(entries)}" if entries else ""
-        raise InvalidInputError(f"is no number or word{known}", field=path)
+        kinds = [each.kind for each in places]
+        if value is None and any(isinstance(kind, KEYED) for kind in kinds):
+            value = next(
+                (_default(each) for each in kinds if isinstance(each, inspect.StructType)), {}
+            )
+            put(self.document, steps, value)
+        elif isinstance(value, str) and any(_is_surface(kind) for kind in kinds):
+            self.presets[steps], preset = value, Preset.named(value)
+            value = {key: getattr(preset, key) for key in _fields(Surface)}
+            put(self.document, steps, value)
+        if isinstance(value, (dict, list)):
+            return value
+        words = self._words(steps)
+        if value is None and any(isinstance(kind, (*LISTED, inspect.AnyType)) for kind in kinds):
+            raise InvalidInputError(
+                f"{words} has no value in the request, of which an entry could vary: give it there",
+                field=path,
+            )
+        told = f"is {value!r} in the request" if _meant(places, value) else "is a number or a word"
+        raise InvalidInputError(f"{words} {told}, without entries", field=path)
 
-    def _entries(self, value: Any, places: list[Place], steps: Steps) -> list[str]:
+    def _own_unit(self, steps: Steps) -> tuple[str, ...]:
+        """Return the unit that an entry of a hand names itself."""
+        entry = _at(self.document, steps[:4]) if steps[:2] == ("stance", "hand") else None
+        unit = entry.get("unit") if isinstance(entry, dict) else None
+        return (unit,) if isinstance(unit, str) and steps[4:5] == ("value",) else ()
+
+    def _listed(self, steps: Steps, places: list[Place], value: Any) -> list[str]:
         """Return the names that are valid one step further."""
         limbs = [hand["limb"] for hand in self.document["stance"]["hands"]]
         if isinstance(value, list):
             return limbs if steps == HANDS else [str(i) for i in range(len(value))]
-        if any(isinstance(place.kind, inspect.StructType) for place in places):
-            names = field_names(place.kind for place in places)
-            return [name for name in names if steps or name not in FIXED]
-        for place in places:
-            if isinstance(place.kind, inspect.TupleType):
-                return [str(i) for i in range(len(place.kind.item_types))]
-        keys = list(value or ())
-        return list(dict.fromkeys([*limbs, *keys])) if steps in BY_LIMB else keys
+        for each in places:
+            if isinstance(each.kind, inspect.StructType):
+                names = field_names(place.kind for place in _meant(places, value))
+                return [name for name in names if steps or name not in FIXED]
+            if isinstance(each.kind, inspect.TupleType):
+                return [str(i) for i in range(len(each.kind.item_types))]
+        return list(dict.fromkeys([*(limbs if steps in BY_LIMB else ()), *(value or ())]))
 
-    def _told(self, steps: Steps) -> list[str]:
+    def _words(self, steps: Steps) -> str:
         """Return steps as a caller writes them."""
-        told = [
-            _at(self.document, steps[:i])[step]["limb"] if steps[:i] == HANDS else str(step)
-            for i, step in enumerate(steps)
-        ]
-        return told[1:] if len(told) > 1 and told[0] == "stance" else told
-
-
-HAND: Final[Steps] = ("stance", "hand")
-HANDS: Final[Steps] = ("stance", "hands")
-BY_LIMB: Final[tuple[Steps, ...]] = (
-    ("stance", "joints"),
-    ("limits", "joint_torque"),
-    ("limits", "per_hand"),
-    ("present",),
-)
-NUMBERS: Final = (inspect.FloatType, inspect.IntType)
-COMPOUND: Final = (
-    inspect.StructType,
-    inspect.DictType,
-    inspect.ListType,
-    inspect.TupleType,
-    inspect.VarTupleType,
-)
+        words = [str(step) for step in steps]
+        if steps[:2] == HANDS and len(steps) > 2:
+            words[2] = _at(self.document, steps[:3])["limb"]
+        return ".".join(words[1:] if words[1:] and words[0] == "stance" else words) or "a request"
 
 
 def put(document: Any, steps: Steps, value: Any) -> None:
@@ -261,27 +220,43 @@ def put(document: Any, steps: Steps, value: Any) -> None:
 
 
 def _at(document: Any, steps: Steps) -> Any:
+    """Return the value at the end of steps; None if there is none."""
     for step in steps:
-        document = document[step] if _has(document, step) else None
+        try:
+            document = document[step]
+        except (LookupError, TypeError):
+            return None
     return document
 
 
-def _has(value: Any, step: str | int) -> bool:
-    if isinstance(value, dict):
-        return step in value
-    return isinstance(value, list) and isinstance(step, int) and step < len(value)
+def _filled(value: Any) -> Any:
+    """Return a value as plain lists and dicts, with the fields that have their default."""
+    if isinstance(value, msgspec.Struct):
+        config = value.__struct_config__
+        tag = {} if config.tag_field is None else {config.tag_field: config.tag}
+        fields = {
+            each.encode_name: getattr(value, each.name) for each in msgspec.structs.fields(value)
+        }
+        return tag | {key: _filled(each) for key, each in fields.items() if each is not None}
+    if isinstance(value, (list, tuple)):
+        return [_filled(each) for each in value]
+    return {key: _filled(each) for key, each in value.items()} if isinstance(value, dict) else value
 
 
-def _is_hand(entry: Any, steps: Steps) -> bool:
-    return steps == HANDS and isinstance(entry, dict)
+def _default(kind: inspect.StructType) -> Any:
+    """Return a struct of which nothing is given; empty where something must be."""
+    try:
+        return _filled(kind.cls())
+    except TypeError:
+        return {}
 
 
 def _fields(kind: type) -> list[str]:
     return field_names(place.kind for place in places_at(kind, ()))
 
 
-def _without_null(places: Iterable[Place]) -> list[Place]:
-    return [place for place in places if not isinstance(place.kind, inspect.NoneType)]
+def _is_surface(kind: inspect.Type) -> bool:
+    return isinstance(kind, inspect.StructType) and kind.cls is Surface
 
 
 def _meant(places: list[Place], value: Any) -> list[Place]:
@@ -289,31 +264,10 @@ def _meant(places: list[Place], value: Any) -> list[Place]:
     found = []
     for place in places:
         kind = place.kind
-        if isinstance(kind, inspect.StructType):
-            tagged = kind.tag_field is not None and isinstance(value, dict)
-            if tagged and value.get(kind.tag_field) != kind.tag:
-                continue
-            found.append(place)
-        elif isinstance(kind, (*COMPOUND, inspect.AnyType)):
+        tag = {kind.tag_field: kind.tag} if isinstance(kind, inspect.StructType) else {}
+        another = isinstance(value, dict) and any(
+            key and value.get(key) != name for key, name in tag.items()
+        )
+        if not another and isinstance(kind, (*KEYED, *LISTED, inspect.AnyType)):
             found.append(place)
     return found
-
-
-def _free_keys(places: list[Place]) -> bool:
-    return any(isinstance(place.kind, inspect.DictType) for place in places)
-
-
-def _default(places: list[Place], step: str | int) -> Any:
-    """Return a field's default as a document has it; None if there is none."""
-    for place in places:
-        if isinstance(place.kind, inspect.StructType):
-            for each in place.kind.fields:
-                if each.encode_name == step and each.default_factory is not msgspec.NODEFAULT:
-                    return _plain(each.default_factory())
-                if each.encode_name == step and each.default is not msgspec.NODEFAULT:
-                    return _plain(each.default)
-    return None
-
-
-def _plain(value: Any) -> Any:
-    return msgspec.json.decode(msgspec.json.encode(value))

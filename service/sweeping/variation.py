@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, NoReturn, Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -18,6 +18,9 @@ Value = float | bool | str | None
 WORDS: Final[dict[str, Value]] = {"true": True, "false": False, "null": None}
 
 FORM: Final = "must be PATH=LOW:HIGH:COUNT or PATH=VALUE,VALUE,..."
+
+MOST_VALUES: Final = 10_000
+"""Of one range."""
 
 
 @dataclass(frozen=True)
@@ -48,29 +51,21 @@ class Variation:
                 raise InvalidInputError(f"must be finite numbers, got {value}", field=self.path)
             if value in self.values[:i]:
                 raise InvalidInputError(f"has the value {value} twice", field=self.path)
-        if self.ranged and not (self.numbers and _number(self.values[0]) < _number(self.last)):
+        low, high = self.values[0], self.values[-1]
+        if self.ranged and not (self.numbers and low < high):  # type: ignore[operator]
             raise InvalidInputError("LOW must be below HIGH", field=self.path)
-
-    @property
-    def last(self) -> Value:
-        """The last value."""
-        return self.values[-1]
 
     @property
     def numbers(self) -> bool:
         """Whether all values are numbers."""
-        return all(
-            isinstance(value, (int, float)) and not isinstance(value, bool) for value in self.values
-        )
+        return all(type(value) in (int, float) for value in self.values)
 
     def text(self, *, sampled: bool = False) -> str:
         """Return it as `parse` reads it; of a range for samples its ends."""
         if not self.ranged:
-            given = ",".join(map(word_of, self.values))
-        else:
-            count = "" if sampled else f":{len(self.values)}"
-            given = f"{word_of(self.values[0])}:{word_of(self.last)}{count}"
-        return f"{self.path}={given}"
+            return f"{self.path}={','.join(map(word_of, self.values))}"
+        count = "" if sampled else f":{len(self.values)}"
+        return f"{self.path}={word_of(self.values[0])}:{word_of(self.values[-1])}{count}"
 
     @classmethod
     def over(cls, path: str, low: float, high: float, count: int = 2) -> Self:
@@ -110,55 +105,36 @@ class Variation:
         InvalidInputError
             If it is not of this form, or there cannot be such values.
         """
-        path, equals, given = text.partition("=")
-        path = path.strip()
-        if not equals or not path or not given.strip():
+        path, _, given = (part.strip() for part in text.partition("="))
+        if not path or not given:
             raise InvalidInputError(f"{FORM}, got {text!r}")
         ends = given.split(":")
         if len(ends) == 1:
             return cls(path, tuple(_value(each.strip(), path) for each in given.split(",")))
         try:
-            low, high = float(ends[0]), float(ends[1])
-            count = int(ends[2]) if len(ends) > 2 else None
+            low, high, *counts = float(ends[0]), float(ends[1]), *map(int, ends[2:])
+            (count,) = counts or ([2] if sampled else [])
         except ValueError:
-            _misread(text, path)
-        if len(ends) > 3 or (count is None and not sampled):
-            _misread(text, path)
-        return cls.over(path, low, high, 2 if count is None else count)
-
-
-MOST_VALUES: Final = 10_000
-"""Of one range."""
+            raise InvalidInputError(
+                f"{FORM} (with --samples also PATH=LOW:HIGH), got {text!r}", field=path
+            ) from None
+        return cls.over(path, low, high, count)
 
 
 def word_of(value: Value) -> str:
     """Return a value as a caller writes it."""
-    if value is None:
-        return "null"
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _number(value: Value) -> float:
-    assert isinstance(value, (int, float))
-    return value
-
-
-def _misread(text: str, path: str) -> NoReturn:
-    raise InvalidInputError(
-        f"{FORM} (with --samples also PATH=LOW:HIGH), got {text!r}", field=path
-    ) from None
+    if value is None or isinstance(value, bool):
+        return next(word for word, meant in WORDS.items() if meant is value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _value(text: str, path: str) -> Value:
+    """Return the number or word that a text is."""
     if not text:
         raise InvalidInputError("has an empty value between its commas", field=path)
-    if text in WORDS:
-        return WORDS[text]
     for kind in (int, float):
         try:
             return kind(text)
         except ValueError:
             continue
-    return text
+    return WORDS.get(text, text)

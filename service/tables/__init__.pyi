@@ -1,6 +1,13 @@
 from .advice import print_advice as print_advice, words_of as words_of
 from .body_spaces import print_body_space as print_body_space
-from .layout import console as console, table_of as table_of, unit_of as unit_of
+from .layout import (
+    console as console,
+    in_order as in_order,
+    name as name,
+    number as number,
+    print_rows as print_rows,
+    text as text,
+)
 from .output_lock import write_alone as write_alone
 from .plans import (
     print_plan as print_plan,
@@ -16,7 +23,6 @@ from .terminal import (
     EXIT_STATUS as EXIT_STATUS,
     FAILED as FAILED,
     OVERLOADED as OVERLOADED,
-    bulk_progress as bulk_progress,
     draw_plan as draw_plan,
     filling_folder as filling_folder,
     note as note,

@@ -8,15 +8,25 @@ import numpy as np
 from rich.console import Console
 from rich.markup import escape
 
-from planner import COMPONENTS, OTHERS, LimitName
+from planner import COMPONENTS, OTHERS
 from service import replies
 from service.replies import BodySpaceReply
-from service.tables.layout import in_colour, show, table_of, unit_of
+from service.tables.layout import in_colour, name, number, print_rows, text, unit_of
 
 __all__ = ["print_body_space"]
 
 FINEST: Final = 1e-3
 """A gap below this is told as this [N]."""
+
+LETS_GO: Final = text(
+    "first to let go",
+    "1.limiting",
+    lambda limit: " ".join(
+        part
+        for part in (limit.limb, limit.joint, limit.finger, limit.phalanx, limit.limit)
+        if part is not None
+    ),
+)
 
 
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:
@@ -32,24 +42,18 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
         f"{axis} {value:z.1f}" for axis, value in zip(COMPONENTS, reply.body_wrench, strict=True)
     )
     out.print(f"body wrench asked for (in B): {asked} [N, N·m]", markup=False)
-    _print_capability(reply, out)
+    axis = name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}")
+    ends = [number(part, f"1.{part}", "z.1f") for part in ("more", "pure", "extent")]
+    title = "how far body wrenches that are held go along the axes of B"
+    print_rows(reply.capability.items(), (axis, *ends, LETS_GO), out, title)
+    out.print("more: beyond the body wrench asked for, and what lets go there first")
+    out.print("pure: with every other component zero; extent: with whatever else; -: none")
     _print_section(reply.section, out)
     _print_accelerations(reply, out)
 
 
-def _print_capability(reply: BodySpaceReply, out: Console) -> None:
-    table = table_of("axis", numbers=("more", "pure", "extent"), words=["first to let go"])
-    for name, end in reply.capability.items():
-        cells = [
-            "-" if cell is None else f"{cell:z.1f}" for cell in (end.more, end.pure, end.extent)
-        ]
-        table.add_row(f"{name} {unit_of(name[1:])}", *cells, _words(end.limiting))
-    show("how far body wrenches that are held go along the axes of B", table, out)
-    out.print("more: beyond the body wrench asked for, and what lets go there first")
-    out.print("pure: with every other component zero; extent: with whatever else; -: none")
-
-
 def _print_section(section: replies.BodySection, out: Console) -> None:
+    """Print how large the part of a plane is that is held."""
     plane = f"plane of {' and '.join(section.axes)}, {OTHERS[section.others]}"
     if not section.inner or section.gap is None:
         out.print(f"{plane}: nothing is held", markup=False)
@@ -69,21 +73,14 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
 
 
 def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
+    """Print the largest accelerations, if the body may move."""
     if reply.acceleration is None:
         return
-    table = table_of("along", numbers=["largest"], words=["first to let go"])
-    turning = reply.angular_acceleration or {}
-    for unit, found in (("m/s²", reply.acceleration), ("rad/s²", turning)):
-        for name, one in found.items():
-            table.add_row(f"{name} {unit}", f"{one.acceleration:z.2f}", _words(one.limiting))
+    rows = [(f"{axis} m/s²", one) for axis, one in reply.acceleration.items()]
+    rows += [(f"{axis} rad/s²", one) for axis, one in (reply.angular_acceleration or {}).items()]
     for one in reply.along or ():
         where = ", ".join(f"{value:.3g}" for value in one.direction)
-        table.add_row(f"({where}) m/s²", f"{one.acceleration:z.2f}", _words(one.limiting))
-    show("largest accelerations of the body from rest, in W", table, out)
-
-
-def _words(name: LimitName | None) -> str:
-    if name is None:
-        return "-"
-    parts = (name.limb, name.joint, name.finger, name.phalanx, name.limit)
-    return " ".join(part for part in parts if part is not None)
+        rows.append((f"({where}) m/s²", one))
+    largest = number("largest", "1.acceleration", "z.2f")
+    title = "largest accelerations of the body from rest, in W"
+    print_rows(rows, (name("along", "0"), largest, LETS_GO), out, title)

@@ -1,15 +1,44 @@
-"""How tables look, in 80 columns."""
+"""How tables look, in 80 columns: rows of structs under a title, each column with its unit."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
+    from rich.text import Text
 
-__all__ = ["console", "in_colour", "short", "show", "table_of", "unit_of"]
+__all__ = [
+    "Column",
+    "console",
+    "in_colour",
+    "in_order",
+    "name",
+    "number",
+    "print_rows",
+    "short",
+    "text",
+    "unit_of",
+]
+
+COLOURS: Final = {
+    "optimal": "green",
+    "overloaded": "red",
+    "infeasible": "red",
+    "failed": "red",
+}
+"""Of a plan's status, where the terminal has them and ``NO_COLOR`` is not set."""
+
+NARROWEST: Final = 80
+"""Letters of a line for which tables are made; a narrower terminal breaks it itself."""
+
+LONG: Final = 1e4
+"""From here on a number is written as a whole one, from a tenth of it on with one decimal."""
+
+UNBOUNDED: Final = 1000
+"""Width in which any table fits [letters]."""
 
 
 def console(stderr: bool = False) -> Console:
@@ -22,25 +51,9 @@ def console(stderr: bool = False) -> Console:
     return screen
 
 
-COLOURS: Final = {
-    "optimal": "green",
-    "overloaded": "red",
-    "infeasible": "red",
-    "failed": "red",
-}
-"""Of a plan's status, where the terminal has them and ``NO_COLOR`` is not set."""
-
-
 def in_colour(status: str, word: str | None = None) -> str:
     """Return a status, or a word in its place, as markup in bold and in its colour."""
     return f"[bold {COLOURS.get(status, 'default')}]{word or status}[/]"
-
-
-NARROWEST: Final = 80
-"""Letters of a line for which tables are made; a narrower terminal breaks it itself."""
-
-LONG: Final = 1e4
-"""From here on a number is written as a whole one, from a tenth of it on with one decimal."""
 
 
 def short(value: float, digits: int) -> str:
@@ -50,25 +63,117 @@ def short(value: float, digits: int) -> str:
     return f"{value:z.{digits}f}"
 
 
-def show(title: str, table: Table, out: Console) -> None:
-    """Print a table under its title."""
-    out.print(f"\n[bold]{title}[/bold]")
-    out.print(table)
+class Column(NamedTuple):
+    """A column of a table.
+
+    Attributes
+    ----------
+    head : str
+        What it shows, with the unit.
+    value : str or callable, optional
+        Where a row has that: attributes, keys and indices with dots between them, or what computes
+        it; by default the attribute that is named as the head.
+    form : str or callable
+        Of numbers, as `format` takes it, or what writes them.
+    scale : float, optional
+        What numbers are multiplied with for their unit.
+    kind : {'name', 'number', 'text'}
+        Names and numbers, which stand right, are never broken as texts are.
+    """
+
+    head: str
+    value: str | Callable[[Any], Any] | None = None
+    form: str | Callable[[Any], str] = ""
+    scale: float | None = None
+    kind: Literal["name", "number", "text"] = "name"
+
+    def cell(self, row: Any) -> str | Text:
+        """Return what it shows of a row; ``-`` where there is nothing."""
+        from rich.text import Text
+
+        found = self.value(row) if callable(self.value) else self._found(row)
+        if found is None or isinstance(found, Text):
+            return found or "-"
+        found = found if self.scale is None else self.scale * found
+        return self.form(found) if callable(self.form) else format(found, self.form)
+
+    def _found(self, row: Any) -> Any:
+        """Return what is at the end of the path; None where a part of it is."""
+        assert not callable(self.value)
+        for step in (self.head if self.value is None else self.value).split("."):
+            if isinstance(row, Mapping):
+                row = row[step]
+            elif row is not None:
+                row = row[int(step)] if step.isdecimal() else getattr(row, step)
+        return row
 
 
-def table_of(*names: str, numbers: Iterable[str] = (), words: Iterable[str] = ()) -> Table:
-    """Return a table with columns of names, then of numbers, then of words, which may wrap."""
+name = Column
+number = partial(Column, kind="number")
+text = partial(Column, kind="text")
+
+
+def in_order(
+    names: Iterable[str], numbers: Iterable[str] = (), texts: Iterable[str] = (), form: str = ""
+) -> list[Column]:
+    """Return columns of rows that are sequences: names, numbers in one form, and texts."""
+    columns = [*map(name, names), *map(partial(number, form=form), numbers), *map(text, texts)]
+    return [column._replace(value=str(i)) for i, column in enumerate(columns)]
+
+
+def print_rows(
+    rows: Iterable[Any],
+    columns: Iterable[Column],
+    out: Console,
+    title: str = "",
+    *,
+    groups: bool = False,
+    style: Callable[[Any], str] | None = None,
+    heads: bool = True,
+    padding: int = 1,
+) -> None:
+    """Print a table.
+
+    Parameters
+    ----------
+    rows : iterable
+        Structs, or sequences of cells.
+    columns : iterable of Column
+    out : Console
+    title : str, optional
+        Printed above it, in bold.
+    groups : bool, optional
+        Whether rows with the same first cell stand apart from others.
+    style : callable, optional
+        Returns the style of a row.
+    heads : bool, optional
+        Whether the columns' heads are shown.
+    padding : int, optional
+        Spaces at either side of a cell; at one where all but texts is wider than the console.
+    """
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
-    for name in names:
-        table.add_column(name, no_wrap=True)
-    for name in numbers:
-        table.add_column(name, justify="right", overflow="fold")
-    for name in words:
-        table.add_column(name)
-    return table
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, padding), pad_edge=False, show_header=heads)
+    columns = list(columns)
+    for column in columns:
+        side: Any = {"justify": "right", "overflow": "fold"} if column.kind == "number" else {}
+        table.add_column(Text(column.head), no_wrap=column.kind == "name", **side)
+    last = None
+    for row in rows:
+        cells = [column.cell(row) for column in columns]
+        if groups and last not in (None, cells[0]):
+            table.add_section()
+        last = cells[0]
+        shown = (cell if isinstance(cell, Text) else Text(cell) for cell in cells)
+        table.add_row(*shown, style=None if style is None else style(row))
+    if title:
+        out.print(Text(f"\n{title}", style="bold"))
+    widest = out.measure(table, options=out.options.update(max_width=UNBOUNDED)).maximum
+    if widest > out.width and not any(column.kind == "text" for column in columns):
+        table.padding = (0, padding, 0, 0)
+    out.print(table)
 
 
 def unit_of(axis: str) -> str:

@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from rich.console import Console
-from rich.table import Table
 
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import Row
 from planner import Survey
 from service.replies import AXES
-from service.tables.layout import table_of, unit_of
+from service.tables.layout import in_order, name, number, print_rows, text, unit_of
 
-__all__ = ["print_survey", "survey_json"]
+__all__ = ["print_failures", "print_survey", "survey_json"]
 
 DRAGGED: Final = "a tile dragged backwards"
 """What ends the way where no limit does: a part that can only push or only pull is about to do the
@@ -72,22 +71,17 @@ def print_survey(survey: Survey, out: Console) -> None:
     )
     _print_ends(survey, out)
     if found.limiting:
-        out.print(f"\n[bold]what lets go first, at how many of {len(found.limiting)}[/bold]")
-        out.print(failures_table(found.limiting))
+        print_failures(found.limiting, out)
 
 
 def _print_ends(survey: Survey, out: Console) -> None:
     """Print where the hand lets go along each axis."""
-    table = table_of("axis", numbers=["reach"], words=("finger", "phalanx", "limit"))
-    for name, end in zip(_names(), survey.ends, strict=True):
-        unit = unit_of(name[1:])
-        if end is None:
-            table.add_row(f"{name} {unit}", "-", "", "", "")
-            continue
-        row = end.limiting
-        cells = ("-",) * 3 if row is None else (row.finger or "-", row.phalanx or "-", row.limit)
-        table.add_row(f"{name} {unit}", f"{end.reach:.2f}", *cells)
-    out.print(table)
+    columns = (
+        name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}"),
+        number("reach", "1.reach", ".2f"),
+        *(text(part, f"1.limiting.{part}") for part in ("finger", "phalanx", "limit")),
+    )
+    print_rows(zip(_names(), survey.ends, strict=True), columns, out)
     if any(end is None for end in survey.ends):
         out.print("reach -: no way along the axis was found that holds", markup=False)
     if any(end is not None and end.limiting is None for end in survey.ends):
@@ -98,18 +92,20 @@ def _print_ends(survey: Survey, out: Console) -> None:
         )
 
 
-def failures_table(limiting: Sequence[Row | None]) -> Table:
-    """Return how often each tile of each finger lets go first, and what is no finger's."""
+def print_failures(limiting: Sequence[Row | None], out: Console) -> None:
+    """Print how often each tile of each finger lets go first, and what is no finger's."""
     counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
-    parts = [part for part in ORDER if any(finger and name == part for finger, name in counts)]
-    table = table_of("", numbers=(*parts, "all"))
+    parts = [part for part in ORDER if any(finger and what == part for finger, what in counts)]
+    rows = []
     for finger in FINGERS:
         own = [counts[finger, part] for part in parts]
-        table.add_row(finger, *(str(count or "-") for count in own), str(sum(own)))
-    for (other, name), count in counts.items():
+        rows.append((finger, *(count or "-" for count in own), sum(own)))
+    for (other, what), count in counts.items():
         if other is None:
-            table.add_row(name, *[""] * len(parts), str(count))
-    return table
+            rows.append((what, *[""] * len(parts), count))
+    columns = in_order([""], [*parts, "all"])
+    title = f"what lets go first, at how many of {len(limiting)}"
+    print_rows(rows, columns, out, title)
 
 
 def _place(row: Row) -> tuple[str | None, str]:

@@ -6,18 +6,16 @@ import errno
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 import msgspec
 
+import planner
 from hand_models.base import CruxError, InvalidInputError
+from service import answering, replies
 from service.requests import PlanRequest
 from service.tables.layout import console
-
-if TYPE_CHECKING:
-    from service.answering import Planned
-    from service.replies import BriefPlanReply, PlanReply
 
 __all__ = [
     "BAD_INPUT",
@@ -25,7 +23,6 @@ __all__ = [
     "EXIT_STATUS",
     "FAILED",
     "OVERLOADED",
-    "bulk_progress",
     "draw_plan",
     "filling_folder",
     "note",
@@ -79,13 +76,12 @@ def say(result: object) -> None:
     click.echo(msgspec.json.encode(result))
 
 
-def show(reply: PlanReply | BriefPlanReply, as_json: bool) -> int:
+def show(reply: replies.PlanReply | replies.BriefPlanReply, as_json: bool) -> int:
     """Write a plan, and return its exit status; what is brief is not for a person."""
-    from service.replies import BriefPlanReply
     from service.tables.advice import print_advice
     from service.tables.plans import print_plan
 
-    if as_json or isinstance(reply, BriefPlanReply):
+    if as_json or isinstance(reply, replies.BriefPlanReply):
         say(reply)
     else:
         print_plan(reply, console(), brief=verbosity() < 0)
@@ -95,7 +91,7 @@ def show(reply: PlanReply | BriefPlanReply, as_json: bool) -> int:
     return EXIT_STATUS.get(reply.status, FAILED)
 
 
-def tell_solver(reply: PlanReply) -> None:
+def tell_solver(reply: replies.PlanReply) -> None:
     """Say how a plan was found, where more is to be said."""
     if verbosity() > 0:
         solver, time = reply.solver, reply.time
@@ -106,12 +102,10 @@ def tell_solver(reply: PlanReply) -> None:
         )
 
 
-def draw_plan(answer: Planned, picture: Path) -> None:
+def draw_plan(answer: answering.Planned, picture: Path) -> None:
     """Draw a plan in its stance."""
-    from planner import plot_plan
-
     with writing(picture):
-        plot_plan(answer.plan, answer.question, picture)
+        planner.plot_plan(answer.plan, answer.question, picture)
 
 
 @contextmanager
@@ -143,53 +137,43 @@ def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError
 
 
 @contextmanager
-def progress(title: str, *, line: str | None = None) -> Iterator[Callable[[int, int], None]]:
+def progress(
+    title: str, *, line: str | None = None, counted: bool = False
+) -> Iterator[Callable[..., None]]:
     """Show a bar on standard error while the work lasts; yields what tells it done and total.
 
-    Where no bar can be shown, the line, if there is one, is written when the first step is told.
+    Parameters
+    ----------
+    title : str
+        What is done.
+    line : str, optional
+        Written when the first step is told, where no bar can be shown.
+    counted : bool, optional
+        Whether counts, the time left and a few words, which are told third, are shown as well.
     """
-    from rich.progress import Progress
+    from rich import progress as bars
 
+    columns = (
+        bars.TextColumn("{task.description}", markup=False),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn() if counted else bars.TaskProgressColumn(),
+        bars.TimeRemainingColumn(),
+        bars.TextColumn("{task.fields[words]}", markup=False),
+    )
     screen = console(stderr=True)
     shown = screen.is_terminal and verbosity() >= 0
     lines = [line] if line is not None and not screen.is_terminal else []
-    bar = Progress(console=screen, transient=True, disable=not shown)
+    bar = bars.Progress(*columns, console=screen, transient=True, disable=not shown)
     # before rich 14.3 a bar that is not shown leaves an empty line behind
     with bar if shown else nullcontext():
-        task = bar.add_task(title, total=None)
+        task = bar.add_task(title, total=None, words="")
 
-        def tell(done: int, total: int) -> None:
+        def tell(done: int, total: int, words: str = "") -> None:
             if lines:
                 remark(lines.pop())
-            bar.update(task, completed=done, total=total)
+            bar.update(task, completed=done, total=total, words=words)
 
         yield tell
-
-
-@contextmanager
-def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a bar with counts and the time left; yields what tells done, total and a few words."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    screen = console(stderr=True)
-    shown = screen.is_terminal and verbosity() >= 0
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[words]}", markup=False),
-    )
-    bar = Progress(*columns, console=screen, transient=True, disable=not shown)
-    with bar if shown else nullcontext():
-        task = bar.add_task(title, total=None, words="")
-        yield lambda done, total, words: bar.update(task, completed=done, total=total, words=words)
 
 
 def waiting(title: str, request: PlanRequest) -> AbstractContextManager[None]:

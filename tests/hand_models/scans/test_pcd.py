@@ -68,6 +68,19 @@ def test_a_viewpoint_that_is_no_pose_is_refused(pose, tmp_path):
         read_scan(pcd(tmp_path / "a.pcd", wall(0.02), pose=pose))
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"pose": "0 0 0"}, "VIEWPOINT of its header is to be seven numbers, .* got 0 0 0: "),
+        ({"kind": "F F Q"}, "TYPE of its header is to be F, I or U of each field, got F F Q: "),
+        ({"kind": "F F"}, "TYPE of its header"),
+    ],
+)
+def test_a_line_of_the_header_that_is_wrong_is_named(change, words, tmp_path):
+    with pytest.raises(InvalidInputError, match=rf"^file: {words}"):
+        read_scan(pcd(tmp_path / "a.pcd", wall(0.02), **change))
+
+
 HUGE = 10**9
 
 

@@ -336,7 +336,6 @@ def test_a_limb_that_hangs_free_would_swing(wall_with_joints):
     [
         (0.0, r"0 for a joint without a motor \(not all of a limb\), got 0"),
         ({"front_left": 0.0}, r"not all of a limb"),
-        ({"front_left": (0.0,) * 7}, r"not all of a limb"),
         ({"front_left": (1e-4,) + (0.0,) * 6}, r"at least 0.001 N·m, .* got 0.0001"),
         ({"front_left": (-1.0,) + (9.0,) * 6}, r"got -1"),
         (float("nan"), r"got nan"),
@@ -352,6 +351,20 @@ def test_limits_that_are_none(given, words):
 def wall_with_joints():
     stance = on_wall()
     return replace(stance, joints=dict(plan(Question(replace(stance, joints="solve"))).joints))
+
+
+@pytest.mark.parametrize(
+    ("limb", "words"),
+    [
+        ("front_left", r"^limits.joint_torque.front_left: .*not all of a limb\), got 0, 0"),
+        ("nobody", r"^limits.joint_torque.nobody: .*front_left"),
+    ],
+)
+def test_a_limb_whose_joints_all_bear_nothing_is_refused_after_its_name(
+    wall_with_joints, limb, words
+):
+    with pytest.raises(InvalidInputError, match=words):
+        Question(wall_with_joints, limits=Limits(joint_torque={limb: (0.0,) * 7}))
 
 
 def test_caps_beside_them_are_kept(wall_with_joints):

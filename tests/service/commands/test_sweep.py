@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service.bulk import answered
+from service.bulk import evaluate
 from service.commands.cli import run
 from service.processes import Interrupted
 from service.wire import LostError, encode_error
@@ -137,11 +137,12 @@ def test_a_point_that_is_lost_is_a_failure(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
 
-    def losing(questions, pool, form):
-        for i, answer in enumerate(answered(questions, pool, form)):
-            yield encode_error(LostError("its process died"), form) if i == 1 else answer
+    def losing(questions, **options):
+        for i, answer in enumerate(evaluate(questions, **options)):
+            lost = encode_error(LostError("its process died"), options["form"])
+            yield lost if i == 1 else answer
 
-    monkeypatch.setattr("service.sweeping.evaluation.answered", losing)
+    monkeypatch.setattr("service.sweeping.rows.evaluate", losing)
     values = "load.mass=60,80,100"
     assert run(["sweep", "wall-300", "--vary", values, "-o", str(tmp_path), "--json"]) == FAILED
     told = result(capfd)
@@ -153,11 +154,11 @@ def test_what_is_answered_is_kept(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
 
-    def interrupted(questions, pool, form):
-        yield next(answered(questions, pool, form))
+    def interrupted(questions, **options):
+        yield next(evaluate(questions, **options))
         raise Interrupted
 
-    monkeypatch.setattr("service.sweeping.evaluation.answered", interrupted)
+    monkeypatch.setattr("service.sweeping.rows.evaluate", interrupted)
     with pytest.raises(Interrupted) as caught:
         run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
     table = tmp_path / "sweep.csv"
@@ -183,17 +184,17 @@ WIDE = ["--vary", "load.mass=60:140:30", "--vary", "body.position.0=-0.06:0.06:4
 STOPPING = """
 import itertools, threading
 from service.bulk.tables import CsvTable
-from service.sweeping import evaluation
+from service.sweeping import rows
 
 CsvTable.seconds = 0.0  # rows are kept at once
-answered = evaluation.answered
+evaluate = rows.evaluate
 
-def first(questions, pool, form):
-    yield from itertools.islice(answered(questions, pool, form), 400)
+def first(questions, **options):
+    yield from itertools.islice(evaluate(questions, **options), 400)
     print("400 are answered", flush=True)
     threading.Event().wait()
 
-evaluation.answered = first
+rows.evaluate = first
 """
 """What makes a sweep stop after 400 points, and stay until it is killed."""
 
@@ -226,12 +227,12 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
         file.write(b"60.0,-0.0")
     asked = []
 
-    def counting(questions, pool, form):
+    def counting(questions, **options):
         questions = list(questions)
         asked.extend(questions)
-        return answered(questions, pool, form)
+        return evaluate(questions, **options)
 
-    monkeypatch.setattr("service.sweeping.evaluation.answered", counting)
+    monkeypatch.setattr("service.sweeping.rows.evaluate", counting)
     again = ["sweep", "wall-300", *WIDE, "-o", str(folder), "--json", "--resume"]
     assert run(again) == DONE
     assert len(asked) == 1200 - done

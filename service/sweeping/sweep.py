@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -12,18 +12,17 @@ import msgspec
 from hand_models.base import InvalidInputError, whole_file
 from hand_models.parameters import ParameterTable
 from service.requests import PlanRequest
-from service.sweeping.border import TOLERANCE, Along, Border, border_in_words, borders
+from service.sweeping.border import TOLERANCE, Border, borders
 from service.sweeping.design import Design
-from service.sweeping.evaluation import Ask, Row, asking, rows_at
-from service.sweeping.table import table_text
-from service.sweeping.variation import Value, Variation
+from service.sweeping.rows import Row, asking, rows_at, write_rows
+from service.sweeping.variation import Variation
 
 if TYPE_CHECKING:
     from distributed import Client
 
     from planner import RobotFile
 
-__all__ = ["Sweep", "sweep", "swept"]
+__all__ = ["Sweep", "sweep", "with_borders"]
 
 STATUSES: Final = ("optimal", "overloaded", "infeasible", "failed", "error")
 
@@ -51,6 +50,14 @@ class Sweep(NamedTuple):
         found = Counter(row.status for row in self.rows)
         return {status: found[status] for status in STATUSES}
 
+    @property
+    def extremes(self) -> tuple[Row, ...]:
+        """The points of least and of most utilisation; none where no point has one."""
+        rows = [row for row in self.rows if row.utilisation is not None]
+        return tuple(
+            pick(rows, key=lambda row: row.utilisation or 0.0) for pick in (min, max) if rows
+        )
+
     def write_table(self, path: Path) -> None:
         """Write a row for each point, as CSV.
 
@@ -60,77 +67,54 @@ class Sweep(NamedTuple):
             If it cannot be written.
         """
         with whole_file(path) as part:
-            part.write_text(table_text(self.design, self.rows), encoding="utf-8")
+            write_rows(self.design, self.rows, part)
 
     def summary(self) -> dict[str, Any]:
         """Return what a program needs to know: what varied, how many hold, and the borders."""
-        rows = [row for row in self.rows if row.utilisation is not None]
-        least, most = (
-            pick(rows, key=lambda row: row.utilisation or 0.0, default=None) for pick in (min, max)
-        )
-        design = self.design
+        variations, sampled = self.design.variations, self.design.sampled
+        paths = [each.path for each in variations]
+        ends: list[Any] = [
+            {"at": dict(zip(paths, row.point, strict=True)), "utilisation": row.utilisation}
+            for row in self.extremes
+        ] or [None, None]
+        values = [
+            {"low": each.values[0], "high": each.values[-1]}
+            if sampled and each.ranged
+            else each.values
+            for each in variations
+        ]
         return {
             "v": 1,
             "variations": [
-                {"path": each.path, "unit": target.unit, "values": _span(each, design.sampled)}
-                for each, target in zip(design.variations, design.targets, strict=True)
+                {"path": path, "unit": target.unit, "values": given}
+                for path, target, given in zip(paths, self.design.targets, values, strict=True)
             ],
-            "points": len(design.points),
+            "points": len(self.design.points),
             "answered": sum(row.answered for row in self.rows),
             "statuses": self.counts,
             "errors": dict(Counter(row.error.kind for row in self.rows if row.error is not None)),
-            "least_utilisation": None if least is None else _brief(least, design),
-            "most_utilisation": None if most is None else _brief(most, design),
+            "least_utilisation": ends[0],
+            "most_utilisation": ends[1],
             "borders": [
-                msgspec.structs.asdict(each) | {"words": border_in_words(each)}
-                for each in self.borders
+                msgspec.structs.asdict(each) | {"words": each.words} for each in self.borders
             ],
         }
 
 
-def _span(variation: Variation, sampled: bool) -> dict[str, float] | tuple[Value, ...]:
-    """Return the values of a variation, or between what samples of it are."""
-    if sampled and variation.ranged:
-        return {"low": variation.values[0], "high": variation.last}  # type: ignore[dict-item]
-    return variation.values
-
-
-def _brief(row: Row, design: Design) -> dict[str, Any]:
-    paths = (each.path for each in design.variations)
-    return {"at": dict(zip(paths, row.point, strict=True)), "utilisation": row.utilisation}
-
-
-def swept(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Sweep:
+def with_borders(
+    design: Design, rows: Sequence[Row], robot: RobotFile | None, tolerance: float
+) -> Sweep:
     """Return a sweep of which every point is answered, with its borders, which take more plans."""
-    return Sweep(design, tuple(rows), tuple(_borders(design, rows, ask, tolerance)))
-
-
-def has_borders(design: Design) -> bool:
-    """Whether one number varies, and nothing else."""
-    place, *others = design.varying
-    return not others and design.variations[place].numbers
-
-
-def _borders(design: Design, rows: Sequence[Row], ask: Ask, tolerance: float) -> Iterator[Border]:
-    """Yield the borders over a number that alone varies."""
-    if not has_borders(design):
-        return
-    (place,) = design.varying
-    variation, target = design.variations[place], design.targets[place]
-    unique: Mapping[Any, Row] = {row.point[place]: row for row in rows}
-    ordered = [unique[value] for value in sorted(unique)]
-    range_ = float(max(unique)) - float(min(unique))
-    if not range_ > 0.0:
-        return
+    ask = asking(1, 1, robot)
 
     def plan(value: float) -> Row:
-        point = list(ordered[0].point)
-        point[place] = int(value) if target.whole else value
+        point = list(design.points[0])
+        point[place] = int(value) if design.targets[place].whole else value
         (row,) = rows_at(design, [tuple(point)], ask)
         return row
 
-    along = Along(place, variation.path, target.unit, target.whole)
-    yield from borders(ordered, along, tolerance * range_, plan)
+    place = design.number or 0
+    return Sweep(design, tuple(rows), tuple(borders(design, rows, tolerance, plan)))
 
 
 def sweep(
@@ -188,13 +172,10 @@ def sweep(
     ]
     asked = with_robot(with_hand(request, hand), robot)
     design = Design.of(asked, chosen, samples, seed, robots_of(robot))
-    rows: list[Row] = []
-    total = len(design.points)
-    with asking(total, workers, robot, on) as ask:
-        if progress is not None:
-            progress(0, total)
-        for row in rows_at(design, design.points, ask):
-            rows.append(row)
-            if progress is not None:
-                progress(len(rows), total)
-        return swept(design, rows, ask, tolerance)
+    tell, total = progress or (lambda *_: None), len(design.points)
+    tell(0, total)
+    rows = []
+    for row in rows_at(design, design.points, asking(total, workers, robot, on)):
+        rows.append(row)
+        tell(len(rows), total)
+    return with_borders(design, rows, robot, tolerance)

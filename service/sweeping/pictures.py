@@ -1,0 +1,383 @@
+"""The picture of a sweep: curves over one variable, a map over two, panels of maps over more."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap, TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from hand_models.base import Array, whole_file
+from service.sweeping.rows import Row, State
+from service.sweeping.sweep import Sweep
+from service.sweeping.variation import Value, word_of
+
+__all__ = ["plot_sweep"]
+
+PANELS: Final = 6
+"""Of one figure: values of a third variable, evenly chosen."""
+
+COLUMNS: Final = 3
+
+TOP: Final = 0.97
+"""Height, in axes, of marks of points without a utilisation."""
+
+SCALE: Final = "RdBu_r"
+"""Colours: blue where it holds, white at the cap, red beyond."""
+
+LEAST, LESS_RED, MOST = 0.5, 1.5, 2.0
+"""Of the scale, over the cap: it goes at least from the first to the second, and at most to the
+last; what is beyond is as red as that."""
+
+MARKED: Final = 600
+"""So many points of a map at most have a dot each."""
+
+LIMIT: Final[dict[str, Any]] = {"color": "tab:red", "linestyle": "--", "linewidth": 1.0}
+STOP: Final[dict[str, Any]] = {"color": "0.3", "linestyle": ":", "linewidth": 1.2}
+BORDER: Final[dict[str, Any]] = {"colors": "black", "linewidths": 1.8}
+
+Columns = dict[str, Any]
+"""Arrays over the rows that are drawn: state, holds, utilisation, load factor, margin, x, y."""
+
+
+class Look(NamedTuple):
+    """How points of a state are drawn: marker, colour, words; and cells without a utilisation."""
+
+    marker: str
+    colour: str
+    words: str
+    fill: str = ""
+    hatch: str = ""
+
+
+LOOKS: Final[dict[State, Look]] = {
+    "holds": Look("o", "tab:blue", "holds"),
+    "overloaded": Look("s", "tab:red", "overloaded"),
+    "infeasible": Look("x", "0.35", "infeasible: nothing balances the body", "0.75", "////"),
+    "error": Look("+", "tab:orange", "no answer: see the column error", "white", "xx"),
+}
+"""From the best to the worst."""
+
+
+def plot_sweep(sweep: Sweep, path: Path, title: str, over: Sequence[str] | None = None) -> None:
+    """Draw a sweep.
+
+    A grid over one number is drawn as curves of utilisation and load factor, over a number and
+    words as a curve for each word, and over two numbers as a map. Over more there is a map over the
+    first two numbers for up to six values of the next variable, each cell the worst over all
+    others. Two things that are sampled are drawn as points over both; more, as utilisation over
+    each.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    path : Path
+        PNG, PDF or SVG.
+    title : str
+    over : sequence of str, optional
+        Paths of the two variations over which it is drawn instead.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``over`` does not name two of them.
+    """
+    design = sweep.design
+    varying, sampled = design.varying, design.sampled
+    numbers = [i for i in varying if design.variations[i].numbers]
+    ordered = [*numbers, *(i for i in varying if i not in numbers)]
+    if over is not None:
+        figure = _maps(sweep, *design.places_of(over))
+    elif len(varying) == 1 or (len(varying) == 2 and len(numbers) == 1 and not sampled):
+        figure = _plots(
+            sweep, [(ordered[0], "utilisation"), (ordered[0], "load factor")], ordered[1:]
+        )
+    elif sampled and len(varying) > 2:
+        figure = _plots(sweep, [(place, "utilisation") for place in varying], [])
+    else:
+        figure = _maps(sweep, *(varying if sampled else ordered)[:2])
+    holding = sum(row.holds for row in sweep.rows)
+    lines = f"{title}: {holding} of {len(sweep.rows)} points hold", figure.get_suptitle()
+    figure.suptitle("\n".join(filter(None, lines)), fontsize=11, parse_math=False)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=120, facecolor="white")
+
+
+class Side:
+    """A variation as an axis.
+
+    Attributes
+    ----------
+    place : int
+        Of the variation.
+    label : str
+    values : list of Value
+        Numbers in their order, words in the order given.
+    words : list of str
+        Instead of numbers along the axis; empty where there are numbers.
+    """
+
+    def __init__(self, sweep: Sweep, place: int) -> None:
+        variation = sweep.design.variations[place]
+        self.place, self.label = place, sweep.design.labels[place]
+        self.values = list(dict.fromkeys(row.point[place] for row in sweep.rows))
+        self.words: list[str] = []
+        if variation.numbers:
+            self.values.sort()
+        else:
+            self.values = list(variation.values)
+            self.words = list(map(word_of, self.values))
+        self.places = np.array(range(len(self.words)) if self.words else self.values, float)
+
+    def of(self, rows: Sequence[Row]) -> Array:
+        """Return where rows are along the axis."""
+        found = (self.places[self.values.index(row.point[self.place])] for row in rows)
+        return np.fromiter(found, float)
+
+    @property
+    def edges(self) -> Array:
+        """Where the cells of the values begin and end: halfway to the next."""
+        if len(self.places) == 1:
+            return np.array([self.places[0] - 0.5, self.places[0] + 0.5])
+        middle = 0.5 * (self.places[1:] + self.places[:-1])
+        first, last = 2.0 * self.places[[0, -1]] - middle[[0, -1]]
+        return np.array([first, *middle, last])
+
+    def label_axis(self, axis: Any) -> None:
+        """Write what varies along an axis, and the words instead of numbers if it has words."""
+        axis.set_label_text(self.label, fontsize=9)
+        if self.words:
+            turned = sum(map(len, self.words)) > 40 and axis.axis_name == "x"
+            style = {"rotation": 30, "ha": "right"} if turned else {}
+            axis.set_ticks(self.places, self.words, **style)
+            axis.axes.set(**{f"{axis.axis_name}lim": self.edges[[0, -1]]})
+
+
+def _columns(rows: Sequence[Row], x: Side, y: Side | None = None) -> Columns:
+    """Return what is drawn of rows."""
+    found: Columns = {
+        name: np.array([getattr(row, name.replace(" ", "_")) for row in rows], float)
+        for name in ("utilisation", "load factor", "margin")
+    }
+    found |= {name: np.array([getattr(row, name) for row in rows]) for name in ("state", "holds")}
+    return found | {"x": x.of(rows), "y": x.of(rows) if y is None else y.of(rows)}
+
+
+def _figure(
+    count: int, size: tuple[float, float], columns: int, **shared: Any
+) -> tuple[Figure, list[Any]]:
+    """Return a figure with so many panels of a size [in]."""
+    lines = math.ceil(count / columns)
+    figure = Figure(figsize=(0.8 + size[0] * columns, 1.6 + size[1] * lines), layout="constrained")
+    panels = list(figure.subplots(lines, columns, squeeze=False, **shared).ravel())
+    for axes in panels[count:]:
+        axes.remove()
+    return figure, panels[:count]
+
+
+def _legend(figure: Figure, handles: Sequence[Any], title: str | None = None) -> None:
+    """Write a legend below a figure, if there is one."""
+    if handles:
+        columns = 2 if len(handles) < 5 else 3
+        place: Any = {"loc": "outside lower center", "ncols": columns}
+        figure.legend(handles=handles, title=title, fontsize=9, **place)
+
+
+def _markers(rows: Sequence[Row], colour: str | None = None) -> list[Any]:
+    """Return the legend of the states that there are, in their colours or in one."""
+    return [
+        Line2D([], [], ls="", marker=look.marker, color=colour or look.colour, label=look.words)
+        for state, look in LOOKS.items()
+        if any(row.state == state for row in rows)
+    ]
+
+
+# Curves -------------------------------------------------------------------------------------------
+
+
+def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int]) -> Figure:
+    """Draw numbers over variations, each in a panel, as a curve for each value of a series."""
+    curves = panels[0][1] != panels[-1][1]
+    columns, size = (1, (7.2, 2.5)) if curves else (min(COLUMNS, len(panels)), (4.0, 3.4))
+    figure, every = _figure(len(panels), size, columns, sharex=curves, sharey=not curves)
+    design, caps = sweep.design, {row.cap for row in sweep.rows}
+    values = design.variations[series[0]].values if series else (None,)
+    for axes, (place, name) in zip(every, panels, strict=True):
+        side = Side(sweep, place)
+        for k, value in enumerate(values):
+            rows = [row for row in sweep.rows if not series or row.point[series[0]] == value]
+            colour = f"C{k}" if series else None
+            _draw_curve(axes, _columns(rows, side), name, colour, curves and not side.words)
+        for limit in (1.0,) if name == "load factor" else caps if len(caps) == 1 else ():
+            axes.axhline(limit, **LIMIT)
+        for border in sweep.borders:
+            axes.axvline(border.holds, **STOP)
+        axes.set_ylabel(f"{name} [1]")
+        axes.grid(alpha=0.3)
+        axes.margins(y=0.12)
+        side.label_axis(axes.xaxis)
+        if curves:
+            axes.label_outer()
+    lines = zip(itertools.count(), values if series else (), strict=False)
+    handles = [Line2D([], [], color=f"C{k}", label=word_of(value)) for k, value in lines]
+    handles += _markers(sweep.rows, "0.3" if series else None)
+    if len(caps) == 1:
+        handles.append(Line2D([], [], **LIMIT, label=f"cap on the utilisation: {caps.pop():g}"))
+    for border in sweep.borders:
+        words = f"stops holding at {border.holds:.4g} {border.unit or ''}".strip()
+        handles.append(Line2D([], [], **STOP, label=words))
+    _legend(figure, handles, design.labels[series[0]] if series else None)
+    return figure
+
+
+def _draw_curve(axes: Any, drawn: Columns, name: str, colour: str | None, line: bool) -> None:
+    """Draw one number over x, each point as its state; those without a utilisation at the top."""
+    order = np.argsort(drawn["x"], kind="stable")
+    if line:
+        axes.plot(drawn["x"][order], drawn[name][order], color=colour or "C0")
+    for state, look in LOOKS.items():
+        there = drawn["state"] == state
+        heights = np.full(there.sum(), TOP) if look.hatch else drawn[name][there]
+        across = axes.get_xaxis_transform() if look.hatch else axes.transData
+        style = {"color": colour or look.colour, "markersize": 4, "transform": across}
+        axes.plot(drawn["x"][there], heights, look.marker, **style)
+
+
+# Maps ---------------------------------------------------------------------------------------------
+
+
+def _maps(sweep: Sweep, *pair: int) -> Figure:
+    """Draw a map over two variations, or one for each of some values of a third."""
+    design = sweep.design
+    others = [] if design.sampled else [i for i in design.varying if i not in pair]
+    values: list[Value] = [None]
+    if others:
+        given = Side(sweep, others[0]).values
+        values = [given[round(i)] for i in np.linspace(0, len(given) - 1, min(len(given), PANELS))]
+    columns = min(COLUMNS, math.ceil(math.sqrt(len(values))))
+    size = (4.4, 3.9) if others else (7.4, 4.8)
+    figure, every = _figure(len(values), size, columns, sharex=True, sharey=True)
+    groups = [
+        [row for row in sweep.rows if not others or row.point[others[0]] == value]
+        for value in values
+    ]
+    shown = [row for rows in groups for row in rows]
+    x, y = (Side(sweep, place) for place in pair)
+    colours, extend = _colours(shown)
+    drawn = None
+    for i, (axes, value, rows) in enumerate(zip(every, values, groups, strict=True)):
+        draw = _draw_samples if design.sampled else _draw_map
+        drawn = draw(axes, x, y, _columns(rows, x, y), colours) or drawn
+        x.label_axis(axes.xaxis)
+        y.label_axis(axes.yaxis)
+        axes.label_outer()
+        if i + columns >= len(values):
+            axes.xaxis.set_tick_params(labelbottom=True)
+            axes.set_xlabel(x.label)
+        if others:
+            unit = design.targets[others[0]].unit or ""
+            words = f"{design.variations[others[0]].path} = {word_of(value)} {unit}"
+            axes.set_title(words.strip(), fontsize=9)
+    if drawn is not None:
+        figure.colorbar(drawn, ax=every, label="utilisation [1]", extend=extend)
+    _legend(figure, _markers(shown) if design.sampled else _map_handles(shown))
+    if others[1:]:
+        names = ", ".join(design.variations[i].path for i in others[1:])
+        figure.suptitle(f"each cell: the worst over {names}")
+    return figure
+
+
+def _colours(rows: Sequence[Row]) -> tuple[TwoSlopeNorm, str]:
+    """Return the scale of utilisations, the cap in its middle, and whether some are beyond it."""
+    used = [row.utilisation for row in rows if row.utilisation is not None]
+    caps = {row.cap for row in rows}
+    cap = caps.pop() if len(caps) == 1 else 1.0
+    low, high = min(used, default=0.0), max(used, default=cap)
+    top = max(min(high, MOST * cap), LESS_RED * cap)
+    return TwoSlopeNorm(cap, min(low, LEAST * cap), top), "max" if high > top else "neither"
+
+
+def _map_handles(rows: Sequence[Row]) -> list[Any]:
+    """Return the legend of a map: its border, and cells without a utilisation."""
+    handles: list[Any] = []
+    if len({row.holds for row in rows if row.state != "error"}) > 1:
+        caps = {row.cap for row in rows}
+        words = f": utilisation {caps.pop():g}" if len(caps) == 1 else ""
+        handles.append(Line2D([], [], color="black", lw=1.8, label=f"stops holding{words}"))
+    states = {row.state for row in rows}
+    return handles + [
+        Patch(facecolor=look.fill, edgecolor="0.4", hatch=look.hatch, label=look.words)
+        for state, look in LOOKS.items()
+        if look.hatch and state in states
+    ]
+
+
+def _draw_map(axes: Any, x: Side, y: Side, drawn: Columns, colours: TwoSlopeNorm) -> Any:
+    """Draw cells, the worst on top, and the border of those that hold; return the cells."""
+    names = list(LOOKS)
+    rank = [names.index(state) for state in drawn["state"]]
+    order: Any = np.lexsort((np.nan_to_num(drawn["margin"]), rank))
+    cells = np.zeros((len(y.places), len(x.places)), int)
+    places: Any = np.searchsorted(y.places, drawn["y"]), np.searchsorted(x.places, drawn["x"])
+    cells[places[0][order], places[1][order]] = order  # the last, and worst, stays
+    states, margins = drawn["state"][cells], np.ma.masked_invalid(drawn["margin"][cells])
+    used = np.ma.masked_invalid(drawn["utilisation"][cells])
+    mesh = axes.pcolormesh(x.edges, y.edges, used, cmap=SCALE, norm=colours)
+    for state in (state for state in names if (states == state).any() and LOOKS[state].hatch):
+        there, look = np.ma.masked_where(states != state, np.ones(states.shape)), LOOKS[state]
+        style = {"hatch": look.hatch, "cmap": ListedColormap([look.fill]), "edgecolor": "0.4"}
+        axes.pcolor(x.edges, y.edges, there, linewidth=0.0, **style)
+    known = ~np.ma.getmaskarray(margins)
+    if x.words or y.words or not (known.any() and margins.min() < 1.0 < margins.max()):
+        known[:] = False
+    else:
+        axes.contour(x.places, y.places, margins, levels=[1.0], **BORDER)
+    edges = _edges_of_holding(states, known, x.edges, y.edges)
+    axes.add_collection(LineCollection(edges, **BORDER))
+    if cells.size <= MARKED:
+        spots = np.meshgrid(x.places, y.places)
+        axes.plot(*map(np.ravel, spots), ".", color="0.3", markersize=2.5, clip_on=False)
+    for side, name in ((x, "xlim"), (y, "ylim")):
+        axes.set(**{name: (side.places if len(side.places) > 1 else side.edges)[[0, -1]]})
+    return mesh
+
+
+def _edges_of_holding(states: Any, known: Any, across: Array, up: Array) -> list[Any]:
+    """Return the edges between cells that hold and others, where no contour shows the border.
+
+    A contour needs four neighbouring cells that all have a ``known`` utilisation.
+    """
+    squares = np.pad(known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:], 1)
+    holds, answered = states == "holds", states != "error"
+    beside = (holds[:, 1:] != holds[:, :-1]) & answered[:, 1:] & answered[:, :-1]
+    above = (holds[1:] != holds[:-1]) & answered[1:] & answered[:-1]
+    beside &= ~(squares[:-1, 1:-1] | squares[1:, 1:-1])
+    above &= ~(squares[1:-1, :-1] | squares[1:-1, 1:])
+    return [
+        *([(across[j + 1], up[i + k]) for k in (0, 1)] for i, j in np.argwhere(beside)),
+        *([(across[j + k], up[i + 1]) for k in (0, 1)] for i, j in np.argwhere(above)),
+    ]
+
+
+def _draw_samples(axes: Any, x: Side, y: Side, drawn: Columns, colours: TwoSlopeNorm) -> Any:
+    """Draw samples in the colours of their utilisations; return what a colour bar is of."""
+    shown = None
+    axes.grid(alpha=0.3)
+    for state, look in LOOKS.items():
+        there = drawn["state"] == state
+        places = drawn["x"][there], drawn["y"][there]
+        if look.hatch:
+            axes.scatter(*places, marker=look.marker, color=look.colour, s=36)
+        elif there.any():
+            style = {"cmap": SCALE, "norm": colours, "edgecolor": "0.3", "linewidth": 0.6}
+            used = drawn["utilisation"][there]
+            shown = axes.scatter(*places, c=used, marker=look.marker, s=40, **style)
+    return shown

@@ -1,0 +1,265 @@
+"""What each point of a sweep comes to: a row of a table, which grows as CSV and goes on."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import msgspec
+
+from hand_models.base import InvalidInputError
+from hand_models.parameters import ParameterTable
+from planner import LimitName
+from service import bulk
+from service.bulk import LOCAL, Column, CsvTable, Rows, evaluate
+from service.processes import worth
+from service.replies import ErrorDetail
+from service.requests import PlanRequest
+from service.sweeping.design import Design, Point
+from service.wire import REQUEST_KINDS, Answer, Format
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from planner import RobotFile
+
+__all__ = ["Ask", "PointRows", "Row", "State", "asking", "rows_at", "write_rows"]
+
+Ask = Callable[[Iterable[bytes]], Generator[Answer, None, None]]
+"""Yields the answers to encoded requests, in order."""
+
+State = Literal["holds", "overloaded", "infeasible", "error"]
+
+STATES: Final[dict[str, State]] = {
+    "optimal": "holds",
+    "overloaded": "overloaded",
+    "infeasible": "infeasible",
+}
+
+LIMIT: Final = ("limb", "finger", "phalanx", "joint", "limit")
+
+COLUMNS: Final = (
+    Column("status", "text", "", "of the plan, or error"),
+    Column("utilisation", "float", "1", "the largest of any limit"),
+    Column("load_factor", "float", "1", "inf where there is no end to it"),
+    *(Column(part, "text", "", f"{part} of the limit that is used most") for part in LIMIT),
+    Column("error", "text", "", "why there is no plan"),
+)
+"""After what varies."""
+
+
+class Row(msgspec.Struct, frozen=True):
+    """What one point of a sweep comes to; but for its point and cap as in a reply.
+
+    Attributes
+    ----------
+    point : tuple
+        A value of each variation.
+    status : str
+        Of the plan, or ``error``.
+    utilisation, load_factor : float or None
+    load_factor_unbounded : bool
+    limiting : LimitName or None
+        What limits the plan.
+    error : ErrorDetail or None
+        Why there is no plan.
+    cap : float
+        Utilisation up to which this point holds.
+    """
+
+    point: Point = ()
+    status: str = "error"
+    utilisation: float | None = None
+    load_factor: float | None = None
+    load_factor_unbounded: bool = False
+    limiting: LimitName | None = None
+    error: ErrorDetail | None = None
+    cap: float = 1.0
+
+    @property
+    def holds(self) -> bool:
+        """Whether there is a plan within its limits."""
+        return self.status == "optimal"
+
+    @property
+    def state(self) -> State:
+        """As it is drawn; an error where the planner failed, too."""
+        return STATES.get(self.status, "error")
+
+    @property
+    def answered(self) -> bool:
+        """Whether there is an answer, if only that the request at this point cannot be."""
+        if self.error is not None:
+            return self.error.kind in REQUEST_KINDS
+        return self.state != "error"
+
+    @property
+    def margin(self) -> float | None:
+        """Utilisation over its cap; None where there is none."""
+        return None if self.utilisation is None else self.utilisation / self.cap
+
+    @property
+    def complaint(self) -> str | None:
+        """What is wrong, in one line."""
+        if self.error is None:
+            return "the planner failed" if self.state == "error" else None
+        field = "" if self.error.field is None else f"{self.error.field}: "
+        return f"{self.error.kind}: {field}{self.error.message}"
+
+    @property
+    def cells(self) -> list[Any]:
+        """What the table has of it."""
+        point = [
+            msgspec.json.encode(v).decode() if v in (None, True, False) else v for v in self.point
+        ]
+        factor = "inf" if self.load_factor_unbounded else self.load_factor
+        limit = [getattr(self.limiting, part, None) for part in LIMIT]
+        return [*point, self.status, self.utilisation, factor, *limit, self.complaint]
+
+    @classmethod
+    def read(cls, design: Design, point: Point, cells: Sequence[str]) -> Row:
+        """Return the row that was written as cells; an error's field is in its message then.
+
+        Raises
+        ------
+        ValueError
+            If they are no row's.
+        """
+        names = [column.name for column in COLUMNS]
+        known = dict(zip(names, cells[len(point) :], strict=True))
+        given: dict[str, Any] = {key: value for key, value in known.items() if value}
+        if given.get("load_factor") == "inf":
+            given = given | {"load_factor": None, "load_factor_unbounded": True}
+        if "limit" in given:
+            given["limiting"] = {part: known[part] or None for part in LIMIT}
+        if given.pop("error", None) and known["status"] == "error":
+            kind, _, message = known["error"].partition(": ")
+            given["error"] = {"kind": kind, "message": message, "field": None}
+        row = msgspec.convert(given, cls, strict=False)
+        return msgspec.structs.replace(row, point=point, cap=design.cap(point))
+
+
+def asking(
+    count: int, workers: int | None, robot: RobotFile | None, on: str | Client | None = None
+) -> Ask:
+    """Return what answers encoded requests, some ``count`` of them in all.
+
+    ``on`` is as of `service.bulk.evaluate`, or ``local``; by default processes, where they are
+    worth it.
+    """
+    if on is None:
+        workers = worth(count, workers)
+        on = "here" if workers == 1 else "processes"
+    place = LOCAL if on == "local" else on
+    return partial(evaluate, on=place, workers=workers, robot=robot, form=Format.MSGPACK)
+
+
+def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[Row]:
+    """Yield the row of each point, in order."""
+    answers = ask(design.payload(point) for point in points)
+    for point, answer in zip(points, answers, strict=True):
+        yield row_of(design, point, answer.payload)
+
+
+def row_of(design: Design, point: Point, payload: bytes) -> Row:
+    """Return the row of a point whose answer is there."""
+    row = msgspec.msgpack.decode(payload, type=Row)
+    return msgspec.structs.replace(row, point=point, cap=design.cap(point))
+
+
+def columns_of(design: Design) -> tuple[Column, ...]:
+    """Return the columns of a design's table: what varies, and what that comes to."""
+    varied = zip(design.labels, design.variations, design.targets, strict=True)
+    return (
+        *(
+            Column(label, "float" if each.numbers else "text", target.unit or "", each.path)
+            for label, each, target in varied
+        ),
+        *COLUMNS,
+    )
+
+
+def write_rows(design: Design, rows: Iterable[Row], path: Path) -> None:
+    """Write a whole table."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([each.name for each in columns_of(design)])
+        writer.writerows(row.cells for row in rows)
+
+
+class PointRows(Rows):
+    """Rows of points, in a file that grows with them, and the questions that they answer.
+
+    Parameters
+    ----------
+    request : PlanRequest
+    design : Design
+        Of that request.
+    seed : int
+        Of its samples.
+    path : Path
+    resume : bool
+        Whether rows that are there are kept.
+    hand : ParameterTable or None
+    robot : RobotFile or None
+
+    Attributes
+    ----------
+    count : int
+        How many points there are.
+    points : list of Row
+        Those of the points that are answered.
+
+    Raises
+    ------
+    InvalidInputError
+        If the sweep of that file is another one.
+    """
+
+    columns = None
+
+    def __init__(
+        self,
+        request: PlanRequest,
+        design: Design,
+        seed: int,
+        path: Path,
+        resume: bool,
+        hand: ParameterTable | None,
+        robot: RobotFile | None,
+    ) -> None:
+        columns, self._design, self.count = columns_of(design), design, len(design.points)
+        count = f"{self.count} of seed {seed}" if design.sampled else "none"
+        about = {
+            "stance": bulk.digest_of(msgspec.json.encode(request)),
+            "--samples": count,
+            "--vary": " ".join(each.text(sampled=design.sampled) for each in design.variations),
+        }
+        begun = bulk.new_manifest([each.name for each in columns], False, hand, robot, about)
+        table = CsvTable.opened(path, columns, begun, resume, self)
+        super().__init__(table)
+        try:
+            known = zip(design.points, table.whole_rows(), strict=False)
+            self.points = [Row.read(design, point, cells) for point, cells in known]
+        except (ValueError, IndexError):
+            self.points = []
+        if len(self.points) != self.whole:
+            raise InvalidInputError(
+                f"{path}: its rows are not those that were written; begin anew without it",
+                field="--resume",
+            )
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Yield the encoded request at each point."""
+        return map(self._design.payload, self._design.points)
+
+    questions = __iter__
+
+    def row(self, payload: bytes) -> bulk.Row:
+        """Return the cells of the point that is next."""
+        row = row_of(self._design, self._design.points[len(self.points)], payload)
+        self.points.append(row)
+        return bulk.Row(row.cells, None if row.error else row.status, row.error)
