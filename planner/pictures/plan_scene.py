@@ -12,7 +12,6 @@ import scipy
 
 from hand_models.base import Array, Pose
 from hand_models.hand import SettledHand
-from hand_models.rock import Mesh
 from planner.pictures.rock_patches import rock_patch
 from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
@@ -223,13 +222,12 @@ def scene_of(plan: Plan, question: Question) -> Scene:
 
 
 def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[Array]:
-    """Return the rock of each hand in W; that of a scan which several hold, with the first."""
+    """Return the rock of each hand in W; that which several hold, with the first."""
     placed = [hand.pose @ known.seating.pose for hand, known in zip(hands, settled, strict=True)]
 
     def alike(i: int, j: int) -> bool:
         return (
-            isinstance(hands[i].hold, Mesh)
-            and hands[i].hold is hands[j].hold
+            hands[i].hold is hands[j].hold
             and np.allclose(placed[i].position, placed[j].position, atol=1e-6)
             and np.allclose(placed[i].rotation, placed[j].rotation, atol=1e-6)
         )
