@@ -202,7 +202,8 @@ class SweptHold(Hold):
         pole = (middle - centre) / semi_axes
         length = float(np.linalg.norm(pole))
         pole = pole / length if length > 0.0 else np.array([0.0, 0.0, -1.0])
-        across = np.linalg.svd(pole[None])[2][1:]
+        aside = np.linalg.svd(pole[None])[2][1]
+        across = np.array([aside, np.cross(pole, aside)])
         t = np.linspace(0.0, min(math.pi, reach / float(semi_axes.min())), STEPS + 1)
         turn = np.linspace(0.0, 2.0 * math.pi, STEPS + 1)
         around = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
