@@ -31,6 +31,7 @@ from .study_result import (
     Claim as Claim,
     Role as Role,
     StudyResult as StudyResult,
+    StudyText as StudyText,
     part as part,
     track as track,
 )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from importlib import resources
 from typing import Any, Literal, TypeAlias, TypeVar
 
 from hand_models.base import Progress
 
-__all__ = ["Claim", "Role", "StudyResult", "part", "track"]
+__all__ = ["Claim", "Role", "StudyResult", "StudyText", "part", "track"]
 
 Item = TypeVar("Item")
 
@@ -61,6 +63,67 @@ class StudyResult:
     data: dict[str, Any]
     claims: tuple[Claim, ...]
     hand: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+class StudyText:
+    """The words of a study in ``studies.toml``, and its claims as they are checked.
+
+    Parameters
+    ----------
+    study : str
+        Its table there.
+
+    Attributes
+    ----------
+    claims : list of Claim
+        Those checked so far.
+    """
+
+    def __init__(self, study: str) -> None:
+        text = resources.files(__package__).joinpath("studies.toml").read_text("utf-8")
+        self._name, self._words = study, tomllib.loads(text)[study]
+        self.claims: list[Claim] = []
+
+    def check(
+        self,
+        name: str,
+        got: str | float,
+        holds: object,
+        *,
+        claimed: float | None = None,
+        role: Role | None = None,
+        **values: Any,
+    ) -> None:
+        """Add a claim by its name.
+
+        Parameters
+        ----------
+        name : str
+        got : str or float
+            What the model gives.
+        holds : bool
+        claimed : float, optional
+            The paper's figure, of a claim that has it from a parameter.
+        role : {'test', 'calibration'}, optional
+            In place of the entry's, which is ``test`` where it has none.
+        **values
+            Of the placeholders in its words.
+        """
+        entry = self._words["claims"][name]
+        paper: str | float = entry["claimed"] if claimed is None else claimed
+        if isinstance(paper, str):
+            paper = paper.format(**values)
+        role = role or entry.get("role", "test")
+        self.claims.append(Claim(entry["claim"].format(**values), paper, got, bool(holds), role))
+
+    def label(self, axes: Any, name: str, **values: Any) -> None:
+        """Write title and labels of axes by their name; ``values`` are of the placeholders."""
+        axes.set(**{key: text.format(**values) for key, text in self._words["axes"][name].items()})
+
+    def result(self, data: dict[str, Any]) -> StudyResult:
+        """Return the study's result, with the claims checked."""
+        data = {**data, "not_tested": self._words["not_tested"]}
+        return StudyResult(self._name, self._words["title"], data, tuple(self.claims))
 
 
 def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, Pose, check_positive
 from hand_models.parameters import scan_table
+from hand_models.rock.triangles import Triangles, drawn_out, grid
 from hand_models.sections import PARALLEL, Section, Swept, cut_of, entry_distances
 
 __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]
@@ -24,6 +25,12 @@ Angle = TypeVar("Angle", float, Array)
 
 LARGEST: Final = 1e6
 """Size of a hold above which its curve is lost in rounding [m]."""
+
+STEPS: Final = 28
+"""Pieces of a curve in a hold's surface."""
+
+RAYS: Final = 41
+"""Rays along each side of a region, of rock whose surface is known by rays alone."""
 
 
 class Hold(ABC):
@@ -76,6 +83,31 @@ class Hold(ABC):
 
         Negative where the point is inside; infinite where the line misses the rock.
         """
+
+    def surface(self, low: Array, high: Array) -> Triangles:
+        """Return the rock's surface in the hold's frame, at least within a region.
+
+        It is what pictures show and what limbs are kept away from. Unless a hold knows better, it
+        is where rays along z enter the rock, without what hangs over.
+
+        Parameters
+        ----------
+        low, high : ndarray, shape (3,)
+            Corners of the region [m].
+
+        Returns
+        -------
+        Triangles
+            Counterclockwise from outside; none where there is no rock.
+        """
+        x, y = np.meshgrid(*np.linspace(low[:2], high[:2], RAYS).T)
+        begins = [(*place, low[2]) for place in zip(x.flat, y.flat, strict=True)]
+        z = low[2] + np.array([self.entry(place, (0.0, 0.0, 1.0)) for place in begins])
+        found = grid(np.stack([x, y, z.reshape(x.shape)], axis=2))
+        whole = np.isfinite(z[found.faces]).all(axis=1)
+        return Triangles(
+            np.where(np.isfinite(found.vertices), found.vertices, 0.0), found.faces[whole]
+        )
 
     def check_place(self, at: Pose | None = None) -> None:
         """Refuse a frame that a palm is to be at, unless there is rock that faces it.
@@ -135,6 +167,48 @@ class SweptHold(Hold):
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
         places = [self._scaled(point, self.swept.depth)]
         return entry_distances(self.swept, places, self._scaled(direction))[0]
+
+    def surface(self, low: Array, high: Array) -> Triangles:
+        middle, reach = 0.5 * (low + high), 0.5 * float((high - low).max())
+        if self.swept.scale_y:
+            return self._cap(middle, reach)
+        return drawn_out(self._outline(middle, reach), float(low[1]), float(high[1]))
+
+    def _outline(self, middle: Array, reach: float) -> Array:
+        """Return the outline (x, z) of a hold without end along y, about a place."""
+        shape = self.swept
+        stretch = np.array([shape.scale_x or 1.0, shape.scale_z])
+        # points of the circle are at angles from the crest; flat faces begin where it ends
+        end = math.pi / 2.0 - math.atan2(shape.sine, shape.cosine) if shape.sine else math.inf
+        aside, below = stretch * (middle[[0, 2]] - (0.0, shape.depth))
+        over = min(max(math.atan2(aside, -below), -end), end)
+        size = shape.radius / float(stretch.max())
+        half = min(math.pi, reach / size) if size else 0.0
+        count = STEPS + 1 if size else 1
+        t = np.linspace(max(over - half, -end), min(over + half, end), count)
+        circle = shape.radius * np.column_stack([np.sin(t), -np.cos(t)])
+        arc: Array = circle / stretch + (0.0, shape.depth)
+        if not shape.sine:
+            return arc
+        far = float(np.abs(middle).max()) + 2.0 * reach
+        sides = far * np.array([[-shape.sine, shape.cosine], [shape.sine, shape.cosine]])
+        return np.vstack([arc[0] + sides[0], arc, arc[-1] + sides[1]])
+
+    def _cap(self, middle: Array, reach: float) -> Triangles:
+        """Return a ball's surface, or a boulder's, about the place nearest to another."""
+        shape = self.swept
+        semi_axes = shape.radius / np.array([shape.scale_x, shape.scale_y, shape.scale_z])
+        centre = np.array([0.0, 0.0, shape.depth])
+        pole = (middle - centre) / semi_axes
+        length = float(np.linalg.norm(pole))
+        pole = pole / length if length > 0.0 else np.array([0.0, 0.0, -1.0])
+        aside = np.linalg.svd(pole[None])[2][1]
+        across = np.array([aside, np.cross(pole, aside)])
+        t = np.linspace(0.0, min(math.pi, reach / float(semi_axes.min())), STEPS + 1)
+        turn = np.linspace(0.0, 2.0 * math.pi, STEPS + 1)
+        around = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
+        unit = np.cos(t)[:, None, None] * pole + np.sin(t)[:, None, None] * around
+        return grid(centre + unit * semi_axes)
 
     def _scaled(self, vector: ArrayLike, depth: float = 0.0) -> tuple[float, float, float]:
         """Return a direction, or a place from the centre of the ball, scaled."""

@@ -116,6 +116,10 @@ class Mesh(OutlinedHold):
             )
         return tuple(found)
 
+    def surface(self, low: Array, high: Array) -> Triangles:
+        """Return all triangles."""
+        return self.triangles
+
     def check_place(self, at: Pose | None = None) -> None:
         there, table = at or Pose.identity(), scan_table()
         near, view = table.scalar("scan", "near"), table.vector("scan", "view")

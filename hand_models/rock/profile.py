@@ -77,13 +77,14 @@ class Profile(OutlinedHold):
         inner = hand.vector("fingers", "inner_joint")[1]
         self._half_way = 0.5 * (inner + hand.vector("fingers", "outer_axis")[1])
 
-    def surface(self, low: float, high: float) -> Triangles:
-        """Return the outlines drawn out along y, each over its strip, from y = low to high."""
+    def surface(self, low: Array, high: Array) -> Triangles:
+        """Return the outlines drawn out along y, each over its strip, as far as a region goes."""
         from trimesh.util import append_faces
 
+        ends = float(low[1]), float(high[1])
         if len(self.outlines) == 1:
-            return drawn_out(self.outlines[0], low, high)
-        bounds = np.clip([math.inf, self._half_way, 0.0, -self._half_way, -math.inf], low, high)
+            return drawn_out(self.outlines[0], *ends)
+        bounds = np.clip([math.inf, self._half_way, 0.0, -self._half_way, -math.inf], *ends)
         strips = [
             drawn_out(outline, bottom, top)
             for outline, (top, bottom) in zip(self.outlines, pairwise(bounds.tolist()), strict=True)

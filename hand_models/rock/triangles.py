@@ -57,8 +57,11 @@ def grid(points: Array) -> Triangles:
 
 
 def drawn_out(outline: Array, low: float, high: float) -> Triangles:
-    """Return the surface of an outline (x, z), shape (n, 2), drawn out from y = low to high."""
-    return grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)], axis=1))
+    """Return the surface of an outline (x, z), shape (n, 2), drawn out from y = low to high.
+
+    The rock is on its left, seen along y.
+    """
+    return grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)]))
 
 
 def edges_of(faces: Indices) -> Indices:

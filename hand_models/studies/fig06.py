@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +11,7 @@ import scipy
 from matplotlib.figure import Figure
 
 from hand_models.base import Progress
-from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, track
+from hand_models.experiments import PalmExperiment, StudyResult, StudyText, panels, track
 from hand_models.parameters import ParameterTable
 from hand_models.tendon import share_load
 
@@ -39,50 +37,40 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     experiment = PalmExperiment.from_tables(hand)
     numbers = range(1, len(experiment.springs) + 1)
     pairs = list(itertools.combinations(numbers, 2))
-    ordered = [order for pair in pairs for order in (pair, pair[::-1])]
-    loaded = [*ordered, *((number, number) for number in numbers)]
-    jobs = [
-        *(partial(_configuration, experiment, pair) for pair in loaded),
-        *(partial(_curve, experiment, pair) for pair in pairs),
-    ]
-    found = [job() for job in track(progress, jobs)]
+    loaded = [order for pair in pairs for order in (pair, pair[::-1])]
+    loaded += [(number, number) for number in numbers]
     data = {
         "contact_springs": experiment.springs,
         "preload_stiffness": experiment.preload_stiffness,
         "friction": experiment.friction,
-        "configurations": found[: len(loaded)],
-        "curves": found[len(loaded) :],
+        "configurations": [
+            {
+                "springs": pair,
+                "load_without_friction": experiment.load(pair, 0.0),
+                "load_with_friction": experiment.load(pair, experiment.friction),
+                "gain": experiment.gain(pair),
+            }
+            for pair in track(progress, loaded)
+        ],
+        "curves": [_curve(experiment, pair) for pair in pairs],
         "friction_axis": FRICTIONS,
         "preload_axis": SPRING_RANGE,
         "preload_stiffness_at_printed_gain": _least_gain_is_printed(experiment, pairs),
-        "not_tested": [
-            "the measurements match the model within 5 %: they are printed in a picture only",
-            "loads in newtons: the travel of the hard stop is not printed",
-        ],
     }
-    claims = tuple(_claims(experiment, pairs, data))
-    return StudyResult("fig06", "two tiles sharing a load", data, claims)
-
-
-def _configuration(experiment: PalmExperiment, pair: Pair) -> dict[str, Any]:
-    return {
-        "springs": pair,
-        "load_without_friction": experiment.load(pair, 0.0),
-        "load_with_friction": experiment.load(pair, experiment.friction),
-        "gain": experiment.gain(pair),
-    }
+    text = StudyText("fig06")
+    _check(text, experiment, pairs, data)
+    return text.result(data)
 
 
 def _curve(experiment: PalmExperiment, pair: Pair) -> dict[str, Any]:
     """Return load over μ and gain over k_p of a pair, and where μ is best by Eq. 2."""
     k2, k1 = sorted(experiment.springs[number - 1] for number in pair)
+    others = [replace(experiment, preload_stiffness=kp) for kp in SPRING_RANGE]
     return {
         "springs": pair,
         "best_friction": 2.0 * (k1 - k2) / (k1 + k2),
         "load_over_friction": np.array([experiment.load(pair, mu) for mu in FRICTIONS]),
-        "gain_over_preload_stiffness": np.array(
-            [replace(experiment, preload_stiffness=kp).gain(pair) for kp in SPRING_RANGE]
-        ),
+        "gain_over_preload_stiffness": np.array([other.gain(pair) for other in others]),
     }
 
 
@@ -99,53 +87,32 @@ def _least_gain_is_printed(experiment: PalmExperiment, pairs: list[Pair]) -> flo
     return float(scipy.optimize.brentq(excess, softest, stiffest))
 
 
-def _claims(experiment: PalmExperiment, pairs: list[Pair], data: dict[str, Any]) -> Iterator[Claim]:
+def _check(
+    text: StudyText, experiment: PalmExperiment, pairs: list[Pair], data: dict[str, Any]
+) -> None:
     gains = {c["springs"]: c["gain"] for c in data["configurations"]}
     listed = ", ".join(f"{a}-{b} {100 * gains[a, b]:.1f} %" for a, b in pairs)
+    text.check("gain", listed, min(gains[pair] for pair in pairs) >= PRINTED_GAIN - EXACT)
     differences = np.array([_against_equations(experiment, pair) for pair in pairs])
-    (off_1, off_3, _), shifted = differences.max(axis=0), differences[:, 2].min()
-    order = max(abs(gains[a, b] - gains[b, a]) for a, b in pairs)
+    for i, name in enumerate(("equation_1", "equation_3")):
+        off = differences[:, i].max()
+        text.check(name, f"differ by {off:.0e}", off <= EXACT)
+    # how far the first friction of the largest load is from Eq. 2
     step = FRICTIONS[1] - FRICTIONS[0]
-    off_2 = max(_off_equation_2(curve) for curve in data["curves"])
+    loads = np.array([curve["load_over_friction"] for curve in data["curves"]])
+    first = (loads >= loads.max(axis=1, keepdims=True) * (1.0 - EXACT)).argmax(axis=1)
+    off = np.abs(FRICTIONS[first] - [curve["best_friction"] for curve in data["curves"]]).max()
+    told = f"first at it within {off:.3f}, curves' step {step:.2f}"
+    text.check("equation_2", told, off <= step)
     softer = experiment.springs[0]
     matched = share_load([2.0 * softer, softer], experiment.preload_stiffness, 2.0 / 3.0)
     shares = float(matched.tile_stiffness[0] / matched.tile_stiffness[1])
-    yield Claim(
-        "friction improves the maximum load by at least 14 % (Section 4.2)",
-        ">= 14 %",
-        listed,
-        min(gains[pair] for pair in pairs) >= PRINTED_GAIN - EXACT,
-        role="calibration",
-    )
-    for words, off in (
-        ("tile loads are those of Eq. 1", off_1),
-        ("the load at the softer tile's travel is that of Eq. 3", off_3),
-    ):
-        yield Claim(words, "same", f"differ by {off:.0e}", bool(off <= EXACT))
-    yield Claim(
-        "mu = 2 (k1 - k2)/(k1 + k2) is best (Eq. 2); here: more adds nothing",
-        "largest load there",
-        f"first at it within {off_2:.3f}, curves' step {step:.2f}",
-        bool(off_2 <= step),
-    )
-    yield Claim(
-        "at force limits of 2:1, mu = 2/3 shares the load 2:1 (Section 4.1)",
-        2.0,
-        shares,
-        abs(shares - 2.0) <= EXACT,
-    )
-    yield Claim(
-        "friction shifts load to the stiffer contact (Section 4.1)",
-        "more",
-        f"its share grows by {100 * shifted:.1f} % of the load or more",
-        bool(shifted > 0.0),
-    )
-    yield Claim(
-        "the order of the springs does not matter (Fig. 6 has each pair once)",
-        "same",
-        f"differ by {order:.0e}",
-        order <= EXACT,
-    )
+    text.check("matched", shares, abs(shares - 2.0) <= EXACT)
+    shifted = differences[:, 2].min()
+    told = f"its share grows by {100 * shifted:.1f} % of the load or more"
+    text.check("shift", told, shifted > 0.0)
+    off = max(abs(gains[a, b] - gains[b, a]) for a, b in pairs)
+    text.check("order", f"differ by {off:.0e}", off <= EXACT)
 
 
 def _against_equations(experiment: PalmExperiment, pair: Pair) -> tuple[float, float, float]:
@@ -157,80 +124,48 @@ def _against_equations(experiment: PalmExperiment, pair: Pair) -> tuple[float, f
     kp, mu = experiment.preload_stiffness, experiment.friction
     loads, without = (share_load([k1, k2], kp, friction).tile_stiffness for friction in (mu, 0.0))
     below = (2.0 - mu) * k1 + (2.0 + mu) * k2 + 4.0 * kp
-    by_1 = np.array(
-        [
-            2.0 * (2.0 + mu) * k1 * k2 + 4.0 * kp * k1,
-            2.0 * (2.0 - mu) * k1 * k2 + 4.0 * kp * k2,
-        ]
-    )
+    signs, own = np.array([1.0, -1.0]), np.array([k1, k2])
+    by_1 = (2.0 * (2.0 + signs * mu) * k1 * k2 + 4.0 * kp * own) / below
     by_3 = (4.0 * k1 * k2 + 2.0 * kp * (k1 + k2)) / ((2.0 - mu) * k1 + 2.0 * kp)
     return (
-        float(np.abs(loads * below / by_1 - 1.0).max()),
+        float(np.abs(loads / by_1 - 1.0).max()),
         abs(experiment.load(pair, mu) / by_3 - 1.0),
         float(loads[0] / loads.sum() - without[0] / without.sum()),
     )
 
 
-def _off_equation_2(curve: dict[str, Any]) -> float:
-    """Return how far the first μ of the largest load is from Eq. 2."""
-    loads = curve["load_over_friction"]
-    first = np.argmax(loads >= loads.max() * (1.0 - EXACT))
-    return float(abs(FRICTIONS[first] - curve["best_friction"]))
-
-
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the paper's bars, and what the gain depends on."""
-    data = result.data
+    data, text = result.data, StudyText("fig06")
     figure, (bars, over_friction, over_springs) = panels(
         1, 3, (14.0, 4.6), grid="y", width_ratios=(1.2, 1.0, 1.0)
     )
-    _draw_bars(bars, data)
+    shown = [c for c in data["configurations"] if c["springs"][0] != c["springs"][1]]
+    for place, c in enumerate(shown):
+        without, held = (1e-3 * c[f"load_{key}_friction"] for key in ("without", "with"))
+        bars.bar(place - 0.2, without, 0.4, color="0.7")
+        bars.bar(place + 0.2, held, 0.4, color="tab:blue")
+        gain = f"{100 * c['gain']:+.0f} %"
+        bars.text(place + 0.2, held, gain, ha="center", va="bottom", color="tab:red")
+    bars.set_xticks(range(len(shown)), ["-".join(map(str, c["springs"])) for c in shown])
+    bars.set_ylim(0.0, 1.2e-3 * max(c["load_with_friction"] for c in shown))
+    names = ("bearings, μ = 0", f"fixed rods, μ = {data['friction']:g}")
+    bars.legend(bars.containers[:2], names, loc="upper left")
     # springs 1-3 and 2-3 gain alike: by Eq. 3 the gain depends on the stiffer one alone
     for curve, style in zip(data["curves"], itertools.cycle(("-", "-", "--")), strict=False):
-        name = "-".join(map(str, curve["springs"]))
-        loads = curve["load_over_friction"]
+        name, loads = "-".join(map(str, curve["springs"])), curve["load_over_friction"]
         (line,) = over_friction.plot(FRICTIONS, loads / loads[0], style, label=name)
         colour = line.get_color()
         over_friction.axvline(curve["best_friction"], color=colour, linestyle=":", linewidth=1.0)
         gains = 100.0 * curve["gain_over_preload_stiffness"]
         over_springs.plot(1e-3 * SPRING_RANGE, gains, style, color=colour, label=name)
-    over_friction.set(
-        xlabel="friction of a tile's pulley, μ [1]; dotted: Eq. 2",
-        ylabel="maximum load over that without friction [1]",
-        title="more friction than Eq. 2 adds nothing",
-    )
     over_springs.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0)
     used = 1e-3 * data["preload_stiffness"]
     over_springs.axvline(used, color="0.4", linestyle="--", linewidth=1.0)
-    over_springs.set(
-        xlabel="preload springs, k_p [N/mm]; dashed: the hand's",
-        ylabel="gain by friction [%]; red: printed",
-        title=f"gain at μ = {data['friction']:g}",
-        ylim=(0.0, None),
-    )
+    over_springs.set_ylim(0.0, None)
+    text.label(bars, "bars", springs=", ".join(f"{1e-3 * k:g}" for k in data["contact_springs"]))
+    text.label(over_friction, "friction")
+    text.label(over_springs, "preload", friction=data["friction"])
     for axes in (over_friction, over_springs):
         axes.legend(title="springs")
     return {"fig06": figure}
-
-
-def _draw_bars(axes: Any, data: dict[str, Any]) -> None:
-    shown = [c for c in data["configurations"] if c["springs"][0] != c["springs"][1]]
-    places = np.arange(len(shown))
-    for shift, key, label, colour in (
-        (-0.2, "load_without_friction", "bearings, μ = 0", "0.7"),
-        (0.2, "load_with_friction", f"fixed rods, μ = {data['friction']:g}", "tab:blue"),
-    ):
-        axes.bar(places + shift, [1e-3 * c[key] for c in shown], 0.4, label=label, color=colour)
-    for place, c in zip(places, shown, strict=True):
-        height = 1e-3 * c["load_with_friction"]
-        text = f"{100 * c['gain']:+.0f} %"
-        axes.text(place + 0.2, height, text, ha="center", va="bottom", color="tab:red")
-    stiffness = ", ".join(f"{1e-3 * k:g}" for k in data["contact_springs"])
-    axes.set_xticks(places, ["-".join(map(str, c["springs"])) for c in shown])
-    axes.set(
-        xlabel=f"springs of the two contacts; 1, 2, 3: {stiffness} N/mm",
-        ylabel="maximum load over the stop's travel [N/mm]",
-        title="two tiles, a hard stop on the softer contact",
-        ylim=(0.0, 1.2e-3 * max(c["load_with_friction"] for c in shown)),
-    )
-    axes.legend(loc="upper left")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -12,7 +11,7 @@ import scipy
 from matplotlib.figure import Figure
 
 from hand_models.base import Progress
-from hand_models.experiments import Claim, PalmExperiment, StudyResult, panels, track
+from hand_models.experiments import PalmExperiment, StudyResult, StudyText, panels, track
 from hand_models.parameters import ParameterTable, experiment_table
 
 __all__ = ["plot", "run"]
@@ -24,24 +23,25 @@ PRINTED_GAIN: Final = 0.24
 VARIANTS: Final = {"tiles": False, "tiles and palm": True}
 """Where the pulleys are fixed rods, and whether that is the palm's own too."""
 
+COLOURS: Final = {"tiles": "tab:blue", "tiles and palm": "tab:orange"}
+
 SIGNIFICANT: Final = 0.05
 """Probability by chance below which a rank correlation counts."""
 
 ALIKE: Final = 1e-9
 """Gains that differ by less are the same."""
 
+Loaded = list[dict[str, Any]]
+"""Configurations of springs, with their loads and gains."""
+
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Load every sequence (mirror images once) with and without friction, for several k_p."""
     experiment = PalmExperiment.from_tables(hand)
     numbers = range(1, len(experiment.springs) + 1)
-    sequences = [s for s in itertools.product(numbers, repeat=TILES) if s <= s[::-1]]
     tried = experiment_table().vector("load_sharing", "springs_tried")
     others = [replace(experiment, preload_stiffness=stiffness) for stiffness in tried]
-    configurations, *for_others = (
-        [_configuration(each, sequence) for sequence in sequences]
-        for each in track(progress, [experiment, *others])
-    )
+    configurations, *for_others = (_loaded(each) for each in track(progress, [experiment, *others]))
     unlike = _unlike(configurations)
     data: dict[str, Any] = {
         "contact_springs": experiment.springs,
@@ -70,31 +70,47 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             {"preload_stiffness": stiffness, "variants": _gains(_unlike(found))}
             for stiffness, found in zip(tried, for_others, strict=True)
         ],
-        "not_tested": [
-            "which eight configurations Fig. 7 has, and their loads: in the picture only",
-        ],
     }
-    claims = tuple(_claims(experiment, data, unlike))
-    return StudyResult("fig07", "four tiles sharing a load", data, claims)
+    text = StudyText("fig07")
+    for name, summary in data["variants"].items():
+        least, largest = (100.0 * summary[end] for end in ("least", "largest"))
+        count = f"{summary['reach_printed']} of {summary['configurations']}"
+        told = f"{least:+.0f} to {largest:+.0f} %; {count} reach 24 %"
+        text.check("gain", told, summary["least"] >= PRINTED_GAIN, rods=name)
+        hurt = ", ".join("".join(map(str, s)) for s in summary["hurts"]) or "none"
+        told = f"least {least:+.1f} %; hurt: {hurt}"
+        text.check("helpful", told, summary["least"] >= 0.0, rods=name)
+        found = _discrepancy_correlations(experiment, unlike, name)
+        told = ", ".join(f"{what} {r:+.2f}" for what, (r, _) in found.items())
+        significant = all(r > 0.0 and p < SIGNIFICANT for r, p in found.values())
+        text.check("discrepancies", told, significant, rods=name)
+    return text.result(data)
 
 
-def _configuration(experiment: PalmExperiment, sequence: tuple[int, ...]) -> dict[str, Any]:
-    mu = experiment.friction
-    loads = {name: experiment.load(sequence, mu, mu * own) for name, own in VARIANTS.items()}
-    without = experiment.load(sequence, 0.0)
-    return {
-        "springs": sequence,
-        "load_without_friction": without,
-        "load_with_friction": loads,
-        "gain": {name: load / without - 1.0 for name, load in loads.items()},
-    }
+def _loaded(experiment: PalmExperiment) -> Loaded:
+    """Return every sequence of springs, mirror images once."""
+    numbers, mu = range(1, len(experiment.springs) + 1), experiment.friction
+    found = []
+    for sequence in itertools.product(numbers, repeat=TILES):
+        if sequence <= sequence[::-1]:
+            without = experiment.load(sequence, 0.0)
+            loads = {
+                name: experiment.load(sequence, mu, mu * own) for name, own in VARIANTS.items()
+            }
+            found.append({
+                "springs": sequence,
+                "load_without_friction": without,
+                "load_with_friction": loads,
+                "gain": {name: load / without - 1.0 for name, load in loads.items()},
+            })  # fmt: skip
+    return found
 
 
-def _unlike(configurations: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _unlike(configurations: Loaded) -> Loaded:
     return [c for c in configurations if len(set(c["springs"])) > 1]
 
 
-def _gains(configurations: list[dict[str, Any]]) -> dict[str, Any]:
+def _gains(configurations: Loaded) -> dict[str, Any]:
     """Return the range of gains, how many reach the printed one, and where friction hurts."""
     summaries = {}
     for name in VARIANTS:
@@ -110,38 +126,8 @@ def _gains(configurations: list[dict[str, Any]]) -> dict[str, Any]:
     return summaries
 
 
-def _claims(
-    experiment: PalmExperiment, data: dict[str, Any], unlike: list[dict[str, Any]]
-) -> Iterator[Claim]:
-    for name, summary in data["variants"].items():
-        range_text = f"{100 * summary['least']:+.0f} to {100 * summary['largest']:+.0f} %"
-        count = f"{summary['reach_printed']} of {summary['configurations']}"
-        yield Claim(
-            "friction improves the load in all 8 configurations by at least 24 %; here all "
-            f"unlike sequences, as the 8 are not known; rods at {name}",
-            ">= 24 %",
-            f"{range_text}; {count} reach 24 %",
-            bool(summary["least"] >= PRINTED_GAIN),
-        )
-        hurt = ", ".join("".join(map(str, s)) for s in summary["hurts"]) or "none"
-        yield Claim(
-            f"friction is helpful (Section 4.2); rods at {name}",
-            "no loss",
-            f"least {100 * summary['least']:+.1f} %; hurt: {hurt}",
-            bool(summary["least"] >= 0.0),
-        )
-        correlations = _discrepancy_correlations(experiment, unlike, name)
-        yield Claim(
-            "particularly with substantial discrepancies in contact quality: rank correlation "
-            f"of the gain; rods at {name}",
-            "positive",
-            ", ".join(f"{what} {r:+.2f}" for what, (r, _) in correlations.items()),
-            all(r > 0.0 and p < SIGNIFICANT for r, p in correlations.values()),
-        )
-
-
 def _discrepancy_correlations(
-    experiment: PalmExperiment, configurations: list[dict[str, Any]], variant: str
+    experiment: PalmExperiment, configurations: Loaded, variant: str
 ) -> dict[str, tuple[float, float]]:
     """Return Spearman's rank correlation of gain with two measures of discrepancy, and its p.
 
@@ -159,9 +145,6 @@ def _discrepancy_correlations(
     return {what: (answer.statistic, answer.pvalue) for what, answer in answers.items()}
 
 
-COLOURS: Final = {"tiles": "tab:blue", "tiles and palm": "tab:orange"}
-
-
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw loads and gains of all sequences, and what the gains depend on."""
     return {
@@ -172,70 +155,55 @@ def plot(result: StudyResult) -> dict[str, Figure]:
 
 def _draw_sequences(data: dict[str, Any]) -> Figure:
     shown = sorted(data["configurations"], key=lambda c: float(c["gain"]["tiles"]))
-    places = np.arange(len(shown))
+    places, text = np.arange(len(shown)), StudyText("fig07")
     figure, (loads, gains) = panels(2, 1, (14.0, 7.5), grid="y", sharex=True)
     without = [1e-3 * c["load_without_friction"] for c in shown]
     loads.bar(places - 0.28, without, 0.28, color="0.7", label="bearings everywhere, μ = 0")
-    for shift, name in zip((0.0, 0.28), VARIANTS, strict=True):
+    for shift, (name, colour) in zip((0.0, 0.28), COLOURS.items(), strict=True):
         height = [1e-3 * c["load_with_friction"][name] for c in shown]
         label = f"rods at {name}, μ = {data['friction']:g}"
-        loads.bar(places + shift, height, 0.28, color=COLOURS[name], label=label)
+        loads.bar(places + shift, height, 0.28, color=colour, label=label)
         gain = [100.0 * c["gain"][name] for c in shown]
-        gains.plot(places, gain, "o", color=COLOURS[name], label=f"rods at {name}")
-    stiffness = ", ".join(f"{1e-3 * k:g}" for k in data["contact_springs"])
-    loads.set(
-        ylabel="maximum load over the stop's travel [N/mm]",
-        title=f"four tiles, k_p = {1e-3 * data['preload_stiffness']:g} N/mm, a hard stop on the "
-        "softest contacts; all sequences, mirror images once",
-    )
+        gains.plot(places, gain, "o", color=colour, label=f"rods at {name}")
+    text.label(loads, "loads", stiffness=1e-3 * data["preload_stiffness"])
     loads.set_ylim(top=1.35 * loads.get_ylim()[1])
     loads.legend(loc="upper left", ncols=3)
     gains.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0, label="printed, at least")
     gains.axhline(0.0, color="black", linewidth=0.8)
-    names = ["".join(map(str, c["springs"])) for c in shown]
-    gains.set_xticks(places, names, rotation=90)
-    gains.set(
-        ylabel="gain by friction [%]",
-        xlabel=f"springs of the contacts from the left; 1, 2, 3: {stiffness} N/mm",
-        xlim=(-0.8, len(shown) - 0.2),
-    )
+    gains.set_xticks(places, ["".join(map(str, c["springs"])) for c in shown], rotation=90)
+    gains.set_xlim(-0.8, len(shown) - 0.2)
+    text.label(gains, "gains", springs=", ".join(f"{1e-3 * k:g}" for k in data["contact_springs"]))
     gains.legend(loc="upper left")
     return figure
 
 
 def _draw_dependence(data: dict[str, Any]) -> Figure:
-    figure, (softest, springs) = panels(1, 2, (11.0, 4.4), grid="y", sharey=True)
-    for shift, name in zip((-0.1, 0.1), VARIANTS, strict=True):
-        for axes, entries, key, scale, offset in (
-            (softest, data["by_number_of_softest_tiles"], "softest_tiles", 1.0, shift),
-            (springs, data["sensitivity"], "preload_stiffness", 1e-3, 0.15 * shift),
-        ):
-            x = np.array([scale * entry[key] + offset for entry in entries])
-            ranges = [entry["variants"][name] for entry in entries]
+    text = StudyText("fig07")
+    figure, both = panels(1, 2, (11.0, 4.4), grid="y", sharey=True)
+    of = (
+        ("by_number_of_softest_tiles", "softest_tiles", 1.0),
+        ("sensitivity", "preload_stiffness", 1e-3),
+    )
+    for axes, (entries, key, scale), apart in zip(both, of, (0.1, 0.015), strict=True):
+        for side, (name, colour) in zip((-1.0, 1.0), COLOURS.items(), strict=True):
+            x = np.array([scale * entry[key] + side * apart for entry in data[entries]])
+            ranges = [entry["variants"][name] for entry in data[entries]]
             low, middle, high = (
-                100.0 * np.array([r[key_of] for r in ranges])
-                for key_of in ("least", "median", "largest")
+                100.0 * np.array([r[end] for r in ranges]) for end in ("least", "median", "largest")
             )
-            bar = {"color": COLOURS[name], "capsize": 4.0, "label": f"rods at {name}"}
+            bar = {"color": colour, "capsize": 4.0, "label": f"rods at {name}"}
             axes.errorbar(x, middle, (middle - low, high - middle), fmt="o", **bar)
             for place, spot, r in zip(x, middle, ranges, strict=True):
-                text = f"{r['reach_printed']}/{r['configurations']}"
+                reached = f"{r['reach_printed']}/{r['configurations']}"
                 style = {"xytext": (6, 3), "textcoords": "offset points", "fontsize": 8}
-                axes.annotate(text, (place, spot), **style)
+                axes.annotate(reached, (place, spot), **style)
+        axes.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0)
+        axes.axhline(0.0, color="black", linewidth=0.8)
+    softest, springs = both
     softest.set_xticks(range(1, TILES))
     softest.set_xlim(0.6, TILES - 0.4)
     springs.margins(x=0.12)
-    softest.set(
-        xlabel="tiles with the softest contact [1]",
-        ylabel="gain by friction [%]: least, median, largest",
-        title="friction helps most where one tile is weak",
-    )
-    springs.set(
-        xlabel="preload springs, k_p [N/mm]",
-        title="n/m: how many of the sequences reach the printed 24 %",
-    )
-    for axes in (softest, springs):
-        axes.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0)
-        axes.axhline(0.0, color="black", linewidth=0.8)
+    text.label(softest, "softest")
+    text.label(springs, "preload")
     softest.legend(loc="upper right")
     return figure

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -20,7 +19,7 @@ import scipy
 from matplotlib.figure import Figure
 
 from hand_models.base import Array, Progress
-from hand_models.experiments import SANDPAPER, Claim, StudyResult, panels
+from hand_models.experiments import SANDPAPER, StudyResult, StudyText, panels
 from hand_models.parameters import ParameterTable
 from hand_models.tile import (
     LEAST_SPINES,
@@ -106,13 +105,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "lateral_fit": fit_lateral(array, limit)._asdict(),
         "bounds": gaps,
         "hull_over_surface": hull_over_surface(surface),
-        "not_tested": [
-            "the 70 trials of the paper match its model: both are printed in a picture only",
-        ],
     }
     progress(4, steps)
-    title = "limit curve of a spine tile on 36-grit sandpaper"
-    return StudyResult("fig10", title, data, tuple(_claims(surface, array, data)))
+    text = StudyText("fig10")
+    _check(text, surface, array, data)
+    return text.result(data)
 
 
 def _directions(angle: Array | float, azimuth: Array | float) -> Array:
@@ -124,9 +121,8 @@ def _directions(angle: Array | float, azimuth: Array | float) -> Array:
 def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> dict[str, float]:
     """Fit T + k P = T_0 to the curve up to φ_max, by least squares of the distance."""
     within = within_law(angles, pull_off_angle)
-    points = strengths[within, None] * np.column_stack(
-        [np.cos(angles[within]), np.sin(angles[within])]
-    )
+    angles, strengths = angles[within], strengths[within]
+    points = strengths[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     centre = points.mean(axis=0)
     spread = points - centre
     normal = np.linalg.svd(spread)[2][1]
@@ -148,18 +144,13 @@ def _table() -> list[dict[str, Any]]:
         for cell in measured_tile_shear(concrete):
             tile = replace(array, spines=cell.spines, backlash=cell.backlash)
             found = statistics(tile.simulate_drag(np.random.default_rng(SEED), TRIALS))
-            cells.append(
-                {
-                    "concrete": concrete,
-                    **cell._asdict(),
-                    "simulated_mean": found.mean,
-                    "simulated_deviation": found.deviation,
-                }
-            )
+            simulated = {"simulated_mean": found.mean, "simulated_deviation": found.deviation}
+            cells.append({"concrete": concrete, **cell._asdict(), **simulated})
     return cells
 
 
 def _gaps(surface: Surface) -> list[dict[str, float]]:
+    """Return, for numbers of half-planes, how far they are inside and outside the law."""
     directions = np.abs(np.random.default_rng(SEED).normal(size=(DIRECTIONS, 3)))
     directions *= (1.0, -1.0, 1.0)
     directions /= np.linalg.norm(directions, axis=1)[:, None]
@@ -167,12 +158,9 @@ def _gaps(surface: Surface) -> list[dict[str, float]]:
     gaps = []
     for count in COUNTS:
         pieces = replace(surface, half_planes=count)
-        lateral = (
-            float(directional_strength(inner_half_planes(pieces), sideways)[0])
-            / surface.shear_limit
-        )
-        gap = bounds_gap(pieces, directions)
-        gaps.append({"half_planes": count, "lateral_reach": lateral, **gap._asdict()})
+        reach = float(directional_strength(inner_half_planes(pieces), sideways)[0])
+        gap = bounds_gap(pieces, directions)._asdict()
+        gaps.append({"half_planes": count, "lateral_reach": reach / surface.shear_limit, **gap})
     return gaps
 
 
@@ -193,95 +181,41 @@ def hull_over_surface(surface: Surface) -> float:
     return float(scipy.spatial.ConvexHull(points.reshape(-1, 3)).volume) / own
 
 
-def _claims(surface: Surface, array: SpineArray, data: dict[str, Any]) -> Iterator[Claim]:
+def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str, Any]) -> None:
     limit = surface.pull_off_angle
     # what the mean of the measurements in one direction is known to
     error = np.mean(data["array"]["deviation"][within_law(CURVE, limit)]) / math.sqrt(REPEATS)
-    fitted = data["fit_of_trials"]["shear_limit"]
-    pressed = CURVE[CURVE < 0.0]
-    force = array.share(pressed)
-    gained = float(np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0])
-    ratio = surface.pull_off_limit / surface.shear_limit
-    at_limit, beyond = float(array.share(limit)), float(array.share(BEYOND))
-    kept = float(surface.strength(BEYOND) / surface.shear_limit)
-    for key, words in (
-        ("fit_of_mean", "attachment is approximately linear with the loading angle (Appendix 9.4)"),
-        (
-            "cartesian_line_of_mean",
-            "the limit curve is nearly a straight line in Cartesian coordinates (Section 6.1)",
-        ),
-    ):
+    for name, key in (("linear_in_angle", "fit_of_mean"), ("straight", "cartesian_line_of_mean")):
         line = data[key]
-        yield Claim(
-            words,
-            f"off by less than five measurements can tell, {error:.1f} N",
-            f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}",
-            bool(line["worst"] <= error),
-        )
-    yield Claim(
-        "f_smax of Eq. 21, fitted to 70 trials, is the planner's",
-        surface.shear_limit,
-        fitted,
-        bool(abs(fitted - surface.shear_limit) <= error),
-        role="calibration",
-    )
-    yield Claim(
-        "f_smin / f_smax at 45° is that of the fit to Fig. 13",
-        ratio,
-        at_limit,
-        abs(at_limit - ratio) <= 0.01 * ratio,
-        role="calibration",
-    )
-    yield Claim(
-        "beyond 45° (not published) the planner's constant f_smin: f_s / f_smax at 60°",
-        kept,
-        beyond,
-        beyond >= kept,
-    )
-    yield Claim(
-        "under positive normal forces conventional Coulomb friction applies (Section 6.1)",
-        array.tile_friction,
-        gained,
-        abs(gained - array.tile_friction) <= 1e-6,
-    )
-    for preset, words in (
-        ("concrete-coarse", "coarse concrete, as measured"),
-        ("rock", "the planner's rock"),
-    ):
-        times = Surface.named(preset).shear_limit / surface.shear_limit
-        yield Claim(
-            f"the force on rock is 2 to 5 times greater (Section 6): {words}",
-            "2 to 5",
-            times,
-            2.0 <= times <= 5.0,
-            role="calibration" if preset == "rock" else "test",
-        )
+        told = f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}"
+        text.check(name, told, line["worst"] <= error, error=error)
+    fitted, planned = data["fit_of_trials"]["shear_limit"], surface.shear_limit
+    text.check("shear_limit", fitted, abs(fitted - planned) <= error, claimed=planned)
+    ratio, at_limit = surface.pull_off_limit / planned, float(array.share(limit))
+    text.check("ratio", at_limit, abs(at_limit - ratio) <= 0.01 * ratio, claimed=ratio)
+    kept, beyond = float(surface.strength(BEYOND) / planned), float(array.share(BEYOND))
+    text.check("beyond", beyond, beyond >= kept, claimed=kept)
+    pressed = CURVE[CURVE < 0.0]
+    force, friction = array.share(pressed), array.tile_friction
+    gained = float(np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0])
+    text.check("friction", gained, abs(gained - friction) <= 1e-6, claimed=friction)
+    for preset in ("concrete-coarse", "rock"):
+        times = Surface.named(preset).shear_limit / planned
+        text.check(f"times_on_{preset}", times, 2.0 <= times <= 5.0)
     enough = [cell for cell in data["tile_shear"] if cell["spines"] >= LEAST_SPINES]
     few = [cell for cell in data["tile_shear"] if cell["spines"] < LEAST_SPINES]
-    for cells, spines in ((enough, "20, 40, 60"), (few, "5, 10")):
+    for cells, name in ((enough, "strength_of_many"), (few, "strength_of_few")):
         off = [abs(cell["simulated_mean"] - cell["mean"]) / cell["error"] for cell in cells]
-        yield Claim(
-            f"strength of tiles of {spines} spines, 2 concretes, 2 backlashes ([16], Fig. 7)",
-            "within the bars",
-            f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less",
-            max(off) <= 1.0,
-            role="calibration" if cells is enough else "test",
-        )
+        told = f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less"
+        text.check(name, told, max(off) <= 1.0)
     for concrete in ("fine", "coarse"):
         cells = [cell for cell in enough if cell["concrete"] == concrete]
         ratios = [cell["simulated_deviation"] / cell["error"] for cell in cells]
-        yield Claim(
-            f"scatter of those tiles on {concrete} concrete, over the length of its bar",
-            "0.5 to 1.5",
-            f"{min(ratios):.2f} to {max(ratios):.2f}",
-            min(ratios) >= 0.5 and max(ratios) <= 1.5,
-        )
-    yield Claim(
-        "the loading limits form a non-convex hull (Section 1.2): its convex hull has more volume",
-        "> 1",
-        data["hull_over_surface"],
-        data["hull_over_surface"] > 1.01,
-    )
+        told = f"{min(ratios):.2f} to {max(ratios):.2f}"
+        holds = min(ratios) >= 0.5 and max(ratios) <= 1.5
+        text.check("scatter", told, holds, concrete=concrete)
+    more = data["hull_over_surface"]
+    text.check("not_convex", more, more > 1.01)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
@@ -318,20 +252,11 @@ def _draw_curve(data: dict[str, Any]) -> Figure:
         polar.plot(np.degrees(angles), strength, label=label, **style)
         shear, pull_off = strength * np.cos(angles), strength * np.sin(angles)
         cartesian.plot(shear, pull_off, label=of_points, **style)
-    polar.set(
-        xlabel="loading angle φ from shear toward pull-off [°]; grey: pressed",
-        ylabel="largest force [N]; band: 5 to 95 % of tiles",
-        title="over the loading angle",
-        xlim=(-30.0, 90.0),
-        ylim=(0.0, 60.0),
-    )
-    cartesian.set(
-        xlabel="shear [N]",
-        ylabel="pull-off [N]; grey: pressed",
-        title="in Cartesian coordinates",
-        xlim=(0.0, 50.0),
-        ylim=(-20.0, 20.0),
-    )
+    polar.set(xlim=(-30.0, 90.0), ylim=(0.0, 60.0))
+    cartesian.set(xlim=(0.0, 50.0), ylim=(-20.0, 20.0))
+    text = StudyText("fig10")
+    text.label(polar, "polar")
+    text.label(cartesian, "cartesian")
     polar.legend()
     cartesian.legend()
     return figure
@@ -340,7 +265,10 @@ def _draw_curve(data: dict[str, Any]) -> Figure:
 def _draw_table(data: dict[str, Any]) -> Figure:
     """Draw the measured and the simulated strengths over the number of spines."""
     figure, both = panels(1, 2, (11.0, 4.4), sharey=True)
-    highest = 1.3 * max(cell["mean"] + cell["error"] for cell in data["tile_shear"])
+    highest, text = (
+        1.3 * max(cell["mean"] + cell["error"] for cell in data["tile_shear"]),
+        StudyText("fig10"),
+    )
     for axes, concrete in zip(both, ("fine", "coarse"), strict=True):
         cells = [cell for cell in data["tile_shear"] if cell["concrete"] == concrete]
         ordered = itertools.groupby(cells, key=lambda cell: cell["backlash"])
@@ -348,15 +276,15 @@ def _draw_table(data: dict[str, Any]) -> Figure:
             keys = ("spines", "mean", "error", "simulated_mean", "simulated_deviation")
             found = np.array([[row[key] for key in keys] for row in group])
             spines, mean, error, simulated, deviation = found.T
-            name = f"{1e3 * backlash:g} mm of play"
+            name, style = f"{1e3 * backlash:g} mm of play", {"color": colour}
             axes.errorbar(
-                spines, mean, error, fmt="o", color=colour, capsize=3, label=f"measured, {name}"
+                spines, mean, error, fmt="o", capsize=3, label=f"measured, {name}", **style
             )
-            axes.plot(spines, simulated, color=colour, label=f"simulated, {name}")
-            axes.fill_between(
-                spines, simulated - deviation, simulated + deviation, color=colour, alpha=0.15
-            )
-        axes.set(xlabel="spines of a tile [1]", title=f"{concrete} concrete", ylim=(0.0, highest))
+            axes.plot(spines, simulated, label=f"simulated, {name}", **style)
+            band = simulated - deviation, simulated + deviation
+            axes.fill_between(spines, *band, alpha=0.15, **style)
+        text.label(axes, "concrete", concrete=concrete)
+        axes.set_ylim(0.0, highest)
         axes.legend(loc="upper left")
     both[0].set_ylabel("tile's strength in shear [N]; bars and bands: scatter")
     return figure
@@ -366,29 +294,25 @@ def _draw_surface() -> Figure:
     """Draw the strength over the azimuth at three loading angles."""
     surface, array = Surface.named(SANDPAPER), SpineArray.named(SANDPAPER)
     figure, shown = panels(1, 3, (13.0, 4.6))
-    azimuth = np.radians(np.linspace(-90.0, 90.0, 181))
+    azimuth, text = np.radians(np.linspace(-90.0, 90.0, 181)), StudyText("fig10")
     for axes, part in zip(shown, (0.0, 0.5, 1.0), strict=True):
         angle = part * surface.pull_off_angle
         directions = _directions(angle, azimuth)
         drag = float(surface.strength(angle)) / float(array.share(angle))
-        radii: list[tuple[Array, str, str, str]] = [
-            (drag * array.share(angle, azimuth), "tab:blue", "-", "spine array, to its level"),
-            (surface.strength(angle, azimuth), "k", "-", "planner's surface"),
-        ]
-        for count, style in ((1, ":"), (4, "--")):
-            pieces = inner_half_planes(replace(surface, half_planes=count))
-            radii.append(
-                (directional_strength(pieces, directions), "k", style, f"half-planes: {count}")
-            )
-        for radius, colour, style, label in radii:
-            shear, _, lateral = radius * directions.T
-            axes.plot(shear, lateral, style, color=colour, label=label)
-        axes.set(
-            xlabel="shear [N]",
-            ylabel="lateral load [N]",
-            title=f"pulled at φ = {math.degrees(angle):g}°",
-            aspect="equal",
+        one, four = (
+            directional_strength(inner_half_planes(replace(surface, half_planes=n)), directions)
+            for n in (1, 4)
         )
+        for radius, style, label in (
+            (drag * array.share(angle, azimuth), "tab:blue", "spine array, to its level"),
+            (surface.strength(angle, azimuth), "k-", "planner's surface"),
+            (one, "k:", "half-planes: 1"),
+            (four, "k--", "half-planes: 4"),
+        ):
+            shear, _, lateral = radius * directions.T
+            axes.plot(shear, lateral, style, label=label)
+        text.label(axes, "azimuth", angle=math.degrees(angle))
+        axes.set_aspect("equal")
     handles, labels = shown[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure

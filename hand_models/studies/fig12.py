@@ -8,7 +8,6 @@ the base moves is then a test.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -18,8 +17,8 @@ from hand_models.base import Array, Progress
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
 from hand_models.experiments import (
     COLOURS,
-    Claim,
     StudyResult,
+    StudyText,
     panels,
     pull,
     pulled_off_poses,
@@ -108,12 +107,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             "force_z": elsewhere.wrenches[:, 1],
             "shift": np.linalg.norm((elsewhere.poses - rest)[:, :2], axis=1),
         },
-        "not_tested": [
-            "the measured lines: they are printed in a picture only, one trial, with oscillations"
-        ],
     }
-    claims = (*_claims_of_ends(data), *_claims_of_lines(data, table), *_claims_of_slip(data, table))
-    return StudyResult("fig12", "forces on the phalanges under a pull straight off", data, claims)
+    text = StudyText("fig12")
+    _check_lines(text, data, table)
+    _check_slip(text, data, table)
+    return text.result(data)
 
 
 def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
@@ -145,84 +143,50 @@ def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
     return A
 
 
-def _claims_of_ends(data: dict[str, Any]) -> Iterator[Claim]:
-    """Yield a claim for shears and normals at both ends of the lines."""
+def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
     for kind in KINDS:
-        for end, words, at in (("unloaded", "without load", 0), ("pulled", "at the end", -1)):
+        for end, where, at in (("unloaded", "without load", 0), ("pulled", "at the end", -1)):
             read, got = np.array(data["read_off"][f"{kind}_{end}"]), data[kind][at]
-            near = np.maximum(NEAR_SHARE * read, NEAR_FORCE)
+            near = np.abs(got - read) <= np.maximum(NEAR_SHARE * read, NEAR_FORCE)
             there = data["pull"][at]
-            yield Claim(
-                f"{kind} of proximal, middle, distal {words}, within 10 % or 0.3 N (Fig. 12)",
-                f"{_listed(read)} N",
-                f"{_listed(got)} N; pulled by {there:g} N",
-                (at == 0 or bool(there == data["pull_of_figure"]))
-                and bool((np.abs(got - read) <= near).all()),
-                role="calibration",
-            )
-
-
-def _claims_of_lines(data: dict[str, Any], table: ParameterTable) -> Iterator[Claim]:
-    for kind, signs, words in (
+            told = f"{_listed(got)} N; pulled by {there:g} N"
+            holds = (at == 0 or there == data["pull_of_figure"]) and near.all()
+            text.check("ends", told, holds, kind=kind, where=where, read=_listed(read))
+    for kind, signs, course in (
         ("shear", (1, 1, 1), "shear forces increase gradually on every phalanx"),
         ("normal", (-1, 0, -1), "the normal forces of proximal and distal phalanx decrease"),
         ("normal", (0, 1, 0), "the normal force of the middle phalanx rises"),
     ):
-        told = np.flatnonzero(signs)
+        meant = np.flatnonzero(signs)
         total = data[kind][-1] - data[kind][0]
-        rising = data[kind][:, told] * np.array(signs)[told]
+        rising = data[kind][:, meant] * np.array(signs)[meant]
         back = float((np.maximum.accumulate(rising) - rising).max())
-        listed = ", ".join(f"{PHALANGES[i]} {total[i]:+.2f}" for i in told)
-        yield Claim(
-            f"under the pull {words} (Section 6.2 and Fig. 12)",
-            "from one end to the other",
-            f"{listed} N" + (f"; {back:.1g} N back on the way" if back > 0.0 else ""),
-            bool((rising[-1] > rising[0]).all()),
-        )
-    ranges = table.vector("fig12", "sensor_range")
-    for kind, span in zip(KINDS, ranges, strict=True):
+        told = ", ".join(f"{PHALANGES[i]} {total[i]:+.2f}" for i in meant) + " N"
+        told += f"; {back:.1g} N back on the way" if back > 0.0 else ""
+        text.check("course", told, (rising[-1] > rising[0]).all(), course=course)
+    for kind, span in zip(KINDS, table.vector("fig12", "sensor_range"), strict=True):
         within = table.scalar("fig12", "sensor_accuracy") * span
         fitted = np.polynomial.polynomial.polyfit(data["pull"], data[kind], 1)
         straight = np.polynomial.polynomial.polyval(data["pull"], fitted).T
         off = float(np.abs(data[kind] - straight).max())
-        yield Claim(
-            f"the grasp model is linear (Section 6.2): {kind} is straight over the pull",
-            f"off by less than the sensors' accuracy, {within:.2g} N",
-            f"off by up to {off:.2g} N",
-            off <= within,
-        )
+        text.check("straight", f"off by up to {off:.2g} N", off <= within, kind=kind, within=within)
     condition, least = data["condition"], data["condition_printed"]
-    yield Claim(
-        "cond(A) > 270 in all trials (Section 5.4.2); here in SI units",
-        f"> {least:g}",
-        f"{condition.min():.0f} to {condition.max():.0f}",
-        bool(condition.min() > least),
-    )
+    told = f"{condition.min():.0f} to {condition.max():.0f}"
+    text.check("condition", told, condition.min() > least, least=least)
 
 
-def _claims_of_slip(data: dict[str, Any], table: ParameterTable) -> Iterator[Claim]:
+def _check_slip(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
     slip = data["slip"]
-    used = slip["utilisation_by_phalanx"]
-    yield Claim(
-        "proximal or distal contacts are likely to exceed their limits first (Section 6.2)",
-        "proximal or distal",
-        f"{slip['phalanx']}, at {slip['pull']:.1f} N ({slip['way'].replace('_', ' ')})",
-        slip["phalanx"] in ("proximal", "distal"),
-    )
-    yield Claim(
-        "the middle phalanx stays within safe loading: utilisation when a tile lets go",
-        "middle < 1",
-        ", ".join(f"{name} {u:.2f}" for name, u in zip(PHALANGES, used, strict=True)),
-        bool(used[1] < 1.0),
-    )
-    shift = table.scalar("fig12", "base_shift")
+    first, used = slip["phalanx"], slip["utilisation_by_phalanx"]
+    told = f"{first}, at {slip['pull']:.1f} N ({slip['way'].replace('_', ' ')})"
+    text.check("first", told, first in ("proximal", "distal"))
+    told = ", ".join(f"{name} {u:.2f}" for name, u in zip(PHALANGES, used, strict=True))
+    text.check("middle", told, used[1] < 1.0)
+    shift, own = table.scalar("fig12", "base_shift"), slip["base_shift"]
     furthest = data["base_shift_elsewhere"]["shift"].max()
-    yield Claim(
-        "the base shifts by up to 5 mm, as the model predicts (Section 6.2): until it lets go",
-        f"{1e3 * shift:g} mm within {100 * NEAR_SHIFT:g} %",
-        f"{1e3 * slip['base_shift']:.2f} mm; pulled aside, up to {1e3 * furthest:.2f} mm",
-        bool(abs(max(slip["base_shift"], furthest) - shift) <= NEAR_SHIFT * shift),
-    )
+    told = f"{1e3 * own:.2f} mm; pulled aside, up to {1e3 * furthest:.2f} mm"
+    holds = abs(max(own, furthest) - shift) <= NEAR_SHIFT * shift
+    text.check("base", told, holds, shift=1e3 * shift, near=100 * NEAR_SHIFT)
 
 
 def _listed(values: Array) -> str:
@@ -231,30 +195,20 @@ def _listed(values: Array) -> str:
 
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw shear and normal forces over the pull, and the condition of A."""
-    data = result.data
+    data, slip, text = result.data, result.data["slip"], StudyText("fig12")
     figure, (shear, normal, condition) = panels(1, 3, (14.0, 4.4))
     for axes, kind in ((shear, "shear"), (normal, "normal")):
         for i, (name, colour) in enumerate(COLOURS.items()):
             axes.plot(data["pull"], data[kind][:, i], color=colour, label=name)
             axes.plot(data["until_slip"]["pull"], data["until_slip"][kind][:, i], ":", color=colour)
             read = [data["read_off"][f"{kind}_{end}"][i] for end in ("unloaded", "pulled")]
-            axes.plot(
-                [0.0, data["pull_of_figure"]], read, "o", color=colour, markerfacecolor="white"
-            )
-            axes.plot(data["slip"]["pull"], data["slip"][kind][i], "x", color=colour)
-        axes.set(
-            xlabel="pull straight off, −F_z [N]",
-            ylabel=f"{kind} force on the rock [N]",
-            title=f"{kind}: lines; read off Fig. 12: circles",
-            ylim=(min(0.0, 1.2 * min(data["slip"][kind])), None),
-        )
-        axes.legend(title=f"×: a tile lets go, {data['slip']['pull']:.1f} N")
+            axes.plot([0.0, data["pull_of_figure"]], read, "o", color=colour, mfc="white")
+            axes.plot(slip["pull"], slip[kind][i], "x", color=colour)
+        text.label(axes, "forces", kind=kind)
+        axes.set_ylim(min(0.0, 1.2 * min(slip[kind])), None)
+        axes.legend(title=f"×: a tile lets go, {slip['pull']:.1f} N")
     condition.plot(data["pull"], data["condition"], color="k")
     condition.axhline(data["condition_printed"], color="tab:red", linewidth=1.0)
-    condition.set(
-        xlabel="pull straight off, −F_z [N]",
-        ylabel="cond(A) of Eq. 7, SI units [1]",
-        title="condition of the balance; red: printed, above",
-        ylim=(0.0, 1.2 * max(*data["condition"], data["condition_printed"])),
-    )
+    text.label(condition, "condition")
+    condition.set_ylim(0.0, 1.2 * max(*data["condition"], data["condition_printed"]))
     return {"fig12": figure}

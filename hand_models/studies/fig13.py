@@ -7,7 +7,6 @@ straight direction reaches before a tile lets go, since the set itself is not co
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -20,9 +19,9 @@ from hand_models.base import Array, Progress
 from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces, search
 from hand_models.experiments import (
     UNITS,
-    Claim,
     Extents,
     StudyResult,
+    StudyText,
     clipped_vertices,
     distance_along,
     edge,
@@ -61,17 +60,13 @@ GRID: Final = 81
 """Points of F_x, and of M_y, of the map of pull-off strengths."""
 
 STEPS: Final = 1000
-"""Of the progress told."""
-
-SEARCHED: Final = 100
-PULLED: Final = 300
-LISTED: Final = 980
-"""Of these, done when the search ends, when the pulls do, and when the list of sets does."""
+SEARCHED, PULLED, LISTED = 100, 300, 980
+"""Of the progress told, and where the search ends, the pulls, and the list of sets."""
 
 SYMMETRIC: Final = 1e-6
 """Of its extents, by how much a hull may be off its mirror image."""
 
-NEAR: Final = Extents(0.1, 0.1, 0.1)
+NEAR: Final = 0.1
 NEAR_SIDE: Final = 0.25
 """Shares by which extents and the side view may be off the figure's."""
 
@@ -89,8 +84,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     found = search(gripper, PER_AXIS, part(progress, 0, SEARCHED, STEPS))
     whole = in_paper_signs(found.wrenches)
     size = np.abs(clipped_vertices(whole)).max(axis=0)
-    directions = even_pulls(DIRECTIONS, size)
-    pulled = pull(gripper, directions, part(progress, SEARCHED, PULLED, STEPS))
+    pulled = pull(gripper, even_pulls(DIRECTIONS, size), part(progress, SEARCHED, PULLED, STEPS))
     # a pull that a search of poses has missed is held all the same
     whole = np.vstack([whole, pulled.wrenches])
     full, shown = vertices(whole), clipped_vertices(whole)
@@ -98,6 +92,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     over = np.linalg.norm(pulled.wrenches * UNITS, axis=1)
     filled = distance_along(full, pulled.wrenches / over[:, None]) / over
     force_x, moment = (np.linspace(-1.0, 1.0, GRID) * size[i] for i in (0, 2))
+    edge_at, side_at = table.vector("fig13", "edge_force_x"), table.scalar("fig13", "side_force_x")
     data: dict[str, Any] = {
         "diameter": diameter,
         "tension": tension,
@@ -108,13 +103,14 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "extents": extents(shown)._asdict(),
         "extents_of_wrenches": extents(held)._asdict(),
         "edge": {
-            "force_x": table.vector("fig13", "edge_force_x"),
-            "moment": edge(held[:, [0, 2]], np.array(table.vector("fig13", "edge_force_x"))),
+            "force_x": edge_at,
+            "moment": edge(held[:, [0, 2]], np.array(edge_at)),
             "printed": table.vector("fig13", "edge_moment"),
         },
         "side": {
-            "force_x": table.scalar("fig13", "side_force_x"),
-            "force_z": _side(held, table.scalar("fig13", "side_force_x")),
+            "force_x": side_at,
+            # the least F_z there, seen along M_y
+            "force_z": -float(edge(held[:, [0, 1]] * (1.0, -1.0), np.array([side_at]))[0]),
             "printed": table.scalar("fig13", "side_force_z"),
         },
         "extents_of_pulls": extents(pulled.wrenches)._asdict(),
@@ -134,16 +130,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "positive_moment": _positive_moment(full, force_x),
         "linearised": _linearised(gripper, full, size),
         "linear_pieces": _linear_pieces(gripper, full, size, part(progress, PULLED, LISTED, STEPS)),
-        "not_tested": [
-            "the 17 measured wrenches (dots) are printed in a picture only, so neither is the "
-            "prediction error of 10 % on average",
-            "errors of 12 % and 14 % on 700 mm: the measurements are not published",
-        ],
     }
     progress(STEPS, STEPS)
-    return StudyResult(
-        "fig13", "wrench space of the gripper on 300 mm", data, tuple(_claims(data, table))
-    )
+    text = StudyText("fig13")
+    _check(text, data, table)
+    return text.result(data)
 
 
 def _held(hand: ParameterTable, table: ParameterTable) -> Array:
@@ -155,11 +146,6 @@ def _held(hand: ParameterTable, table: ParameterTable) -> Array:
         most_pressing=table.scalar("fig13", "top"),
     )
     return with_mirrored(in_paper_signs(search(gripper, PER_AXIS).wrenches))
-
-
-def _side(points: Array, force_x: float) -> float:
-    """Return the least F_z at an F_x, seen along M_y."""
-    return -float(edge(points[:, [0, 1]] * (1.0, -1.0), np.array([force_x]))[0])
 
 
 def _spread(values: Array) -> dict[str, float]:
@@ -247,85 +233,59 @@ def _linearised(gripper: Gripper, full: Array, size: Array) -> dict[str, Any]:
     return result
 
 
-def _claims(data: dict[str, Any], table: ParameterTable) -> Iterator[Claim]:
-    for name, words, unit, near in zip(
-        Extents._fields,
-        ("largest F_x", "least F_z", "largest M_y"),
-        ("N", "N", "N·m"),
-        NEAR,
-        strict=True,
-    ):
+def _check(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
+    names = zip(Extents._fields, ("largest F_x", "least F_z", "largest M_y"), strict=True)
+    for (name, extent), unit in zip(names, ("N", "N", "N·m"), strict=True):
         read, got = table.scalar("fig13", name), data["extents_of_wrenches"][name]
         whole, pulled = data["extents"][name], data["extents_of_pulls"][name]
-        yield Claim(
-            f"{words} of wrenches held, within {100 * near:g} % (Fig. 13)",
-            f"{read:g} {unit}",
+        told = (
             f"{got:.3g} {unit} ({100 * (got / read - 1):+.0f} %); of straight pulls {pulled:.3g}, "
-            f"of the whole hull's part F_z ≤ 0 {whole:.3g}",
-            abs(got / read - 1.0) <= near,
-            role="calibration",
+            f"of the whole hull's part F_z ≤ 0 {whole:.3g}"
         )
+        holds, near = abs(got / read - 1.0) <= NEAR, 100 * NEAR
+        text.check("extent", told, holds, extent=extent, near=near, read=read, unit=unit)
     off = np.abs(np.array(data["edge"]["moment"]) - data["edge"]["printed"])
-    yield Claim(
-        "edge seen along F_z, within 0.2 N·m everywhere and 0.1 on average (Fig. 13)",
-        "the printed surface",
-        f"off by {off.max():.2f} at most, {off.mean():.2f} on average",
-        bool(off.max() <= NEAR_EDGE and off.mean() <= NEAR_EDGE_ON_AVERAGE),
-        role="calibration",
-    )
-    side = data["side"]
-    printed = side["printed"]
-    yield Claim(
-        f"largest pull-off at F_x = {side['force_x']:g} N, within a quarter (Fig. 13, from aside)",
-        f"{printed:g} N",
-        f"{side['force_z']:.3g} N",
-        abs(side["force_z"] / printed - 1.0) <= NEAR_SIDE,
-        role="calibration",
-    )
-    yield Claim(
-        "the wrench space is skew symmetric (Section 7): off its image (−F_x, F_z, −M_y)",
-        "nothing",
-        f"{data['asymmetry']:.1g} of its extents",
-        data["asymmetry"] <= SYMMETRIC,
-    )
-    moments = data["positive_moment"]
-    best, forces = moments["best_moment"], moments["force_x"]
+    told = f"off by {off.max():.2f} at most, {off.mean():.2f} on average"
+    text.check("edge", told, off.max() <= NEAR_EDGE and off.mean() <= NEAR_EDGE_ON_AVERAGE)
+    force_x, force_z, printed = data["side"].values()
+    holds = abs(force_z / printed - 1.0) <= NEAR_SIDE
+    text.check("side", f"{force_z:.3g} N", holds, force_x=force_x, printed=printed)
+    off = data["asymmetry"]
+    text.check("skew_symmetric", f"{off:.1g} of its extents", off <= SYMMETRIC)
+    forces, best, strength, without = data["positive_moment"].values()
     share = float((best > 0.0).sum() / max(len(best), 1))
     middle = len(forces) // 2
-    without = np.nan_to_num(moments["strength_without"][middle])
-    yield Claim(
-        "with shear F_x > 0, a positive moment raises the pull-out strength (Section 6.3)",
-        "for every F_x",
+    told = (
         f"for {100 * share:.0f} % of F_x up to {forces.max(initial=0.0):.1f} N; strength at half "
-        f"of that from {without:.1f} to {moments['strength'][middle]:.1f} N",
-        share == 1.0,
+        f"of that from {np.nan_to_num(without[middle]):.1f} to {strength[middle]:.1f} N"
     )
+    text.check("positive_moment", told, share == 1.0)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the hull from aside, from above and along F_x, and the map of pull-off strengths."""
-    data = result.data
+    data, text = result.data, StudyText("fig13")
     figure = Figure(figsize=(14.0, 10.0), layout="constrained")
     points, pulled = data["hull_vertices"], data["pulls"]["wrenches"]
     _draw_solid(figure.add_subplot(2, 2, 1, projection="3d"), points)
     top, side, strength = (figure.add_subplot(2, 2, k) for k in (2, 3, 4))
-    for axes, first, second, labels, title in (
-        (top, 0, 2, ("F_x [N]", "M_y [N·m]"), "from above"),
-        (side, 0, 1, ("F_x [N]", "F_z [N]"), "from aside"),
+    edge_x, _, edge_moment = data["edge"].values()
+    side_x, _, side_z = data["side"].values()
+    # the surface is skew symmetric: what was read off on one side is on both
+    for axes, name, second, x, y in (
+        (top, "top", 2, np.array(edge_x), np.array(edge_moment)),
+        (side, "side", 1, np.array([side_x]), np.array([side_z])),
     ):
-        outline = points[hull(points[:, [first, second]]).vertices]
-        axes.fill(outline[:, first], outline[:, second], color="tab:blue", alpha=0.2)
-        axes.plot(pulled[:, first], pulled[:, second], ".", color="0.4", markersize=3)
-        axes.set(xlabel=labels[0], ylabel=labels[1], title=f"{title}; dots: straight pulls")
+        outline = points[hull(points[:, [0, second]]).vertices]
+        axes.fill(outline[:, 0], outline[:, second], color="tab:blue", alpha=0.2)
+        axes.plot(pulled[:, 0], pulled[:, second], ".", color="0.4", markersize=3)
+        mirrored = y if second == 1 else -y
+        axes.plot([*x, *-x], [*y, *mirrored], "x", color="tab:red", label="read off Fig. 13")
+        text.label(axes, name)
         axes.grid(alpha=0.3)
-    printed, side_view = data["edge"], data["side"]
-    corners = np.column_stack([printed["force_x"], printed["printed"]])
-    read: dict[str, Any] = {"color": "tab:red", "label": "read off Fig. 13"}
-    top.plot(*np.vstack([corners, -corners]).T, "x", **read)
-    side.plot(side_view["force_x"] * np.array([1.0, -1.0]), [side_view["printed"]] * 2, "x", **read)
-    for axes in (top, side):
         axes.legend(loc="lower right")
     _draw_strength(strength, data)
+    text.label(strength, "strength")
     return {"fig13": figure}
 
 
@@ -341,11 +301,7 @@ def _draw_solid(axes: Any, points: Array) -> None:
         Poly3DCollection(faces[:, :, [0, 2, 1]], facecolors=colours, edgecolor=colours, lw=0.2)
     )
     low, high = points.min(axis=0), points.max(axis=0)
-    axes.set(
-        xlim=(low[0], high[0]),
-        ylim=(low[2], high[2]),
-        zlim=(low[1], 0.0),
-    )
+    axes.set(xlim=(low[0], high[0]), ylim=(low[2], high[2]), zlim=(low[1], 0.0))
     label_solid(axes, "hull, F_z ≤ 0, F_z downward, the paper's signs")
 
 
@@ -364,5 +320,4 @@ def _draw_strength(axes: Any, data: dict[str, Any]) -> None:
     inside = drawn[above, columns] & drawn[above - 1, columns]
     line = np.where(inside, best["best_moment"], np.nan)
     axes.plot(best["force_x"], line, color="tab:red", label="best M_y for each F_x")
-    axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", title="pull-off strength")
     axes.legend(loc="upper left")

@@ -10,7 +10,6 @@ M_y = a F_x.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -22,9 +21,9 @@ from hand_models.experiments import (
     COLOURS,
     DRAGGED,
     UNBALANCED,
-    Claim,
     Role,
     StudyResult,
+    StudyText,
     clipped_vertices,
     even_pulls,
     extents,
@@ -79,19 +78,11 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         found = _surface(gripper, part(progress, start, end, STEPS))
         surfaces.append({"diameter": diameter, "tension": held, **found})
     progress(STEPS, STEPS)
-    data = {
-        "phalanges": PHALANGES,
-        "surfaces": surfaces,
-        "not_tested": [
-            "that failures in experiments were those predicted: they are not published",
-        ],
-    }
-    claims = (
-        *_claims_of_failures(*surfaces[:2]),
-        *_claims_of_planes(surfaces[:2], table),
-        *_claims_of_size(*surfaces),
-    )
-    return StudyResult("fig14", "failure modes and planes of loading", data, claims)
+    text = StudyText("fig14")
+    _check_failures(text, *surfaces[:2])
+    _check_planes(text, surfaces[:2], table)
+    _check_sizes(text, *surfaces)
+    return text.result({"phalanges": PHALANGES, "surfaces": surfaces})
 
 
 def _surface(gripper: Gripper, progress: Progress) -> dict[str, Any]:
@@ -180,92 +171,65 @@ def _listed(surface: dict[str, Any]) -> str:
     )
 
 
-def _claims_of_failures(near: dict[str, Any], far: dict[str, Any]) -> Iterator[Claim]:
-    yield Claim(
-        "on 300 mm most failures start from the proximal phalanx (Section 7)",
-        "> 50 % of directions",
-        _listed(near),
-        near["pulls"]["phalanx"].count("proximal") > 0.5 * len(near["pulls"]["phalanx"]),
-    )
-    wrenches = near["pulls"]["wrenches"]
-    arms = np.abs(wrenches[:, 2] / wrenches[:, 0])
-    distal = np.array(near["pulls"]["phalanx"]) == "distal"
+def _check_failures(text: StudyText, near: dict[str, Any], far: dict[str, Any]) -> None:
+    wrenches, _, phalanges, _ = near["pulls"].values()
+    proximal = phalanges.count("proximal") > 0.5 * len(phalanges)
+    text.check("proximal_first", _listed(near), proximal)
+    arms, distal = np.abs(wrenches[:, 2] / wrenches[:, 0]), np.array(phalanges) == "distal"
     told, small = "no distal failure", False
     if distal.any():
         here, others = np.median(arms[distal]), np.median(arms[~distal])
         told = f"median M_y : F_x {1e3 * here:.1f} mm, {1e3 * others:.1f} mm where others fail"
         small = bool(here < others)
-    yield Claim(
-        "on 300 mm the distal phalanx fails where M_y is small against F_x (Section 7)",
-        "M_y : F_x less than where others fail",
-        told,
-        small,
-    )
+    text.check("distal_where", told, small)
     limits = [entry for entry in far["shares"] if entry["way"] not in (DRAGGED, UNBALANCED)]
     mine = sum(entry["share"] for entry in limits if entry["phalanx"] == "proximal")
     letting_go = mine / sum(entry["share"] for entry in limits) if limits else 0.0
-    yield Claim(
-        "on 700 mm the entire wrench space is dominated by proximal failure (Section 7)",
-        "proximal in all directions",
-        f"{_listed(far)}; of tiles that let go {100 * letting_go:.1f} %",
-        set(far["pulls"]["phalanx"]) == {"proximal"},
-    )
+    told = f"{_listed(far)}; of tiles that let go {100 * letting_go:.1f} %"
+    text.check("proximal_only", told, set(far["pulls"]["phalanx"]) == {"proximal"})
 
 
-def _claims_of_planes(surfaces: list[dict[str, Any]], table: ParameterTable) -> Iterator[Claim]:
+def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: ParameterTable) -> None:
     fitted = table.scalar("fig13", "diameter")
     for surface in surfaces:
         where = f"on {1e3 * surface['diameter']:g} mm"
         # the gripper's numbers were fitted to those planes on the surface of Fig. 13
         role: Role = "calibration" if surface["diameter"] == fitted else "test"
-        planes = surface["planes"]
-        for name, words in (("force", "point force"), ("moment", "moment")):
+        planes, ratios = surface["planes"], []
+        for name, aim in (("force", "point force"), ("moment", "moment")):
             best, printed = planes[f"best_for_{name}"], table.scalar("fig14", f"{name}_ratio")
             there = np.interp(1.0 / printed, planes["arm"], planes[name]) / best[name]
-            yield Claim(
-                f"{where} the best F_x : M_y for {words} is about {printed:g} : 1 (Section 7)",
-                f"{printed:g} within {100 * ABOUT:g} %",
-                f"{best['ratio']:.3g} : 1 (M_y : F_x {1e3 * best['arm']:.1f} mm); at "
-                f"{printed:g} : 1 {100 * there:.1f} % of the best; best of straight pulls "
-                f"{surface['best_pulls'][name]['ratio']:.3g} : 1",
-                bool(abs(best["ratio"] - printed) <= ABOUT * printed),
-                role=role,
+            ratio = best["ratio"]
+            told = (
+                f"{ratio:.3g} : 1 (M_y : F_x {1e3 * best['arm']:.1f} mm); at {printed:g} : 1 "
+                f"{100 * there:.1f} % of the best; best of straight pulls "
+                f"{surface['best_pulls'][name]['ratio']:.3g} : 1"
             )
-        force, moment = (planes[f"best_for_{name}"]["ratio"] for name in ("force", "moment"))
-        yield Claim(
-            f"{where} a higher F_x : M_y is better for force, a lower for moment (Section 7)",
-            "higher for force",
-            f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment",
-            bool(0.0 < moment < force),
-        )
+            holds = abs(ratio - printed) <= ABOUT * printed
+            words: dict[str, Any] = {"where": where, "aim": aim, "printed": printed}
+            text.check("best_plane", told, holds, role=role, about=100 * ABOUT, **words)
+            ratios.append(ratio)
+        force, moment = ratios
+        told = f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment"
+        text.check("higher_for_force", told, 0.0 < moment < force, where=where)
     anchor, best = table.scalar("fig14", "anchor"), surfaces[0]["planes"]["best_for_force"]
     span = "nowhere else"
     if best["arms_as_good"]:
         span = "from {:.2f} to {:.2f} cm".format(*(100 * arm for arm in best["arms_as_good"]))
-    yield Claim(
-        "on 300 mm a cable is best anchored 1.1 cm behind the palm (Section 7)",
-        f"{100 * anchor:.1f} cm within {100 * ABOUT:g} %",
-        f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}",
-        bool(abs(best["arm"] - anchor) <= ABOUT * anchor),
-        role="calibration",
-    )
+    told = f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}"
+    holds = abs(best["arm"] - anchor) <= ABOUT * anchor
+    text.check("anchor", told, holds, anchor=100 * anchor, about=100 * ABOUT)
 
 
-def _claims_of_size(near: dict[str, Any], *others: dict[str, Any]) -> Iterator[Claim]:
+def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any]) -> None:
     for surface in others:
-        of = {name: surface["extents"][name] / near["extents"][name] for name in near["extents"]}
-        shares = ", ".join(
-            f"{words} {100 * share:.0f} %"
-            for words, share in zip(("F_x", "F_z", "M_y"), of.values(), strict=True)
-        )
+        of = [surface["extents"][name] / near["extents"][name] for name in near["extents"]]
         size = surface["volume"] / near["volume"]
-        yield Claim(
-            f"the limit surface on 700 mm at {surface['tension']:g} N is smaller than on "
-            f"300 mm at {near['tension']:g} N (Sections 6.3 and 7)",
-            "every extent smaller",
-            f"{shares}, volume {100 * size:.0f} % of that on 300 mm",
-            all(value < 1.0 for value in (*of.values(), size)),
-        )
+        shares = zip(("F_x", "F_z", "M_y"), of, strict=True)
+        told = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
+        told += f", volume {100 * size:.0f} % of that on 300 mm"
+        tensions = {"far": surface["tension"], "near": near["tension"]}
+        text.check("smaller", told, max(*of, size) < 1.0, **tensions)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
@@ -274,17 +238,20 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     return {"fig14": _draw_failures(surfaces[:2]), "fig14_planes": _draw_planes(surfaces)}
 
 
+def _name(surface: dict[str, Any]) -> str:
+    return f"{1e3 * surface['diameter']:g} mm, {surface['tension']:g} N"
+
+
 def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
-    figure = Figure(figsize=(15.0, 9.0), layout="constrained")
+    figure, text = Figure(figsize=(15.0, 9.0), layout="constrained"), StudyText("fig14")
     for row, surface in enumerate(surfaces):
-        name = f"{1e3 * surface['diameter']:g} mm, {surface['tension']:g} N"
         solid: Any = figure.add_subplot(2, 3, 3 * row + 1, projection="3d")
         top, side = (figure.add_subplot(2, 3, 3 * row + k) for k in (2, 3))
         wrenches = surface["pulls"]["wrenches"]
         fails = np.array(surface["pulls"]["phalanx"])
         dragged = np.array(surface["pulls"]["way"]) == DRAGGED
         for phalanx, colour in COLOURS.items():
-            for mark, those, words in (
+            for marker, those, how in (
                 (".", ~dragged, "lets go"),
                 ("x", dragged, "dragged backwards"),
             ):
@@ -292,47 +259,36 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
                 if len(x):
                     style: dict[str, Any] = {
                         "color": colour,
-                        "marker": mark,
-                        "label": f"{phalanx} {words}",
+                        "marker": marker,
+                        "label": f"{phalanx} {how}",
                     }
                     solid.scatter(x, moment, z, s=12, depthshade=False, **style)
                     top.scatter(x, moment, s=14, **style)
                     side.scatter(x, z, s=14, **style)
         low, high = wrenches.min(axis=0), wrenches.max(axis=0)
-        for key, line in (("force", "--"), ("moment", ":")):
+        ends = np.array([low[0], high[0]])
+        for key, line in (("force", "k--"), ("moment", "k:")):
             best = surface["planes"][f"best_for_{key}"]
-            ends = np.array([low[0], high[0]])
-            heights = best["arm"] * ends
-            top.plot(ends, heights, line, color="k", label=f"best for {key}: {best['ratio']:.3g}:1")
-        top.set(xlabel="F_x [N]", ylabel="M_y [N·m]", ylim=(1.15 * low[2], 1.9 * high[2]))
-        top.set_title(f"{name}: from above, planes of loading")
-        side.set(xlabel="F_x [N]", ylabel="F_z [N]", title=f"{name}: from aside")
-        label_solid(solid, f"{name}: first failure, F_z downward")
-        top.grid(alpha=0.3)
-        side.grid(alpha=0.3)
+            top.plot(ends, best["arm"] * ends, line, label=f"best for {key}: {best['ratio']:.3g}:1")
+        top.set_ylim(1.15 * low[2], 1.9 * high[2])
+        label_solid(solid, f"{_name(surface)}: first failure, F_z downward")
+        for axes, view in ((top, "top"), (side, "side")):
+            text.label(axes, view, surface=_name(surface))
+            axes.grid(alpha=0.3)
         top.legend(fontsize=8, loc="upper left")
     return figure
 
 
 def _draw_planes(surfaces: list[dict[str, Any]]) -> Figure:
     figure, both = panels(1, 2, (12.0, 4.4))
-    for axes, key, label in zip(
-        both,
-        ("force", "moment"),
-        ("largest √(F_x² + F_z²) [N]", "largest M_y [N·m]"),
-        strict=True,
-    ):
+    strengths = {"force": "largest √(F_x² + F_z²) [N]", "moment": "largest M_y [N·m]"}
+    for axes, (key, strength) in zip(both, strengths.items(), strict=True):
         for surface in surfaces:
             planes = surface["planes"]
-            name = f"{1e3 * surface['diameter']:g} mm, {surface['tension']:g} N"
-            (line,) = axes.plot(1e3 * planes["arm"], planes[key], label=name)
+            (line,) = axes.plot(1e3 * planes["arm"], planes[key], label=_name(surface))
             best = planes[f"best_for_{key}"]
             axes.plot(1e3 * best["arm"], best[key], "o", color=line.get_color())
-        axes.set(
-            xlabel="M_y : F_x, where a cable is anchored behind the palm [mm]; dots: best",
-            ylabel=label,
-            xlim=(-60.0, 90.0),
-            ylim=(0.0, None),
-        )
+        axes.set(xlim=(-60.0, 90.0), ylim=(0.0, None))
+        StudyText("fig14").label(axes, "planes", strength=strength)
         axes.legend()
     return figure

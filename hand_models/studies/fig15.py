@@ -9,7 +9,6 @@ wrench it has one without F_x and M_y that pulls as hard.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -20,11 +19,11 @@ from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import (
     PARAMETER_STUDIES,
-    Claim,
     Conditions,
     HullPoints,
     Limit,
     StudyResult,
+    StudyText,
     clipped_vertices,
     distance_along,
     limit,
@@ -92,10 +91,10 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "force_to_moment": settings.scalar(PARAMETER_STUDIES, "force_to_moment"),
         "tension": tried,
         "curves": curves,
-        "not_tested": ["how high the printed lines are: the figure has no numbers here"],
     }
-    title = "force limits over the tension of the tendons"
-    return StudyResult("fig15", title, data, tuple(_claims(tried, curves)))
+    text = StudyText("fig15")
+    _check(text, tried, curves)
+    return text.result(data)
 
 
 def _at(grasp: Gripper) -> dict[str, Any]:
@@ -153,7 +152,7 @@ def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> floa
     return float(scipy.optimize.bisect(excess, tried[first - 1], tried[first], xtol=CLOSE))
 
 
-def _claims(tried: Array, curves: list[dict[str, Any]]) -> Iterator[Claim]:
+def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     """Hold the sentences of Section 7.1 against the curves, as far as closing alone holds."""
     strong, weak = (_Curve(curve) for curve in curves)
     both = strong.holds & weak.holds
@@ -162,72 +161,40 @@ def _claims(tried: Array, curves: list[dict[str, Any]]) -> Iterator[Claim]:
     for curve in (strong, weak):
         best, moderate = curve.best("volume"), curve.last // 2
         widened = curve["volume"][moderate] / curve["volume"][0]
-        yield Claim(
-            "moderate finger tendon forces help expand the wrench space (Section 7.1): its "
-            f"volume half way to the most tension at which closing alone holds, {curve.name}",
-            "more than at the least tension",
-            f"{widened:.3g} times as much at {tried[moderate]:g} N as at {tried[0]:g} N",
-            bool(widened > 1.0),
-        )
-        yield Claim(
-            f"more than large ones do: the tension of most volume, {curve.name}",
-            "between the least and the most at which closing alone holds",
-            f"{tried[best]:g} N of {tried[0]:g} to {tried[curve.last]:g} N",
-            0 < best < curve.last,
-        )
+        told = f"{widened:.3g} times as much at {tried[moderate]:g} N as at {tried[0]:g} N"
+        text.check("moderate", told, widened > 1.0, where=curve.name)
+        told = f"{tried[best]:g} N of {tried[0]:g} to {tried[curve.last]:g} N"
+        text.check("not_large", told, 0 < best < curve.last, where=curve.name)
     most, sheared = weak["normal"][weak.last], weak["normal"][weak.best("shear")]
-    yield Claim(
-        "large tendon actuation may help obtain better normal attachment on lower curvature "
-        f"surfaces: normal limit, {weak.name}",
-        "more at the most tension than at that of most shear",
-        f"{most:.1f} N at {tried[weak.last]:g} N, "
-        f"{sheared:.1f} N at {tried[weak.best('shear')]:g} N",
-        bool(most > sheared),
-    )
+    told = f"{most:.1f} N at {tried[weak.last]:g} N, "
+    told += f"{sheared:.1f} N at {tried[weak.best('shear')]:g} N"
+    text.check("normal_on_flat", told, most > sheared, where=weak.name)
     for curve in (weak, strong):
         best = curve.best("shear")
         after = curve["shear"][best : curve.last + 1]
         falls = bool((np.diff(after) <= SLACK * after[0]).all())
-        yield Claim(
-            f"but large tendon actuation gradually reduces shear loading capability: {curve.name}",
-            "less and less from some tension on",
-            f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
-            f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily"),
-            len(after) > 1 and falls and bool(after[-1] < (1.0 - SLACK) * after[0]),
-        )
+        told = f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
+        told += f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily")
+        holds = len(after) > 1 and falls and after[-1] < (1.0 - SLACK) * after[0]
+        text.check("reduces_shear", told, holds, where=curve.name)
     for force in FORCES:
         high, low = strong[force][both], weak[force][both]
-        yield Claim(
-            f"the wrench space for a low curvature surface is lower: {force} limit",
-            "lower at every tension",
-            f"{np.min(low / high):.2f} to {np.max(low / high):.2f} times that on {strong.name}",
-            bool((low < high).all()),
-        )
-        yield Claim(
-            f"and less sensitive to tendon force variations: {force} limit",
-            "varies by less",
+        ratios = low / high
+        told = f"{ratios.min():.2f} to {ratios.max():.2f} times that on {strong.name}"
+        text.check("lower", told, (low < high).all(), force=force)
+        told = (
             f"by {np.ptp(low):.1f} N, on {strong.name} by {np.ptp(high):.1f} N, over the tensions "
-            "at which both hold",
-            bool(np.ptp(low) < np.ptp(high)),
+            "at which both hold"
         )
+        text.check("less_sensitive", told, np.ptp(low) < np.ptp(high), force=force)
     curved, flat = (float(np.mean(curve["pressed_share"][both])) for curve in (strong, weak))
-    yield Claim(
-        "on more curved surfaces the normal force component of the contacts contributes "
-        "substantially to attachment: its share of F_x at the shear limit",
-        f"more on {strong.name} than on {weak.name}",
-        f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold",
-        curved > flat,
-    )
+    told = f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold"
+    text.check("normal_share", told, curved > flat, strong=strong.name, weak=weak.name)
     beyond = [strong[key][i] for i in range(strong.best("shear"), strong.last + 1) for key in WHO]
     others = sorted({p for found in beyond for p in found} - {"proximal", "distal"})
     ends = sum("proximal" in found or "distal" in found for found in beyond)
-    yield Claim(
-        "it can lead to premature failure at the distal or proximal phalanx: who fails at the "
-        f"limits, {strong.name}, from the tension of most shear on",
-        "proximal or distal, at most of the limits",
-        f"at {ends} of {len(beyond)} limits; also: {', '.join(others) or 'nobody'}",
-        2 * ends > len(beyond),
-    )
+    told = f"at {ends} of {len(beyond)} limits; also: {', '.join(others) or 'nobody'}"
+    text.check("ends_fail", told, 2 * ends > len(beyond), where=strong.name)
 
 
 class _Curve:
@@ -249,39 +216,21 @@ class _Curve:
 
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the limits over the tension, dotted where closing alone fails."""
-    data = result.data
-    tension = data["tension"]
-    figure, (shear, normal) = panels(1, 2, (12.0, 4.8))
-    for axes, force in zip((shear, normal), FORCES, strict=True):
+    data, tension, text = result.data, result.data["tension"], StudyText("fig15")
+    figure, both = panels(1, 2, (12.0, 4.8))
+    for axes, force in zip(both, FORCES, strict=True):
         for curve, colour in zip(data["curves"], COLOURS, strict=True):
-            values = curve[force]
-            holds = np.array(curve["state"]) == "holds"
+            values, fails = curve[force], curve["closing_alone_fails_at"]
+            held = np.where(np.array(curve["state"]) == "holds", values, np.nan)
             name = f"{1e3 * curve['diameter']:g} mm"
             axes.plot(tension, values, ":", color=colour)
-            axes.plot(tension, np.where(holds, values, np.nan), color=colour, label=name)
-            fails = curve["closing_alone_fails_at"]
+            axes.plot(tension, held, color=colour, label=name)
             if fails is not None:
                 axes.axvline(fails, color=colour, alpha=0.4, linestyle="--")
-                axes.annotate(
-                    name,
-                    (fails, 0.02),
-                    xycoords=axes.get_xaxis_transform(),
-                    xytext=(4.0, 0.0),
-                    textcoords="offset points",
-                    rotation=90.0,
-                    color=colour,
-                )
-        axes.set(
-            xlabel="tension of the tendons [N]; dashed: from there on closing alone fails",
-            ylabel=f"{force} limit [N]",
-            xlim=(0.0, tension[-1]),
-            ylim=(0.0, None),
-        )
+                place = {"xycoords": axes.get_xaxis_transform(), "textcoords": "offset points"}
+                axes.annotate(name, (fails, 0.02), (4.0, 0.0), rotation=90.0, color=colour, **place)
+        text.label(axes, force, ratio=data["force_to_moment"])
+        axes.set(xlim=(0.0, tension[-1]), ylim=(0.0, None))
         axes.legend(title="diameter")
-    shear.set_title(
-        f"largest $F_x$ with $F_z \\leq 0$ at $F_x = "
-        f"{data['force_to_moment']:g}\\,\\mathrm{{m^{{-1}}}}\\ M_y$"
-    )
-    normal.set_title("largest $-F_z$")
     figure.suptitle(data["surface"])
     return {"fig15": figure}

@@ -7,7 +7,7 @@ stays. Blue cells fail by closing alone, dark blue ones push themselves off the 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -18,10 +18,10 @@ from hand_models.base import Array, Progress
 from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     Axis,
-    Claim,
     Conditions,
     Measure,
     StudyResult,
+    StudyText,
     conditions_title,
     draw_map,
     legend,
@@ -71,21 +71,17 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             tell = part(progress, done, done + n * n, total)
             data[key][name] = sweep_map(table, *axes, conditions, measures, tell)
             done += n * n
-    data |= {
-        "in_use": {
-            name: {
-                at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)
-                for at, surfaces in (("usual", usual), ("lower", lower))
-            }
-            for name in SURFACES
-        },
-        "normal_slopes": _slopes(table, usual["A"]),
-        "not_tested": [
-            "where the printed maps have their edges: they have no numbers on their axes here"
-        ],
+    data["in_use"] = {
+        name: {
+            at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)
+            for at, surfaces in (("usual", usual), ("lower", lower))
+        }
+        for name in SURFACES
     }
-    title = "force limits over the middle and distal pulley radii"
-    return StudyResult("fig16", title, data, tuple(_claims(data)))
+    data["normal_slopes"] = _slopes(table, usual["A"])
+    text = StudyText("fig16")
+    _check(text, data)
+    return text.result(data)
 
 
 def _slopes(table: ParameterTable, conditions: Conditions) -> Array:
@@ -104,43 +100,26 @@ def _slopes(table: ParameterTable, conditions: Conditions) -> Array:
     return np.column_stack(columns)
 
 
-def _claims(data: dict[str, Any]) -> Iterator[Claim]:
-    maps, at_lower = data["maps"], data["states_at_lower_tension"]
+def _check(text: StudyText, data: dict[str, Any]) -> None:
+    maps, states = data["maps"], data["states_at_lower_tension"]
     for name, usual in maps.items():
         middle, distal = np.meshgrid(usual["x"]["values"], usual["y"]["values"])
         fails = usual["state"] != "holds"
         above, below = fails[distal > middle], fails[distal <= middle]
-        yield Claim(
-            "the distal pulley should not be larger than the middle one, as this could lead to "
-            f"failure by closing alone (Section 7.1): cells that fail, surface {name}",
-            "more where the distal one is larger",
-            f"{above.mean():.0%} of those where it is, {below.mean():.0%} of the others",
-            bool(above.mean() > below.mean()),
-        )
-        yield Claim(
-            f"every distal radius above the middle one fails by closing alone, surface {name}",
-            "all cells",
-            f"{above.mean():.0%}",
-            bool(above.all()),
-        )
+        told = f"{above.mean():.0%} of those where it is, {below.mean():.0%} of the others"
+        text.check("distal_larger", told, above.mean() > below.mean(), surface=name)
+        text.check("every_larger", f"{above.mean():.0%}", above.all(), surface=name)
     for name in SURFACES:
         cell = data["in_use"][name]["usual"]
-        yield Claim(
-            f"the radii in use perform adequately on surface {name} (Section 7.1, Fig. 16)",
-            "they hold, in shear and in pull-off",
-            ", ".join([cell["state"], *(f"{m} {v:.1f} N" for m, v in cell["limits"].items())]),
-            cell["state"] == "holds" and all(v > 0.0 for v in cell["limits"].values()),
-        )
+        told = ", ".join([cell["state"], *(f"{m} {v:.1f} N" for m, v in cell["limits"].items())])
+        holds = cell["state"] == "holds" and all(v > 0.0 for v in cell["limits"].values())
+        text.check("in_use", told, holds, surface=name)
     for name in SURFACES:
-        high, low = maps[name], at_lower[name]
+        high, low = maps[name], states[name]
         tension, lower = (found["conditions"]["tension"] for found in (high, low))
-        yield Claim(
-            f"lowering the tendon force may shrink the failure regions: cells that fail at "
-            f"{lower:g} N, surface {name} (Section 7.1)",
-            f"fewer than at {tension:g} N",
-            f"{low['failing']:.1%}, {high['failing']:.1%} at {tension:g} N",
-            low["failing"] < high["failing"],
-        )
+        told = f"{low['failing']:.1%}, {high['failing']:.1%} at {tension:g} N"
+        fewer = low["failing"] < high["failing"]
+        text.check("lower_tension", told, fewer, surface=name, tension=tension, lower=lower)
     for name, measure in itertools.product(SURFACES, MEASURES_SHOWN):
         high, low = maps[name]["limits"][measure], data["maps_at_lower_tension"][name]
         # cell by cell of the coarser map
@@ -149,20 +128,16 @@ def _claims(data: dict[str, Any]) -> Iterator[Claim]:
         ratios = (low["limits"][measure] / thinned)[thinned > 0.0]
         ratios = ratios[np.isfinite(ratios)]
         ratio = float(np.median(ratios)) if len(ratios) else float("nan")
-        yield Claim(
-            f"but also reduces the limits: {measure}, median over the cells that hold at "
-            f"both tensions, surface {name}",
-            f"less than at {maps[name]['conditions']['tension']:g} N",
+        told, tension = (
             f"{ratio:.2f} of it ({len(ratios)} cells)",
-            ratio < 1.0,
+            maps[name]["conditions"]["tension"],
+        )
+        text.check(
+            "lower_limits", told, ratio < 1.0, surface=name, measure=measure, tension=tension
         )
     moved = np.abs(1e-3 * data["normal_slopes"]) > UNMOVED
-    yield Claim(
-        "a change in only one of the radii adjusts every contact force (Section 7.1)",
-        "3 of 3 normal forces for each radius",
-        ", ".join(f"{name} {n}" for name, n in zip(PHALANGES, moved.sum(axis=0), strict=True)),
-        bool(moved.all()),
-    )
+    told = ", ".join(f"{name} {n}" for name, n in zip(PHALANGES, moved.sum(axis=0), strict=True))
+    text.check("every_force", told, moved.all())
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:

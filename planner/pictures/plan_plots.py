@@ -15,14 +15,19 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from mpl_toolkits.mplot3d import proj3d
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.base import Array, whole_file
-from planner.pictures.plan_scene import UP, Scene, ViewDirections, scene_of, view_directions
+from planner.pictures.plan_scene import (
+    UP,
+    Scene,
+    ViewDirections,
+    joint_utilisations,
+    scene_of,
+    view_directions,
+)
 from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_tiles
 from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
 from planner.pictures.spread_plots import draw_spread
@@ -97,7 +102,7 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     """Draw a plan; arguments as of `plot_plan`."""
     scene, seen = scene_of(plan, question), view_directions(question.stance)
     rows = sum(len(hand.fingers) for hand in plan.hands or ())
-    joints = [limb for limb in scene.limbs if limb.utilisations is not None]
+    joints = joint_utilisations(plan, question.stance)
     needed = ROW * (rows + len(joints)) / (TOP - BOTTOM)
     figure = Figure(figsize=(SIZE[0], max(SIZE[1], needed)))
     FigureCanvasAgg(figure)  # which tells how large texts are
@@ -179,7 +184,7 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
 
     height = np.array([0.0, 0.0, math.sin(elevation)])
     look = -math.cos(elevation) * camera - height
-    draw_scene(View(axes, lambda points: points, flat, Poly3DCollection, look, deep=True), scene)
+    draw_scene(View(axes, lambda points: points, flat, look, deep=True), scene)
     axes.set(xlabel="x of W [m]", ylabel="y of W [m]", zlabel="z of W [m]")
 
 
@@ -200,7 +205,7 @@ def _draw_side(
     axes: Any, scene: Scene, right: Array, up: Array, words: tuple[str, str], seen_from: str
 ) -> None:
     def flat(points: Array) -> Array:
-        return (np.asarray(points) - scene.body.position) @ np.column_stack([right, up])
+        return (np.asarray(points) - scene.origin) @ np.column_stack([right, up])
 
     axes.set_title(f"seen from {seen_from}", fontsize=10)
     axes.set_aspect("equal", adjustable="datalim")
@@ -208,4 +213,4 @@ def _draw_side(
     axes.update_datalim(flat(scene.points))
     axes.grid(alpha=0.3)
     axes.set(xlabel=f"{words[0]}, from B [m]", ylabel=f"{words[1]}, from B [m]")
-    draw_scene(View(axes, flat, flat, PolyCollection, np.cross(up, right), deep=False), scene)
+    draw_scene(View(axes, flat, flat, np.cross(up, right), deep=False), scene)

@@ -1,4 +1,7 @@
-"""What there is to see of a plan: hands, rock, limbs and forces, placed in W."""
+"""What there is to see of a plan, as plain data in W: surfaces, lines, dots, arrows and labels.
+
+Each has a kind, by which what draws it gives it its style. Nothing here knows what draws it.
+"""
 
 from __future__ import annotations
 
@@ -10,28 +13,33 @@ from typing import Final, NamedTuple
 import numpy as np
 import scipy
 
-from hand_models.base import Array, Pose
+from hand_models.base import Array
 from hand_models.hand import SettledHand
-from hand_models.rock import Mesh
+from hand_models.rock import grid
 from planner.pictures.rock_patches import rock_patch
 from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
-from planner.result import HandPlan, Plan
+from planner.result import Plan
 
 __all__ = [
     "UP",
-    "DrawnCapsules",
-    "DrawnHand",
-    "DrawnLimb",
-    "DrawnLoad",
+    "Arrow",
+    "Dots",
+    "Label",
+    "Line",
     "Scene",
+    "Surface",
     "ViewDirections",
+    "joint_utilisations",
     "scene_of",
     "view_directions",
 ]
 
 ARROW: Final = 0.5
 """Length of the longest force arrow in a picture [m]."""
+
+ROUND: Final = 10
+"""Points of half the outline of a capsule's end."""
 
 LEANING: Final = 0.3
 """Horizontal part of a direction from which on it says where ahead is."""
@@ -46,121 +54,110 @@ SAME: Final = 1e-3
 """How far, relatively, a load may be from the robot's weight and still be called so."""
 
 
-@dataclass(frozen=True, eq=False)
-class DrawnHand:
-    """A hand on its hold; places in W [m].
+class Surface(NamedTuple):
+    """Triangles of one thing.
 
     Attributes
     ----------
-    limb : str
-    floats : bool
-        Whether its wrist does.
-    place : ndarray, shape (3,)
-        Origin of H.
-    palm : ndarray, shape (4, 3)
-        Corners of the palm.
-    fingers : tuple of ndarray, shape (4, 3)
-        Joints and tip of each.
-    touching : ndarray, shape (n, 3)
-        Contacts of tiles and nails that hold.
-    rock : ndarray, shape (m, 3, 3)
-        Triangles.
-    force : ndarray, shape (3,), or None
-        Of the rock on the robot, in W [N].
+    kind : {'rock', 'palm', 'body', 'link'}
+        All but rock are convex.
+    name : str
+        The limb of rock and of a palm.
+    triangles : ndarray, shape (n, 3, 3)
+        [m]
+    """
+
+    kind: str
+    name: str
+    triangles: Array
+
+
+class Line(NamedTuple):
+    """Places that are joined, shape (n, 3) [m]; of the kind ``finger`` or ``limb``."""
+
+    kind: str
+    points: Array
+
+
+class Dots(NamedTuple):
+    """Places that are marked.
+
+    Attributes
+    ----------
+    kind : {'contact', 'joint', 'load', 'origin'}
+    points : ndarray, shape (n, 3)
+        [m]
+    utilisations : ndarray, shape (n,), or None
+        Of joints.
+    """
+
+    kind: str
+    points: Array
+    utilisations: Array | None = None
+
+
+class Arrow(NamedTuple):
+    """A force at a place, with what is written at its tip.
+
+    Attributes
+    ----------
+    kind : {'force', 'load'}
+        Of the rock on a hand, or what the hands hold up.
+    start : ndarray, shape (3,)
+        [m]
+    force : ndarray, shape (3,)
+        [N]
+    text : str
     utilisation : float or None
+        Of the hand.
     """
 
-    limb: str
-    floats: bool
-    place: Array
-    palm: Array
-    fingers: tuple[Array, ...]
-    touching: Array
-    rock: Array
-    force: Array | None
-    utilisation: float | None
-
-
-class DrawnLimb(NamedTuple):
-    """A limb: its joints and its H in W, shape (n + 1, 3) [m], and each joint's utilisation (n,).
-
-    None for a plan without torques.
-    """
-
-    limb: str
-    chain: Array
-    utilisations: Array | None
-
-
-class DrawnCapsules(NamedTuple):
-    """Capsules: their segments in W, shape (n, 2, 3), and their radii, shape (n,) [m]."""
-
-    ends: Array
-    radii: Array
-
-
-class DrawnLoad(NamedTuple):
-    """What the hands hold up: a force at a place, in W [m, N], and a moment about it [N·m].
-
-    ``weight`` tells whether it is the robot's own weight and nothing else.
-    """
-
-    place: Array
+    kind: str
+    start: Array
     force: Array
-    moment: Array
-    weight: bool
+    text: str
+    utilisation: float | None = None
+
+
+class Label(NamedTuple):
+    """Words at a place, shape (3,) [m]; of the kind ``limb`` or ``origin``."""
+
+    kind: str
+    place: Array
+    text: str
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """All that is drawn of a plan.
+    """All that there is to see of a plan.
 
     Attributes
     ----------
-    body : Pose
-        B in W.
-    hands : tuple of DrawnHand
-    limbs : tuple of DrawnLimb
-        Empty where nothing is said of joints.
-    body_capsules, link_capsules : DrawnCapsules
-        Of what no joint moves, and of the limbs' links where the joints are known; as in the
-        robot's parameters.
-    torso : ndarray, shape (m, 3, 3)
-        Of a robot whose file has no such capsules: triangles of the hull of B and the first joints,
-        in W [m].
-    load : DrawnLoad
+    origin : ndarray, shape (3,)
+        Of B [m].
+    surfaces, lines, dots, arrows, labels : tuple
+        Arrows of the hands come first, in their order, and that of the load last.
     """
 
-    body: Pose
-    hands: tuple[DrawnHand, ...]
-    limbs: tuple[DrawnLimb, ...]
-    body_capsules: DrawnCapsules
-    link_capsules: DrawnCapsules
-    torso: Array
-    load: DrawnLoad
+    origin: Array
+    surfaces: tuple[Surface, ...]
+    lines: tuple[Line, ...]
+    dots: tuple[Dots, ...]
+    arrows: tuple[Arrow, ...]
+    labels: tuple[Label, ...]
 
     @property
     def points(self) -> Array:
         """All places, with the tips of arrows, shape (n, 3) [m]."""
-        parts = [
-            self.body.position,
-            self.load.place,
-            self.load.place + self.scale * self.load.force,
-        ]
-        for hand in self.hands:
-            parts += [hand.rock, hand.palm, *hand.fingers]
-            if hand.force is not None:
-                parts.append(hand.place + self.scale * hand.force)
-        parts += [limb.chain for limb in self.limbs]
-        for ends, radii in (self.body_capsules, self.link_capsules):
-            parts += [ends + side * radii[:, None, None] for side in (-1.0, 1.0)]
+        parts = [self.origin, *(arrow.start + self.scale * arrow.force for arrow in self.arrows)]
+        parts += [surface.triangles for surface in self.surfaces]
+        parts += [line.points for line in self.lines] + [dots.points for dots in self.dots]
         return np.vstack([np.reshape(part, (-1, 3)) for part in parts])
 
     @property
     def scale(self) -> float:
         """Length of the arrow of a force [m/N]."""
-        forces = [self.load.force, *(hand.force for hand in self.hands if hand.force is not None)]
-        return ARROW / max(1.0, *(float(np.linalg.norm(force)) for force in forces))
+        return ARROW / max(1.0, *(float(np.linalg.norm(arrow.force)) for arrow in self.arrows))
 
 
 class ViewDirections(NamedTuple):
@@ -202,34 +199,73 @@ def view_directions(stance: Stance) -> ViewDirections:
 def scene_of(plan: Plan, question: Question) -> Scene:
     """Return what there is to see of a plan for a question."""
     stance = question.stance
-    plans = {hand.limb: hand for hand in plan.hands or ()}
     settled = [settle_hand(hand, stance) for hand in stance.hands]
-    rocks = _rocks(stance.hands, settled)
-    limbs = _limbs(plan, question)
-    body, links = _capsules(plan, stance)
-    hull = [stance.body.position, *(limb.chain[0] for limb in limbs)]
+    surfaces = _body(plan, stance)
+    lines: list[Line] = []
+    dots: list[Dots] = []
+    for hand, known, rock in zip(stance.hands, settled, _rocks(stance.hands, settled), strict=True):
+        kind, into_world = known.hand, hand.pose.apply
+        x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
+        a, b, c, d = into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
+        surfaces += [
+            Surface("rock", hand.limb, rock),
+            Surface("palm", hand.limb, np.array([(a, b, c), (a, c, d)])),
+        ]
+        frames = kind.frames(known.grasp.outer_rotation)
+        lines += [
+            Line("finger", into_world(frame.joint + finger.chain @ [frame.along, UP]))
+            for frame, finger in zip(frames, known.fingers, strict=True)
+        ]
+        dots.append(Dots("contact", into_world(known.positions[known.holding])))
+    names = {
+        hand.limb: hand.limb + " (floats)" * (hand.wrist == "floating") for hand in stance.hands
+    }
+    labels = {hand.limb: hand.pose.position for hand in stance.hands}
+    if plan.joints is not None:
+        used = joint_utilisations(plan, stance)
+        for limb in stance.robot.limbs:
+            chain = stance.body.apply(stance.robot.link_chain(plan.joints, limb))
+            lines.append(Line("limb", chain))
+            dots.append(Dots("joint", chain[:-1], used.get(limb)))
+            if limb not in labels:
+                names[limb], labels[limb] = f"{limb} (free)", chain[-1]
+    plans = {hand.limb: hand for hand in plan.hands or ()}
+    arrows = []
+    for hand in stance.hands:
+        if (planned := plans.get(hand.limb)) is not None:
+            force = -hand.pose.rotation @ planned.wrench[:3]
+            size = f"{np.linalg.norm(force):.0f} N"
+            arrows.append(Arrow("force", hand.pose.position, force, size, planned.utilisation))
+    load, origin = _load(plan, question), stance.body.position
     return Scene(
-        body=stance.body,
-        hands=tuple(
-            _hand(hand, known, rock, plans.get(hand.limb))
-            for hand, known, rock in zip(stance.hands, settled, rocks, strict=True)
+        origin=origin,
+        surfaces=tuple(surfaces),
+        lines=tuple(lines),
+        dots=(*dots, Dots("load", load.start[None]), Dots("origin", origin[None])),
+        arrows=(*arrows, load),
+        labels=(
+            *(Label("limb", labels[limb], name.replace("_", " ")) for limb, name in names.items()),
+            Label("origin", origin, "B"),
         ),
-        limbs=limbs,
-        body_capsules=body,
-        link_capsules=links,
-        torso=np.zeros((0, 3, 3)) if len(body.ends) else _torso(np.array(hull)),
-        load=_load(plan, question),
     )
 
 
+def joint_utilisations(plan: Plan, stance: Stance) -> dict[str, Array]:
+    """Return each joint's utilisation by limb, shape (n,) each; none for a plan without torques."""
+    shares = plan.joint_shares
+    if plan.joints is None or shares is None:
+        return {}
+    robot = stance.robot
+    return {limb: (robot.chains[limb].coupling != 0.0) @ shares[limb] for limb in robot.limbs}
+
+
 def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[Array]:
-    """Return the rock of each hand in W; that of a scan which several hold, with the first."""
+    """Return the rock of each hand in W; that which several hold, with the first."""
     placed = [hand.pose @ known.seating.pose for hand, known in zip(hands, settled, strict=True)]
 
     def alike(i: int, j: int) -> bool:
         return (
-            isinstance(hands[i].hold, Mesh)
-            and hands[i].hold is hands[j].hold
+            hands[i].hold is hands[j].hold
             and np.allclose(placed[i].position, placed[j].position, atol=1e-6)
             and np.allclose(placed[i].rotation, placed[j].rotation, atol=1e-6)
         )
@@ -245,56 +281,46 @@ def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[
     return rocks
 
 
-def _hand(hand: HandOnHold, settled: SettledHand, rock: Array, plan: HandPlan | None) -> DrawnHand:
-    kind = settled.hand
-    x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
-    into_world, frames = hand.pose.apply, kind.frames(settled.grasp.outer_rotation)
-    return DrawnHand(
-        limb=hand.limb,
-        floats=hand.wrist == "floating",
-        place=hand.pose.position,
-        palm=into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)]),
-        fingers=tuple(
-            into_world(frame.joint + finger.chain @ [frame.along, UP])
-            for frame, finger in zip(frames, settled.fingers, strict=True)
-        ),
-        touching=into_world(settled.positions[settled.holding]),
-        rock=rock,
-        force=None if plan is None else -hand.pose.rotation @ plan.wrench[:3],
-        utilisation=None if plan is None else plan.utilisation,
-    )
+def _body(plan: Plan, stance: Stance) -> list[Surface]:
+    """Return the capsules of what no joint moves, and of links where the joints are known.
 
-
-def _limbs(plan: Plan, question: Question) -> tuple[DrawnLimb, ...]:
-    if plan.joints is None:
-        return ()
-    stance, shares = question.stance, plan.joint_shares
+    Of a robot whose file has no capsules of its body, the hull of B and the first joints.
+    """
     robot = stance.robot
-    return tuple(
-        DrawnLimb(
-            limb,
-            stance.body.apply(robot.link_chain(plan.joints, limb)),
-            None if shares is None else (robot.chains[limb].coupling != 0.0) @ shares[limb],
-        )
-        for limb in stance.robot.limbs
-    )
-
-
-def _capsules(plan: Plan, stance: Stance) -> tuple[DrawnCapsules, DrawnCapsules]:
-    """Return those of the body, and those of links."""
-    robot = stance.robot
-    (body, radii), links = robot.body_capsules, np.zeros((0, 2, 3))
+    ends, radii = robot.body_capsules
+    kinds = ["body"] * len(ends)
     if plan.joints is not None:
-        links = robot.placed_capsules(plan.joints)[len(body) :]
-    of_links = robot.capsules.radii[len(body) :][: len(links)]
+        ends, radii = robot.placed_capsules(plan.joints), robot.capsules.radii
+        kinds += ["link"] * (len(ends) - len(kinds))
+    placed = stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3)
+    found = [
+        Surface(kind, "", _capsule(start, end, radius))
+        for kind, (start, end), radius in zip(kinds, placed, radii.tolist(), strict=True)
+    ]
+    if "body" not in kinds:
+        hull = [stance.body.position]
+        if plan.joints is not None:
+            chains = [robot.link_chain(plan.joints, limb) for limb in robot.limbs]
+            hull += [stance.body.apply(chain[0]) for chain in chains]
+        found.append(Surface("body", "", _hull(np.array(hull))))
+    return found
 
-    def placed(ends: Array, widths: Array) -> DrawnCapsules:
-        return DrawnCapsules(stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3), widths)
 
-    return placed(body, radii), placed(links, of_links)
+def _capsule(start: Array, end: Array, radius: float) -> Array:
+    """Return a capsule's triangles, shape (n, 3, 3) [m]."""
+    length = float(np.linalg.norm(end - start))
+    along = (end - start) / length if length else UP
+    aside = np.linalg.svd(along[None])[2][1]
+    across = np.array([aside, np.cross(along, aside)])
+    turn, rise = np.linspace(0.0, 2.0 * np.pi, 2 * ROUND + 1), np.linspace(0.0, np.pi / 2.0, ROUND)
+    around = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
+    half = np.sin(rise)[:, None, None] * around, np.cos(rise)[:, None, None] * along
+    beyond, before = half[0] + half[1], (half[0] - half[1])[::-1]
+    vertices, faces = grid(np.concatenate([end + radius * beyond, start + radius * before]))
+    return np.asarray(vertices[faces])
 
 
-def _torso(points: Array) -> Array:
+def _hull(points: Array) -> Array:
     """Return the triangles of the hull of points (n, 3), whether it is solid, flat or a line."""
     off = points - points.mean(axis=0)
     axes = np.linalg.svd(off)[2]
@@ -312,8 +338,11 @@ def _torso(points: Array) -> Array:
     return np.array([(ends[0], ends[1], ends[1])])
 
 
-def _load(plan: Plan, question: Question) -> DrawnLoad:
-    """Return what the hands hold up, at the centre of mass that was planned with."""
+def _load(plan: Plan, question: Question) -> Arrow:
+    """Return what the hands hold up, at the centre of mass that was planned with.
+
+    It is called a weight where it is the robot's own weight and nothing else.
+    """
     stance, load = question.stance, question.load
     robot, turn = stance.robot, stance.body.rotation
     com = robot.com if plan.joints is None else robot.com_at(plan.joints)
@@ -322,12 +351,9 @@ def _load(plan: Plan, question: Question) -> DrawnLoad:
     force, moment = -plan.body_wrench[:3], -plan.body_wrench[3:]
     moment = moment - np.cross(com, force)
     weight = robot.mass * turn.T @ stance.gravity
-    size = SAME * max(float(np.linalg.norm(weight)), 1.0)
-    return DrawnLoad(
-        place=stance.body.apply(com),
-        force=turn @ force,
-        moment=turn @ moment,
-        weight=bool(
-            np.linalg.norm(force - weight) <= size and np.linalg.norm(moment) <= size * robot.reach
-        ),
-    )
+    size, about = SAME * max(float(np.linalg.norm(weight)), 1.0), float(np.linalg.norm(moment))
+    own = np.linalg.norm(force - weight) <= size and about <= size * robot.reach
+    text = f"{'weight' if own else 'load'} {np.linalg.norm(force):.0f} N"
+    if not own and round(about):
+        text += f"\nand {about:.0f} N·m"
+    return Arrow("load", stance.body.apply(com), turn @ force, text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any, Final
 
@@ -12,7 +12,6 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.hand import NAIL
 from planner.explanation import constraint_words
-from planner.pictures.plan_scene import DrawnLimb
 from planner.pictures.plan_views import COLOURS, UTILISATION
 from planner.question import Question
 from planner.result import Certificate, LimitName, Plan
@@ -92,12 +91,11 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
     axes.set_title("utilisation of each tile, tendon, palm and hand", fontsize=10, loc="right")
 
 
-def draw_joints(axes: Any, limbs: Sequence[DrawnLimb]) -> None:
-    """Draw the utilisation of every joint as a table of colours."""
-    used = [np.asarray(limb.utilisations) for limb in limbs]
-    values = np.array(list(zip_longest(*used, fillvalue=np.nan))).T
+def draw_joints(axes: Any, used: Mapping[str, Array]) -> None:
+    """Draw the utilisation of every joint, by limb, as a table of colours."""
+    values = np.array(list(zip_longest(*used.values(), fillvalue=np.nan))).T
     columns = [str(i + 1) for i in range(values.shape[1])]
-    _draw_colours(axes, values, columns, [limb.limb.replace("_", " ") for limb in limbs])
+    _draw_colours(axes, values, columns, [limb.replace("_", " ") for limb in used])
     _write_numbers(axes, values)
     axes.set_title("utilisation of each joint, from the body outward", fontsize=10, loc="right")
 

@@ -1,4 +1,4 @@
-"""Looks at the scene of a plan: what is drawn alike in axes of two and of three dimensions."""
+"""Looks at the scene of a plan by matplotlib: what is drawn alike in two and three dimensions."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
+import scipy
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.base import Array
-from planner.pictures.plan_scene import DrawnCapsules, DrawnHand, DrawnLimb, Scene
+from planner.pictures.plan_scene import Scene
 
-__all__ = ["COLOURS", "UTILISATION", "View", "capsule_outlines", "draw_scene"]
+__all__ = ["COLOURS", "UTILISATION", "View", "draw_scene", "silhouette"]
 
 COLOURS: Final = LinearSegmentedColormap.from_list(
     "load", ["#1a9850", "#e6a117", "#d73027"]
@@ -34,11 +37,26 @@ LIMB: Final = "#4a6a8a"
 BODY: Final = (*to_rgb(LIMB), 0.16)
 """Of the body, through which hands and rock are seen."""
 
-ROUND: Final = 16
-"""Points of half a circle."""
-
 LOAD: Final = "tab:blue"
 
+OUTLINES: Final[dict[str, dict[str, Any]]] = {
+    "palm": {"facecolor": "0.7", "edgecolor": "0.2", "linewidth": 1.0, "zorder": 2},
+    "link": {"facecolor": BODY, "edgecolor": "none", "linewidth": 0.5, "zorder": 4},
+    "body": {"facecolor": BODY, "edgecolor": LIMB, "linewidth": 0.5, "zorder": 4},
+}
+"""Of convex surfaces, by their kind."""
+
+LINES: Final[dict[str, dict[str, Any]]] = {
+    "finger": {"color": "0.2", "linewidth": 1.5, "zorder": 3},
+    "limb": {"color": LIMB, "linewidth": 4.0, "solid_capstyle": "round", "zorder": 5},
+}
+
+DOTS: Final[dict[str, dict[str, Any]]] = {
+    "contact": {"color": "black", "marker": ".", "ms": 4, "zorder": 3},
+    "joint": {"color": "white", "mec": LIMB, "marker": "o", "ms": 5, "zorder": 6},
+    "load": {"color": LOAD, "marker": "o", "ms": 8, "zorder": 6},
+    "origin": {"color": "black", "marker": "+", "ms": 10, "zorder": 6},
+}
 NEAR_TIPS: Final = 0.05
 """How near to each other tips of arrows are that share a note, in the views from a side [m]."""
 
@@ -95,8 +113,6 @@ class View:
         Coordinates of places (n, 3) in the axes, (n, 2) or (n, 3).
     flat : callable
         Places as they are seen, (n, 2), for arrows and notes.
-    polygons : callable
-        Makes the collection of polygons that these axes show.
     look : ndarray, shape (3,)
         Direction in W of looking.
     deep : bool
@@ -108,29 +124,37 @@ class View:
     axes: Any
     place: Callable[[Array], Array]
     flat: Callable[[Array], Array]
-    polygons: Callable[..., Any]
     look: Array
     deep: bool
     seen: list[Array] = field(default_factory=list)
 
     def line(self, points: Array, **style: Any) -> None:
         self.axes.plot(*self.place(points).T, clip_on=False, **style)
-        spots = self.flat(points)
-        # marks alone are joined by nothing
-        self.seen.extend(spots[:, None] if style.get("linestyle") == "none" else [spots])
+        self.seen.append(self.flat(points))
 
-    def fill(self, polygons: Array, **style: Any) -> None:
-        if len(polygons):
-            corners = self.place(np.reshape(polygons, (-1, 3)))
-            shape = (*np.shape(polygons)[:2], corners.shape[1])
-            drawn = self.polygons(corners.reshape(shape), clip_on=False, **style)
-            self.axes.add_collection(drawn)
+    def dots(self, points: Array, **style: Any) -> None:
+        if len(points):
+            self.axes.plot(*self.place(points).T, clip_on=False, linestyle="none", **style)
+            self.seen.extend(self.flat(points)[:, None])
 
-    def back_to_front(self, polygons: Array) -> Array:
-        """Return polygons (n, k, 3) of W in the order in which they are to be drawn."""
-        if self.deep:
-            return polygons
-        return np.asarray(polygons[np.argsort(-(polygons @ self.look).mean(axis=1))])
+    def fill(self, polygons: Iterable[Array], **style: Any) -> None:
+        corners = [self.place(polygon) for polygon in polygons]
+        if corners:
+            # of one length, since axes of three dimensions fill up with numbers at random
+            most = max(map(len, corners))
+            corners = [np.pad(each, ((0, most - len(each)), (0, 0)), "edge") for each in corners]
+            collection = Poly3DCollection if self.deep else PolyCollection
+            self.axes.add_collection(collection(corners, clip_on=False, **style))
+
+    def rock(self, triangles: Array) -> None:
+        """Draw lit triangles, shape (n, 3, 3), the farthest first."""
+        if not self.deep:
+            triangles = triangles[np.argsort(-(triangles @ self.look).mean(axis=1))]
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        size = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
+        lit = np.abs(normals @ LIGHT) / (size * math.sqrt(LIGHT @ LIGHT))
+        shades = np.repeat(GREYS[0] + (GREYS[1] - GREYS[0]) * lit[:, None], 3, axis=1)
+        self.fill(triangles, facecolors=shades, edgecolors=shades, linewidth=0.8, zorder=1)
 
     def arrow(self, start: Array, step: Array, colour: Any) -> tuple[Array, Array]:
         """Draw an arrow, and return where it is seen to begin and to end, shape (2,) each."""
@@ -214,112 +238,76 @@ class View:
 
 def draw_scene(view: View, scene: Scene) -> None:
     """Draw rock, hands, limbs, forces and names."""
-    rock = view.back_to_front(np.concatenate([hand.rock for hand in scene.hands]))
-    shades = _shades(rock)
-    view.fill(rock, facecolors=shades, edgecolors=shades, linewidth=0.8, zorder=1)
-    for hand in scene.hands:
-        _draw_hand(view, hand)
-    _draw_body(view, scene)
-    for limb in scene.limbs:
-        _draw_limb(view, limb)
-    _name_hands(view, scene)
-    _draw_forces(view, scene)
-    origin = view.flat(scene.body.position[None])[0]
-    view.line(scene.body.position[None], color="black", marker="+", ms=10, zorder=6)
-    view.note("B", origin, (-8.0, 6.0), bbox=None)
+    view.rock(np.concatenate([s.triangles for s in scene.surfaces if s.kind == "rock"]))
+    for kind, style in OUTLINES.items():
+        drawn = [s.triangles for s in scene.surfaces if s.kind == kind and len(s.triangles)]
+        view.fill([silhouette(triangles, view.look) for triangles in drawn], **style)
+    for line in scene.lines:
+        view.line(line.points, **LINES[line.kind])
+    for dots in scene.dots:
+        if dots.utilisations is None:
+            view.dots(dots.points, **DOTS[dots.kind])
+            continue
+        for i in np.argsort(dots.utilisations, kind="stable"):
+            colour = COLOURS(UTILISATION(dots.utilisations[i]))
+            style = DOTS[dots.kind] | {"color": colour, "mec": "0.2", "ms": 6}
+            view.dots(dots.points[i : i + 1], **style)
+    _write_names(view, scene)
+    _draw_arrows(view, scene)
     view.untangle()
 
 
-def _shades(triangles: Array) -> Array:
-    """Return the greys of lit triangles, shape (n, 3)."""
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    size = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
-    lit = np.abs(normals @ LIGHT) / (size * math.sqrt(LIGHT @ LIGHT))
-    return np.repeat(GREYS[0] + (GREYS[1] - GREYS[0]) * lit[:, None], 3, axis=1)
-
-
-def _draw_hand(view: View, hand: DrawnHand) -> None:
-    view.fill(hand.palm[None], facecolor="0.7", edgecolor="0.2", linewidth=1.0, zorder=2)
-    for chain in hand.fingers:
-        view.line(chain, color="0.2", linewidth=1.5, zorder=3)
-    if len(hand.touching):
-        view.line(hand.touching, color="black", linestyle="none", marker=".", ms=4, zorder=3)
-
-
-def _draw_body(view: View, scene: Scene) -> None:
-    """Draw capsules as they are seen; the hull of the shoulders if the body has none."""
-    for capsules, edge in ((scene.link_capsules, "none"), (scene.body_capsules, LIMB)):
-        outlines = capsule_outlines(capsules, view.look)
-        view.fill(outlines, facecolor=BODY, edgecolor=edge, linewidth=0.5, zorder=4)
-    width = 1.0 if len(scene.torso) == 1 else 0.0
-    view.fill(scene.torso, facecolor=BODY, edgecolor=LIMB, linewidth=width, zorder=4)
-
-
-def capsule_outlines(capsules: DrawnCapsules, look: Array) -> Array:
-    """Return the outlines of capsules as seen in parallel along a direction.
+def silhouette(triangles: Array, look: Array) -> Array:
+    """Return the corners of a convex surface's outline as seen in parallel, in order.
 
     Parameters
     ----------
-    capsules : DrawnCapsules
+    triangles : ndarray, shape (n, 3, 3)
+        [m]
     look : ndarray, shape (3,)
         Unit direction.
 
     Returns
     -------
-    ndarray, shape (n, 2 · `ROUND`, 3)
-        Half a circle about each end, across the direction [m].
+    ndarray, shape (m, 3)
+        Two ends where it is seen edge-on [m].
     """
-    ends, radii = capsules
-    across = np.linalg.svd(look[None])[2][1:]
-    steps = (ends[:, 1] - ends[:, 0]) @ across.T
-    along = np.arctan2(steps[:, 1], steps[:, 0])
-    turn = along[:, None] + np.linspace(-math.pi / 2.0, math.pi / 2.0, ROUND)
-    half = np.stack([np.cos(turn), np.sin(turn)], axis=-1) @ across * radii[:, None, None]
-    return np.concatenate([ends[:, None, 1] + half, ends[:, None, 0] - half], axis=1)
+    corners = triangles.reshape(-1, 3)
+    flat = corners @ np.linalg.svd(look[None])[2][1:].T
+    try:
+        return np.asarray(corners[scipy.spatial.ConvexHull(flat).vertices])
+    except scipy.spatial.QhullError:
+        along = flat @ np.linalg.svd(flat - flat.mean(axis=0))[2][0]
+        return np.asarray(corners[[along.argmin(), along.argmax()]])
 
 
-def _draw_limb(view: View, limb: DrawnLimb) -> None:
-    """Draw a limb's links, and its joints in the colours of their utilisation."""
-    view.line(limb.chain, color=LIMB, linewidth=4.0, solid_capstyle="round", zorder=5)
-    joints = limb.chain[:-1]
-    if limb.utilisations is None:
-        view.line(joints, color="white", mec=LIMB, marker="o", ms=5, linestyle="none", zorder=6)
-        return
-    for i in np.argsort(limb.utilisations, kind="stable"):
-        colour = COLOURS(UTILISATION(limb.utilisations[i]))
-        view.line(joints[i : i + 1], color=colour, mec="0.2", marker="o", ms=6, zorder=6)
-
-
-def _name_hands(view: View, scene: Scene) -> None:
-    """Write the limbs' names beside their hands, away from the body."""
-    held = {hand.limb for hand in scene.hands}
-    named = [(hand.limb + " (floats)" * hand.floats, hand.place) for hand in scene.hands]
-    named += [(f"{limb} (free)", chain[-1]) for limb, chain, _ in scene.limbs if limb not in held]
-    names, places = zip(*((name.replace("_", " "), place) for name, place in named), strict=True)
-    spots = view.flat(np.array(places))
-    middle = view.flat(scene.body.position[None])[0]
-    for spot, text in view.merged(spots, names, ",\n", NEAR_NAMES):
+def _write_names(view: View, scene: Scene) -> None:
+    """Write the limbs' names beside their hands, away from the body, and that of B."""
+    middle = view.flat(scene.origin[None])[0]
+    names = [label for label in scene.labels if label.kind == "limb"]
+    spots = view.flat(np.array([label.place for label in names]))
+    texts = [label.text for label in names]
+    for spot, text in view.merged(spots, texts, ",\n", NEAR_NAMES):
         outward = 1.0 if spot[0] >= middle[0] else -1.0
         view.note(text, spot, (14.0 * outward, -14.0), ha="left" if outward > 0.0 else "right")
+    for label in scene.labels:
+        if label.kind == "origin":
+            view.note(label.text, middle, (-8.0, 6.0), bbox=None)
 
 
-def _draw_forces(view: View, scene: Scene) -> None:
-    """Draw the hands' forces on the robot in the colours of their utilisation, and the load."""
-    arrows = []
-    for hand in scene.hands:
-        if hand.force is not None and hand.utilisation is not None:
-            colour = COLOURS(UTILISATION(hand.utilisation))
-            begin, tip = view.arrow(hand.place, scene.scale * hand.force, colour)
-            arrows.append((tip, f"{np.linalg.norm(hand.force):.0f} N", tip - begin))
-    steps = {tuple(tip): step for tip, _, step in arrows}
-    tips, sizes = [tip for tip, _, _ in arrows], [size for _, size, _ in arrows]
-    for tip, text in view.merged(tips, sizes, ", ", NEAR_TIPS):
+def _draw_arrows(view: View, scene: Scene) -> None:
+    """Draw forces of hands in the colours of their utilisation, and the load."""
+    steps: dict[tuple[float, ...], Array] = {}
+    tips, texts = [], []
+    for arrow in scene.arrows:
+        known = arrow.utilisation
+        colour = LOAD if known is None else COLOURS(UTILISATION(known))
+        begin, tip = view.arrow(arrow.start, scene.scale * arrow.force, colour)
+        if arrow.kind == "load":
+            view.beyond(arrow.text, tip, tip - begin, color=LOAD)
+            continue
+        steps[tuple(tip)] = tip - begin
+        tips.append(tip)
+        texts.append(arrow.text)
+    for tip, text in view.merged(tips, texts, ", ", NEAR_TIPS):
         view.beyond(text, tip, steps[tuple(tip)])
-    load = scene.load
-    view.line(load.place[None], color=LOAD, marker="o", ms=8, zorder=6)
-    begin, tip = view.arrow(load.place, scene.scale * load.force, LOAD)
-    text = f"{'weight' if load.weight else 'load'} {np.linalg.norm(load.force):.0f} N"
-    moment = f"{np.linalg.norm(load.moment):.0f}"
-    if moment != "0" and not load.weight:
-        text += f"\nand {moment} N·m"
-    view.beyond(text, tip, tip - begin, color=LOAD)

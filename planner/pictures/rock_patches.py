@@ -1,7 +1,6 @@
 """The rock around a hand as triangles, for pictures.
 
-Every hold is drawn from what defines it (circles, faces, semi-axes, outlines, triangles), and cut
-off at a box about the hand.
+Every hold has a surface (`hand_models.rock.Hold.surface`), cut off at a box about the hand.
 """
 
 from __future__ import annotations
@@ -14,27 +13,12 @@ from trimesh.intersections import slice_faces_plane
 
 from hand_models.base import Array, Indices, Pose
 from hand_models.hand import SettledHand
-from hand_models.rock import (
-    Cylinder,
-    Edge,
-    Ellipsoid,
-    Mesh,
-    Plane,
-    Profile,
-    Sphere,
-    Triangles,
-    drawn_out,
-    grid,
-    weld,
-)
+from hand_models.rock import Triangles, weld
 
 __all__ = ["AROUND", "rock_patch"]
 
 AROUND: Final = 0.45
 """Half the side of the box about the hand in which rock is drawn [m]."""
-
-STEPS: Final = 28
-"""Of a curve that is drawn in pieces."""
 
 MOST: Final = 3000
 """Triangles of a mesh near a hand above which it is drawn coarsely."""
@@ -56,10 +40,13 @@ def rock_patch(settled: SettledHand, beside: Array = HERE) -> Array:
     ----------
     settled : SettledHand
     beside : ndarray, shape (n, 3), optional
-        Places in H of all hands on this rock, if it is a mesh; its rock reaches so far beyond them.
+        Places in H of all hands on this rock, which is drawn so far beyond each.
     """
     in_hand = settled.seating.pose
-    vertices, faces = _surface(settled, in_hand.inverse().position)
+    there = in_hand.inverse().apply(beside)
+    # as far about each hand as the corners of a box are, however that is turned
+    reach = 2.0 * AROUND
+    vertices, faces = settled.hold.surface(there.min(axis=0) - reach, there.max(axis=0) + reach)
     low, high = beside.min(axis=0) - AROUND, beside.max(axis=0) + AROUND
     near = _near(in_hand, vertices, faces, low, high)
     if not len(near.faces):
@@ -94,56 +81,3 @@ def _coarse(triangles: Triangles, size: float) -> Triangles:
     counts = np.bincount(cell)
     middles = np.column_stack([np.bincount(cell, x) / counts for x in places.T])
     return weld(Triangles(middles, cell[faces.reshape(-1, 3)]))
-
-
-def _surface(settled: SettledHand, hand: Array) -> Triangles:
-    """Return a hold's surface in its own frame, at least near a hand at a place in that frame."""
-    hold, middle = settled.hold, float(hand[1])
-    sides = middle - 2.0 * AROUND, middle + 2.0 * AROUND
-    match hold:
-        case Plane():
-            x = float(hand[0])
-            outline = np.array([[x - 2.0 * AROUND, 0.0], [x + 2.0 * AROUND, 0.0]])
-            return drawn_out(outline, *sides)
-        case Cylinder() | Edge():
-            return drawn_out(_round_outline(hold, hand), *sides)
-        case Sphere():
-            return _cap(np.full(3, hold.diameter / 2.0), hand)
-        case Ellipsoid():
-            return _cap(np.array(hold.semi_axes), hand)
-        case Profile():
-            return hold.surface(*sides)
-        case Mesh():
-            return hold.triangles
-    return Triangles(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.intp))
-
-
-def _round_outline(hold: Cylinder | Edge, hand: Array) -> Array:
-    """Return the outline (x, z) of a hold with a round crest, near a hand."""
-    radius, sine, cosine = hold.swept.radius, hold.swept.sine, hold.swept.cosine
-    # points of the circle are at angles from the crest; flat faces begin where it ends
-    end = math.pi / 2.0 - hold.angle / 2.0 if isinstance(hold, Edge) else math.inf
-    over = math.atan2(float(hand[0]), radius - float(hand[2]))
-    middle = min(max(over, -end), end)
-    half = min(math.pi, 2.0 * AROUND / radius)
-    t = np.linspace(max(middle - half, -end), min(middle + half, end), STEPS + 1)
-    arc = np.column_stack([radius * np.sin(t), radius - radius * np.cos(t)])
-    if not sine:
-        return arc
-    far = float(np.abs(hand).max()) + 4.0 * AROUND
-    ends = arc[0] + far * np.array([-sine, cosine]), arc[-1] + far * np.array([sine, cosine])
-    return np.vstack([ends[0], arc, ends[1]])
-
-
-def _cap(semi_axes: Array, hand: Array) -> Triangles:
-    """Return an ellipsoid's surface about the place nearest to a hand."""
-    centre = np.array([0.0, 0.0, semi_axes[2]])
-    pole = (hand - centre) / semi_axes
-    length = float(np.linalg.norm(pole))
-    pole = pole / length if length > 0.0 else np.array([0.0, 0.0, -1.0])
-    across = np.linalg.svd(pole[None])[2][1:]
-    t = np.linspace(0.0, min(math.pi, 2.0 * AROUND / float(semi_axes.min())), STEPS + 1)
-    turn = np.linspace(0.0, 2.0 * math.pi, STEPS + 1)
-    round_about = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
-    unit = np.cos(t)[:, None, None] * pole + np.sin(t)[:, None, None] * round_about
-    return grid(centre + unit * semi_axes)

@@ -10,7 +10,7 @@ from hand_models.base import Array, InvalidInputError, check_positive, finite_ve
 from hand_models.hand import FINGERS
 from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
-from planner.question.limits import BodyRange, Limits
+from planner.question.limits import BodyRange, Limits, no_torque
 from planner.question.load import Load, Weights
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 

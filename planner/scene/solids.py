@@ -1,7 +1,6 @@
 """What can be in the way as shapes that `coal` measures, in B: capsules, hands, rock.
 
-A hold's rock goes on as its kind does: a wall without end, logs, edges and outlines drawn out along
-y, as far as the limbs get.
+A wall goes on without end; logs, edges and outlines are drawn out along y as far as the limbs get.
 """
 
 from __future__ import annotations
@@ -14,7 +13,8 @@ import coal
 import numpy as np
 
 from hand_models.base import Array, BoundedStore, Indices, Pose
-from hand_models.rock import Edge, Ellipsoid, Hold, Mesh, Plane, Profile
+from hand_models.rock import Hold
+from hand_models.sections import Swept
 from planner.scene.scene import Scene
 
 __all__ = ["Solid", "capsule_solids", "distance_between", "hand_solids", "rock_solids"]
@@ -108,33 +108,33 @@ def rock_solids(scene: Scene) -> tuple[Solid, ...]:
 
 
 def _rock(hold: Hold) -> tuple[Any, Pose]:
-    """Return a hold's shape, and where that is in the hold's frame."""
-    match hold:
-        case Plane():
-            return coal.Halfspace(np.array([0.0, 0.0, -1.0]), 0.0), Pose.identity()
-        case Edge():
-            return _wedge(hold), Pose.identity()
-        case Ellipsoid():
-            return coal.Ellipsoid(*hold.semi_axes), Pose(
-                np.array([0.0, 0.0, hold.semi_axes[2]]), np.eye(3)
-            )
-        case Mesh():
-            return _surface(*hold.triangles), Pose.identity()
-        case Profile():
-            return _surface(*hold.surface(-FAR, FAR)), Pose.identity()
+    """Return a hold's shape, and where that is in the hold's frame.
+
+    A smooth hold's is exact where `coal` has such a shape; of any other the triangles of its
+    surface.
+    """
     swept = hold.swept
-    if swept is None:
-        raise TypeError(f"no shape for a {type(hold).__name__}")
-    centre = np.array([0.0, 0.0, swept.depth])
-    if swept.scale_y:
-        return coal.Sphere(swept.radius), Pose(centre, np.eye(3))
-    return coal.Cylinder(swept.radius, 2.0 * FAR), Pose(centre, TURN)
+    if swept is not None:
+        scales = np.array([swept.scale_x, swept.scale_y, swept.scale_z])
+        centre = np.array([0.0, 0.0, swept.depth])
+        if not swept.scale_x:
+            return coal.Halfspace(np.array([0.0, 0.0, -1.0]), 0.0), Pose.identity()
+        if swept.sine:
+            return _wedge(swept), Pose.identity()
+        if scales.all():
+            alike = np.ptp(scales) == 0.0
+            size = swept.radius / scales
+            return coal.Sphere(size[0]) if alike else coal.Ellipsoid(*size), Pose(centre, np.eye(3))
+        if swept.scale_x == swept.scale_z:
+            radius = swept.radius / swept.scale_x
+            return coal.Cylinder(radius, 2.0 * FAR), Pose(centre, TURN)
+    return _surface(*hold.surface(np.full(3, -FAR), np.full(3, FAR))), Pose.identity()
 
 
-def _wedge(edge: Edge) -> Any:
+def _wedge(edge: Swept) -> Any:
     """Return an edge's rock: all within the fillet's radius of a sharp one."""
-    radius, half = edge.fillet_radius, 0.5 * edge.angle
-    aside, deep = FAR * np.sin(half), radius + FAR * np.cos(half)
+    radius = edge.radius
+    aside, deep = FAR * edge.sine, radius + FAR * edge.cosine
     section = [(0.0, radius), (aside, deep), (-aside, deep)]
     points = coal.StdVec_Vec3s()
     points.extend([np.array([x, y, z]) for x, z in section for y in (-FAR, FAR)])
