@@ -24,7 +24,7 @@ from planner.result import LoadRecovery, PlanArrays
 from planner.verification.check import BALANCE, Check
 from planner.verification.joint_balance import LEVER
 from planner.verification.limbs import ARM, JointUse, force_use
-from planner.verification.recomputation import LimitCurves, held_by
+from planner.verification.recomputation import LimitCurves, held_by, limiting_shares
 from planner.verification.sentences import LOAD, NEAR, SIGNED, STOP, STOPS, UTILISATION
 
 __all__ = ["LoadsCheck"]
@@ -81,7 +81,8 @@ class LoadsCheck:
         self._body = np.hstack([*(carries @ self._matrix[:, self._wrench])])
         self._from_rest = check.carry @ self._constant[:, self._wrench].ravel()
         touching = known.touch.touching
-        shares = self._by_hand(known.engagement[touching, None], known.places.hand[touching], 1.0)
+        limiting = limiting_shares(known)[touching, None]
+        shares = self._by_hand(limiting, known.places.hand[touching], 1.0)
         of_tile = np.repeat(np.arange(len(places)), shares.shape[1])
         self._curves = LimitCurves([hand.surface for hand in known.hands], of_tile, shares.ravel())
 
@@ -131,7 +132,7 @@ class LoadsCheck:
             [(again.along, each)],
             signs,
             [stops],
-            [(tiles[touching] / known.engagement[touching, None], on_rock)],
+            [(tiles[touching] / limiting_shares(known)[touching, None], on_rock)],
             used,
         ]
         return [_flat(part) for part in parts]

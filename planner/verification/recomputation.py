@@ -26,7 +26,7 @@ from planner.verification.joint_balance import Fingers, JointBalance, tendons_of
 from planner.verification.nails import NO_NAILS, Nails
 from planner.verification.sentences import COUNT, LOAD, PALM_SIGNS, UTILISATION, Recomputed
 
-__all__ = ["LimitCurves", "Recomputing", "held_by", "planes_of"]
+__all__ = ["LimitCurves", "Recomputing", "held_by", "limiting_shares", "planes_of"]
 
 SMALL: Final = 1e-300
 """In place of a load that is zero, where something is divided by it [N]."""
@@ -174,6 +174,16 @@ def held_by(forces: Array) -> Array:
     return np.asarray(np.sqrt(np.add.reduce(held * held, axis=1)))
 
 
+def limiting_shares(known: HandBatch) -> Array:
+    """Return the part of a whole tile's strength that limits each tile on rock, shape (T,).
+
+    The share of its spines there; with fewer than φ₀ of them, the hand's ``least_share``, half of
+    φ₀ at none, and as a parabola between.
+    """
+    share, least = known.engagement, known.hands[0].hand.least_share
+    return np.where(share < least, 0.5 * least * (1.0 + (share / least) ** 2), share)
+
+
 class Recomputing:
     """Recomputes plans of the same settled hands.
 
@@ -194,7 +204,9 @@ class Recomputing:
         self._places = places
         self._balance = JointBalance(known)
         # tiles that touch nothing use nothing of their limits
-        shares = np.where(known.touch.away, 1.0, known.engagement)
+        shares = np.where(known.touch.away, 1.0, limiting_shares(known))
+        sheared = np.array([hand.surface.shear_limit for hand in hands])[index.hand]
+        self._allowances = sheared * (shares - known.engagement) * known.touch.touches
         self._whole = known.touch.touches / shares
         self._curves = LimitCurves([hand.surface for hand in hands], index.hand, shares)
         self._lateral = np.array([hand.surface.lateral_limit for hand in hands])[index.hand]
@@ -296,6 +308,7 @@ class Recomputing:
             floats=bool(floats),
             shear=shear,
             normal=normal,
+            allowances=self._allowances,
             left=left if balance.held is None else np.where(balance.held, 0.0, left),
             stops=stops,
             stop_fingers=balance.stop_fingers,

@@ -92,6 +92,8 @@ class Recomputed(NamedTuple):
         Whether a wrist does.
     shear, normal : ndarray, shape (T,)
         Of each tile [N]; of nails zero.
+    allowances : ndarray, shape (T,)
+        By how much tiles with few spines on the rock may be dragged backwards [N].
     left : ndarray, shape (F, 3)
         What is left of each free joint's balance [N·m].
     stops : ndarray, shape (k,)
@@ -129,6 +131,7 @@ class Recomputed(NamedTuple):
     floats: bool
     shear: Array
     normal: Array
+    allowances: Array
     left: Array
     stops: Array
     stop_fingers: Indices
@@ -165,7 +168,7 @@ class Recomputed(NamedTuple):
         pressed[bases] = self.known.engagement[bases] * self.normal[bases + 1]
         return (
             self.arrays.tensions,
-            self.shear + self.known.friction * pressed,
+            self.shear + self.known.friction * pressed + self.allowances,
             self.normal * self.known.touch.framed,
             self.arrays.palms[:, ::2] * PALM_SIGNS,
             self.slackened,
