@@ -96,7 +96,7 @@ class FloatingWrist(CompliantGrasp):
         k = len(tile)
         for part, slope in enumerate(slopes):
             P[np.arange(k), part * n + tile] = slope
-        s[:k] = capacity * settled.engagement[tile]
+        s[:k] = capacity * settled.limit_shares[tile]
         most = settled.hand.maximum_tension
         if self.tension_limit is not None:
             most = min(most, self.tension_limit)
@@ -132,7 +132,9 @@ class FloatingWrist(CompliantGrasp):
         base = layout.bases
         Q[row[np.isin(touching, base)], n + base + 1] = -friction * settled.engagement[base]
         Q[len(those) :, stop:] = -np.diag(pushed)
-        return LoadRows(layout.rows, P, p, np.hstack([HELD, np.zeros_like(HELD)]), s, Q)
+        q = np.zeros(len(Q))
+        q[row] = settled.drag_allowances[touching]
+        return LoadRows(layout.rows, P, p, np.hstack([HELD, np.zeros_like(HELD)]), s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
         """Return loads and wrenches at some twists of the wrist, shape (m, 6)."""
@@ -163,6 +165,7 @@ class FloatingWrist(CompliantGrasp):
                     share = self.hand.settled.engagement[own[0]]
                     pressed = np.column_stack([share * pressed[:, 0], pressed])
                 drags = found.shears + self.hand.settled.surface.friction * pressed
+                drags += self.hand.settled.drag_allowances[own]
                 holds &= found.reached & (drags >= 0.0).all(axis=1)
             left = left[holds]
         return left

@@ -3,7 +3,7 @@
 A pose ξ of the wrist gives loads e (of tiles, tendons, the palm) and the wrench w on the rock.
 Limit rows are affine in loads, or of the wrench itself, and hard rows linear in loads,
 
-    P e + p ≤ u s,    D w ≤ u s,    Q e ≤ 0,
+    P e + p ≤ u s,    D w ≤ u s,    Q e ≤ q,
 
 so that with e and w linearised about a pose they are a `WrenchSpace`.
 """
@@ -67,8 +67,8 @@ class LoadRows(NamedTuple):
         Of the limit rows after them, D w.
     s : ndarray, shape (n + nd,)
         Capacities of both.
-    Q : ndarray, shape (nh, k)
-        Hard rows Q e ≤ 0.
+    Q, q : ndarray, shapes (nh, k), (nh,)
+        Hard rows Q e ≤ q.
     """
 
     names: tuple[Row, ...]
@@ -77,6 +77,7 @@ class LoadRows(NamedTuple):
     D: Array
     s: Array
     Q: Array
+    q: Array
 
 
 class Evaluation(NamedTuple):
@@ -137,7 +138,7 @@ class CompliantGrasp(ABC):
         with np.errstate(invalid="ignore"):
             loads = [found.elements @ rows.P.T + rows.p, found.wrenches @ rows.D.T]
             used = np.where(lost, np.inf, np.concatenate(loads, axis=1) / rows.s)
-            broken = np.where(lost, np.inf, found.elements @ rows.Q.T)
+            broken = np.where(lost, np.inf, found.elements @ rows.Q.T - rows.q)
         most = broken.max(axis=1, initial=-np.inf)
         return Evaluation(found.wrenches, used.max(axis=1), used.argmax(axis=1), most)
 
@@ -176,7 +177,7 @@ class CompliantGrasp(ABC):
         rows = self.load_rows
         start, slope = _affine(found.elements, at)
         origin, generators = _affine(found.wrenches, at)
-        H, h = np.vstack([rows.Q @ slope, more]), np.concatenate([-rows.Q @ start, most])
+        H, h = np.vstack([rows.Q @ slope, more]), np.concatenate([rows.q - rows.Q @ start, most])
         names = rows.names
         if within is not None:
             inverse = np.diag(1.0 / np.asarray(within, dtype=float))

@@ -153,6 +153,7 @@ class Gripper(CompliantGrasp):
                 [piece.capacity for piece in pieces] * len(tiles) + [self.most_pressing] * len(cap)
             ),
             Q=np.hstack([-each, -self.surface.friction * each]),
+            q=np.zeros(len(hard)),
         )
 
     def finger_loads(self, twists: Numbers) -> tuple[FingerLoads, FingerLoads]:

@@ -130,7 +130,7 @@ def limit_rows(
     planes = layout.planes([hand.surface for hand in hands])
     planar = planes[:, :, :1] * loads[:, tile, 0] + planes[:, :, 1:2] * loads[:, tile, 1]
     l0[:, :k], L[:, row, of] = planar.transpose(2, 0, 1)
-    s[:, :k] = planes[:, :, 3] * _of_tiles(hands, "engagement")[:, tile]
+    s[:, :k] = planes[:, :, 3] * _of_tiles(hands, "limit_shares")[:, tile]
     if layout.reacting:
         column = np.zeros(TENDONS, dtype=np.intp)
         column[list(layout.reacting)] = layout.lateral_columns
@@ -186,6 +186,8 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
         row, along = k + np.arange(len(tiles)), kept[:, tiles]
         H[:, row, layout.finger_of[tiles]], h[:, row] = -along[:, :, 1], along[:, :, 0]
+        if tiles is layout.touching:
+            h[:, row] += _of_tiles(hands, "drag_allowances")[:, tiles]
         k += len(tiles)
     if layout.stops:
         row, stopped = k + np.arange(len(layout.stops)), [finger for finger, _ in layout.stops]

@@ -82,6 +82,11 @@ class HandModel:
                 raise InvalidInputError(f"must be in [0, 1), got {mu:g}", field=f"tendon.{name}")
         self.tendon_friction = table.scalar("tendon", "holding_friction")
         self.spine_travel = table.scalar("tile", "spine_travel")
+        self.least_share = table.positive("tile", "least_share")
+        if self.least_share > 1.0:
+            raise InvalidInputError(
+                f"must be in (0, 1], got {self.least_share:g}", field="tile.least_share"
+            )
         self.lateral_stiffness = table.positive("tile", "lateral_stiffness")
         self.bending_stiffness = table.positive("beam", "bending_stiffness")
         self.torsional_stiffness = table.positive("beam", "torsional_stiffness")

@@ -169,7 +169,7 @@ class SettledHand:
         Share φ of each tile's spines that are on the rock (`engaged_share`): above 0, at most 1,
         where its contact is ``face`` or ``edge``, 0 of all others and of nails. A tile has φ times
         the shear that its tendon would give the whole of it, holds φ times as much, and carries
-        its finger's lateral reaction in proportion to φ.
+        its finger's lateral reaction in proportion to φ. See `limit_shares`, too.
     nail_angles : ndarray, shape (4,)
         How far each finger's nail has turned; all the way where it does not hook [rad].
     nail_normals : ndarray, shape (4, 3)
@@ -242,6 +242,26 @@ class SettledHand:
         """Share of its finger's lateral reaction that each tile carries, as its φ, shape (n,)."""
         sums = np.where(self._whole_tiles > 0.0, self._whole_tiles, 1.0)
         return np.asarray(self.engagement / sums[self.finger_of])
+
+    @cached_property
+    def limit_shares(self) -> Array:
+        """Part of a whole tile's strength that limits each tile's load, shape (n,).
+
+        φ, and below φ₀, the hand's ``least_share``, φ + (φ₀ − φ)² / (2 φ₀): a tile's load goes to
+        zero with φ, its limit does not, so that a tile with fewer and fewer spines on the rock
+        limits the hand less and less. Zero where it has none.
+        """
+        least, share = self.hand.least_share, self.engagement
+        more = np.maximum(least - share, 0.0) ** 2 / (2.0 * least)
+        return np.where(share > 0.0, share + more, 0.0)
+
+    @cached_property
+    def drag_allowances(self) -> Array:
+        """By how much each tile may be dragged backwards beyond friction, shape (n,) [N].
+
+        Shear strength times what its part of `limit_shares` is more than φ: zero from φ₀ on.
+        """
+        return self.surface.shear_limit * (self.limit_shares - self.engagement)
 
     @cached_property
     def lateral_limits(self) -> Array:

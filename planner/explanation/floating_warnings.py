@@ -45,6 +45,7 @@ def idle_preloads(
             finger = int(hand.finger_of[t])
             drag = hand.loads[t, 0] + hand.surface.friction * hand.loads[t, 1]
             at_zero, per_newton = (float(value) for value in drag)
+            at_zero += float(hand.drag_allowances[t])
             shear = at_zero + per_newton * float(wrist.hand.preload[finger])
             if shear < -BACKWARDS and per_newton > 0.0:
                 needs.append((-at_zero / per_newton, finger, hand.tiles[t].phalanx))

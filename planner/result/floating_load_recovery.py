@@ -60,6 +60,7 @@ def recover_floating_hand(
         positions=positions,
         axes=axes,
         engagement=settled.engagement,
+        limit_shares=settled.limit_shares,
         tile_utilisations=used,
         tiles=settled.tiles,
         half_planes=inner_half_planes(settled.surface),

@@ -77,8 +77,9 @@ class HandPlan:
         [N], [m]
     axes : ndarray, shape (n, 3, 3)
         Rows: unit forces of shear, normal and lateral load.
-    engagement : ndarray, shape (n,)
-        Share of each tile's spines that are on the rock.
+    engagement, limit_shares : ndarray, shape (n,)
+        Share of each tile's spines that are on the rock, and part of a whole tile's strength that
+        limits its load, as of `SettledHand`.
     tile_utilisations : ndarray, shape (n,)
     tiles : tuple of Tile
         Their names and contacts.
@@ -110,6 +111,7 @@ class HandPlan:
     positions: Array
     axes: Array
     engagement: Array
+    limit_shares: Array
     tile_utilisations: Array
     tiles: tuple[NamedTile, ...]
     half_planes: tuple[HalfPlane, ...]
@@ -152,7 +154,7 @@ class HandPlan:
 
     def limits_of(self, tile: int) -> tuple[HalfPlane, ...]:
         """Return the half-planes of a tile's spines on the rock, or of its nail, by its index."""
-        nail, share = self.nail_planes.get(tile), float(self.engagement[tile])
+        nail, share = self.nail_planes.get(tile), float(self.limit_shares[tile])
         if nail is not None or share in (0.0, 1.0):
             return self.half_planes if nail is None else nail
         return tuple(p._replace(capacity=share * p.capacity) for p in self.half_planes)
@@ -263,6 +265,7 @@ class PlanArrays(NamedTuple):
                     positions=self.points[own],
                     axes=self.axes[own],
                     engagement=self.engagement[own],
+                    limit_shares=hand.limit_shares,
                     tile_utilisations=self.tile_utilisations[own],
                     tiles=self.tiles[h],
                     half_planes=self.half_planes[h],

@@ -13,6 +13,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.tile import HalfPlane, Surface
+from planner.prepare import HandBatch
 from planner.verification.nails import NailLoads
 from planner.verification.residuals import LOAD, UTILISATION, Names, Recomputed, Residual, claim
 
@@ -89,6 +90,16 @@ def _numbers(surface: Surface) -> tuple[float, ...]:
     )
 
 
+def limiting_shares(known: HandBatch) -> Array:
+    """Return the part of a whole tile's strength that limits each tile on rock, shape (T,).
+
+    The share of its spines there; with fewer than φ₀ of them, the hand's ``least_share``, half of
+    φ₀ at none, and as a parabola between.
+    """
+    share, least = known.engagement, known.hands[0].hand.least_share
+    return np.where(share < least, 0.5 * least * (1.0 + (share / least) ** 2), share)
+
+
 class TileLimits:
     """What tiles bear: friction, the law's surface, and what a plan's half-planes say is used.
 
@@ -103,7 +114,9 @@ class TileLimits:
         self._names, self._known = names, known
         self._framed = bool(known.touch.framed.any())
         # tiles that touch nothing use nothing of their limits
-        shares = np.where(known.touch.away, 1.0, known.engagement)
+        shares = np.where(known.touch.away, 1.0, limiting_shares(known))
+        sheared = np.array([each.shear_limit for each in surfaces])[self._of]
+        self._allowances = sheared * (shares - known.engagement) * known.touch.touches
         self._per_share = (known.touch.touches / shares)[:, None]
         self._curves = LimitCurves(surfaces, self._of, shares)
         self._lateral = np.array([each.lateral_limit for each in surfaces])[self._of, None]
@@ -119,7 +132,7 @@ class TileLimits:
         bases, pressed = known.places.bases, normal.copy()
         pressed[bases] = known.engagement[bases] * normal[bases + 1]
         backwards = " is pulled off or dragged backwards: {:.3g} N along, {:.3g} N across"
-        rubs, across = shear + known.friction * pressed, (shear, normal)
+        rubs, across = shear + known.friction * pressed + self._allowances, (shear, normal)
         yield Residual("least", rubs, self._of, name, backwards, across)
         if self._framed:
             text, pressed = ": its bare frame would be pulled off", normal * known.touch.framed

@@ -18,6 +18,7 @@ from tests.suite.helpers.hands import (
     PINCH,
     ROCK,
     changed_hand,
+    limiting,
     partly,
     pinch,
     settled_at,
@@ -166,7 +167,7 @@ def test_rows_say_what_tile_by_tile_reckoning_says(seed):
                 for p in inner_half_planes(settled.surface)
                 if p.limit == limit
             )
-            expected /= holds[finger, phalanx]
+            expected /= limiting(holds[finger, phalanx])
         assert u == pytest.approx(expected, rel=1e-9, abs=1e-9)
     kept = dict(
         zip(
@@ -184,8 +185,10 @@ def test_rows_say_what_tile_by_tile_reckoning_says(seed):
             pressed = normal
             if tile.phalanx == "base":
                 pressed = holds[tile.finger, "base"] * loads[tile.finger, "proximal"][1]
+            held = holds[tile.finger, tile.phalanx]
+            allowed = settled.surface.shear_limit * (limiting(held) - held)
             assert kept[f"{name}/dragged_backwards"] == (
-                shear + settled.surface.friction * pressed >= -1e-9
+                shear + settled.surface.friction * pressed + allowed >= -1e-9
             )
         if tile.contact == "frame":
             assert kept[f"{name}/frame_pulled"] == (normal >= -1e-9)
@@ -267,6 +270,34 @@ def test_a_tile_half_on_the_rock_has_half_the_load_and_half_the_strength():
     np.testing.assert_allclose(used[1][0], used[0][0], rtol=1e-12)
     np.testing.assert_allclose(used[1][1], used[0][1], rtol=1e-12)
     np.testing.assert_allclose(used[1][2], 0.5 * used[0][2], rtol=1e-12)
+
+
+def test_a_tile_with_fewer_and_fewer_spines_limits_its_hand_less_and_less():
+    """Its utilisation goes to zero with its share, and no tension drags it backwards at last."""
+    whole = HAND.settle(Cylinder(0.3), ROCK, Grasp(outer_rotation=0.0))
+    assert whole.engagement[0] > 0.15
+    at_zero, per_newton = whole.loads[0, 0] / whole.engagement[0]
+    used, least = [], []
+    for share in (0.15, 0.1 + 1e-9, 0.1 - 1e-9, 0.05, 0.01, 1e-3, 1e-6):
+        part = np.ones(14)
+        part[0] = share / whole.engagement[0]
+        settled = partly(whole, part)
+        space = wrench_space(settled)
+        rows = [row.label.startswith("outer_left/base/") for row in space.rows]
+        limits, hard = np.array(rows[: len(space.s)]), np.array(rows[len(space.s) :])
+        y = np.zeros(len(space.columns))
+        y[:4] = 100.0
+        used.append(space.utilisations(y)[limits].max())
+        least.append(float((space.h[hard] / space.H[hard, 0])[0]))
+        whole_tile = (at_zero + per_newton * 100.0) / ROCK.shear_limit
+        assert used[-1] >= whole_tile * share / limiting(share) - 1e-9
+        assert -1e-9 <= settled.limit_shares[0] - share <= 0.05
+    assert used[1] == pytest.approx(used[2], rel=1e-6)
+    assert used[0] == pytest.approx(used[1], rel=1e-6)
+    assert (np.diff(used[2:]) < 0.0).all()
+    assert used[-1] < 1e-4
+    assert least[0] == pytest.approx(least[2], rel=1e-6)
+    assert least[-1] < -1e3
 
 
 def test_lateral_switched_off_leaves_no_lateral_column():

@@ -50,18 +50,9 @@ FADING = {
 }
 """Stances, and a share of spines that is none at last as the rock goes so far off [m]."""
 
-LIMITING = pytest.mark.xfail(
-    reason="as long as it has a spine on the rock, a tile limits its hand as a whole one",
-    strict=True,
-)
-
 CASES = [
     *((name, "fixed", CALIBRATION_LOAD) for name in FADING),
-    pytest.param("base tiles", "floating", CALIBRATION_LOAD, marks=[LIMITING, pytest.mark.slow]),
-    pytest.param(
-        "base tiles of pinches", "floating", CALIBRATION_LOAD, marks=[LIMITING, pytest.mark.slow]
-    ),
-    ("two rows of the palm", "floating", CALIBRATION_LOAD),
+    *((name, "floating", CALIBRATION_LOAD) for name in FADING),
 ]
 
 

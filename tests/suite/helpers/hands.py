@@ -111,6 +111,11 @@ def settled_at(seed: int, lateral: bool | None = None) -> SettledHand | None:
         return None
 
 
+def limiting(share: float, least: float = 0.1) -> float:
+    """Part of a whole tile's strength that limits a tile with a share of its spines on rock."""
+    return share if share >= least else share + (least - share) ** 2 / (2.0 * least)
+
+
 def partly(settled: SettledHand, shares: np.ndarray | float) -> SettledHand:
     """A hand of which only so much of each tile's spines, (n,), holds; not one at a joint's stop.
 
