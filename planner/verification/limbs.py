@@ -204,16 +204,16 @@ def force_use(
     if cap is None:
         return NOTHING, NOTHING
     force = wrench[:3]
-    if not isinstance(cap.largest_force, tuple):
+    if not isinstance(cap.most, tuple):
         along, size = BALL @ force, float(np.linalg.norm(force))
         if not size <= along.max() + allowed:
             found.append(f"{place.limb}: the hand exerts {size:.6g} N, more than its rows say")
-        return along / cap.largest_force, NOTHING
+        return along / cap.most, NOTHING
     if cap.frame != "hand":
         force = place.pose.rotation @ force
     if cap.frame == "body":
         force = question.stance.body.rotation.T @ force
-    ends = np.array(cap.largest_force)
+    ends = np.array(cap.most)
     both, barred = np.column_stack([force, force]), ends == 0.0
     none = both * [-1.0, 1.0]
     for axis in (barred & ~(none <= allowed)).any(axis=1).nonzero()[0].tolist():

@@ -71,9 +71,7 @@ class LoadsCheck:
         ]
         caps = [question.limits.per_hand.get(place.limb) for place in places]
         self._capped = [
-            i
-            for i, cap in enumerate(caps)
-            if cap is not None and not isinstance(cap.largest_force, tuple)
+            i for i, cap in enumerate(caps) if cap is not None and not isinstance(cap.most, tuple)
         ]
         size = max(map(len, columns))
         self._stack([self._numbers(y) for y in np.eye(size + 1, size, k=-1)])

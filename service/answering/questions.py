@@ -17,9 +17,7 @@ from hand_models.parameters import Draw, ParameterTable, own_draw, own_hand
 from hand_models.tile import Surface
 from planner import (
     EARTH,
-    ForceCap,
     HandOnHold,
-    Limits,
     Load,
     Question,
     Stance,
@@ -70,7 +68,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         stance=stance(request.stance, robots),
         body_wrench=_array(request.body_wrench),
         load=request.load or Load(),
-        limits=_limits(request.limits),
+        limits=request.limits,
         want=frozenset(request.want),
         objective=request.objective,
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
@@ -102,7 +100,7 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
         start=start,
         moves=tuple(map(Move, _placed(kind, moved, "moves"), map(bodies.get, places), angles)),
         load=request.load or Load(),
-        limits=_limits(request.limits),
+        limits=request.limits,
         objective=request.objective,
         explain=request.explain,
         want=frozenset(request.want),
@@ -152,17 +150,6 @@ def _joints(
     }
 
 
-def _limits(message: requests.Limits) -> Limits:
-    with within("limits"):
-        return Limits(
-            utilisation=message.utilisation,
-            tendon_tension=message.tendon_tension,
-            joint_torque=message.joint_torque,
-            per_hand={limb: _force_cap(cap, limb) for limb, cap in message.per_hand.items()},
-            tension_change=message.tension_change,
-        )
-
-
 def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
     """Return a caller's own draws; None for the bundled ones."""
     found = []
@@ -170,20 +157,6 @@ def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
         with within(f"draws[{i}]"):
             found.append(own_draw(msgspec.structs.asdict(message)))
     return tuple(found) or None
-
-
-def _force_cap(message: requests.ForceCap, limb: str) -> ForceCap:
-    given = message.largest_force
-    most = tuple(_range(axis) for axis in given) if isinstance(given, list) else given
-    with within(f"per_hand.{limb}"):
-        return ForceCap(most, message.frame)
-
-
-def _range(axis: requests.AxisForce) -> tuple[float, float]:
-    """Return the least and the largest force along an axis."""
-    if axis is None:
-        return -math.inf, math.inf
-    return (axis[0], axis[1]) if isinstance(axis, list) else (-axis, axis)
 
 
 def _hands(
