@@ -39,6 +39,7 @@ from .message_fields import (
     Acceleration as Acceleration,
     AccelerationEntry as AccelerationEntry,
     Coordinate as Coordinate,
+    Force as Force,
     Mass as Mass,
     Name as Name,
     Position as Position,

@@ -6,7 +6,7 @@ Wrenches are ``[fx, fy, fz, mx, my, mz]``: force first, moment about the frame's
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -129,6 +129,25 @@ class Pose:
         pose = cls(place, rotation)
         object.__setattr__(pose, "proper", True)
         return pose
+
+    @classmethod
+    def from_quaternions(
+        cls, given: Iterable[tuple[str, Sequence[float] | Array, Sequence[float] | Array]]
+    ) -> list[Pose]:
+        """Return the poses of fields, each its path, its position and its orientation.
+
+        Raises
+        ------
+        InvalidInputError
+            As of `from_quaternion`; the field begins with the path.
+        """
+        found = []
+        for path, position, orientation in given:
+            try:
+                found.append(cls.from_quaternion(position, orientation))
+            except InvalidInputError as error:
+                raise error.within(path) from None
+        return found
 
     def quaternion(self) -> Array:
         """Return the orientation as ``[x, y, z, w]``, shape (4,), with w ≥ 0."""

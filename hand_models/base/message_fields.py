@@ -14,6 +14,7 @@ __all__ = [
     "Acceleration",
     "AccelerationEntry",
     "Coordinate",
+    "Force",
     "Mass",
     "Name",
     "Position",
@@ -28,6 +29,7 @@ Acceleration = Annotated[
     tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
     Meta(description="in W [m/s²]"),
 ]
+Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
 Mass = Annotated[float, Meta(ge=1e-3, le=1e5, description="[kg]")]
 Tension = Annotated[float, Meta(ge=1e-3, le=1e4, description="of a tendon [N]")]
 Name = Annotated[str, Meta(max_length=64)]

@@ -129,7 +129,7 @@ def _drop(question: Question, whole: dict[str, Any], what: str, limb: str) -> No
     else:
         limits = whole.get("limits", question.limits)
         caps = {name: each for name, each in limits.per_hand.items() if name != limb}
-        whole["limits"] = replace(limits, per_hand=caps)
+        whole["limits"] = structs.replace(limits, per_hand=caps)
 
 
 def _hands(

@@ -204,7 +204,7 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
         found.append(
             StanceConstraints(
                 joints=None if where is None else where.joints[hand.limb],
-                cap=None if cap is None else cap.largest_force,
+                cap=None if cap is None else cap.most,
                 frame=frame,
                 present=question.present.get(hand.limb),
                 change=math.inf if change is None else change,

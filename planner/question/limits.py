@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal, get_args
 
 from msgspec import Meta
+from msgspec.structs import force_setattr
 
-from hand_models.base import InvalidFieldError, InvalidInputError, Strict, check_positive
+from hand_models.base import Force, InvalidFieldError, Name, Strict, Tension, check_positive
 
 __all__ = ["BodyRange", "ForceCap", "Limits", "no_torque"]
 
@@ -24,57 +24,93 @@ FRAMES: Final = get_args(Frame)
 LEAST: Final = 1e-3
 """Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""
 
+Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
+JointTorque = Annotated[float, Meta(ge=0.0, le=1e6)]
+Torques = Annotated[
+    Sequence[JointTorque],
+    Meta(
+        min_length=1,
+        max_length=64,
+        description="of a limb's joints from the body outward, 0 of one without a motor [N·m]",
+    ),
+]
+ForceBound = Annotated[float, Meta(ge=-1e6, le=1e6)]
+ForceRange = Annotated[
+    Sequence[ForceBound],
+    Meta(min_length=2, max_length=2, description="least and largest, with zero in between [N]"),
+]
+# a tuple with lists in it crashes msgspec's garbage collection
+AxisForces = Annotated[Sequence[Force | ForceRange | None], Meta(min_length=3, max_length=3)]
+Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
 
-@dataclass(frozen=True)
-class ForceCap:
+
+class ForceCap(Strict, frozen=True):
     """The most that a hand may do to its rock.
 
     Attributes
     ----------
-    largest_force : float, or tuple of (float, float) of length 3
-        Whatever its direction, or the least and the largest along each axis [N]; those are not
-        above and not below zero, and may be infinite.
+    largest_force : float, or sequence of (float, pair of float or None), length 3
+        Whatever its direction; or along each axis the largest either way, the least and the
+        largest, which are not above and not below zero and may be infinite, or None for no cap [N].
     frame : {'hand', 'body', 'world'}
         Whose axes they are.
     """
 
-    largest_force: float | tuple[tuple[float, float], ...]
+    largest_force: Annotated[
+        Force | AxisForces,
+        Meta(
+            description="whatever its direction; or along each axis of the frame: the largest "
+            "either way, a range, or null for none"
+        ),
+    ]
     frame: Frame = "hand"
 
     def __post_init__(self) -> None:
-        if isinstance(self.largest_force, list):
-            ranges = tuple((float(low), float(high)) for low, high in self.largest_force)
-            object.__setattr__(self, "largest_force", ranges)
         if self.frame not in FRAMES:
-            raise InvalidInputError(
+            raise InvalidFieldError(
                 f"unknown frame {self.frame!r}; known are {', '.join(FRAMES)}", field="frame"
             )
-        if isinstance(self.largest_force, tuple):
-            if len(self.largest_force) != 3:
-                raise InvalidInputError(
-                    f"3 axes are needed, got {len(self.largest_force)}", field="largest_force"
+        most = self.most
+        if isinstance(most, float):
+            if not (math.isfinite(most) and most >= LEAST):
+                raise InvalidFieldError(
+                    f"must be at least {LEAST:g} N, got {most:g}", field="largest_force"
                 )
-            for i, (low, high) in enumerate(self.largest_force):
-                if not low <= 0.0 <= high or low == high:
-                    raise InvalidInputError(
-                        f"a range from below to above zero is needed, one end of which may be "
-                        f"zero; got {low:g} to {high:g} N",
-                        field=f"largest_force[{i}]",
-                    )
-                if any(0.0 < abs(end) < LEAST for end in (low, high)):
-                    raise InvalidInputError(
-                        f"an end is zero or at least {LEAST:g} N, got {low:g} to {high:g} N",
-                        field=f"largest_force[{i}]",
-                    )
-        elif not (math.isfinite(self.largest_force) and self.largest_force >= LEAST):
-            raise InvalidInputError(
-                f"must be at least {LEAST:g} N, got {self.largest_force:g}", field="largest_force"
-            )
+            return
+        if len(most) != 3:
+            raise InvalidFieldError(f"3 axes are needed, got {len(most)}", field="largest_force")
+        for i, (low, high) in enumerate(most):
+            if not low <= 0.0 <= high or low == high:
+                raise InvalidFieldError(
+                    f"a range from below to above zero is needed, one end of which may be zero; "
+                    f"got {low:g} to {high:g} N",
+                    field=f"largest_force[{i}]",
+                )
+            if any(0.0 < abs(end) < LEAST for end in (low, high)):
+                raise InvalidFieldError(
+                    f"an end is zero or at least {LEAST:g} N, got {low:g} to {high:g} N",
+                    field=f"largest_force[{i}]",
+                )
+
+    @property
+    def most(self) -> float | tuple[tuple[float, float], ...]:
+        """The force in any direction, or the least and the largest along each axis [N]."""
+        given = self.largest_force
+        return tuple(map(_range, given)) if isinstance(given, Sequence) else float(given)
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Caps that a caller puts on a plan.
+def _range(axis: float | Sequence[float] | None) -> tuple[float, float]:
+    """Return the least and the largest force along an axis [N]."""
+    if axis is None:
+        return -math.inf, math.inf
+    if isinstance(axis, Sequence):
+        low, high = axis
+        return float(low), float(high)
+    return -axis, axis
+
+
+class Limits(Strict, frozen=True):
+    """Caps that the caller puts on the plan.
 
     Attributes
     ----------
@@ -91,15 +127,20 @@ class Limits:
         Largest change of a tendon's tension from the present one [N].
     """
 
-    utilisation: float = 1.0
-    tendon_tension: float | None = None
-    joint_torque: float | Mapping[str, float | Sequence[float]] | None = None
-    per_hand: Mapping[str, ForceCap] = field(default_factory=dict)
-    tension_change: float | None = None
+    utilisation: Utilisation = 1.0
+    tendon_tension: Tension | None = None
+    joint_torque: Annotated[
+        Torque | Mapping[Name, Torque | Torques] | None,
+        Meta(description="of all joints, or by limb, in place of the robot's own figures [N·m]"),
+    ] = None
+    per_hand: Annotated[Mapping[Name, ForceCap], Meta(description="by limb")] = {}
+    tension_change: Annotated[
+        Tension | None, Meta(description="largest change from the present tensions [N]")
+    ] = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.utilisation <= 1.0:
-            raise InvalidInputError(
+            raise InvalidFieldError(
                 f"must be in (0, 1], got {self.utilisation:g}", field="utilisation"
             )
         for name in ("tendon_tension", "tension_change"):
@@ -114,7 +155,7 @@ class Limits:
                 limb: tuple(most) if isinstance(most, Sequence) else most
                 for limb, most in torque.items()
             }
-            object.__setattr__(self, "joint_torque", torque)
+            force_setattr(self, "joint_torque", torque)
         by_limb = torque if isinstance(torque, Mapping) else {"": torque}
         for limb, given in by_limb.items():
             each = given if isinstance(given, tuple) else (given,)
@@ -124,9 +165,9 @@ class Limits:
                 raise no_torque(wrong, "joint_torque" + (f".{limb}" if limb else ""))
 
 
-def no_torque(given: Sequence[float], field: str) -> InvalidInputError:
+def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
     """Return the error about the most that joints may bear."""
-    return InvalidInputError(
+    return InvalidFieldError(
         f"must be at least {LEAST:g} N·m, or in a list 0 for a joint without a motor "
         f"(not all of a limb), got {', '.join(f'{most:g}' for most in given)}",
         field=field,

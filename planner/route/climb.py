@@ -14,6 +14,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final, Literal
 
+from msgspec import structs
+
 from hand_models.base import Array, InvalidInputError, Pose, within
 from hand_models.parameters import Draw
 from planner.prepare import settle_hand
@@ -257,7 +259,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
         question = Question(
             stance,
             load=route.load,
-            limits=replace(route.limits, per_hand=caps),
+            limits=structs.replace(route.limits, per_hand=caps),
             want=route.want | {"load_factor"},
             draws=route.draws,
             objective=route.objective,

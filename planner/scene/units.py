@@ -303,7 +303,7 @@ def _tensions(question: Question) -> Iterator[Finding]:
 def _caps(question: Question) -> Iterator[Finding]:
     held = question.stance.robot.hand.structure.hand_load
     for limb, cap in question.limits.per_hand.items():
-        given = cap.largest_force
+        given = cap.most
         ends = (
             [given] if isinstance(given, float | int) else [end for pair in given for end in pair]
         )

@@ -206,12 +206,12 @@ class _Cap(NamedTuple):
 
 def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
     stance, hand = question.stance, np.array([h])
-    if not isinstance(cap.largest_force, tuple):
-        return _Cap(hand, BALL / cap.largest_force, np.zeros((0, 3)), (), ball=True)
+    if not isinstance(cap.most, tuple):
+        return _Cap(hand, BALL / cap.most, np.zeros((0, 3)), (), ball=True)
     turn = np.eye(3) if cap.frame == "hand" else stance.hands[h].pose.rotation
     if cap.frame == "body":
         turn = stance.body.rotation.T @ turn
-    ends = np.array(cap.largest_force)
+    ends = np.array(cap.most)
     axis, end = (ends != 0.0).nonzero()
     barred, side = (ends == 0.0).nonzero()
     none = turn[barred] * np.where(side == 0, 1.0, -1.0)[:, None]

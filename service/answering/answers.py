@@ -1,24 +1,32 @@
-"""From the planner's plan to a reply, whole or brief."""
+"""From the planner's plan, with its arrays, to a reply of plain numbers, whole or brief."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
-from msgspec import UNSET
+import numpy as np
+from msgspec import UNSET, UnsetType
 
-from planner import Certificate, HandPlan, Plan, Question
+from hand_models.base import Array, Pose
+from hand_models.hand import Seating
+from hand_models.wrench_spaces import WrenchSpace
+from planner import Certificate, HandPlan, Plan, Question, Stance, WristPlan
 from service import replies
-from service.answering.hand_answers import (
-    finite,
-    hand_reply,
-    listed,
-    listed_by_limb,
-    placed_poses,
-    wrench_set_reply,
-)
 from service.requests import Detail
 
-__all__ = ["Planned", "brief_plan_reply", "cut_reason", "plan_reply"]
+__all__ = [
+    "Planned",
+    "brief_plan_reply",
+    "cut_reason",
+    "finite",
+    "placed_poses",
+    "plan_reply",
+    "seating_reply",
+    "wrench_set_reply",
+    "wrist_reply",
+]
 
 LONGEST: Final = 120
 """Bytes of a reason beside set-points, which have to be small whatever the reason."""
@@ -79,14 +87,14 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         load_factor_unbounded=answer.load_factor_unbounded,
         load_factor_status=answer.load_factor_status,
         limiting=answer.limiting,
-        hands=None if hands is None else [hand_reply(hand, model) for hand in hands],
-        joints=listed_by_limb(answer.joints),
-        joint_torque=listed_by_limb(answer.joint_torque),
-        joint_torque_limit=listed_by_limb(answer.joint_torque_limit),
+        hands=None if hands is None else [_hand_reply(hand, model) for hand in hands],
+        joints=_listed_by_limb(answer.joints),
+        joint_torque=_listed_by_limb(answer.joint_torque),
+        joint_torque_limit=_listed_by_limb(answer.joint_torque_limit),
         prices=None if answer.prices is None else list(answer.prices),
         effort_prices=None if answer.effort_prices is None else list(answer.effort_prices),
         certificate=None if proof is None else _certificate(proof, model and hands is None),
-        residual=listed(answer.residual),
+        residual=_listed(answer.residual),
         path=answer.path,
         verified=bool(answer.verified),
         solver=answer.solver,
@@ -110,8 +118,8 @@ def _certificate(proof: Certificate, model: bool) -> replies.Certificate:
         held={limb: share.tolist() for limb, share in proof.held.items()},
         supremum=float(proof.supremum),
         needed=float(proof.needed),
-        shortfall=listed(proof.shortfall),
-        nearest=listed(proof.nearest),
+        shortfall=_listed(proof.shortfall),
+        nearest=_listed(proof.nearest),
         blocking=list(proof.blocking),
         irreducible=None if proof.irreducible is None else list(proof.irreducible),
         irreducible_up_to=finite(proof.irreducible_up_to),
@@ -149,7 +157,7 @@ def brief_plan_reply(
         reply.load_factor = finite(answer.load_factor)
         reply.load_factor_unbounded = answer.load_factor_unbounded
         reply.load_factor_status = answer.load_factor_status
-        reply.joints = listed_by_limb(answer.joints)
+        reply.joints = _listed_by_limb(answer.joints)
         reply.warnings = list(answer.warnings)
         reply.findings = list(answer.findings)
         reply.time = answer.time
@@ -171,3 +179,101 @@ def cut_reason(reason: str) -> str:
     """Return a sentence, or its beginning where it is long."""
     short = reason.encode()[:LONGEST].decode(errors="ignore")
     return reason if short == reason else f"{short[:-3]}…"
+
+
+def finite(value: float | None) -> float | None:
+    """Return a number as it travels; None where it is infinite, or there is none."""
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _listed(array: Array | None) -> replies.Vector | None:
+    """Return an array as a list, if there is one."""
+    return None if array is None else array.tolist()
+
+
+def _listed_by_limb(arrays: Mapping[str, Array] | None) -> dict[str, replies.Vector] | None:
+    """Return arrays by limb as lists, if there are any."""
+    return None if arrays is None else {limb: array.tolist() for limb, array in arrays.items()}
+
+
+def _hand_reply(part: HandPlan, model: bool) -> replies.Hand:
+    """Return a hand of a plan as a reply has it, with its wrench space if ``model``."""
+    palm = part.palm
+    return replies.Hand(
+        limb=part.limb,
+        wrench=part.wrench.tolist(),
+        fingers=part.finger_by_finger(model=model),
+        palm=replies.Palm(
+            position=palm.position.tolist(),
+            force=palm.force.tolist(),
+            moment=palm.moment.tolist(),
+            engaged=list(palm.engaged),
+            utilisation=float(palm.utilisation),
+        ),
+        utilisation=float(part.utilisation),
+        seating=seating_reply(part.seating),
+        wrist=wrist_reply(part.wrist),
+        wrench_space=wrench_set_reply(part.space) if model else UNSET,
+    )
+
+
+def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
+    """Return how a wrist is; none for one that is fixed."""
+    if wrist is None:
+        return replies.Wrist(mode="fixed")
+    return replies.Wrist(
+        mode="floating",
+        twist=wrist.twist.tolist(),
+        palm=wrist.palm,
+        rounds=wrist.rounds,
+        error=finite(wrist.error),
+    )
+
+
+def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
+    """Return H in W of the hands that were given by a place on a rock; unset if there is none."""
+    poses = {hand.limb: _frame(hand.pose) for hand in stance.hands if hand.at is not None}
+    return poses or UNSET
+
+
+def _frame(pose: Pose) -> replies.PlacedFrame:
+    return replies.PlacedFrame(pose.position.tolist(), pose.quaternion().tolist())
+
+
+def seating_reply(seating: Seating) -> replies.Seating:
+    """Return where a hold is in H."""
+    return replies.Seating(
+        rule=seating.rule, pose=_frame(seating.pose), backed_off=float(seating.backed_off)
+    )
+
+
+def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
+    """Return the generators and named rows of a wrench space."""
+    numbers = (
+        np.vstack([space.L, space.H]),
+        np.concatenate([space.l0, np.zeros(len(space.h))]),
+        np.concatenate([space.s, space.h]),
+    )
+    return replies.WrenchSet(
+        origin=space.origin.tolist(),
+        generators=[
+            replies.Generator(name, column)
+            for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
+        ],
+        rows=[
+            replies.Row(
+                name=row.label,
+                kind=row.kind,
+                finger=row.finger,
+                phalanx=row.phalanx,
+                limit=row.limit,
+                joint=row.joint,
+                coefficients=coefficients,
+                constant=constant,
+                capacity=capacity,
+            )
+            for row, coefficients, constant, capacity in zip(
+                space.rows, *(array.tolist() for array in numbers), strict=True
+            )
+        ],
+    )

@@ -11,7 +11,7 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError
 from planner import COMPONENTS, BodySection, BodySpace, End, Time
 from service import replies
-from service.answering.hand_answers import finite, placed_poses
+from service.answering.answers import finite, placed_poses
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply

@@ -14,7 +14,7 @@ from hand_models.hand import FINGERS, SettledHand, Tile, closing_sequence, nearb
 from hand_models.wrench_spaces import WrenchSpace
 from planner import WristPlan, deadline, resting_hand
 from service import replies
-from service.answering.hand_answers import (
+from service.answering.answers import (
     finite,
     placed_poses,
     seating_reply,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from hashlib import blake2b
-from typing import Final, overload
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -14,7 +14,7 @@ from hand_models.parameters import ParameterTable
 from hand_models.rock import Mesh, Profile
 from service import requests
 
-__all__ = ["Rocks", "placed", "pose_of", "rocks_of", "within"]
+__all__ = ["Placed", "Rocks", "placed_holds", "poses_of", "rocks_of"]
 
 KEPT: Final = 8
 """Meshes that are kept, those asked for last: on the same object hands are found settled."""
@@ -25,6 +25,16 @@ MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests",
 
 Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
 """A stance's rocks by name, and each one's frame in W if that is given."""
+
+Poses = Mapping[str, Pose]
+"""Poses of a message by their paths."""
+
+
+def poses_of(messages: Mapping[str, requests.Pose | None]) -> Poses:
+    """Return the poses that are given, by their paths; raises as `Pose.from_quaternions`."""
+    given = {path: pose for path, pose in messages.items() if pose is not None}
+    found = Pose.from_quaternions([(at, p.position, p.orientation) for at, p in given.items()])
+    return dict(zip(given, found, strict=True))
 
 
 def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:
@@ -47,36 +57,67 @@ def rocks_of(message: requests.Stance, numbers: ParameterTable) -> Rocks:
                     field="pose_in_hand",
                 )
             hold = _hold(each, numbers, anywhere=True)
-            found[name] = hold, pose_of(each.pose, "pose")
+            found[name] = hold, poses_of({"pose": each.pose}).get("pose")
     return found
 
 
-def placed(
-    message: requests.Hold, numbers: ParameterTable, rocks: Rocks, *, anywhere: bool = False
-) -> tuple[rock.Hold, Pose | None, Pose | None]:
-    """Return a hold, and its frame in W and in H as far as these are given.
+class Placed(NamedTuple):
+    """A hold, and its frame in W and in H as far as these are given."""
 
-    ``anywhere``: the hand is not seated at its origin.
+    hold: rock.Hold
+    pose: Pose | None
+    in_hand: Pose | None
+
+
+def placed_holds(
+    hands: Sequence[requests.Hand], numbers: ParameterTable, rocks: Rocks, path: str
+) -> list[Placed]:
+    """Return the holds of hands.
+
+    Parameters
+    ----------
+    hands : sequence of Hand
+    numbers : ParameterTable
+        Of the robot's hands.
+    rocks : Rocks
+    path : str
+        Where the hands are in the message.
 
     Raises
     ------
     InvalidInputError
-        If it is impossible, or refers to no rock; the field begins with ``hold``.
+        If one is impossible, or refers to no rock.
     """
-    with within("hold"):
-        pose = pose_of(message.pose, "pose")
-        in_hand = pose_of(message.pose_in_hand, "pose_in_hand")
-        if not isinstance(message, requests.RockReference):
-            return _hold(message, numbers, anywhere), pose, in_hand
-        if message.rock not in rocks:
-            known = f"known are {', '.join(rocks)}" if rocks else "stance.rocks names none"
-            raise InvalidInputError(f"unknown rock {message.rock!r}; {known}", field="rock")
-        hold, place = rocks[message.rock]
-        if pose is None and in_hand is None:
-            pose = place
-            if pose is None and not anywhere:
-                _check_seat(hold)
-        return hold, pose, in_hand
+    places = [f"{path}[{i}].hold" for i in range(len(hands))]
+    given: dict[str, requests.Pose | None] = {}
+    for at, hand in zip(places, hands, strict=True):
+        given |= {f"{at}.pose": hand.hold.pose, f"{at}.pose_in_hand": hand.hold.pose_in_hand}
+    poses = poses_of(given)
+    found: list[Placed] = []
+    for at, hand in zip(places, hands, strict=True):
+        message, anywhere = hand.hold, hand.place is not None
+        pose, in_hand = poses.get(f"{at}.pose"), poses.get(f"{at}.pose_in_hand")
+        try:
+            if isinstance(message, requests.RockReference):
+                hold, known = _shared(message, rocks)
+                if pose is None and in_hand is None:
+                    pose = known
+                    if pose is None and not anywhere:
+                        _check_seat(hold)
+            else:
+                hold = _hold(message, numbers, anywhere)
+        except InvalidInputError as error:
+            raise error.within(at) from None
+        found.append(Placed(hold, pose, in_hand))
+    return found
+
+
+def _shared(message: requests.RockReference, rocks: Rocks) -> tuple[rock.Hold, Pose | None]:
+    """Return the rock that a hand refers to, and its frame in W if that is given."""
+    if message.rock not in rocks:
+        known = f"known are {', '.join(rocks)}" if rocks else "stance.rocks names none"
+        raise InvalidInputError(f"unknown rock {message.rock!r}; {known}", field="rock")
+    return rocks[message.rock]
 
 
 def _check_seat(shared: rock.Hold) -> None:
@@ -87,18 +128,6 @@ def _check_seat(shared: rock.Hold) -> None:
         raise InvalidInputError(
             f"without a pose the hand is seated at its origin: {error.message}", field="rock"
         ) from None
-
-
-@overload
-def pose_of(message: requests.Pose, field: str) -> Pose: ...
-@overload
-def pose_of(message: requests.Pose | None, field: str) -> Pose | None: ...
-def pose_of(message: requests.Pose | None, field: str) -> Pose | None:
-    """Return a pose, if there is one; raises what `Pose.from_quaternion` raises."""
-    if message is None:
-        return None
-    with within(field):
-        return Pose.from_quaternion(message.position, message.orientation)
 
 
 def _hold(message: requests.Rock, numbers: ParameterTable, anywhere: bool = False) -> rock.Hold:

@@ -17,16 +17,14 @@ from hand_models.parameters import Draw, ParameterTable, own_draw, own_hand
 from hand_models.tile import Surface
 from planner import (
     EARTH,
-    ForceCap,
     HandOnHold,
-    Limits,
     Load,
     Question,
     Stance,
     settle_each,
 )
 from service import requests
-from service.answering.holds import Rocks, placed, pose_of, rocks_of
+from service.answering.holds import Rocks, placed_holds, poses_of, rocks_of
 from service.answering.own_models import ROBOTS, Robots, builder_of
 
 if TYPE_CHECKING:
@@ -70,7 +68,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
         stance=stance(request.stance, robots),
         body_wrench=_array(request.body_wrench),
         load=request.load or Load(),
-        limits=_limits(request.limits),
+        limits=request.limits,
         want=frozenset(request.want),
         objective=request.objective,
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
@@ -93,15 +91,16 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
 
     start, rocks = _stance(request.stance, robots)
     kind = start.robot.hand
-    moved = [_hand(move, kind.table, rocks, f"moves[{i}]") for i, move in enumerate(request.moves)]
-    bodies = [pose_of(move.body, f"moves[{i}].body") for i, move in enumerate(request.moves)]
+    moved = _hands(request.moves, kind.table, rocks, "moves")
+    places = [f"moves[{i}].body" for i in range(len(request.moves))]
+    bodies = poses_of({at: each.body for at, each in zip(places, request.moves, strict=True)})
     angles = [_joints(move.joints) or "solve" for move in request.moves]
     return Route(
         name=request.name,
         start=start,
-        moves=tuple(map(Move, _placed(kind, moved, "moves"), bodies, angles)),
+        moves=tuple(map(Move, _placed(kind, moved, "moves"), map(bodies.get, places), angles)),
         load=request.load or Load(),
-        limits=_limits(request.limits),
+        limits=request.limits,
         objective=request.objective,
         explain=request.explain,
         want=frozenset(request.want),
@@ -129,10 +128,10 @@ def _stance(message: requests.Stance, robots: Robots) -> tuple[Stance, Rocks]:
             robot = build(own)
         numbers = robot.hand.table
         rocks = rocks_of(message, numbers)
-        hands = [_hand(hand, numbers, rocks, f"hands[{i}]") for i, hand in enumerate(message.hands)]
+        hands = _hands(message.hands, numbers, rocks, "hands")
         found = Stance(
             hands=tuple(_placed(robot.hand, hands, "hands")),
-            body=pose_of(message.body, "body"),
+            body=poses_of({"body": message.body})["body"],
             gravity=np.array(EARTH if message.gravity is None else message.gravity),
             robot=robot,
             joints=_joints(message.joints),
@@ -151,17 +150,6 @@ def _joints(
     }
 
 
-def _limits(message: requests.Limits) -> Limits:
-    with within("limits"):
-        return Limits(
-            utilisation=message.utilisation,
-            tendon_tension=message.tendon_tension,
-            joint_torque=message.joint_torque,
-            per_hand={limb: _force_cap(cap, limb) for limb, cap in message.per_hand.items()},
-            tension_change=message.tension_change,
-        )
-
-
 def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
     """Return a caller's own draws; None for the bundled ones."""
     found = []
@@ -171,52 +159,47 @@ def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
     return tuple(found) or None
 
 
-def _force_cap(message: requests.ForceCap, limb: str) -> ForceCap:
-    given = message.largest_force
-    most = tuple(_range(axis) for axis in given) if isinstance(given, list) else given
-    with within(f"per_hand.{limb}"):
-        return ForceCap(most, message.frame)
-
-
-def _range(axis: requests.AxisForce) -> tuple[float, float]:
-    """Return the least and the largest force along an axis."""
-    if axis is None:
-        return -math.inf, math.inf
-    return (axis[0], axis[1]) if isinstance(axis, list) else (-axis, axis)
-
-
-def _hand(message: requests.Hand, numbers: ParameterTable, rocks: Rocks, path: str) -> HandOnHold:
-    with within(path):
-        surface = _surface(message.surface)
-        hold, hold_pose, hold_in_hand = placed(
-            message.hold, numbers, rocks, anywhere=message.place is not None
-        )
-        pose, at = pose_of(message.pose, "pose"), None
-        if message.place is not None:
-            if pose is not None or hold_in_hand is not None:
-                which = "pose" if pose is not None else "hold.pose_in_hand"
-                raise InvalidInputError("give a place or a pose, not both", field=which)
-            # of the rock, until the hand has been seated there
-            pose, hold_pose = hold_pose or Pose.identity(), None
-            at = _frame(message.place, pose)
-            hold.check_place(at)
-        if pose is None:
-            raise InvalidInputError("missing", field="pose")
-        return HandOnHold(
-            limb=message.limb,
-            pose=pose,
-            hold=hold,
-            surface=surface,
-            hold_pose=hold_pose,
-            hold_in_hand=hold_in_hand,
-            at=at,
-            grasp=message.grasp,
-            wrist=message.wrist,
-            tendon_preload=_array(message.tendon_preload),
-            wrench=message.wrench,
-            seat=message.seat,
-            seat_direction=_array(message.seat_direction),
-        )
+def _hands(
+    messages: Sequence[requests.Hand], numbers: ParameterTable, rocks: Rocks, path: str
+) -> list[HandOnHold]:
+    """Return hands on their holds; those with a place stand at their rock's pose, until placed."""
+    paths = [f"{path}[{i}]" for i in range(len(messages))]
+    surfaces = [_surface(hand.surface, at) for at, hand in zip(paths, messages, strict=True)]
+    holds = placed_holds(messages, numbers, rocks, path)
+    poses = poses_of({f"{at}.pose": hand.pose for at, hand in zip(paths, messages, strict=True)})
+    found = []
+    for at, message, surface, placed in zip(paths, messages, surfaces, holds, strict=True):
+        pose, hold_pose, seat = poses.get(f"{at}.pose"), placed.pose, None
+        try:
+            if message.place is not None:
+                if pose is not None or placed.in_hand is not None:
+                    which = "pose" if pose is not None else "hold.pose_in_hand"
+                    raise InvalidInputError("give a place or a pose, not both", field=which)
+                pose, hold_pose = placed.pose or Pose.identity(), None
+                seat = _frame(message.place, pose)
+                placed.hold.check_place(seat)
+            if pose is None:
+                raise InvalidInputError("missing", field="pose")
+            found.append(
+                HandOnHold(
+                    limb=message.limb,
+                    pose=pose,
+                    hold=placed.hold,
+                    surface=surface,
+                    hold_pose=hold_pose,
+                    hold_in_hand=placed.in_hand,
+                    at=seat,
+                    grasp=message.grasp,
+                    wrist=message.wrist,
+                    tendon_preload=_array(message.tendon_preload),
+                    wrench=message.wrench,
+                    seat=message.seat,
+                    seat_direction=_array(message.seat_direction),
+                )
+            )
+        except InvalidInputError as error:
+            raise error.within(at) from None
+    return found
 
 
 def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
@@ -248,12 +231,15 @@ def _placed(kind: SpinyHand, hands: Sequence[HandOnHold], path: str) -> list[Han
     return found
 
 
-def _surface(message: str | requests.Surface) -> Surface:
-    with within("surface"):
+def _surface(message: str | requests.Surface, path: str) -> Surface:
+    """Return the surface of the hand at a path."""
+    try:
         if isinstance(message, str):
             return Surface.named(message)
         given = msgspec.structs.asdict(message)
         return Surface.from_values({name: v for name, v in given.items() if v is not None})
+    except InvalidInputError as error:
+        raise error.within("surface").within(path) from None
 
 
 def _array(values: Sequence[float] | None) -> Array | None:

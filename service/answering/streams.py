@@ -12,8 +12,7 @@ from msgspec.structs import replace
 
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner import SetPoints, WrenchStream, deadline
-from service.answering.answers import cut_reason
-from service.answering.hand_answers import finite, placed_poses
+from service.answering.answers import cut_reason, finite, placed_poses
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply

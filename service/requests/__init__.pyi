@@ -13,11 +13,8 @@ from .holds import (
 )
 from .questions import (
     Axis as Axis,
-    AxisForce as AxisForce,
     BodySpaceRequest as BodySpaceRequest,
     Draw as Draw,
-    ForceCap as ForceCap,
-    Limits as Limits,
     PlanRequest as PlanRequest,
     RouteRequest as RouteRequest,
     SetPointsRequest as SetPointsRequest,

@@ -10,11 +10,10 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from msgspec import Meta, field
 
-from hand_models.base import Coordinate, Name, Strict, Tension
-from planner import BodyRange, Load
+from hand_models.base import Coordinate, Name, Strict
+from planner import BodyRange, Limits, Load
 from service.requests.request import (
     Detail,
-    Force,
     Identifier,
     Later,
     Pose,
@@ -27,11 +26,8 @@ from service.requests.stance import Angles, Entries, Hand, HandEntries, Stance
 
 __all__ = [
     "Axis",
-    "AxisForce",
     "BodySpaceRequest",
     "Draw",
-    "ForceCap",
-    "Limits",
     "PlanRequest",
     "RouteRequest",
     "SetPointsRequest",
@@ -45,25 +41,6 @@ __all__ = [
 Q = TypeVar("Q", bound=Query)
 
 
-Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
-JointTorque = Annotated[float, Meta(ge=0.0, le=1e6)]
-Torques = Annotated[
-    list[JointTorque],
-    Meta(
-        min_length=1,
-        max_length=64,
-        description="of a limb's joints from the body outward, 0 of one without a motor [N·m]",
-    ),
-]
-ForceBound = Annotated[float, Meta(ge=-1e6, le=1e6)]
-ForceRange = Annotated[
-    list[ForceBound],
-    Meta(min_length=2, max_length=2, description="least and largest, with zero in between [N]"),
-]
-AxisForce = Force | ForceRange | None
-# a tuple with lists in it crashes msgspec's garbage collection
-AxisForces = Annotated[list[AxisForce], Meta(min_length=3, max_length=3)]
-Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
 ObjectiveName = Annotated[
     Literal["max_margin", "min_effort"],
     Meta(description="least utilisation, or least effort within limits.utilisation"),
@@ -87,34 +64,6 @@ Radius = Annotated[
         description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
     ),
 ]
-
-
-class ForceCap(Strict, frozen=True, kw_only=True):
-    """The most that a hand may do to its rock."""
-
-    largest_force: Annotated[
-        Force | AxisForces,
-        Meta(
-            description="whatever its direction; or along each axis of the frame: the largest "
-            "either way, a range, or null for none"
-        ),
-    ]
-    frame: Literal["hand", "body", "world"] = "hand"
-
-
-class Limits(Strict, frozen=True, kw_only=True):
-    """Caps that the caller puts on the plan."""
-
-    utilisation: Utilisation = 1.0
-    tendon_tension: Tension | None = None
-    joint_torque: Annotated[
-        Torque | dict[Name, Torque | Torques] | None,
-        Meta(description="of all joints, or by limb, in place of the robot's own figures [N·m]"),
-    ] = None
-    per_hand: Annotated[dict[Name, ForceCap], Meta(description="by limb")] = {}
-    tension_change: Annotated[
-        Tension | None, Meta(description="largest change from the present tensions [N]")
-    ] = None
 
 
 class Draw(Strict, frozen=True, kw_only=True):

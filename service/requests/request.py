@@ -16,7 +16,6 @@ __all__ = [
     "LEAST_REPLY_BYTES",
     "LONGEST_DEADLINE",
     "Detail",
-    "Force",
     "FourTensions",
     "Identifier",
     "Later",
@@ -43,7 +42,6 @@ Wrench = Annotated[
 PreloadEntry = Annotated[float, Meta(ge=0.0, le=1e4)]
 FourTensions = tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry]
 Tensions = Annotated[FourTensions, Meta(description="of a hand's tendons [N]")]
-Force = Annotated[float, Meta(ge=1e-3, le=1e6, description="[N]")]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
 DEFAULT_DEADLINE: Final = 10.0
 """Of a question to a service that names none, from its arrival [s]."""

@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.spatial import ConvexHull
 
 from hand_models.base import InvalidInputError
@@ -108,7 +109,7 @@ def test_support_and_capability_are_those_of_highs(seed):
             assert end.reach == pytest.approx(wanted, rel=1e-6, abs=1e-3)
             assert way @ end.wrench == pytest.approx(end.reach, rel=1e-9)
             # what ends the way may be that a load turns round, which no limit's room changes
-            room = replace(space.question.limits, utilisation=0.99 * cap)
+            room = structs.replace(space.question.limits, utilisation=0.99 * cap)
             less = farthest(replace(space.question, limits=room), way, np.eye(6), np.zeros(6))
             assert (end.limiting is None) == (less == pytest.approx(wanted, rel=1e-6, abs=1e-4))
         for start, end in ((np.zeros(6), space.pure(way)), (space.needed, space.more(way))):
@@ -221,7 +222,7 @@ def test_where_nothing_is_held_there_is_nothing():
 
 
 def planned(question: Question, acceleration: np.ndarray) -> str:
-    load = replace(
+    load = structs.replace(
         question.load,
         acceleration=tuple(float(a) for a in acceleration[:3]),
         angular_acceleration=tuple(float(a) for a in acceleration[3:]) or (0.0, 0.0, 0.0),

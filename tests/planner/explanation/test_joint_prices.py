@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import Pose
 from planner.prepare import assemble, posture
@@ -64,7 +65,7 @@ def with_torque(question: Question, price: Price):
         torque = list(limits.joint_torque[limb])
         torque[index] = limit
         by_limb = {**limits.joint_torque, limb: tuple(torque)}
-        return replace(question, limits=replace(limits, joint_torque=by_limb))
+        return replace(question, limits=structs.replace(limits, joint_torque=by_limb))
 
     return changed, limits.joint_torque[limb][index]
 

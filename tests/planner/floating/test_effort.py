@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.optimize import minimize
 
 from hand_models.base import wrench_transport
@@ -150,7 +151,7 @@ def test_a_tighter_cap_costs_effort_and_is_kept():
     question, margin, effort = both("with joints")
     efforts = []
     for cap in (margin.utilisation + 0.02, 0.5 * (1.0 + margin.utilisation)):
-        limits = replace(question.limits, utilisation=cap)
+        limits = structs.replace(question.limits, utilisation=cap)
         answer = least(replace(question, limits=limits))
         assert answer.status == "optimal"
         assert answer.utilisation <= cap + SLACK
@@ -160,7 +161,7 @@ def test_a_tighter_cap_costs_effort_and_is_kept():
 
 def test_the_least_utilisation_itself_may_be_the_cap():
     question, margin, _ = both("with joints")
-    limits = replace(question.limits, utilisation=margin.utilisation)
+    limits = structs.replace(question.limits, utilisation=margin.utilisation)
     answer = least(replace(question, limits=limits))
     assert answer.status == "optimal"
     assert answer.verified
@@ -169,7 +170,7 @@ def test_the_least_utilisation_itself_may_be_the_cap():
 
 def test_beyond_the_cap_the_least_utilisation_is_told():
     question, margin, _ = both("with joints")
-    limits = replace(question.limits, utilisation=margin.utilisation - 0.01)
+    limits = structs.replace(question.limits, utilisation=margin.utilisation - 0.01)
     answer = least(replace(question, limits=limits))
     assert answer.status == "overloaded"
     assert answer.utilisation == pytest.approx(margin.utilisation, abs=1e-6)
@@ -292,7 +293,7 @@ def test_fixed_hands_beside_floating_ones_keep_near_their_present_tensions():
         for hand in margin.hands
         if hand.wrist is None
     }
-    limits = replace(question.limits, tension_change=3.0)
+    limits = structs.replace(question.limits, tension_change=3.0)
     free = least(question)
     answer = least(replace(question, present=now, limits=limits))
     assert answer.status == "optimal"

@@ -8,6 +8,7 @@ from functools import cache
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import InvalidInputError, UnsupportedError, wrench_transport
 from hand_models.finger import settle_finger
@@ -185,7 +186,7 @@ def test_preload_holds_at_rest_and_limits_count_it():
     answer = plan(question)
     tensions = [finger.tendon_tension for finger in answer.hands[0].fingers]
     np.testing.assert_allclose(tensions, preload, atol=1e-6)
-    capped = plan(replace(question, limits=replace(question.limits, tendon_tension=30.0)))
+    capped = plan(replace(question, limits=structs.replace(question.limits, tendon_tension=30.0)))
     assert capped.status == "overloaded"
     assert capped.utilisation == pytest.approx(2.0, rel=1e-6)
     assert capped.limiting.finger == "outer_right"

@@ -10,6 +10,7 @@ from functools import cache
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 from rich.console import Console
 
 from hand_models.compliance import CompliantHand, FloatingWrist
@@ -145,7 +146,7 @@ def test_preload_that_alone_overloads_is_named():
     used = wrist.evaluate(np.zeros((1, 6))).utilisation[0]
     assert used > 1.0
     assert f"utilisation {used:.3g} at rest" in told[0]
-    limits = replace(asked.limits, tendon_tension=60.0)
+    limits = structs.replace(asked.limits, tendon_tension=60.0)
     capped = plan(replace(asked, limits=limits, want=frozenset()))
     assert any("tendon_preload of 95 N is above the limit of 60 N" in t for t in capped.warnings)
 

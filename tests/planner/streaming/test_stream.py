@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.rock import Cylinder
@@ -286,7 +287,7 @@ def test_an_interpolation_whose_corners_have_no_plan_is_smaller():
 
 
 def test_an_interpolation_keeps_to_the_cap_where_its_centre_does():
-    light = replace(WALL, load=replace(WALL.load, mass=90.0))
+    light = replace(WALL, load=structs.replace(WALL.load, mass=90.0))
     used = plan(light).utilisation
     for cap, radius in ((used + 0.1, 100.0), (used + 0.03, 25.0), (used - 0.1, 100.0)):
         with WrenchStream(replace(light, limits=Limits(utilisation=cap)), radius=100.0) as stream:

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import Pose
@@ -70,7 +71,7 @@ def with_angle(limb: str, by: float) -> Posture:
 
 
 def with_limits(**changes) -> Question:
-    return replace(asked(), limits=replace(asked().limits, **changes))
+    return replace(asked(), limits=structs.replace(asked().limits, **changes))
 
 
 def test_an_honest_plan_passes():

@@ -44,10 +44,10 @@ def test_a_request_with_joints_becomes_a_question() -> None:
     assert asked.objective == "min_effort"
     limits = asked.limits
     assert limits.joint_torque == {"front_left": 150.0, "rear_left": (180.0,) * 7}
-    assert limits.per_hand["rear_left"].largest_force == 400.0
+    assert limits.per_hand["rear_left"].most == 400.0
     assert limits.per_hand["rear_left"].frame == "hand"
     capped = limits.per_hand["front_left"]
-    assert capped.largest_force == ((-300.0, 300.0), (-math.inf, math.inf), (-250.0, 300.0))
+    assert capped.most == ((-300.0, 300.0), (-math.inf, math.inf), (-250.0, 300.0))
     assert capped.frame == "body"
     assert limits.tension_change == 60.0
     np.testing.assert_array_equal(asked.present["front_left"], [45.0, 50.0, 50.0, 45.0])

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import Pose
@@ -265,7 +266,9 @@ def with_strength(stance: Stance, **numbers: float) -> Stance:
 
 def with_grasp(stance: Stance, **changes: float) -> Stance:
     """All hands with another grasp."""
-    return all_of(stance, lambda s, i: with_hand(s, i, grasp=replace(s.hands[i].grasp, **changes)))
+    return all_of(
+        stance, lambda s, i: with_hand(s, i, grasp=structs.replace(s.hands[i].grasp, **changes))
+    )
 
 
 def all_of(stance: Stance, slip: Callable[[Stance, int], Stance]) -> Stance:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from msgspec import structs
+
 from planner.question import Question
 from planner.streaming.stream_stance import StreamStance
 
@@ -13,7 +15,7 @@ def streamable(question: Question) -> Question:
     question = replace(
         question,
         objective="max_margin",
-        limits=replace(question.limits, tension_change=None),
+        limits=structs.replace(question.limits, tension_change=None),
         present={},
     )
     return replace(question, body_wrench=StreamStance(question).first)
