@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
 from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner import programs
-from planner.prepare.stance_constraints import NOTHING, StanceConstraints
+from planner.prepare.stance_constraints import StanceConstraints
 from planner.programs import (
     TWIST_UNIT,
     WRIST_RANGE,
@@ -37,7 +37,6 @@ __all__ = [
     "HandSets",
     "LinearisationPoint",
     "Sets",
-    "are_own",
     "widest_at_rest",
     "wrist_at",
     "wrists_at",
@@ -152,6 +151,8 @@ class HandSets:
         millimetre or some ten milliradians hardly moves them.
     data : StanceData
         Of hands with a fixed wrist; of floating ones a place to fill.
+    floating : bool
+        Whether any wrist floats.
     """
 
     spaces: tuple[WrenchSpace, ...]
@@ -162,16 +163,10 @@ class HandSets:
     held: tuple[Array, ...]
     added: tuple[StanceConstraints, ...]
     data: StanceData
+    floating: bool = field(init=False)
 
-    @property
-    def floating(self) -> bool:
-        """Whether any wrist floats."""
-        return any(wrist is not None for wrist in self.wrists)
-
-    @property
-    def own(self) -> bool:
-        """Whether sets are of this stance alone; see `are_own`."""
-        return are_own(self.wrists, self.added)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "floating", any(wrist is not None for wrist in self.wrists))
 
     def with_sets(
         self,
@@ -290,11 +285,6 @@ class HandSets:
             if wrist is not None
         ]
         return max(moved, default=0.0)
-
-
-def are_own(wrists: Sequence[FloatingWrist | None], added: Sequence[StanceConstraints]) -> bool:
-    """Whether sets are of one stance alone: a wrist floats, or the stance adds rows."""
-    return any(wrist is not None for wrist in wrists) or any(rows is not NOTHING for rows in added)
 
 
 def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:

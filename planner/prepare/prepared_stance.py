@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_batch import HandBatch
-from planner.prepare.hand_sets import HandSets, Sets, are_own, wrists_at
+from planner.prepare.hand_sets import HandSets, Sets, wrists_at
 from planner.prepare.joint_posture import Posture, posture
 from planner.prepare.settled_stance import settle_stance
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
@@ -56,6 +56,8 @@ class PreparedStance:
         What the programs need of them.
     wrench : ndarray, shape (6,)
         The body wrench that is planned for, in B [N, N·m].
+    limbs : tuple of str
+        Of the hands, in the order of all arrays.
     """
 
     question: Question
@@ -63,11 +65,11 @@ class PreparedStance:
     batch: HandBatch
     hands: HandSets
     wrench: Array
+    limbs: tuple[str, ...] = field(init=False)
 
-    @property
-    def limbs(self) -> tuple[str, ...]:
-        """Of the hands, in the order of all arrays."""
-        return tuple([hand.limb for hand in self.question.stance.hands])
+    def __post_init__(self) -> None:
+        limbs = tuple([hand.limb for hand in self.question.stance.hands])
+        object.__setattr__(self, "limbs", limbs)
 
     @property
     def floating(self) -> list[str]:
@@ -157,7 +159,8 @@ def assemble(
     def made() -> tuple[HandBatch, tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]:
         return HandBatch.of(settled), *_sets_of(settled, wrists, added, cap)
 
-    own = are_own(wrists, added)
+    # sets are of this stance alone where a wrist floats, or the stance adds rows
+    own = any(each is not None for each in wrists) or any(each is not NOTHING for each in added)
     batch, spaces, scaled = made() if own else KNOWN.get((settled, cap), made)
     held, aims = _held(question)
     transports = wrench_transports(stance.body, [hand.pose for hand in stance.hands])

@@ -136,7 +136,7 @@ def _of_plan(
 ) -> tuple[dict[str, Any], tuple[Unfinished, ...], list[str]]:
     """Return what is to be said of a plan, by fields of `Plan`; what is unfinished; warnings."""
     question, solution, idle = prepared.question, found.solution, checks.idle
-    (spaces, data), cap = solution.sets, question.limits.utilisation
+    spaces, cap = solution.sets.spaces, question.limits.utilisation
     hands, unfinished, warnings = found.by_hand(), tuple[Unfinished, ...](), list[str]()
     binding = ActiveLimits(prepared.limbs, spaces, solution.least.limit_duals)
     limiting, reason = _explain(binding, found, hands, idle, cap)
@@ -155,8 +155,7 @@ def _of_plan(
         own = ActiveLimits(prepared.limbs, spaces, solution.best.limit_duals)
         parts |= solution.objective.reported(own, solution.cap)
     if question.present:
-        given = prepared.limbs, spaces, solution.loads, question.present, cap, idle
-        parts["path"] = path = tension_path(data, *given)
+        parts["path"] = path = tension_path(prepared, solution.sets, solution.loads, idle)
         unfinished += late("path") if path is None else ()
         if path is None and not unfinished:
             warnings.append(UNKNOWN)
@@ -197,10 +196,9 @@ def _clearance(prepared: PreparedStance) -> Clearance:
 
 def _wrist_warnings(prepared: PreparedStance, answer: Answer) -> Iterator[str]:
     """Yield what a caller should know of floating wrists."""
-    limbs, wrists = prepared.limbs, prepared.hands.wrists
     if prepared.hands.floating:
-        yield from idle_preloads(limbs, prepared.batch.hands, wrists)
-        yield from strained_preloads(limbs, wrists, prepared.question.limits.tendon_tension)
+        yield from idle_preloads(prepared)
+        yield from strained_preloads(prepared)
         if isinstance(answer, Verified):
             yield from far_wrists(answer.by_hand())
     if not answer.solution.proven:

@@ -99,7 +99,7 @@ class FloatingSolution(Solution):
         reason = "no pose of the floating wrists was found that balances the body"
         if wrench_is_given(prepared):
             reason += " with the wrenches that they are given; that is no proof of none"
-        idle = idle_preloads(prepared.limbs, prepared.batch.hands, prepared.hands.wrists)
+        idle = idle_preloads(prepared)
         return f"{reason}; {idle[0]}" if idle else reason
 
 

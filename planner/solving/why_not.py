@@ -28,8 +28,9 @@ def proof_of_none(
     nearest : Outcome
         Of `programs.nearest`.
     """
-    given = len(solution.sets.data.wrench) > len(prepared.wrench)
-    return _certify(prepared, solution, None, None if given else nearest)
+    sets, least = solution.sets, solution.least
+    given = len(sets.data.wrench) > len(prepared.wrench)
+    return certify(prepared, sets, least, nearest=None if given else nearest)
 
 
 def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinished, ...]:
@@ -38,17 +39,6 @@ def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinishe
         return ()
     whole = proof.irreducible is not None and proof.sufficient is not None
     return () if whole else late("explanation")
-
-
-def _certify(
-    prepared: PreparedStance, solution: Solution, cap: float | None, nearest: Outcome | None = None
-) -> Certificate | None:
-    """Return the proof that there is no plan: at any utilisation, or within a cap."""
-    spaces, data = solution.sets
-    question = prepared.question
-    stance = data, prepared.limbs, spaces, prepared.hands.held, question.limits
-    known = solution.least
-    return certify(*stance, cap, nearest=nearest, known=known, explain=question.explain)
 
 
 def overload(
@@ -69,6 +59,6 @@ def overload(
         return certify_idle(most, cap, alone)
     if not proven:
         return None
-    proof = _certify(prepared, found.solution, cap)
+    proof = certify(prepared, found.solution.sets, found.solution.least, cap)
     # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
     return replace(proof, sufficient=()) if proof is not None and beyond else proof
