@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -163,26 +163,34 @@ class HandSets:
     held: tuple[Array, ...]
     added: tuple[StanceConstraints, ...]
     data: StanceData
-    floating: bool = field(init=False)
+    floating: bool
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "floating", any(wrist is not None for wrist in self.wrists))
+    @classmethod
+    def of(
+        cls,
+        spaces: Sequence[WrenchSpace],
+        wrists: tuple[FloatingWrist | None, ...],
+        transports: Array,
+        wrench: Array,
+        held: tuple[Array, ...],
+        added: tuple[StanceConstraints, ...],
+        known: tuple[ScaledRows, ...] | None = None,
+    ) -> HandSets:
+        """Return the hands of a stance; parameters as the attributes, ``known`` as ``scaled``."""
+        scaled = scaled_rows(spaces) if known is None else known
+        data = StanceData(hands_data(scaled, transports, held), wrench)
+        floating = any(wrist is not None for wrist in wrists)
+        of_all = wrists, transports, wrench, held, added
+        return cls(tuple(spaces), scaled, *of_all, data, floating)
 
     def with_sets(
         self,
         spaces: Sequence[WrenchSpace],
-        scaled: tuple[ScaledRows, ...] | None = None,
         wrists: tuple[FloatingWrist | None, ...] | None = None,
     ) -> HandSets:
-        """Return the same stance with other sets of its hands; with their rows and wrists, too."""
-        rows = scaled_rows(spaces) if scaled is None else scaled
-        return replace(
-            self,
-            spaces=tuple(spaces),
-            scaled=rows,
-            wrists=self.wrists if wrists is None else wrists,
-            data=StanceData(hands_data(rows, self.transports, self.held), self.wrench),
-        )
+        """Return the same stance with other sets of its hands, and other wrists."""
+        own = self.wrists if wrists is None else wrists
+        return HandSets.of(spaces, own, self.transports, self.wrench, self.held, self.added)
 
     def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""

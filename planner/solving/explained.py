@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -62,8 +62,9 @@ def explained_plan(
     answer: Answer,
     factor: LoadFactor,
     attempt: Attempt,
+    times: Callable[[], Time],
 ) -> Plan:
-    """Return the plan, explained, with all that is wanted beside it, but for the time it took.
+    """Return the plan, explained, with all that is wanted beside it.
 
     Parameters
     ----------
@@ -73,6 +74,8 @@ def explained_plan(
     factor : LoadFactor
     attempt : callable
         Plans another stance, for the spread.
+    times : callable
+        Returns where the time went.
     """
     question, where, solution = prepared.question, prepared.where, answer.solution
     odd = wrench_findings(question)
@@ -113,7 +116,7 @@ def explained_plan(
         findings=(*checks.findings, *odd),
         warnings=warnings,
         solver=Solver(SOLVER, solution.least.status, solution.least.iterations),
-        time=Time(0.0, 0.0, 0.0),
+        time=times(),
         unfinished=unfinished,
         **parts,
     )

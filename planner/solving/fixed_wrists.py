@@ -51,6 +51,7 @@ class FixedSolution(Solution):
         least: Outcome,
         loads: tuple[Array, ...] = (),
         bound: float | None = None,
+        start: LeastUtilisation | None = None,
     ) -> Self:
         """Return loads of the least utilisation, or near it.
 
@@ -63,6 +64,8 @@ class FixedSolution(Solution):
         loads : tuple of ndarray, optional
         bound : float, optional
             The least utilisation is not below; by default as the multipliers prove it.
+        start : LeastUtilisation, optional
+            What they were found from.
         """
         cap, faults = prepared.question.limits.utilisation, tuple[str, ...]()
         if least.solved:
@@ -77,6 +80,8 @@ class FixedSolution(Solution):
             cap=cap,
             most=tension_trade(least.value, cap).most,
             faults=faults,
+            spare=() if start is None else start.spare,
+            start=start,
         )
 
     def best_in(
@@ -129,8 +134,7 @@ def fixed_solutions(
     late: tuple[Unfinished, ...] = ()
     if found.proven:
         loads = () if found.meant is None else found.meant.loads
-        first = FixedSolution.of_least(prepared, sets, found.outcome, loads, found.bound)
-        first = replace(first, spare=found.spare, start=found)
+        first = FixedSolution.of_least(prepared, sets, found.outcome, loads, found.bound, found)
         for solution in [first] if loads else _less_tense(prepared, first):
             late = solution.unfinished
             yield solution

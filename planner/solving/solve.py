@@ -102,10 +102,13 @@ def plan_on(
     ready, factor = checks.result(), LoadFactor()
     if "load_factor" in question.want:
         factor = load_factor_of(prepared, answer, budget, overloaded=ready.overloaded)
-    times = Time(modelled - start, time.perf_counter() - modelled, 0.0)
-    found = explained_plan(prepared, ready, answer, factor, try_stance)
-    times = Time(times.model, times.solve, time.perf_counter() - start)
-    return Planned(replace(found, time=times), answer.solution)
+    solved = time.perf_counter()
+
+    def times() -> Time:
+        return Time(modelled - start, solved - modelled, time.perf_counter() - start)
+
+    found = explained_plan(prepared, ready, answer, factor, try_stance, times)
+    return Planned(found, answer.solution)
 
 
 def _solutions(
