@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +20,8 @@ from planner.explanation import (
     UNPROVEN,
     ActiveLimits,
     LimitUse,
+    certify,
+    certify_idle,
     far_wrists,
     idle_preloads,
     limit_sentence,
@@ -32,6 +35,7 @@ from planner.explanation import (
 from planner.prepare import PreparedStance
 from planner.programs import SLACK, SOLVER
 from planner.result import (
+    Certificate,
     Clearance,
     Finding,
     HandPlan,
@@ -48,9 +52,8 @@ from planner.solving.robust import find_robust_load_factor
 from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
-from planner.solving.why_not import overload, unexplained
 
-__all__ = ["explained_plan"]
+__all__ = ["explained_plan", "unexplained"]
 
 LEFT: Final = 0.5
 """How far a tension may be from that of closing to be left there [N]: less than motors are held."""
@@ -167,11 +170,42 @@ def _of_plan(
     if found.whole > cap + SLACK:
         parts["status"] = "overloaded"
         if question.explain:
-            proof = overload(prepared, found, idle)
+            proof = _overload(prepared, found, idle)
             parts["certificate"] = proof
             reason += overload_sentence(proof, floating=prepared.floating)
             unfinished += late("certificate") if proof is None else unexplained(prepared, proof)
     return {**parts, "reason": reason}, unfinished, warnings
+
+
+def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinished, ...]:
+    """Return that a proof is not explained, if it was to be, and that is for the time."""
+    if not prepared.question.explain:
+        return ()
+    whole = proof.irreducible is not None and proof.sufficient is not None
+    return () if whole else late("explanation")
+
+
+def _overload(
+    prepared: PreparedStance, found: Verified, idle: Sequence[LimitUse]
+) -> Certificate | None:
+    """Return the proof that no plan keeps to the cap on the utilisation; None without one.
+
+    Of floating hands with their sets linearised at the plan.
+    """
+    cap, used = prepared.question.limits.utilisation, found.utilisation
+    most = max(idle, key=lambda each: each.utilisation, default=None)
+    beyond = [each for each in idle if each.utilisation > cap + SLACK]
+    proven = found.solution.proven
+    if most is not None and beyond and most.utilisation >= used:
+        alone: bool | None = len(beyond) == 1
+        if used > cap + SLACK:
+            alone = False if proven else None
+        return certify_idle(most, cap, alone)
+    if not proven:
+        return None
+    proof = certify(prepared, found.solution.sets, found.solution.least, cap)
+    # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
+    return replace(proof, sufficient=()) if proof is not None and beyond else proof
 
 
 def _spare_findings(prepared: PreparedStance, found: Verified) -> Iterator[Finding]:
