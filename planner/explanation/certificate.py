@@ -30,7 +30,7 @@ from planner.explanation.irreducible_infeasible_set import (
     irreducible_set,
     sufficient_alone,
 )
-from planner.prepare import FORCE_CAP, PASSIVE_JOINT, TENSION_CHANGE
+from planner.prepare import FORCE_CAP, PASSIVE_JOINT, TENSION_CHANGE, PreparedStance, Sets
 from planner.programs import (
     JOINT_FORCE,
     JOINT_TORQUE,
@@ -61,49 +61,40 @@ DISTANT: Final = 1e-9
 
 
 def certify(
-    data: StanceData,
-    limbs: Sequence[str],
-    spaces: Sequence[WrenchSpace],
-    held: Sequence[Array],
-    limits: Limits,
+    prepared: PreparedStance,
+    sets: Sets,
+    known: Outcome,
     cap: float | None = None,
     *,
     nearest: Outcome | None = None,
-    known: Outcome | None = None,
-    explain: bool = True,
 ) -> Certificate | None:
     """Return a checked proof that no loads give the body wrench.
 
     With the direction d and multipliers λ ≥ 0 of the hard rows, what loads give is bounded by
-    `HardRowSystem.bound`; it must be below d · W.
+    `HardRowSystem.bound`; it must be below d · W. Where a question is not to be explained, only
+    that the irreducible set is empty is found.
 
     Parameters
     ----------
-    data : StanceData
-        Whose loads do not balance.
-    limbs, spaces : sequence of str, sequence of WrenchSpace
-        Of the hands, for the rows' names.
-    held : sequence of ndarray, shape (nb − 6, 6)
-        What the further rows of the balance take of each hand's wrench.
-    limits : Limits
-        The caller's.
+    prepared : PreparedStance
+    sets : Sets
+        Of its hands, whose loads do not balance.
+    known : Outcome
+        Of the program without a plan. Where the nearest loads are too near to prove it, or the time
+        is over, its multipliers are the proof.
     cap : float, optional
         On the utilisation, within which they do not balance; by default at any utilisation.
     nearest : Outcome, optional
         The loads that come nearest to the body wrench, with given wrenches of hands as they are
         given; found here by default.
-    known : Outcome, optional
-        Of the program without a plan. Where the nearest loads are too near to prove it, or the time
-        is over, its multipliers are the proof.
-    explain : bool, optional
-        Whether the irreducible set is sought, too, and what of it would do alone. Else only that
-        it is empty is told.
 
     Returns
     -------
     Certificate or None
         None if the bound proves nothing.
     """
+    (spaces, data), limbs, held = sets, prepared.limbs, prepared.hands.held
+    limits, explain = prepared.question.limits, prepared.question.explain
     # limit rows at a cap count as hard rows; without one they do not count
     rows = data if cap is None else data.capped(cap)
     system = _system(rows, limbs, spaces, held, capped=cap is not None)
@@ -117,7 +108,7 @@ def certify(
     else:
         found = _contradiction(system, limbs)
     proven = found is not None and system.proves(*found)
-    if not proven and known is not None:
+    if not proven:
         found = _multipliers(system, known, capped=cap is not None)
         proven = found is not None and system.proves(*found)
     if found is None or not proven:

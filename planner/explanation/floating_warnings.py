@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.compliance import FloatingWrist
-from hand_models.hand import FINGERS, SettledHand
+from hand_models.hand import FINGERS
+from planner.prepare import PreparedStance
 from planner.result import HandPlan
 
 __all__ = ["far_wrists", "idle_preloads", "strained_preloads"]
@@ -26,18 +26,15 @@ LIMIT: Final = 1.0 + 1e-6
 """Utilisation beyond which a hand is overloaded at rest."""
 
 
-def idle_preloads(
-    limbs: Sequence[str],
-    settled: Sequence[SettledHand],
-    wrists: Sequence[FloatingWrist | None],
-) -> tuple[str, ...]:
+def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
     """Return one sentence for each floating hand whose preload lets tiles slip backwards at rest.
 
     A tile's shear at rest is affine in its tendon's tension; where the springs of the finger push
     it away from the finger's base, a tension is needed to hold it.
     """
     found = []
-    for limb, hand, wrist in zip(limbs, settled, wrists, strict=True):
+    hands, wrists = prepared.batch.hands, prepared.hands.wrists
+    for limb, hand, wrist in zip(prepared.limbs, hands, wrists, strict=True):
         if wrist is None:
             continue
         needs = []
@@ -59,21 +56,10 @@ def idle_preloads(
     return tuple(found)
 
 
-def strained_preloads(
-    limbs: Sequence[str],
-    wrists: Sequence[FloatingWrist | None],
-    tension_limit: float | None,
-) -> Iterator[str]:
-    """Yield a sentence for each floating hand that its preload alone overloads.
-
-    Parameters
-    ----------
-    limbs : sequence of str
-    wrists : sequence of FloatingWrist or None
-    tension_limit : float or None
-        A caller's cap on every tendon [N].
-    """
-    for limb, wrist in zip(limbs, wrists, strict=True):
+def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
+    """Yield a sentence for each floating hand that its preload alone overloads."""
+    tension_limit = prepared.question.limits.tendon_tension
+    for limb, wrist in zip(prepared.limbs, prepared.hands.wrists, strict=True):
         if wrist is None:
             continue
         most = float(wrist.hand.preload.max())

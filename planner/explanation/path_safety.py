@@ -29,6 +29,7 @@ from planner import programs
 from planner.explanation.active_limits import LimitUse, close_to, limit_name
 from planner.explanation.infeasibility import ranked, summed
 from planner.explanation.sentences import blocking_sentence
+from planner.prepare import PreparedStance, Sets
 from planner.programs import LOAD_UNIT, SLACK, Outcome, StanceData
 from planner.result import LimitName, TensionPath
 
@@ -49,30 +50,20 @@ tension is known better, and a tendon at rest where it would stick is not slack 
 
 
 def tension_path(
-    data: StanceData,
-    limbs: Sequence[str],
-    spaces: Sequence[WrenchSpace],
+    prepared: PreparedStance,
+    sets: Sets,
     loads: Sequence[Array],
-    present: Mapping[str, Array],
-    cap: float,
     idle: Sequence[LimitUse] = (),
 ) -> TensionPath | None:
-    """Return how safe the way to a plan is.
+    """Return how safe the way is from a question's present tensions to a plan.
 
     Parameters
     ----------
-    data : StanceData
-        The hands' rows, and the balance.
-    limbs : sequence of str
-        Of the hands.
-    spaces : sequence of WrenchSpace
-        Their sets.
+    prepared : PreparedStance
+    sets : Sets
+        Of the hands, about the plan.
     loads : sequence of ndarray
         The plan's y of each hand.
-    present : mapping of str to ndarray, shape (4,)
-        Tensions now, by limb [N]; of hands with fixed wrists.
-    cap : float
-        On the utilisation.
     idle : sequence of LimitUse, optional
         What limbs without a hand use of their joints.
 
@@ -81,6 +72,8 @@ def tension_path(
     TensionPath or None
         None if the solver's answer does not pass the check.
     """
+    (spaces, data), limbs, question = sets, prepared.limbs, prepared.question
+    cap, present = question.limits.utilisation, question.present
     z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
     rows = [hand.L @ part + hand.l0 for hand, part in zip(data.hands, z, strict=True)]
     used = [float(row.max(initial=0.0)) for row in rows]

@@ -19,7 +19,7 @@ from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
 from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner import programs
-from planner.prepare.stance_constraints import NOTHING, StanceConstraints
+from planner.prepare.stance_constraints import StanceConstraints
 from planner.programs import (
     TWIST_UNIT,
     WRIST_RANGE,
@@ -37,7 +37,6 @@ __all__ = [
     "HandSets",
     "LinearisationPoint",
     "Sets",
-    "are_own",
     "widest_at_rest",
     "wrist_at",
     "wrists_at",
@@ -152,6 +151,8 @@ class HandSets:
         millimetre or some ten milliradians hardly moves them.
     data : StanceData
         Of hands with a fixed wrist; of floating ones a place to fill.
+    floating : bool
+        Whether any wrist floats.
     """
 
     spaces: tuple[WrenchSpace, ...]
@@ -162,32 +163,34 @@ class HandSets:
     held: tuple[Array, ...]
     added: tuple[StanceConstraints, ...]
     data: StanceData
+    floating: bool
 
-    @property
-    def floating(self) -> bool:
-        """Whether any wrist floats."""
-        return any(wrist is not None for wrist in self.wrists)
-
-    @property
-    def own(self) -> bool:
-        """Whether sets are of this stance alone; see `are_own`."""
-        return are_own(self.wrists, self.added)
+    @classmethod
+    def of(
+        cls,
+        spaces: Sequence[WrenchSpace],
+        wrists: tuple[FloatingWrist | None, ...],
+        transports: Array,
+        wrench: Array,
+        held: tuple[Array, ...],
+        added: tuple[StanceConstraints, ...],
+        known: tuple[ScaledRows, ...] | None = None,
+    ) -> HandSets:
+        """Return the hands of a stance; parameters as the attributes, ``known`` as ``scaled``."""
+        scaled = scaled_rows(spaces) if known is None else known
+        data = StanceData(hands_data(scaled, transports, held), wrench)
+        floating = any(wrist is not None for wrist in wrists)
+        of_all = wrists, transports, wrench, held, added
+        return cls(tuple(spaces), scaled, *of_all, data, floating)
 
     def with_sets(
         self,
         spaces: Sequence[WrenchSpace],
-        scaled: tuple[ScaledRows, ...] | None = None,
         wrists: tuple[FloatingWrist | None, ...] | None = None,
     ) -> HandSets:
-        """Return the same stance with other sets of its hands; with their rows and wrists, too."""
-        rows = scaled_rows(spaces) if scaled is None else scaled
-        return replace(
-            self,
-            spaces=tuple(spaces),
-            scaled=rows,
-            wrists=self.wrists if wrists is None else wrists,
-            data=StanceData(hands_data(rows, self.transports, self.held), self.wrench),
-        )
+        """Return the same stance with other sets of its hands, and other wrists."""
+        own = self.wrists if wrists is None else wrists
+        return HandSets.of(spaces, own, self.transports, self.wrench, self.held, self.added)
 
     def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""
@@ -290,11 +293,6 @@ class HandSets:
             if wrist is not None
         ]
         return max(moved, default=0.0)
-
-
-def are_own(wrists: Sequence[FloatingWrist | None], added: Sequence[StanceConstraints]) -> bool:
-    """Whether sets are of one stance alone: a wrist floats, or the stance adds rows."""
-    return any(wrist is not None for wrist in wrists) or any(rows is not NOTHING for rows in added)
 
 
 def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -15,11 +15,11 @@ from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_batch import HandBatch
-from planner.prepare.hand_sets import HandSets, Sets, are_own, wrists_at
+from planner.prepare.hand_sets import HandSets, Sets, wrists_at
 from planner.prepare.joint_posture import Posture, posture
 from planner.prepare.settled_stance import settle_stance
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
-from planner.programs import WRENCH_UNIT, ScaledRows, StanceData, hands_data, scaled_rows
+from planner.programs import WRENCH_UNIT, ScaledRows, scaled_rows
 from planner.question import Question
 
 __all__ = ["NO_WRENCH", "PreparedStance", "assemble", "checked_question", "prepare_stance"]
@@ -35,7 +35,7 @@ NO_AIMS: Final = np.zeros(0)
 
 
 KNOWN: Final[
-    BoundedStore[Hashable, tuple[HandBatch, tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]]
+    BoundedStore[Hashable, tuple[HandBatch, list[WrenchSpace], tuple[ScaledRows, ...]]]
 ] = BoundedStore("hands in arrays", 64)
 """Hands of stances in arrays, their sets, and these as programs need them, by the hands and the cap
 on tensions: those that were asked for last."""
@@ -56,6 +56,8 @@ class PreparedStance:
         What the programs need of them.
     wrench : ndarray, shape (6,)
         The body wrench that is planned for, in B [N, N·m].
+    limbs : tuple of str
+        Of the hands, in the order of all arrays.
     """
 
     question: Question
@@ -63,11 +65,11 @@ class PreparedStance:
     batch: HandBatch
     hands: HandSets
     wrench: Array
+    limbs: tuple[str, ...] = field(init=False)
 
-    @property
-    def limbs(self) -> tuple[str, ...]:
-        """Of the hands, in the order of all arrays."""
-        return tuple([hand.limb for hand in self.question.stance.hands])
+    def __post_init__(self) -> None:
+        limbs = tuple([hand.limb for hand in self.question.stance.hands])
+        object.__setattr__(self, "limbs", limbs)
 
     @property
     def floating(self) -> list[str]:
@@ -104,8 +106,8 @@ class PreparedStance:
         """
         stance, cap = self.question.stance, self.question.limits.tendon_tension
         wrists = wrists_at(stance, settled, cap)
-        spaces, scaled = _sets_of(settled, wrists, self.hands.added, cap)
-        hands = self.hands.with_sets(spaces, scaled, wrists)
+        spaces = _spaces_of(settled, wrists, self.hands.added, cap)
+        hands = self.hands.with_sets(spaces, wrists)
         return replace(self, batch=HandBatch.of(settled), hands=hands)
 
 
@@ -154,34 +156,31 @@ def assemble(
     wrists = wrists_at(stance, settled, cap)
     added = _added_rows(question, where)
 
-    def made() -> tuple[HandBatch, tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]:
-        return HandBatch.of(settled), *_sets_of(settled, wrists, added, cap)
+    def made() -> tuple[HandBatch, list[WrenchSpace], tuple[ScaledRows, ...]]:
+        spaces = _spaces_of(settled, wrists, added, cap)
+        return HandBatch.of(settled), spaces, scaled_rows(spaces)
 
-    own = are_own(wrists, added)
+    # sets are of this stance alone where a wrist floats, or the stance adds rows
+    own = any(each is not None for each in wrists) or any(each is not NOTHING for each in added)
     batch, spaces, scaled = made() if own else KNOWN.get((settled, cap), made)
     held, aims = _held(question)
     transports = wrench_transports(stance.body, [hand.pose for hand in stance.hands])
     needed = np.concatenate([wrench / WRENCH_UNIT, aims]) if len(aims) else wrench / WRENCH_UNIT
-    data = StanceData(hands_data(scaled, transports, held), needed)
-    return batch, HandSets(spaces, scaled, wrists, transports, needed, held, added, data)
+    return batch, HandSets.of(spaces, wrists, transports, needed, held, added, scaled)
 
 
-def _sets_of(
+def _spaces_of(
     settled: Sequence[SettledHand],
     wrists: Sequence[FloatingWrist | None],
     added: Sequence[StanceConstraints],
     cap: float | None,
-) -> tuple[tuple[WrenchSpace, ...], tuple[ScaledRows, ...]]:
-    """Return the sets of hands with what the stance adds to them, and these as programs need them.
-
-    ``cap``: on tensions [N].
-    """
+) -> list[WrenchSpace]:
+    """Return the sets of hands with what the stance adds to them; ``cap`` is on tensions [N]."""
     fixed = [hand for hand, wrist in zip(settled, wrists, strict=True) if wrist is None]
     of_fixed = iter(wrench_spaces(fixed, cap))
     plain = [next(of_fixed) if wrist is None else wrist.linearised() for wrist in wrists]
     pairs = zip(plain, added, strict=True)
-    spaces = tuple([each if rows is NOTHING else rows.on(each) for each, rows in pairs])
-    return spaces, scaled_rows(spaces)
+    return [each if rows is NOTHING else rows.on(each) for each, rows in pairs]
 
 
 def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstraints, ...]:

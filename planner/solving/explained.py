@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +20,8 @@ from planner.explanation import (
     UNPROVEN,
     ActiveLimits,
     LimitUse,
+    certify,
+    certify_idle,
     far_wrists,
     idle_preloads,
     limit_sentence,
@@ -32,6 +35,7 @@ from planner.explanation import (
 from planner.prepare import PreparedStance
 from planner.programs import SLACK, SOLVER
 from planner.result import (
+    Certificate,
     Clearance,
     Finding,
     HandPlan,
@@ -48,9 +52,8 @@ from planner.solving.robust import find_robust_load_factor
 from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
-from planner.solving.why_not import overload, unexplained
 
-__all__ = ["explained_plan"]
+__all__ = ["explained_plan", "unexplained"]
 
 LEFT: Final = 0.5
 """How far a tension may be from that of closing to be left there [N]: less than motors are held."""
@@ -62,8 +65,9 @@ def explained_plan(
     answer: Answer,
     factor: LoadFactor,
     attempt: Attempt,
+    times: Callable[[], Time],
 ) -> Plan:
-    """Return the plan, explained, with all that is wanted beside it, but for the time it took.
+    """Return the plan, explained, with all that is wanted beside it.
 
     Parameters
     ----------
@@ -73,6 +77,8 @@ def explained_plan(
     factor : LoadFactor
     attempt : callable
         Plans another stance, for the spread.
+    times : callable
+        Returns where the time went.
     """
     question, where, solution = prepared.question, prepared.where, answer.solution
     odd = wrench_findings(question)
@@ -113,7 +119,7 @@ def explained_plan(
         findings=(*checks.findings, *odd),
         warnings=warnings,
         solver=Solver(SOLVER, solution.least.status, solution.least.iterations),
-        time=Time(0.0, 0.0, 0.0),
+        time=times(),
         unfinished=unfinished,
         **parts,
     )
@@ -136,7 +142,7 @@ def _of_plan(
 ) -> tuple[dict[str, Any], tuple[Unfinished, ...], list[str]]:
     """Return what is to be said of a plan, by fields of `Plan`; what is unfinished; warnings."""
     question, solution, idle = prepared.question, found.solution, checks.idle
-    (spaces, data), cap = solution.sets, question.limits.utilisation
+    spaces, cap = solution.sets.spaces, question.limits.utilisation
     hands, unfinished, warnings = found.by_hand(), tuple[Unfinished, ...](), list[str]()
     binding = ActiveLimits(prepared.limbs, spaces, solution.least.limit_duals)
     limiting, reason = _explain(binding, found, hands, idle, cap)
@@ -155,8 +161,7 @@ def _of_plan(
         own = ActiveLimits(prepared.limbs, spaces, solution.best.limit_duals)
         parts |= solution.objective.reported(own, solution.cap)
     if question.present:
-        given = prepared.limbs, spaces, solution.loads, question.present, cap, idle
-        parts["path"] = path = tension_path(data, *given)
+        parts["path"] = path = tension_path(prepared, solution.sets, solution.loads, idle)
         unfinished += late("path") if path is None else ()
         if path is None and not unfinished:
             warnings.append(UNKNOWN)
@@ -165,11 +170,42 @@ def _of_plan(
     if found.whole > cap + SLACK:
         parts["status"] = "overloaded"
         if question.explain:
-            proof = overload(prepared, found, idle)
+            proof = _overload(prepared, found, idle)
             parts["certificate"] = proof
             reason += overload_sentence(proof, floating=prepared.floating)
             unfinished += late("certificate") if proof is None else unexplained(prepared, proof)
     return {**parts, "reason": reason}, unfinished, warnings
+
+
+def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinished, ...]:
+    """Return that a proof is not explained, if it was to be, and that is for the time."""
+    if not prepared.question.explain:
+        return ()
+    whole = proof.irreducible is not None and proof.sufficient is not None
+    return () if whole else late("explanation")
+
+
+def _overload(
+    prepared: PreparedStance, found: Verified, idle: Sequence[LimitUse]
+) -> Certificate | None:
+    """Return the proof that no plan keeps to the cap on the utilisation; None without one.
+
+    Of floating hands with their sets linearised at the plan.
+    """
+    cap, used = prepared.question.limits.utilisation, found.utilisation
+    most = max(idle, key=lambda each: each.utilisation, default=None)
+    beyond = [each for each in idle if each.utilisation > cap + SLACK]
+    proven = found.solution.proven
+    if most is not None and beyond and most.utilisation >= used:
+        alone: bool | None = len(beyond) == 1
+        if used > cap + SLACK:
+            alone = False if proven else None
+        return certify_idle(most, cap, alone)
+    if not proven:
+        return None
+    proof = certify(prepared, found.solution.sets, found.solution.least, cap)
+    # what a limb without a hand cannot bear stays in the way, whatever is taken from the hands
+    return replace(proof, sufficient=()) if proof is not None and beyond else proof
 
 
 def _spare_findings(prepared: PreparedStance, found: Verified) -> Iterator[Finding]:
@@ -197,10 +233,9 @@ def _clearance(prepared: PreparedStance) -> Clearance:
 
 def _wrist_warnings(prepared: PreparedStance, answer: Answer) -> Iterator[str]:
     """Yield what a caller should know of floating wrists."""
-    limbs, wrists = prepared.limbs, prepared.hands.wrists
     if prepared.hands.floating:
-        yield from idle_preloads(limbs, prepared.batch.hands, wrists)
-        yield from strained_preloads(limbs, wrists, prepared.question.limits.tendon_tension)
+        yield from idle_preloads(prepared)
+        yield from strained_preloads(prepared)
         if isinstance(answer, Verified):
             yield from far_wrists(answer.by_hand())
     if not answer.solution.proven:

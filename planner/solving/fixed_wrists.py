@@ -51,6 +51,7 @@ class FixedSolution(Solution):
         least: Outcome,
         loads: tuple[Array, ...] = (),
         bound: float | None = None,
+        start: LeastUtilisation | None = None,
     ) -> Self:
         """Return loads of the least utilisation, or near it.
 
@@ -63,11 +64,13 @@ class FixedSolution(Solution):
         loads : tuple of ndarray, optional
         bound : float, optional
             The least utilisation is not below; by default as the multipliers prove it.
+        start : LeastUtilisation, optional
+            What they were found from.
         """
-        cap, unproven = prepared.question.limits.utilisation, tuple[str, ...]()
+        cap, faults = prepared.question.limits.utilisation, tuple[str, ...]()
         if least.solved:
             bound = dual_bounds.least_bound(sets.data, least) if bound is None else bound
-            unproven = unproven_sentences("utilisation", least.value, bound)
+            faults = unproven_sentences("utilisation", least.value, bound)
         return cls(
             sets=sets,
             loads=loads,
@@ -76,7 +79,9 @@ class FixedSolution(Solution):
             best=least,
             cap=cap,
             most=tension_trade(least.value, cap).most,
-            unproven=unproven,
+            faults=faults,
+            spare=() if start is None else start.spare,
+            start=start,
         )
 
     def best_in(
@@ -91,7 +96,7 @@ class FixedSolution(Solution):
         if not best.solved:
             if deadline.expired():
                 return self.late(objective.late)
-            return replace(self, wrong=(f"least {objective.words}: {best.status}",))
+            return replace(self, faults=(f"least {objective.words}: {best.status}",))
         bound = objective.bound(data, best, cap)
         further = unproven_sentences(objective.words, best.value, bound)
         return replace(
@@ -101,7 +106,7 @@ class FixedSolution(Solution):
             best=best,
             cap=cap,
             most=np.inf,
-            unproven=self.unproven + further,
+            faults=self.faults + further,
         )
 
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
@@ -129,8 +134,7 @@ def fixed_solutions(
     late: tuple[Unfinished, ...] = ()
     if found.proven:
         loads = () if found.meant is None else found.meant.loads
-        first = FixedSolution.of_least(prepared, sets, found.outcome, loads, found.bound)
-        first = replace(first, spare=found.spare, start=found)
+        first = FixedSolution.of_least(prepared, sets, found.outcome, loads, found.bound, found)
         for solution in [first] if loads else _less_tense(prepared, first):
             late = solution.unfinished
             yield solution
@@ -142,7 +146,7 @@ def fixed_solutions(
     if found.outcome.solved and not solved and deadline.expired():
         loads = found.outcome.loads
         last = FixedSolution.of_least(prepared, sets, found.outcome, loads)
-        last = replace(last, most=np.inf, unproven=(), unfinished=late, start=found)
+        last = replace(last, most=np.inf, faults=(), unfinished=late, start=found)
         yield last.late("least_utilisation")
 
 

@@ -72,7 +72,7 @@ class FloatingSolution(Solution):
             objective=objective,
             best=search.outcome,
             most=np.inf,
-            unproven=_unproven_use(self.usual, self.usual.outcome.value) + further,
+            faults=_unproven_use(self.usual, self.usual.outcome.value) + further,
         )
 
     def _at(self, search: WristSolution) -> FloatingSolution:
@@ -87,7 +87,7 @@ class FloatingSolution(Solution):
         found = replace(
             self, sets=search.sets, loads=search.point.loads, poses=poses, search=search
         )
-        return found if found.proven else replace(found, unproven=(), most=np.inf)
+        return found if found.proven else replace(found, faults=(), most=np.inf)
 
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
         most = most_load(prepared.hands, self.usual, self.factor, budget)
@@ -99,7 +99,7 @@ class FloatingSolution(Solution):
         reason = "no pose of the floating wrists was found that balances the body"
         if wrench_is_given(prepared):
             reason += " with the wrenches that they are given; that is no proof of none"
-        idle = idle_preloads(prepared.limbs, prepared.batch.hands, prepared.hands.wrists)
+        idle = idle_preloads(prepared)
         return f"{reason}; {idle[0]}" if idle else reason
 
 
@@ -133,7 +133,7 @@ def floating_solution(
     if not search.exact:
         return replace(found, sets=prepared.hands.sets(search.point))
     used = search.measure.utilisation
-    found = replace(found, most=tension_trade(used, cap).most, unproven=_unproven_use(search, used))
+    found = replace(found, most=tension_trade(used, cap).most, faults=_unproven_use(search, used))
     return found._at(_less_tense_beside(prepared, search))
 
 

@@ -59,9 +59,7 @@ class Solution:
         On the utilisation.
     most : float
         Largest utilisation that the loads are to have.
-    wrong : tuple of str
-        Why they are no plan, where that is known before they are checked.
-    unproven : tuple of str
+    faults : tuple of str
         Why the multipliers do not prove them the best, if they do not.
     unfinished : tuple of str
         What the deadline came before.
@@ -76,8 +74,7 @@ class Solution:
     best: Outcome
     cap: float
     most: float = math.inf
-    wrong: tuple[str, ...] = ()
-    unproven: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
     unfinished: tuple[Unfinished, ...] = ()
     poses: tuple[WristPlan | None, ...] = ()
 

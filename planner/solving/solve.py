@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -14,19 +14,18 @@ from hand_models.base import Array, finite_vector
 from planner import deadline, programs
 from planner.advice import Trial, advise
 from planner.deadline import Budget, Overlap, late_sentence
-from planner.explanation import LimitUse
+from planner.explanation import LimitUse, certify
 from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
 from planner.programs import LOAD_UNIT, UNLIMITED
 from planner.question import Question, checked_body_wrench
 from planner.result import LoadFactor, Plan, Time
-from planner.solving.explained import explained_plan
+from planner.solving.explained import explained_plan, unexplained
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
 from planner.solving.floating_wrists import floating_solution, wrench_is_given
 from planner.solving.objectives import CappedObjective, objective_of
 from planner.solving.solution import Answer, Failed, Infeasible, Solution, load_factor_of
 from planner.solving.verified import Checks, prepare_checks, recover, verify
-from planner.solving.why_not import proof_of_none, unexplained
 
 __all__ = ["KnownStance", "plan", "plan_on", "try_stance", "with_advice"]
 
@@ -57,15 +56,8 @@ def plan(question: Question) -> Plan:
     """
     start = time.perf_counter()
     with deadline.within(checked_question(question).deadline, started=start):
-        answer = plan_on(prepare_stance(question), start).plan
+        answer = plan_on(prepare_stance(question), start)[0]
         return with_advice(question, answer) if "advice" in question.want else answer
-
-
-class Planned(NamedTuple):
-    """A plan, and the solution that it was made of."""
-
-    plan: Plan
-    solution: Solution
 
 
 def plan_on(
@@ -73,8 +65,8 @@ def plan_on(
     start: float,
     known: Checks | None = None,
     near: Solution | None = None,
-) -> Planned:
-    """Answer a question of a prepared stance.
+) -> tuple[Plan, Solution]:
+    """Answer a question of a prepared stance; return the solution, too, that the plan is made of.
 
     Parameters
     ----------
@@ -102,10 +94,13 @@ def plan_on(
     ready, factor = checks.result(), LoadFactor()
     if "load_factor" in question.want:
         factor = load_factor_of(prepared, answer, budget, overloaded=ready.overloaded)
-    times = Time(modelled - start, time.perf_counter() - modelled, 0.0)
-    found = explained_plan(prepared, ready, answer, factor, try_stance)
-    times = Time(times.model, times.solve, time.perf_counter() - start)
-    return Planned(replace(found, time=times), answer.solution)
+    solved = time.perf_counter()
+
+    def times() -> Time:
+        return Time(modelled - start, solved - modelled, time.perf_counter() - start)
+
+    found = explained_plan(prepared, ready, answer, factor, try_stance, times)
+    return found, answer.solution
 
 
 def _solutions(
@@ -184,7 +179,9 @@ def _second_look(
         # of next to no wrench a hair is more than rounding
     if wrench_is_given(prepared) or not prove:
         return found
-    proof = proof_of_none(prepared, solution, nearest)
+    given = len(data.wrench) > len(prepared.wrench)
+    known = None if given else nearest
+    proof = certify(prepared, solution.sets, solution.least, nearest=known)
     if proof is None:
         return found
     return Infeasible(solution.late(*unexplained(prepared, proof)), proof)

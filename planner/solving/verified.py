@@ -139,13 +139,12 @@ def _hand(prepared: PreparedStance, solution: Solution, index: int) -> HandPlan:
 def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Verified | Failed:
     """Return loads, and what they do, if they pass the checks and are the best; else why not."""
     solution, arrays = recovered.solution, recovered.arrays
-    wrong = list(solution.wrong)
-    wrong += checks.check.problems(arrays, recovered.whole, prepared.wrench, recovered.effort)
+    wrong = checks.check.problems(arrays, recovered.whole, prepared.wrench, recovered.effort)
     objective = solution.objective
     if isinstance(objective, CappedObjective):
         value = objective.value(solution.sets.data, solution.loads)
         wrong += objective.problems(arrays, value)
-    wrong += solution.unproven
+    wrong += solution.faults
     used, most = recovered.utilisation, solution.most
     if not is_least(used, most):
         wrong.append(f"utilisation {used:.6g} is above {most:.6g}, what less tension is worth")
