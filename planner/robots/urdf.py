@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, Pose, stored, turns_about
+from hand_models.base import Array, InvalidInputError, Pose, stored
 
 __all__ = ["JointElement", "Link", "Mimic", "Urdf", "parse_urdf"]
 
@@ -283,9 +283,19 @@ def _origin(owner: str, element: ElementTree.Element) -> Pose:
         _numbers(owner, origin, name, 3, most) if name in origin.attrib else [0.0, 0.0, 0.0]
         for name, most in (("xyz", LONGEST), ("rpy", WIDEST))
     )
-    # about the fixed axes x, y, z, one after the other
-    roll, pitch, yaw = turns_about(np.diag(angles))
-    return Pose(np.array(position), yaw @ pitch @ roll)
+    return Pose(np.array(position), _turned(*angles))
+
+
+def _turned(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation of URDF's angles about the fixed axes x, y, z, one after the other."""
+    (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
+            [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
+            [-sy, sx * cy, cx * cy],
+        ]
+    )
 
 
 def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
