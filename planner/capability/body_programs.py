@@ -31,7 +31,7 @@ from planner.question import Question
 from planner.result import LimitName, Plan
 from planner.solving import plan
 
-__all__ = ["BodyPrograms", "Motion", "size_of"]
+__all__ = ["BodyPrograms", "End", "Motion", "size_of"]
 
 MISSING: Final = "it was known what the stance can hold"
 """What a deadline may come before."""
@@ -56,6 +56,27 @@ class Motion(NamedTuple):
     rest: StanceData
     wrench: Array
     torques: tuple[Array, ...]
+
+
+class End(NamedTuple):
+    """How far a stance goes in a direction.
+
+    Attributes
+    ----------
+    reach : float
+        [N, N·m, m/s² or rad/s²]
+    wrench : ndarray, shape (6,)
+        The body wrench there, in B.
+    limiting : LimitName or None
+        The limit that ends the way; of several, the one that more of would help most.
+    loads : tuple of ndarray
+        y of each hand.
+    """
+
+    reach: float
+    wrench: Array
+    limiting: LimitName | None
+    loads: tuple[Array, ...]
 
 
 class BodyPrograms:
@@ -167,19 +188,17 @@ class BodyPrograms:
         most = max(worth, key=lambda name: round(worth[name], ALIKE), default=None)
         return most if most is not None and worth[most] > BINDING else None
 
-    def linearisation_error(self, ends: Sequence[Sequence[Array]]) -> float:
-        """Return how far floating hands' sets are off at most with some loads [N].
+    def linearisation_error(self, ends: Sequence[End]) -> float:
+        """Return how far floating hands' sets are off at most at some ends [N].
 
         The largest disagreement of a hand's wrench with the exact model there: forces, and moments
         over 0.1 m. Zero where no wrist floats.
         """
-        if self.exact:
-            return 0.0
-        spaces, worst = self._spaces, 0.0
-        for loads in ends:
+        worst = 0.0
+        for end in () if self.exact else ends:
             deadline.check(MISSING)
-            there = self._hands.sets(replace(self._point, loads=tuple(loads))).spaces
-            off = disagreements(self._hands, spaces, there, loads)
+            there = self._hands.sets(replace(self._point, loads=end.loads)).spaces
+            off = disagreements(self._hands, self._spaces, there, end.loads)
             worst = max([worst, *(each for each in off if np.isfinite(each))])
         return worst
 

@@ -22,11 +22,9 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.wrench_spaces import SCALE
-from planner.capability.body_programs import BodyPrograms, size_of
+from planner.capability.body_programs import BodyPrograms, End, size_of
 from planner.capability.polygon import MOST, Polygon, SupportPoint, enclose
 from planner.programs import WRENCH_UNIT, Reached
-from planner.question import Question
-from planner.result import LimitName
 
 __all__ = ["COMPONENTS", "OTHERS", "BodySection", "BodySpace", "End", "Others", "checked_axes"]
 
@@ -41,27 +39,6 @@ OTHERS: Final[dict[str, str]] = {
     "free": "whatever the others",
 }
 """What the other components of a body wrench may be, and how that is told."""
-
-
-class End(NamedTuple):
-    """How far a stance goes in a direction.
-
-    Attributes
-    ----------
-    reach : float
-        [N, N·m, m/s² or rad/s²]
-    wrench : ndarray, shape (6,)
-        The body wrench there, in B.
-    limiting : LimitName or None
-        The limit that ends the way; of several, the one that more of would help most.
-    loads : tuple of ndarray
-        y of each hand.
-    """
-
-    reach: float
-    wrench: Array
-    limiting: LimitName | None
-    loads: tuple[Array, ...]
 
 
 class BodySection(NamedTuple):
@@ -81,8 +58,8 @@ class BodySection(NamedTuple):
     polygon: Polygon | None
 
 
-class BodySpace:
-    """What a stance can hold.
+class BodySpace(BodyPrograms):
+    """What a stance can hold: how far it goes, and sections of that.
 
     Parameters
     ----------
@@ -90,26 +67,11 @@ class BodySpace:
         Its limits, joints, caps and given hand wrenches count as in a plan; its objective and its
         deadline do not.
 
-    Attributes
-    ----------
-    question : Question
-        Without extras and deadline, and for the least utilisation.
-    plan : Plan
-        Of least utilisation for the body wrench asked for.
-    exact : bool
-        Whether no wrist floats.
-
     Raises
     ------
     InvalidInputError
         If the question cannot be understood; its ``field`` is relative to the question.
     """
-
-    def __init__(self, question: Question) -> None:
-        self._programs = programs = BodyPrograms(question)
-        self.plan = programs.plan
-        self.exact = programs.exact
-        self.question = programs.question
 
     @property
     def needed(self) -> Array:
@@ -127,8 +89,8 @@ class BodySpace:
             d; the reach is the largest d · W.
         """
         d = finite_vector(direction, 6, "direction")
-        found = self._programs.reached(d * WRENCH_UNIT, np.eye(6), np.zeros(6))
-        return None if found is None else self._end(found, float(d @ self._programs.wrench(found)))
+        found = self.reached(d * WRENCH_UNIT, np.eye(6), np.zeros(6))
+        return None if found is None else self._end(found, float(d @ self.wrench(found)))
 
     def pure(self, direction: ArrayLike) -> End | None:
         """Return how far t d is held, from zero along a direction d, shape (6,); None if never."""
@@ -136,7 +98,7 @@ class BodySpace:
 
     def more(self, direction: ArrayLike) -> End | None:
         """Return how far W + t d is held from the wrench W asked for; None if W is not held."""
-        cap = self._programs.cap_at_needed
+        cap = self.cap_at_needed
         return None if cap is None else self._along(self.needed, direction, cap)
 
     def section(self, axes: Sequence[str], others: Others = "needed") -> BodySection:
@@ -167,33 +129,24 @@ class BodySpace:
         at = np.where(np.isin(np.arange(6), plane), 0.0, start)
         columns = np.eye(6) if others == "free" else np.eye(6)[:, plane]
         units = (SCALE * WRENCH_UNIT)[plane]
-        programs = self._programs
-        cap = programs.cap_at_needed if others == "needed" else None
+        cap = self.cap_at_needed if others == "needed" else None
 
         def touching(normal: Array) -> SupportPoint | None:
             goal = columns[plane].T @ (normal * units)
-            found = programs.reached(goal, columns, at, cap)
+            found = self.reached(goal, columns, at, cap)
             if found is None:
                 return None
-            point = (SCALE * programs.wrench(found))[plane]
-            return SupportPoint(normal, point, programs.limiting(found.outcome))
+            point = (SCALE * self.wrench(found))[plane]
+            return SupportPoint(normal, point, self.limiting(found.outcome))
 
         polygon = enclose(touching)
         scaled = None if polygon is None else polygon.scaled(1.0 / SCALE[plane])
         return BodySection((one, two), others, scaled)
 
-    def linearisation_error(self, ends: Sequence[End]) -> float:
-        """Return how far floating hands' sets are off at most at some ends [N].
-
-        The largest disagreement of a hand's wrench with the exact model: forces, and moments over
-        0.1 m. Zero where no wrist floats.
-        """
-        return self._programs.linearisation_error([end.loads for end in ends])
-
     @property
     def weight(self) -> Array | None:
         """The body wrench that holds the body at rest, shape (6,); None without a load."""
-        motion = self._programs.motion
+        motion = self.motion
         return None if motion is None else np.asarray(motion.rest.wrench[:6] * WRENCH_UNIT)
 
     # Accelerations ------------------------------------------------------------------------------
@@ -201,13 +154,12 @@ class BodySpace:
     @property
     def accelerates(self) -> bool:
         """Whether accelerations can be told: not where a body wrench is given instead of a load."""
-        return self._programs.motion is not None
+        return self.motion is not None
 
     @property
     def turns(self) -> bool:
         """Whether angular accelerations can be told, too: with joints, and no com of a load."""
-        motion = self._programs.motion
-        return motion is not None and motion.wrench.shape[1] == 6
+        return self.motion is not None and self.motion.wrench.shape[1] == 6
 
     def acceleration(self, direction: ArrayLike) -> End | None:
         """Return the largest acceleration of the body, from rest, that is held along a direction.
@@ -231,9 +183,9 @@ class BodySpace:
             If a program is not solved.
         """
         way = self._ways(finite_vector(direction, len(np.atleast_1d(direction)), "direction"))
-        if self._programs.at_rest is None:
+        if self.at_rest is None:
             return None
-        found = self._programs.accelerated(np.ones(1), way)
+        found = self.accelerated(np.ones(1), way)
         return None if found is None else self._end(found, float(found.t[0]))
 
     def acceleration_section(
@@ -245,22 +197,21 @@ class BodySpace:
         what `acceleration` raises.
         """
         ways = [self._ways(finite_vector(way, 3, "direction")) for way in (one, two)]
-        programs = self._programs
-        if programs.at_rest is None:
+        if self.at_rest is None:
             return None
         plane = np.hstack(ways)
 
         def touching(normal: Array) -> SupportPoint | None:
-            found = programs.accelerated(normal, plane)
+            found = self.accelerated(normal, plane)
             if found is None:
                 return None
-            return SupportPoint(normal, found.t, programs.limiting(found.outcome))
+            return SupportPoint(normal, found.t, self.limiting(found.outcome))
 
         return enclose(touching, most)
 
     def _ways(self, direction: Array) -> Array:
         """Return a direction as a column of the motion's components, shape (k, 1)."""
-        motion = self._programs.motion
+        motion = self.motion
         if motion is None:
             raise InvalidInputError(
                 "a given body wrench tells nothing of the mass; give load", field="body_wrench"
@@ -279,12 +230,12 @@ class BodySpace:
 
     def _along(self, start: Array, direction: ArrayLike, cap: float | None = None) -> End | None:
         d = finite_vector(direction, 6, "direction")
-        found = self._programs.reached(np.ones(1), (d / WRENCH_UNIT)[:, None], start, cap)
+        found = self.reached(np.ones(1), (d / WRENCH_UNIT)[:, None], start, cap)
         return None if found is None else self._end(found, float(found.t[0]))
 
     def _end(self, found: Reached, reach: float) -> End:
-        programs, outcome = self._programs, found.outcome
-        return End(reach, programs.wrench(found), programs.limiting(outcome), outcome.loads)
+        outcome = found.outcome
+        return End(reach, self.wrench(found), self.limiting(outcome), outcome.loads)
 
 
 def checked_axes(axes: Sequence[str]) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-from .capsules import Capsules as Capsules
+from .capsules import Capsules as Capsules, scene_number as scene_number
 from .inverse_kinematics import (
     UnreachableError as UnreachableError,
     solve_limbs as solve_limbs,

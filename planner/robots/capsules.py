@@ -23,7 +23,7 @@ from hand_models.parameters import ParameterTable
 from planner.robots.build import ROOT_JOINT, Chain, pose_of
 from planner.robots.robot_file import RobotDescription
 
-__all__ = ["Capsules", "capsules_of"]
+__all__ = ["Capsules", "capsules_of", "scene_number"]
 
 BODY: Final = 0
 """Step of what no joint moves."""
@@ -81,7 +81,7 @@ def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Ch
     for limb, chain in chains.items():
         known_radius = described.mounts[limb].radius
         assumed = known_radius is None
-        radius = _default_radius() if known_radius is None else known_radius
+        radius = scene_number("link", "radius") if known_radius is None else known_radius
         link = model.frames[model.getFrameId(described.mounts[limb].link, pin.FrameType.BODY)]
         steps = [model.jointPlacements[joint].translation for joint in chain.ids[1:]]
         tips = zip(chain.ids, [*steps, link.placement.translation], strict=True)
@@ -118,7 +118,7 @@ def _given(
 
 
 @cache
-def _default_radius() -> float:
-    """Return the radius of a link of which nothing is known [m]."""
+def scene_number(section: str, name: str) -> float:
+    """Return a number of ``parameters/scene.toml``, in SI units."""
     text = resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8")
-    return ParameterTable.read(text, "scene.toml").positive("link", "radius")
+    return ParameterTable.read(text, "scene.toml").positive(section, name)

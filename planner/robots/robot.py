@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -27,7 +26,7 @@ from hand_models.base import (
 from hand_models.hand import SpinyHand, spiny_hand
 from hand_models.parameters import ParameterTable
 from planner.robots.build import build_model, pose_of
-from planner.robots.capsules import Capsules, capsules_of
+from planner.robots.capsules import capsules_of
 from planner.robots.robot_file import RobotDescription, RobotFile
 
 __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
@@ -96,6 +95,10 @@ class Robot:
         B in the root link.
     locked : dict of str to float
         Where joints are that never move, by name [rad, or m].
+    capsules : Capsules
+        What of it could be in the way; its hands are left out.
+    body_capsules : tuple of ndarray, shapes (n, 2, 3), (n,)
+        Segments in B and radii of those that no joint moves [m].
 
     Raises
     ------
@@ -114,7 +117,15 @@ class Robot:
         self.back = None if description.back is None else np.array(description.back)
         self.reach = max(chain.reach for chain in self.chains.values())
         self.mass = float(pin.computeTotalMass(self.model))
-        self.com = self.com_at({}) if description.com is None else np.array(description.com)
+        self._com_at_zero = self.com_at({})
+        self.com = self._com_at_zero if description.com is None else np.array(description.com)
+        self._limb_weights = self._weighed_limbs()
+        self.capsules = capsules_of(self.model, description, self.chains)
+        of_body = int((self.capsules.steps == 0).sum())
+        self.body_capsules = (
+            self._from_root.apply(self.capsules.ends[:of_body]),
+            self.capsules.radii[:of_body],
+        )
         # of each limb: its link's origin in H, its shoulder in B, its reach
         self._ends = {
             limb: (*mount.pose.inverse().position.tolist(), *chain.shoulder.tolist(), chain.reach)
@@ -296,12 +307,7 @@ class Robot:
             moment = moment + mass * (shoulder + share * (place - shoulder) - com)
         return np.asarray(moment / self.mass)
 
-    @cached_property
-    def _com_at_zero(self) -> Array:
-        return self.com_at({})
-
-    @cached_property
-    def _limb_weights(self) -> dict[str, tuple[float, float, Array]]:
+    def _weighed_limbs(self) -> dict[str, tuple[float, float, Array]]:
         """Return of each limb its mass, how far along its centre is at zero, and where, in B."""
         model, data, found = self.model, self.data, {}
         hands = self.hand_poses({})
@@ -313,17 +319,6 @@ class Robot:
             share = float((com - chain.shoulder) @ way / max(float(way @ way), 1e-12))
             found[limb] = mass, share, com
         return found
-
-    @cached_property
-    def capsules(self) -> Capsules:
-        """What of it could be in the way; its hands are left out."""
-        return capsules_of(self.model, self.description, self.chains)
-
-    @cached_property
-    def body_capsules(self) -> tuple[Array, Array]:
-        """Those that no joint moves: segments in B, shape (n, 2, 3), and radii, shape (n,) [m]."""
-        count = int((self.capsules.steps == 0).sum())
-        return self._from_root.apply(self.capsules.ends[:count]), self.capsules.radii[:count]
 
     def placed_capsules(self, angles: Angles) -> Array:
         """Return the segments of all `capsules` in B, shape (n, 2, 3) [m]."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -57,7 +56,7 @@ class Scene:
         """Of the hands."""
         return tuple(hand.limb for hand in self.hands)
 
-    @cached_property
+    @property
     def palms(self) -> tuple[Array, float]:
         """A capsule in each hand, behind its palm's face: segments in B (n, 2, 3), radius [m].
 

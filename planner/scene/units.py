@@ -11,18 +11,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from importlib import resources
 from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array
-from hand_models.parameters import ParameterTable
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Sphere
 from hand_models.tile import Surface, surface_names
 from planner.question import Question, Stance
 from planner.result import Finding
-from planner.robots import Robot
+from planner.robots import Robot, scene_number
 
 __all__ = ["unit_findings", "wrench_findings"]
 
@@ -121,7 +119,7 @@ def _wrench(stance: Stance, wrench: Array) -> Iterator[Finding]:
     robot, field = stance.robot, "body_wrench"
     gravity = float(np.linalg.norm(stance.gravity))
     force, moment = (float(np.linalg.norm(part)) for part in wrench.reshape(2, 3))
-    weight, on_earth = robot.mass * gravity, robot.mass * _number("standard_gravity")
+    weight, on_earth = robot.mass * gravity, robot.mass * scene_number("usual", "standard_gravity")
     if force > THOUSANDS * on_earth:
         message = f"a force of {force:.3g} N is {force / on_earth:.3g} times the robot's weight"
         yield _finding(field, f"{message} on the Earth: is it in N?", force, "N")
@@ -139,7 +137,10 @@ def _wrench(stance: Stance, wrench: Array) -> Iterator[Finding]:
 
 def _force_unit(part: float) -> str | None:
     """Return the unit in which a force that is such a part of the weight would be the weight."""
-    for unit, newtons, off in (("kN", 1e3, ABOUT), ("kgf", _number("standard_gravity"), NEAR)):
+    for unit, newtons, off in (
+        ("kN", 1e3, ABOUT),
+        ("kgf", scene_number("usual", "standard_gravity"), NEAR),
+    ):
         if 1.0 / off <= part * newtons <= off:
             return unit
     return None
@@ -178,7 +179,7 @@ def _load(question: Question) -> Iterator[Finding]:
                 f"{robot.reach:.2g} m: is it in m, in that frame?"
             )
             yield _finding(f"{field}.com", message, away, "m")
-    most = _number("strongest_gravity")
+    most = scene_number("usual", "strongest_gravity")
     for name, arm, unit in (
         ("acceleration", 1.0, "m/s²"),
         ("angular_acceleration", robot.reach, "rad/s²"),
@@ -190,7 +191,7 @@ def _load(question: Question) -> Iterator[Finding]:
 
 
 def _gravity(stance: Stance) -> Iterator[Finding]:
-    size, most = float(np.linalg.norm(stance.gravity)), _number("strongest_gravity")
+    size, most = float(np.linalg.norm(stance.gravity)), scene_number("usual", "strongest_gravity")
     if abs(size - 1.0) <= ONE_G:
         message = f"it is {size:.3g} m/s², as on no body that is climbed: is it in m/s², or in g?"
         yield _finding("stance.gravity", message, size, "m/s²")
@@ -201,7 +202,7 @@ def _gravity(stance: Stance) -> Iterator[Finding]:
 
 def _robot(robot: Robot) -> Iterator[Finding]:
     field, hand = "stance.robot", robot.hand
-    stone = _number("rock_density") * 4.0 / 3.0 * math.pi * robot.reach**3
+    stone = scene_number("usual", "rock_density") * 4.0 / 3.0 * math.pi * robot.reach**3
     links = robot.mass - len(robot.limbs) * hand.mass
     if not SHORT * hand.palm_length <= robot.reach <= LONG * hand.palm_length:
         message = (
@@ -321,7 +322,7 @@ def _joints(question: Question) -> Iterator[Finding]:
     if stance.joints is None:
         return
     robot, told = stance.robot, set()
-    usual = robot.mass * _number("standard_gravity") * robot.reach
+    usual = robot.mass * scene_number("usual", "standard_gravity") * robot.reach
     for limb, chain in robot.chains.items():
         given = own.get(limb) if isinstance(own, Mapping) else own
         most = _largest(chain.torque_limits if given is None else given, chain.sliding)
@@ -344,9 +345,3 @@ def _largest(limits: float | Sequence[float] | Array, sliding: Iterable[bool]) -
     which = ~np.asarray(sliding)
     values = np.broadcast_to(np.asarray(limits, dtype=float), which.shape)[which]
     return float(values.max()) if len(values) else None
-
-
-@cache
-def _number(name: str) -> float:
-    text = resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8")
-    return ParameterTable.read(text, "scene.toml").positive("usual", name)

@@ -76,7 +76,7 @@ class SettledLimits:
         self._balance = JointBalance(names, self.wound)
         self._tiles, self._hands = TileLimits(names), HandLimits(names)
         self._drives = DriveLimits(names, strength)
-        self._nails = NailLimits(names) if len(known.places.nails) else None
+        self._nails = NailLimits(names)
         self._each = np.arange(len(places))
 
     def recompute(
@@ -101,16 +101,15 @@ class SettledLimits:
         """
         each = wrenches_of(arrays.points, arrays.forces)
         again = self._again(found, arrays)
-        nails = None if self._nails is None else self._nails.loads(arrays)
+        nails, angles, pulled = self._nails.recompute(arrays)
         residuals = [
             *self._balance.recompute(again),
-            *self._tiles.recompute(again, nails),
-            *self._drives.recompute(again, nails),
+            *self._tiles.recompute(again, self._nails.tiles, pulled),
+            *self._drives.recompute(again, self._nails.fingers, angles),
             *self._hands.recompute(again, each),
+            *nails,
             *asked,
         ]
-        if self._nails is not None and nails is not None:
-            residuals += self._nails.recompute(nails)
         uses = [each for each in residuals if each.kind == "use"]
         rows = np.concatenate([np.maximum.reduce(each.values, axis=1) for each in uses])
         used = np.zeros(len(self._each))

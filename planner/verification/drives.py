@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from hand_models.base import Array, Indices
 from planner.verification.joint_balance import tendons_of
-from planner.verification.nails import NailLoads
 from planner.verification.residuals import COUNT, Names, Recomputed, Residual, claim
 
 __all__ = ["DriveLimits"]
@@ -68,8 +68,11 @@ class DriveLimits:
         self._hand = np.arange(len(hands)).repeat(COUNT)
         self._hand_of_drive = np.tile(self._hand, len(DRIVES))
 
-    def recompute(self, again: Recomputed, nails: NailLoads | None) -> Iterator[Residual]:
-        """Yield what tensions use of tendons, motors and fingers, and how far drives are off."""
+    def recompute(self, again: Recomputed, hooked: Indices, angles: Array) -> Iterator[Residual]:
+        """Yield what tensions use of tendons, motors and fingers, and how far drives are off.
+
+        ``hooked``: fingers whose nails hook, and by which angles these have turned [rad].
+        """
         first, told = self._places.first_of_finger, again.arrays
         f, nail = told.tensions, self._body.nail
         shear, normal, lateral = again.loads.T
@@ -82,9 +85,9 @@ class DriveLimits:
             # the motors of hands that float stand still where they have tightened their tendons
             uses[WINCH] += self._per_newton[WINCH] * (again.wound - f)
             uses[WINCH] += self._per_shear[WINCH] * np.add.reduceat(again.drawn - shear, first)
-        if nails is not None:
-            turned = nails.angles - nail.retraction
-            uses[WINCH, nails.fingers] += nail.pulley_radius / self._winch * turned
+        if len(hooked):
+            turned = angles - nail.retraction
+            uses[WINCH, hooked] += nail.pulley_radius / self._winch * turned
         yield Residual("use", uses[DRIVEN:].T, self._hand)
         own, said, hand = uses[:DRIVEN].ravel(), told.drives.ravel(), self._hand_of_drive
         yield claim(own, said, hand, DRIVE, self._name)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, FingerFrame, SettledHand
 from hand_models.tendon import FingerTendon, TendonState, share_load
+from planner.prepare import HandBatch
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
 from planner.verification.residuals import COUNT, Names, allowed_errors
@@ -33,25 +34,6 @@ PLACE: Final = 1e-9
 
 BEARS: Final = 1e-7
 """How far along it a contact may be from where its tile bears [m]."""
-
-
-class MovedFinger(NamedTuple):
-    """A finger of a floating hand, where its wrist goes.
-
-    Attributes
-    ----------
-    shear : ndarray, shape (n,)
-        Of each tile, the base tile's first if there is one [N].
-    torques : ndarray, shape (3,), or None
-        What the tendon leaves of each joint's spring [N·m]; None where only the model knows how far
-        the tiles slip.
-    joints : ndarray, shape (3, 2)
-        Along the straight finger and into the rock, from its proximal joint at rest [m].
-    """
-
-    shear: Array
-    torques: Array | None
-    joints: Array
 
 
 def moved(place: Array, wrist: WristPlan) -> Array:
@@ -86,138 +68,105 @@ def recompute_floating(
     left : ndarray, shape (F, 3)
         What is left of each joint's balance [N·m].
     """
-    known, allowed = names.known, allowed_errors(names.known, arrays)
-    places = known.places
+    known = names.known
+    allowed = allowed_errors(known, arrays).tolist()
     fingers = Fingers(*(part.copy() for part in balance.fingers(wound)))
+    # of some only the model knows how far their tiles slip
     unknown: list[int] = []
     for h, wrist in enumerate(arrays.wrists):
-        if wrist is None:
-            continue
-        hand, limb = known.hands[h], names.limbs[h]
-        for i, name in enumerate(FINGERS):
-            finger = COUNT * h + i
-            own = np.flatnonzero(places.finger == finger)
-            fingers.points[own], fingers.axes[own] = arrays.points[own], arrays.axes[own]
-            planned = arrays.loads[own], arrays.points[own], arrays.axes[own]
-            there = _check_finger(
-                found,
-                f"{limb}: {name}",
-                hand,
-                i,
-                (*planned, float(arrays.tensions[finger])),
-                wrist,
-                (float(wound[finger]), fingers.shear[own]),
-                float(allowed[h]),
-            )
-            fingers.shear[own], fingers.joints[finger] = there.shear, there.joints
-            if there.torques is None:
-                unknown.append(finger)
-            else:
-                fingers.torques[finger] = there.torques
-        _check_palm(found, limb, hand, arrays.palms[h], wrist, float(allowed[h]))
+        if wrist is not None:
+            for i in range(COUNT):
+                finger = COUNT * h + i
+                at = f"{names.limbs[h]}: {FINGERS[i]}"
+                if not _move(found, at, known, finger, arrays, wrist, wound, fingers, allowed[h]):
+                    unknown.append(finger)
+            _check_palm(found, names.limbs[h], known.hands[h], arrays.palms[h], wrist, allowed[h])
     normal, left = balance.solved(fingers)
-    told = places.phalanges[unknown]
+    told = known.places.phalanges[unknown]
     normal[told], left[unknown] = arrays.loads[told, 1], 0.0
     return fingers.shear, normal, left
 
 
-def _check_finger(
+def _move(
     found: list[str],
     name: str,
-    hand: SettledHand,
-    index: int,
-    planned: tuple[Array, Array, Array, float],
+    known: HandBatch,
+    finger: int,
+    arrays: PlanArrays,
     wrist: WristPlan,
-    at_rest: tuple[float, Array],
+    wound: Array,
+    fingers: Fingers,
     allowed: float,
-) -> MovedFinger:
-    """Check what a plan says of one finger of a floating hand, but for its normals.
+) -> bool:
+    """Move a finger with its wrist, and check what a plan says of it but for its normals.
 
-    Parameters
-    ----------
-    found : list of str
-        What is wrong so far; what cannot be is appended.
-    name : str
-    hand : SettledHand
-        At rest.
-    index : int
-        Of the finger.
-    planned : (ndarray, ndarray, ndarray, float)
-        Loads, points and axes of its tiles as `PlanArrays` has them; its tension.
-    wrist : WristPlan
-    at_rest : (float, ndarray)
-        Its tendon's tension and its tiles' shears [N].
-    allowed : float
-        Error that its loads may have [N].
+    Of ``fingers`` its shears, torques and places become those that it has there. Its loads may be
+    off by ``allowed`` [N]. Returns whether it is known how far its tiles slip.
     """
-    finger, model = hand.fingers[index], hand.fingers[index].model
+    h, index = divmod(finger, COUNT)
+    hand = known.hands[h]
+    settled, model = hand.fingers[index], hand.fingers[index].model
     frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
-    own = np.flatnonzero(hand.finger_of == index)
+    own, tiles = np.flatnonzero(hand.finger_of == index), known.places.phalanges[finger]
+    rows = np.flatnonzero(known.places.finger == finger)
+    fingers.points[rows], fingers.axes[rows] = arrays.points[rows], arrays.axes[rows]
     outer = len(own) > len(PHALANGES)
-    loads, *places, tension = planned
-    positions, axes = (part[-len(PHALANGES) :] for part in places)
     step = moved(frame.joint, wrist)
-    turned = -float(wrist.twist[3:] @ frame.across)
     joint = np.array([step @ frame.along, step[2]])
     section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
-    angles, joints, slips = [], [], []
-    exact = True
+    angles, slips, exact = [], [], True
     depths = model.depths(outer) * hand.closing_tension
-    for j, (position, (drag, _, _), contact) in enumerate(
-        zip(positions, axes, finger.contacts, strict=True)
-    ):
+    for j, (tile, contact) in enumerate(zip(tiles, settled.contacts, strict=True)):
+        drag, place = arrays.axes[tile, 0], arrays.points[tile] - frame.joint
         way = np.array([-drag @ frame.along, -drag[2]])
-        point = np.array([(position - frame.joint) @ frame.along, position[2]])
-        point[1] -= frame.joint[2]
+        point = np.array([place @ frame.along, place[2]])
         face = Face.of(contact, model, float(depths[j]))
         arm = point - joint
         rise = way[0] * arm[1] - way[1] * arm[0]
         if not abs(rise - face.height) <= PLACE:
             found.append(f"{name}: {PHALANGES[j]} contact is {rise:.6g} m above its joint")
         dragged = complex(way[0], way[1]) * cmath.rect(1.0, -contact.tilt)
-        u = np.array([dragged.real, dragged.imag])
         angles.append(cmath.phase(dragged))
-        joints.append(joint)
-        slip = 0.0
+        fingers.joints[finger, j] = joint
+        slip: float | None = 0.0
         if contact.kind in ("face", "edge") and section is not None:
             before = np.array(contact.point(model.tile_height))
-            slipped, off = slip_of(section, face, (before, point), (float(arm @ way), way))
-            exact &= slipped is not None
-            slip = slipped or 0.0
+            slip, off = slip_of(section, face, (before, point), (float(arm @ way), way))
+            exact &= slip is not None
             if not abs(off) <= BEARS:
                 found.append(
                     f"{name}: {PHALANGES[j]} contact is {off:.3g} m from where its tile bears"
                 )
-        slips.append(slip)
-        joint = joint + model.joint_spacing * u
-    rest = np.array([contact.angle for contact in finger.contacts])
+        slips.append(slip or 0.0)
+        joint = joint + model.joint_spacing * np.array([dragged.real, dragged.imag])
+    rest = np.array([contact.angle for contact in settled.contacts])
     change = np.array(angles) - rest
     change = change - math.tau * np.round(change / math.tau)
-    turns = np.diff(change, prepend=turned)
-    shear, torques = loads[:, 0].copy(), None
-    off = np.abs(_laterals(hand, frame, own, wrist) - loads[:, 2]).max()
+    turns = np.diff(change, prepend=-float(wrist.twist[3:] @ frame.across))
+    off = np.abs(_laterals(hand, frame, own, wrist) - arrays.loads[rows, 2]).max()
     if exact:
-        tendon, state = _tendon(hand, index, *at_rest)
+        tendon, state = _tendon(hand, own, float(wound[finger]), fingers.shear[rows])
         base = -float(moved(hand.positions[own[0]], wrist) @ frame.along)
         held = tendon.held(
             state,
             [base, *slips] if outer else slips,
             [0.0, *turns] if outer else turns,
         )
-        shear = held.shears
+        fingers.shear[rows] = held.shears
         springs = np.array(model.joint_stiffness) * (np.diff(rest, prepend=0.0) + turns)
         torques = held.tensions[-len(PHALANGES) :] * model.pulley_radii
-        torques -= np.array(model.joint_preload) + springs
-        off = max(off, abs(held.tensions[0] - tension))
+        fingers.torques[finger] = torques - (np.array(model.joint_preload) + springs)
+        off = max(off, abs(held.tensions[0] - arrays.tensions[finger]))
+    else:
+        fingers.shear[rows] = arrays.loads[rows, 0]
     if not off <= allowed:
         found.append(f"{name} does not hold what the plan says")
-    return MovedFinger(shear, torques, np.array(joints))
+    return exact
 
 
 def _tendon(
-    hand: SettledHand, index: int, preload: float, at_rest: Array
+    hand: SettledHand, own: Indices, preload: float, at_rest: Array
 ) -> tuple[FingerTendon, TendonState]:
-    own = np.flatnonzero(hand.finger_of == index)
     table = hand.hand.table
     known = FingerTendon.from_table(table, base_tile=len(own) > len(PHALANGES))
     # a tile whose spines alone gave as these and its spring do would have φ g of shear per newton
@@ -246,14 +195,12 @@ def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristP
     body = hand.hand
     places = hand.positions[own[those]]
     away = [float(moved(place, wrist) @ frame.across) for place in places]
-    out = [max(float((place - frame.joint) @ frame.along), 0.0) for place in places]
-    high = [float(place[2] - frame.joint[2]) for place in places]
+    out = np.maximum((places - frame.joint) @ frame.along, 0.0)
+    high = places[:, 2] - frame.joint[2]
+    near, far = np.minimum.outer(out, out), np.maximum.outer(out, out)
     give = np.diag(1.0 / (hand.engagement[own[those]] * body.lateral_stiffness))
-    for i, a in enumerate(out):
-        for j, b in enumerate(out):
-            near, far = min(a, b), max(a, b)
-            give[i, j] += near**2 * (3.0 * far - near) / (6.0 * body.bending_stiffness)
-            give[i, j] += high[i] * high[j] * near / body.torsional_stiffness
+    give += near**2 * (3.0 * far - near) / (6.0 * body.bending_stiffness)
+    give += np.outer(high, high) * near / body.torsional_stiffness
     found[those] = np.linalg.solve(give, away)
     return found
 

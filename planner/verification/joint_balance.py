@@ -163,7 +163,12 @@ class JointBalance:
 
         # two tensions tell all, as shears, normals and balances are affine in them
         rest, loaded = (self.fingers(np.full(len(self._pull), f)) for f in (0.0, 1.0))
-        (normal, left), (slope, change) = self.solved(rest), self.solved(loaded)
+        try:
+            (normal, left), (slope, change) = self.solved(rest), self.solved(loaded)
+        except np.linalg.LinAlgError:
+            # nothing is what it should be, so that every plan is refused
+            normal, slope = np.full((2, len(rest.shear)), np.nan)
+            left, change = np.full((2, *rest.torques.shape), np.nan)
         self._at_zero, self._per_newton = np.zeros((2, len(normal), 3))
         self._at_zero[:, :2] = np.column_stack((rest.shear, normal))
         self._per_newton[:, :2] = np.column_stack((loaded.shear - rest.shear, slope - normal))

@@ -6,7 +6,6 @@ the Jacobians and the Newton–Euler pass that the program's rows are made of.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
@@ -243,13 +242,12 @@ class AskedLimits:
             if value is not None
         ]
         self._given = [np.array(own) for own in zip(*given, strict=True)]
-        most = limits.tension_change
-        self._most = math.inf if most is None else most
         self._present = {
             h: np.asarray(present[place.limb])
             for h, place in enumerate(hands)
-            if place.limb in present
+            if place.limb in present and limits.tension_change is not None
         }
+        self._most = limits.tension_change or 0.0
 
     def recompute(self, tensions: Array, wrenches: Array) -> Iterator[Residual]:
         """Yield what tensions (F,) and wrenches (H, 6) leave of what is asked."""
@@ -267,13 +265,11 @@ class AskedLimits:
             yield Residual("zero", own - value, hand, limb, text, (j + 1, own, value))
         for h, present in self._present.items():
             fingers = np.arange(COUNT * h, COUNT * (h + 1))
-            name, text = (
-                self._names.of_fingers("tension", fingers),
-                " changes by {:.6g} N, more than",
-            )
+            name = self._names.of_fingers("tension", fingers)
+            text = f" changes by {{:.6g}} N, more than {self._most:g}"
             change, hand = tensions[fingers] - present, np.full(COUNT, h)
             for left in (self._most - change, self._most + change):
-                yield Residual("least", left, hand, name, f"{text} {self._most:g}", (change,))
+                yield Residual("least", left, hand, name, text, (change,))
 
     def recompute_sizes(self, wrenches: Array) -> Iterator[Residual]:
         """Yield what rows say of forces that are capped in all directions, beyond their size."""

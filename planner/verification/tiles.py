@@ -14,7 +14,6 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.tile import HalfPlane, Surface
 from planner.prepare import HandBatch
-from planner.verification.nails import NailLoads
 from planner.verification.residuals import LOAD, UTILISATION, Names, Recomputed, Residual, claim
 
 __all__ = ["LimitCurves", "TileLimits"]
@@ -122,10 +121,10 @@ class TileLimits:
         self._lateral = np.array([each.lateral_limit for each in surfaces])[self._of, None]
         self._planes: tuple[tuple[tuple[HalfPlane, ...], ...], Array] = (), np.zeros(0)
 
-    def recompute(self, again: Recomputed, nails: NailLoads | None) -> Iterator[Residual]:
+    def recompute(self, again: Recomputed, nails: Indices, pulled: Array) -> Iterator[Residual]:
         """Yield what loads leave of friction, of frames that only rest on rock, and of the law.
 
-        ``nails``: what those do that hook, of which the plan says what is used, too.
+        ``nails``: those that hook, and what is used of them, which the plan says with the tiles'.
         """
         known, name, told = self._known, self._names.tile, again.arrays
         shear, normal, _ = again.loads.T
@@ -140,8 +139,7 @@ class TileLimits:
         planes = self._used(told.half_planes, again.loads) * self._per_share
         yield Residual("use", planes, self._of)
         used = np.maximum.reduce(planes, axis=1)
-        if nails is not None:
-            used[nails.tiles] = np.maximum.reduce(nails.used, axis=1)
+        used[nails] = pulled
         used, said = np.maximum(used, 0.0), told.tile_utilisations
         yield claim(used, said, self._of, UTILISATION, name, ": utilisation")
         yield self.recompute_law(told.half_planes, again.loads)

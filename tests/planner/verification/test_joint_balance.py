@@ -1,6 +1,7 @@
 """Whether forces balance joints and tendons, against Eq. 6 solved in full and by hand."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,6 +89,20 @@ def test_normals_are_those_whose_moments_about_the_joints_are_left():
     found, left = balance.solved(fingers._replace(shear=shear, torques=torques))
     np.testing.assert_allclose(found, normal, atol=1e-9)
     np.testing.assert_allclose(left, 0.0, atol=1e-10)
+
+
+def test_a_plan_is_refused_for_hands_whose_balance_cannot_be_solved():
+    """Joints that no contact holds, which no settled hand has."""
+    question = ask(on_wall())
+    prepared = prepare_stance(question)
+    answer, _ = plan_on(prepared, time.perf_counter())
+    hand = prepared.batch.hands[0]
+    tiles = (hand.tiles[0], hand.tiles[1]._replace(contact="none"), *hand.tiles[2:])
+    loose = replace(hand, tiles=tiles)
+    check = Check(question, HandBatch.of([loose, *prepared.batch.hands[1:]]), None)
+    arrays = PlanArrays.of(answer.hands)
+    found = check.problems(arrays, answer.utilisation, prepared.wrench)
+    assert any("not what the plan says" in each for each in found), found
 
 
 @pytest.mark.parametrize("what", ["moved", "turned", "base tile", "palm"])

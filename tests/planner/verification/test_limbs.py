@@ -204,6 +204,13 @@ def test_a_plan_for_another_question_is_found(question, words):
     assert any(words in each for each in found), found
 
 
+def test_tensions_may_change_where_nothing_is_said_of_it():
+    off = tuple(replace(hand, utilisation=1.0) for hand in honest()[0].hands)
+    found = complaints(with_limits(tension_change=None), hands=off)
+    assert all("utilisation is" in each for each in found), found
+    assert len(found) == len(off)
+
+
 def test_another_wrench_that_was_asked_for_is_found():
     hands = list(asked().stance.hands)
     for given in ((None, 5.001, None, None, None, None), (None, 5.0, None, 0.1, None, None)):

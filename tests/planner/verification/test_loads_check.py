@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from hand_models.base import BoundedStore, wrench_transport
-from planner.prepare import settle_hand
+from planner.prepare import prepare_stance, settle_hand
 from planner.question import Stance
 from planner.result import LoadRecovery, Plan
 from planner.solving import plan
 from planner.streaming.stream_stance import StreamStance
-from planner.verification import check as checks, hands as hand_limits, tiles as tile_limits
+from planner.verification import Check, check as checks, hands as hand_limits, tiles as tile_limits
 from planner.verification.tiles import LimitCurves
 from tests.suite.helpers.fingernails import STRONG, hung, one_hand
 from tests.suite.helpers.hands import changed_hand
@@ -82,6 +82,30 @@ def test_plans_that_hang_on_nails_pass(pull):
     assert (
         fault(known, loads, given_by(question.stance, known, loads)) == "a load of the wrong sign"
     )
+
+
+def test_loads_are_refused_where_the_check_of_plans_refuses_them():
+    """Loads a little or much beside those of a plan, with the body wrench that they give."""
+    rng, refused = np.random.default_rng(5), []
+    for kind, seed in (("plain", 0), ("with joints", 1), ("request", 25)):
+        question = streamable(KINDS[kind](seed))
+        known, prepared = StreamStance(question), prepare_stance(question)
+        check = Check(prepared.question, prepared.batch, prepared.where)
+        reader = LoadRecovery(prepared.batch, prepared.at_rest.spaces)
+        start = known.loads_of(plan(question))
+        for scale in (0.0, 1e-7, 1e-2, 1.0, 10.0, 40.0):
+            loads = start + scale * rng.normal(size=start.shape) * (start != 0.0)
+            rows = [y[: len(names)] for y, names in zip(loads, known.columns, strict=True)]
+            arrays = reader.read(rows)[0]
+            wrench = given_by(question.stance, known, loads)
+            used = max(float(arrays.utilisations.max()), known.check.idle)
+            # the reader takes for zero what is below it
+            whole = (
+                check.problems(arrays, used, wrench) == [] and (loads > reader.least - 1e-6).all()
+            )
+            assert (fault(known, loads, wrench) is None) == whole, (kind, seed, scale)
+            refused.append(not whole)
+    assert {*refused} == {True, False}
 
 
 @cache
