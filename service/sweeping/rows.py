@@ -19,6 +19,7 @@ from service.processes import worth
 from service.replies import ErrorDetail
 from service.requests import PlanRequest
 from service.sweeping.design import Design, Point
+from service.sweeping.variation import word_of
 from service.wire import REQUEST_KINDS, Answer, Format
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ class Row(msgspec.Struct, frozen=True):
     def cells(self) -> list[Any]:
         """What the table has of it."""
         point = [
-            msgspec.json.encode(v).decode() if v in (None, True, False) else v for v in self.point
+            word_of(each) if each is None or isinstance(each, bool) else each for each in self.point
         ]
         factor = "inf" if self.load_factor_unbounded else self.load_factor
         limit = [getattr(self.limiting, part, None) for part in LIMIT]

@@ -520,18 +520,11 @@ def test_schema(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [["fly"], ["plan"], ["plan", "--fast"], ["wrench-space", "x"]]
-)
-def test_wrong_usage_is_one_line(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(arguments) == BAD_INPUT
-    complaint(capfd)
-
-
-@pytest.mark.parametrize(
     ("arguments", "told", "asked"),
     [
         (["fly"], "No such command 'fly'", "crux"),
         (["plan"], "Missing argument 'STANCE'", "crux plan"),
+        (["plan", "--fast"], "No such option '--fast'", "crux plan"),
         (["body-space", "wall", "--axes", "fx,up"], "got fx,up", "crux body-space"),
         (["body-space", "wall", "--pure", "--projection"], "not both", "crux body-space"),
         (["body-space", "wall", "--projection", "--pure"], "not both", "crux body-space"),
@@ -548,30 +541,18 @@ def test_wrong_usage_leads_to_the_commands_own_help(
     assert line.endswith(f"; see {asked} --help\n")
 
 
-def test_help_lists_the_commands(capfd: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_the_commands_and_bundled_stances(capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["--help"]) == DONE
     out = capfd.readouterr().out
     for name in COMMANDS:
         assert f"  {name} " in out
+    assert all(name in out for name in bundled())
 
 
-def test_a_plan_is_drawn_where_asked_and_a_bad_place_is_one_line(
+def test_a_plan_is_drawn_where_asked(
     stance_file, tmp_path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     picture = tmp_path / "plan.png"
     assert run(["plan", stance_file(wall_request()), "--plot", str(picture), "--json"]) == DONE
     assert picture.read_bytes().startswith(b"\x89PNG")
-    result(capfd)
-    assert (
-        run(["plan", stance_file(wall_request()), "--plot", str(tmp_path / "a.nothing")])
-        == BAD_INPUT
-    )
-    error = capfd.readouterr().err
-    assert error.startswith("crux: Invalid value for '--plot': ")
-    assert len(error.splitlines()) == 1
-
-
-def test_help_names_every_bundled_stance(capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["--help"]) == DONE
-    out = capfd.readouterr().out
-    assert all(name in out for name in bundled())
+    assert result(capfd)["status"] == "optimal"
