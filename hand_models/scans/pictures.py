@@ -29,15 +29,6 @@ DARK: Final = 0.35
 NAMED: Final = 12
 """Holes whose width is written beside them."""
 
-MARGIN: Final = 0.03
-"""Around the rock, over its longer side."""
-
-LEAST_SPREAD: Final = 1e-2
-"""Half of a scale of colours at least, over what is in its middle, or over one."""
-
-TICKS: Final = 8
-"""Along the rock's longer side, about."""
-
 APART: Final = np.array([0.11, 0.04])
 """How far apart widths are that are written, sideways and upward, as part of the rock's longer
 side."""
@@ -46,12 +37,6 @@ COLOURS: Final = "viridis"
 
 ARROW: Final = 0.06
 """Length of a hand's arrow, as part of the rock's longer side."""
-
-BEYOND: Final = 1.35
-"""Where its rank is written, as part of the arrow."""
-
-NEAR: Final = 0.5
-"""Distance below which ranks are written together, as part of the arrow."""
 
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
@@ -161,8 +146,8 @@ def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
             tuple(start),
             arrowprops={"arrowstyle": "-|>", "color": "red", "shrinkA": 0.0, "shrinkB": 0.0},
         )
-        tip = start + BEYOND * way
-        near = [ranks for at, ranks in labels if np.hypot(*(at - tip)) < NEAR * length]
+        tip = start + 1.35 * way
+        near = [ranks for at, ranks in labels if np.hypot(*(at - tip)) < 0.5 * length]
         if near:
             near[0].append(str(rank))
         else:
@@ -203,9 +188,9 @@ def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarM
         autolim=False,
     )
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    margin = MARGIN * (high - low)[:2].max()
+    margin = 0.03 * (high - low)[:2].max()
     for axis, size in ((axes.xaxis, high[1] - low[1]), (axes.yaxis, high[0] - low[0])):
-        count = round(TICKS * size / (high - low)[:2].max())
+        count = round(8 * size / (high - low)[:2].max())
         axis.set_major_locator(MaxNLocator(count) if count > 1 else FixedLocator([0.0]))
     axes.set(
         xlim=(low[1] - margin, high[1] + margin),
@@ -221,7 +206,7 @@ def _scale(values: Array) -> Normalize:
     """Return the scale of colours of numbers, which are not spread where they are all but alike."""
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
     middle = 0.5 * (low + high)
-    half = max(0.5 * (high - low), LEAST_SPREAD * max(abs(middle), 1.0))
+    half = max(0.5 * (high - low), 1e-2 * max(abs(middle), 1.0))
     return Normalize(middle - half, middle + half)
 
 

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["direction_in_words", "draw_fingers", "draw_wrench_space", "plot_wrench_space"]
 
-PROJECTIONS: Final = ((0, 2), (0, 4), (1, 5))
-
 CONTACTS: Final = {
     "face": ("tab:green", "tile's face"),
     "edge": ("tab:orange", "tile's edge"),
@@ -50,23 +48,11 @@ ARROW: Final = 32.0
 MARGINS: Final = np.array([[62.0, 34.0], [30.0, 40.0]])
 """Beside the fingers, before and behind, along and across them [mm]."""
 
-LEAST: Final = 130.0
-"""That a finger's panel shows across it, at least [mm]."""
-
-CELLS: Final = (110, 80)
-"""Points of a finger's plane, along and across it, at which rock is looked for."""
-
-GROUND: Final = 41
-"""Points along each side of the view from above at which the rock's depth is taken."""
-
 SHADES: Final = 15
 """Of the rock's depth, each of 1 mm at least."""
 
 FLAT: Final = 1e-6
 """A set narrower than this along an axis is drawn as a line [N] or [N·m]."""
-
-MOST_ENDS: Final = 40
-"""Directions in which a set is asked how far it reaches where its vertices are too many."""
 
 AROUND: Final = 0.19
 """Half the side of the view from above [m]."""
@@ -132,7 +118,7 @@ def draw_wrench_space(
         vertices = None if outlined else space.vertices()
         if preload is not None:
             rows[1, 0].suptitle("the set linearised at rest, before the wrist has moved")
-        for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), PROJECTIONS, strict=True):
+        for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), ((0, 2), (0, 4), (1, 5)), strict=True):
             points = _outline(space, i, j) if vertices is None else vertices[:, [i, j]]
             _draw_projection(axes, points, i, j)
     return figure
@@ -163,7 +149,7 @@ def draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> N
     largest = max(float(np.hypot(loads[:, 0], loads[:, 1]).max()), 1.0)
     chains = np.vstack([_chain(finger) for finger in settled.fingers])
     limits = chains.min(axis=0) - MARGINS[0], chains.max(axis=0) + MARGINS[1]
-    limits[1][1] = max(limits[1][1], limits[0][1] + LEAST)
+    limits[1][1] = max(limits[1][1], limits[0][1] + 130.0)
     # left over right, the inner finger beside the outer one
     for axes, name in zip(
         panels, ("inner_left", "outer_left", "inner_right", "outer_right"), strict=True
@@ -248,7 +234,7 @@ def _chain(finger: SettledFinger) -> Array:
 
 
 def _draw_rock(axes: Axes, section: Section, low: Array, high: Array) -> None:
-    s, t = (np.linspace(a, b, n) for a, b, n in zip(low, high, CELLS, strict=True))
+    s, t = (np.linspace(a, b, n) for a, b, n in zip(low, high, (110, 80), strict=True))
     clearance = section.clearances((s + 1j * t[:, None]) / MM)
     if clearance.min() < 0.0:
         axes.contourf(s, t, clearance, levels=[-np.inf, 0.0], colors=[ROCK])
@@ -310,7 +296,7 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
     """Draw the rock's depth, the palm's tiles and the fingers in x and y of H."""
     hand = settled.hand
     centre = np.array([0.03, 0.0])
-    x, y = (c + np.linspace(-AROUND, AROUND, GROUND) for c in centre)
+    x, y = (c + np.linspace(-AROUND, AROUND, 41) for c in centre)
     in_hold = settled.seating.pose.inverse()
     into_rock = in_hold.rotation[:, 2]
     depth = np.array(
@@ -374,7 +360,7 @@ def _outline(space: WrenchSpace, i: int, j: int) -> Array:
         point = space.extreme(direction)[[i, j]] * units
         return SupportPoint(normal, point)
 
-    polygon = enclose(touching, MOST_ENDS)
+    polygon = enclose(touching, 40)
     return np.zeros((1, 2)) if polygon is None else polygon.inner / units
 
 
