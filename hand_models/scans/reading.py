@@ -177,6 +177,7 @@ def _check_numbers(points: Array, read: int, path: Path) -> None:
 
 
 def _raw(path: Path, cell: float | None) -> RawScan:
+    """Return what a file has; an error whose field its reader does not name is of the file."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         does = OTHERS.get(ending, "")
@@ -202,7 +203,8 @@ def _raw(path: Path, cell: float | None) -> RawScan:
         if cell is not None:
             raise InvalidInputError(f"is of grids of heights, {path} has points", field="cell")
         return read(path)
-    except CruxError:
+    except CruxError as error:
+        error.field = error.field or "file"
         raise
     except UnicodeDecodeError:
         raise InvalidInputError(f"no text: {path}", field="file") from None
