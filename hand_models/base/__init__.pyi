@@ -33,7 +33,7 @@ from .frames import (
     wrench_transport as wrench_transport,
     wrench_transports as wrench_transports,
 )
-from .input_files import check_file as check_file
+from .input_files import reading_file as reading_file
 from .long_work import Progress as Progress, broken_off_by as broken_off_by, go_on as go_on
 from .message_fields import (
     Acceleration as Acceleration,

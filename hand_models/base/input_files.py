@@ -1,22 +1,43 @@
-"""Files that are read: plain ones, which end."""
+"""Files that are read: plain ones, which end, and what readers make of what is none of theirs."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from hand_models.base.errors import InvalidInputError
+from hand_models.base.errors import CruxError, InvalidInputError
 
-__all__ = ["check_file"]
+__all__ = ["reading_file"]
 
 
-def check_file(path: Path) -> None:
-    """Refuse what is not there, and what may never end: a folder, a pipe, a socket or a device.
+@contextmanager
+def reading_file(path: Path) -> Iterator[None]:
+    """Make of whatever a reader raises an error that names the file, unless it is the project's.
 
     Raises
     ------
     InvalidInputError
-        The field is ``file``.
+        The field is ``file`` unless the reader named another.
     """
+    _check_plain(path)
+    try:
+        yield
+    except CruxError as error:
+        error.field = error.field or "file"
+        raise
+    except UnicodeDecodeError:
+        raise InvalidInputError(f"no text: {path}", field="file") from None
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
+    except Exception as error:
+        # every reader fails in its own way on what is none of its files
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise InvalidInputError(f"cannot read {path}: {what}", field="file") from None
+
+
+def _check_plain(path: Path) -> None:
+    """Refuse what is not there, and what may never end: a folder, a pipe, a socket or a device."""
     try:
         if path.is_file():
             return

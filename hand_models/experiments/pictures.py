@@ -38,21 +38,8 @@ STATES: Final = {
 }
 """Colour and legend of cells without limits."""
 
-OWN: Final = ("finger", "gripper")
-"""Sections whose entries need no more words than their own."""
-
-SINGULAR: Final = {"pulley_radii": "pulley radius"}
-"""Of entries that are lists of one number a phalanx, where their names are plurals."""
-
 SHOWN: Final = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
 """By SI unit, the scale and the unit that pictures have instead."""
-
-
-LABEL_GAP: Final = 8.0
-"""Between numbers and labels of three-dimensional axes [pt]."""
-
-CORNER: Final = 0.1
-"""Share of a horizontal axis at either end without numbers: they would meet the next axis' ones."""
 
 
 def panels(
@@ -78,10 +65,10 @@ def label_solid(axes: Any, title: str) -> None:
     axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(5))
-        axis.labelpad = LABEL_GAP
+        axis.labelpad = 8.0
     for axis in (axes.xaxis, axes.yaxis):
         low, high = axis.get_view_interval()
-        corner = CORNER * (high - low)
+        corner = 0.1 * (high - low)
         ticks = MaxNLocator(4).tick_values(low, high)
         axis.set_ticks(ticks[(ticks >= low + corner) & (ticks <= high - corner)])
     axes.invert_zaxis()
@@ -101,8 +88,10 @@ def entry_name(entry: str) -> str:
     """Return an entry in words, such as ``middle pulley radius`` of ``finger.pulley_radii[1]``."""
     section, _, name = entry.partition(".")
     name, _, place = name.partition("[")
-    words = SINGULAR.get(name, name.replace("_", " "))
-    whose = PHALANGES[int(place[:-1])] if place else "" if section in OWN else section
+    words = {"pulley_radii": "pulley radius"}.get(name, name.replace("_", " "))
+    whose = (
+        PHALANGES[int(place[:-1])] if place else "" if section in ("finger", "gripper") else section
+    )
     return f"{whose} {words}".strip()
 
 

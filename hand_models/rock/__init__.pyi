@@ -16,8 +16,10 @@ from .mesh_files import (
 from .profile import Profile as Profile
 from .triangles import (
     Triangles as Triangles,
+    connected as connected,
     drawn_out as drawn_out,
     edges_of as edges_of,
     grid as grid,
+    grouped as grouped,
     weld as weld,
 )

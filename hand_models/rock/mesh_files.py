@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from hand_models.base import Array, CruxError, Indices, InvalidInputError, check_file
+from hand_models.base import Array, Indices, InvalidInputError, reading_file
 
 __all__ = ["MESH_ENDINGS", "read_mesh", "read_vertices"]
 
@@ -69,37 +69,31 @@ def read_vertices(path: Path) -> tuple[Array, Indices]:
         raise InvalidInputError(
             f"{path}: a mesh file ends in {', '.join(MESH_ENDINGS)}", field="file"
         )
-    check_file(path)
-    try:
+    with reading_file(path):
         content = path.read_bytes()
         if ending == ".ply":
             _check_counts(content)
         elif ending == ".obj":
             content = _absolute(content)
-        # from memory, and so without a folder in which it would look for what the file names
-        found = trimesh.load(
-            io.BytesIO(content), file_type=ending[1:], process=False, skip_materials=True
-        )
+        try:
+            # from memory, and so without a folder in which it would look for what the file names
+            found = trimesh.load(
+                io.BytesIO(content), file_type=ending[1:], process=False, skip_materials=True
+            )
+        except ImportError:
+            # what is no text either, trimesh would have another package guess the encoding of
+            raise ValueError("broken or cut short") from None
+        except Exception as error:
+            if "unexpected length" not in str(error):
+                raise
+            raise ValueError(
+                "cut short, or its faces have different numbers of corners: make them triangles "
+                "before the export"
+            ) from None
         # an OBJ with several materials has several
         parts: list[Any] = (
             list(found.geometry.values()) if isinstance(found, trimesh.Scene) else [found]
         )
-    except CruxError as error:
-        raise InvalidInputError(f"cannot read {path}: {error}", field="file") from None
-    except OSError as error:
-        raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
-    except ImportError:
-        # what is no text either, trimesh would have another package guess the encoding of
-        raise InvalidInputError(f"cannot read {path}: broken or cut short", field="file") from None
-    except Exception as error:
-        # every loader fails in its own way on what is no mesh
-        what = " ".join(str(error).split()) or type(error).__name__
-        if "unexpected length" in what:
-            what = (
-                "cut short, or its faces have different numbers of corners: make them triangles "
-                "before the export"
-            )
-        raise InvalidInputError(f"cannot read {path}: {what}", field="file") from None
     vertices = [np.array(part.vertices, dtype=float).reshape(-1, 3) for part in parts]
     begins = np.cumsum([0, *map(len, vertices)])
     faces = [
@@ -138,10 +132,10 @@ def _absolute(content: bytes) -> bytes:
         elif kind == b"f":
             corners = [int(entry.split(b"/")[0]) for entry in entries]
             if 0 in corners:
-                raise InvalidInputError("a face has vertex 0, and an OBJ counts from 1")
+                raise ValueError("a face has vertex 0, and an OBJ counts from 1")
             named = [corner if corner > 0 else count + 1 + corner for corner in corners]
             if min(named, default=1) < 1:
-                raise InvalidInputError(f"a face has vertex {min(corners)} of {count} so far")
+                raise ValueError(f"a face has vertex {min(corners)} of {count} so far")
             lines[i] = b"f " + b" ".join(b"%d" % corner for corner in named)
     return b"\n".join(lines)
 
@@ -165,8 +159,8 @@ def _check_counts(content: bytes) -> None:
             least[-1] += 2 if ascii_ else SIZES.get(kind, 1)
     needed = sum(count * max(size, 1) for count, size in zip(counts, least, strict=True))
     if not end or properties > MOST_PROPERTIES or min(counts, default=0) < 0:
-        raise InvalidInputError(f"no header of a PLY, or more than {MOST_PROPERTIES} properties")
+        raise ValueError(f"no header of a PLY, or more than {MOST_PROPERTIES} properties")
     if needed > len(rest) + 1:  # a text may end without a blank
-        raise InvalidInputError(
+        raise ValueError(
             f"its header names at least {needed:,} bytes, and {len(rest):,} are there: cut short?"
         )

@@ -21,10 +21,12 @@ __all__ = [
     "Triangles",
     "borders",
     "bridge",
+    "connected",
     "cut",
     "drawn_out",
     "edges_of",
     "grid",
+    "grouped",
     "weld",
     "without_spikes",
     "wound_alike",
@@ -67,6 +69,18 @@ def drawn_out(outline: Array, low: float, high: float) -> Triangles:
 def edges_of(faces: Indices) -> Indices:
     """Return the edges of triangles in their own direction, shape (3 m, 2), first sides first."""
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def connected(pairs: Indices, count: int) -> Indices:
+    """Return to which connected part each of ``count`` things belongs, by pairs (n, 2) of them."""
+    graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
+
+
+def grouped(some: Indices, parts: Indices) -> list[Indices]:
+    """Return things (n,) of one part together, part by part, each in the order given."""
+    order = some[np.argsort(parts[some], kind="stable")]
+    return np.split(order, np.flatnonzero(np.diff(parts[order])) + 1) if len(order) else []
 
 
 def weld(triangles: Triangles) -> Triangles:
@@ -135,8 +149,7 @@ def wound_alike(triangles: Triangles) -> Triangles:
     turned = np.where(alike, 0, count)
     rows = np.concatenate([first, first + count])
     columns = np.concatenate([second + turned, second + count - turned])
-    graph = scipy.sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
-    _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    part = connected(np.column_stack([rows, columns]), 2 * count)
     as_is, over = part[:count], part[count:]
     if (as_is == over).any():
         raise InvalidInputError("the surface has only one side", field="faces")
@@ -201,8 +214,7 @@ def borders(triangles: Triangles, gap: float) -> Array:
     ends, count = edges_of(faces), len(vertices)
     names, number = np.unique(_edge_names(ends[:, 0], ends[:, 1], count), return_counts=True)
     edges = np.column_stack(np.divmod(names[number == 1], count))
-    graph = scipy.sparse.coo_matrix((np.ones(len(edges)), edges.T), shape=(count, count))
-    _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    part = connected(edges, count)
     low, high = np.full((2, part.max() + 1, 3), np.inf) * np.array([1.0, -1.0])[:, None, None]
     np.minimum.at(low, part, vertices)
     np.maximum.at(high, part, vertices)

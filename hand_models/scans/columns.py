@@ -68,9 +68,7 @@ def read_columns(path: Path) -> RawScan:
         del lines[0]
     width = len(_cells(lines[0], style)) if lines else len(names or ())
     if width < len(AXES):
-        raise InvalidInputError(
-            f"three columns are needed, the first line has {width}: {path}", field="file"
-        )
+        raise InvalidInputError(f"three columns are needed, the first line has {width}: {path}")
     columns = [0, 1, 2] if names is None else _meant(names, width, path)
     if not lines:
         return RawScan(np.empty((0, 3)))
@@ -85,7 +83,7 @@ def _text(path: Path) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16")
     if b"\0" in content:
-        raise InvalidInputError(f"no text: {path}", field="file")
+        raise InvalidInputError(f"no text: {path}")
     return content.decode("utf-8-sig", "replace")
 
 
@@ -100,8 +98,7 @@ def _style(lines: Sequence[str], path: Path) -> _Style:
     best = max(fits)
     if not best:
         raise InvalidInputError(
-            f"no three numbers in a line, parted by commas, semicolons or blanks: {path}",
-            field="file",
+            f"no three numbers in a line, parted by commas, semicolons or blanks: {path}"
         )
     return STYLES[fits.index(best)]
 
@@ -146,23 +143,20 @@ def _meant(names: Sequence[str], width: int, path: Path) -> list[int]:
     if set(AXES) <= set(names):
         if len(names) > width:
             raise InvalidInputError(
-                f"{len(names)} columns have names, and the next line has {width} numbers: {path}",
-                field="file",
+                f"{len(names)} columns have names, and the next line has {width} numbers: {path}"
             )
         return [names.index(axis) for axis in AXES]
     degrees = [name for name in names if name in DEGREES]
     if degrees:
         raise InvalidInputError(
             f"column {degrees[0]} is in degrees, which are no lengths: project it to metres (UTM "
-            f"or the national grid) first: {path}",
-            field="file",
+            f"or the national grid) first: {path}"
         )
     if len(names) == len(AXES) == width:
         return [0, 1, 2]
     raise InvalidInputError(
         f"which columns are x, y and z does not follow from their names, {', '.join(names[:9])}: "
-        f"name them so in the first line of {path}",
-        field="file",
+        f"name them so in the first line of {path}"
     )
 
 
@@ -173,8 +167,7 @@ def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) 
     if style.mark == "," and width == 2 * len(AXES) and whole:
         raise InvalidInputError(
             "commas are between the columns and in the numbers, which cannot be told apart: write "
-            f"points in the numbers, or semicolons between the columns: {path}",
-            field="file",
+            f"points in the numbers, or semicolons between the columns: {path}"
         )
     begin = [cells[0] for cells in some]
     if width > len(AXES) and len(some) > 2 and all(cell.isdecimal() for cell in begin):
@@ -182,8 +175,7 @@ def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) 
         if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
             raise InvalidInputError(
                 "the first column counts the points, it is not x: name the columns in the first "
-                f"line of {path}",
-                field="file",
+                f"line of {path}"
             )
 
 
@@ -206,8 +198,7 @@ def _read(lines: Sequence[str], style: _Style, columns: Sequence[int], path: Pat
         if len(cells) <= max(columns):
             raise InvalidInputError(
                 f"line {i + 1} of the points has {len(cells)} columns, {line.strip()[:60]!r}: "
-                f"{path}",
-                field="file",
+                f"{path}"
             )
         found[i] = [_number(cells[column], style) for column in columns]
     return found

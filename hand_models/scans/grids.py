@@ -56,21 +56,19 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
     """Return the heights of an ``.npy``, or of an ``.npz`` with its cells ``dx`` and ``dy``."""
     with path.open("rb") as file:
         if not file.read(len(MAGIC[0])).startswith(MAGIC):
-            raise InvalidInputError(f"no NumPy file: {path}", field="file")
+            raise InvalidInputError(f"no NumPy file: {path}")
     arrays = _arrays(path)
     flat = [name for name, array in arrays.items() if array.ndim == 2]
     named = [name for name in HEIGHTS if name in flat]
     if len(flat) != 1 and not named:
         raise InvalidInputError(
             f"one grid of heights is needed, or one named {', '.join(HEIGHTS)}; {path} has "
-            f"{len(flat)} arrays of two dimensions",
-            field="file",
+            f"{len(flat)} arrays of two dimensions"
         )
     heights = arrays[flat[0] if len(flat) == 1 else named[0]]
     if heights.shape[1] == 3 < heights.shape[0]:
         raise InvalidInputError(
-            f"three columns are points, no grid of heights: {path}; write them as .xyz",
-            field="file",
+            f"three columns are points, no grid of heights: {path}; write them as .xyz"
         )
     return _grid(heights, _sides(cell, _numpy_cell(arrays)))
 
@@ -84,7 +82,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     with zipfile.ZipFile(path) as archive:
         for info in archive.infolist():
             if info.file_size > DEFLATE * info.compress_size + SHORT:
-                raise InvalidInputError(f"{info.filename} in {path} is broken", field="file")
+                raise InvalidInputError(f"{info.filename} in {path} is broken")
             with archive.open(info) as file:
                 content = io.BytesIO(file.read(info.file_size))
             version = np.lib.format.read_magic(content)
@@ -94,9 +92,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
             shape, _, kind = header(content)
             left = info.file_size - content.tell()
             if not kind.hasobject and math.prod(shape) * kind.itemsize > left:
-                raise InvalidInputError(
-                    f"{info.filename} of shape {shape} is cut short in {path}", field="file"
-                )
+                raise InvalidInputError(f"{info.filename} of shape {shape} is cut short in {path}")
             content.seek(0)
             name = info.filename.removesuffix(".npy")
             found[name] = np.lib.format.read_array(content, allow_pickle=False)
@@ -115,27 +111,25 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
         from PIL import Image, UnidentifiedImageError
     except ImportError:
         raise InvalidInputError(
-            f"reading GeoTIFF needs the package pillow: {to_install('scans')}", field="file"
+            f"reading GeoTIFF needs the package pillow: {to_install('scans')}"
         ) from None
     try:
         image = Image.open(path, formats=["TIFF"])
     except UnidentifiedImageError:
         raise InvalidInputError(
             f"no TIFF file, or of numbers other than integers and 32-bit floats: {path}; 64-bit "
-            "floats are to be made 32-bit ones, as by gdal_translate -ot Float32",
-            field="file",
+            "floats are to be made 32-bit ones, as by gdal_translate -ot Float32"
         ) from None
     if math.prod(image.size) > TIFF_RATIO * path.stat().st_size:
         raise InvalidInputError(
-            f"{image.size[0]} by {image.size[1]} heights are more than {path} can have: cut short?",
-            field="file",
+            f"{image.size[0]} by {image.size[1]} heights are more than {path} can have: cut short?"
         )
     with image:
         tags = {tag: image.getexif().get(tag) for tag in (NO_DATA, PIXEL_SCALE, TRANSFORMATION)}
         keys = tuple(image.getexif().get(GEO_KEYS, ()))
         heights = np.asarray(image)
     if heights.ndim != 2:
-        raise InvalidInputError(f"one band of heights is needed: {path}", field="file")
+        raise InvalidInputError(f"one band of heights is needed: {path}")
     if tags[NO_DATA] is not None:
         heights = _without(heights, float(str(tags[NO_DATA]).strip("\0 ")))
     return _grid(heights, _sides(cell, _geo_cell(tags, keys)))
@@ -175,8 +169,7 @@ def read_esri(path: Path, cell: float | None) -> RawScan:
     shape = int(header.get("nrows", 0)), int(header.get(COLUMNS, 0))
     if values.size != math.prod(shape):
         raise InvalidInputError(
-            f"{shape[0]} rows of {shape[1]} heights are needed, {values.size} are in {path}",
-            field="file",
+            f"{shape[0]} rows of {shape[1]} heights are needed, {values.size} are in {path}"
         )
     heights = _without(values.reshape(shape), header.get("nodata_value", -9999.0))
     if "cellsize" in header:

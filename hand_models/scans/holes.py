@@ -12,10 +12,10 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from hand_models.base import Array
+from hand_models.rock import connected, grouped
 from hand_models.scans.rock import Hole, Step
 
 __all__ = ["Gaps", "empty_circles"]
@@ -75,15 +75,10 @@ class Gaps:
         """
         open_, beside, count = self.open_(hole), self.beside, len(self.triangles)
         rows, side = np.nonzero(open_[:, None] & (beside >= 0) & open_[beside])
-        graph = scipy.sparse.coo_matrix(
-            (np.ones(len(rows)), (rows, beside[rows, side])), (count, count)
-        )
-        number, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
-        outside = np.zeros(number, dtype=bool)
+        part = connected(np.column_stack([rows, beside[rows, side]]), count)
+        outside = np.zeros(count, dtype=bool)
         outside[part[(beside < 0).any(axis=1)]] = True
-        inside = np.flatnonzero(open_ & ~outside[part])
-        order = inside[np.argsort(part[inside], kind="stable")]
-        groups = np.split(order, np.flatnonzero(np.diff(part[order])) + 1) if len(order) else []
+        groups = grouped(np.flatnonzero(open_ & ~outside[part]), part)
         circle, rise = empty_circles(self.triangles), np.abs(self._edges[..., 2]).max(axis=1)
         holes: list[Hole] = []
         steps: list[Step] = []

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose
-from hand_models.rock import Triangles, edges_of, filled_cells, weld
+from hand_models.rock import Triangles, connected, edges_of, filled_cells, grouped, weld
 from hand_models.scans.frame import axes_along, in_scan, start_on
 from hand_models.scans.holes import empty_circles
 from hand_models.scans.rock import Hole, ScannedRock
@@ -69,15 +69,10 @@ def _holes(
     Of a surface that is open the largest border of each of its parts is its outline.
     """
     count, edges = len(points), edges_of(faces)
-    whole = scipy.sparse.coo_matrix((np.ones(len(edges)), edges.T), (count, count))
-    part = scipy.sparse.csgraph.connected_components(whole, directed=False)[1]
+    part = connected(edges, count)
     pairs, number = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     border = pairs[number == 1]
-    rim = scipy.sparse.coo_matrix((np.ones(len(border)), border.T), (count, count))
-    loop = scipy.sparse.csgraph.connected_components(rim, directed=False)[1]
-    on = np.unique(border)
-    order = on[np.argsort(loop[on], kind="stable")]
-    loops = np.split(order, np.flatnonzero(np.diff(loop[order])) + 1) if len(on) else []
+    loops = grouped(np.unique(border), connected(border, count))
     loops.sort(key=lambda each: -float(np.linalg.norm(np.ptp(points[each], axis=0))))
     found: list[tuple[float, Array]] = []
     outlined: set[int] = set()

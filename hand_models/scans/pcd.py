@@ -45,25 +45,23 @@ def read_pcd(path: Path) -> RawScan:
         from pypcd4.pypcd4 import PointCloud
     except ImportError:
         raise InvalidInputError(
-            f"reading PCD needs the package pypcd4: {to_install('scans')}", field="file"
+            f"reading PCD needs the package pypcd4: {to_install('scans')}"
         ) from None
     cloud = PointCloud.from_path(path)
     absent = [axis for axis in AXES if axis not in cloud.fields]
     if absent:
-        raise InvalidInputError(f"no field {absent[0]} in {path}", field="file")
+        raise InvalidInputError(f"no field {absent[0]} in {path}")
     points = np.column_stack([np.atleast_1d(cloud.pc_data[axis]) for axis in AXES]).astype(float)
     if len(points) != cloud.metadata.points:
         raise InvalidInputError(
-            f"{len(points)} of {cloud.metadata.points} points, cut short: {path}", field="file"
+            f"{len(points)} of {cloud.metadata.points} points, cut short: {path}"
         )
     if tuple(cloud.metadata.viewpoint) == NOWHERE:
         return RawScan(points)
     x, y, z, *turn = cloud.metadata.viewpoint
     length = math.hypot(*turn)
     if not (math.isfinite(x + y + z) and math.isfinite(length) and length > 0.0):
-        raise InvalidInputError(
-            f"its VIEWPOINT is no pose: {cloud.metadata.viewpoint} in {path}", field="file"
-        )
+        raise InvalidInputError(f"its VIEWPOINT is no pose: {cloud.metadata.viewpoint} in {path}")
     w, *axis = (part / length for part in turn)
     return RawScan(points, scanner=Pose.from_quaternion([x, y, z], [*axis, w]))
 
@@ -75,11 +73,10 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     named = [words for words in lines if not words[0].startswith(b"#")]
     found = {words[0].upper(): words[1:] for words in named}
     if b"FIELDS" not in found or b"DATA" not in found:
-        raise InvalidInputError(f"no PCD file, its header is missing: {path}", field="file")
+        raise InvalidInputError(f"no PCD file, its header is missing: {path}")
     if len(found) < len(named) or len(named) > HEADER_LINES:
         raise InvalidInputError(
-            f"its header has {len(named)} lines, of {HEADER_LINES} at most, each once: {path}",
-            field="file",
+            f"its header has {len(named)} lines, of {HEADER_LINES} at most, each once: {path}"
         )
     try:
         sizes, counts = ([int(each) for each in found[name]] for name in (b"SIZE", b"COUNT"))
@@ -88,8 +85,7 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
         kind = found[b"DATA"][0]
     except (KeyError, IndexError, ValueError):
         raise InvalidInputError(
-            f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of its header are to be whole numbers: {path}",
-            field="file",
+            f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of its header are to be whole numbers: {path}"
         ) from None
     kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", NOWHERE)
     if len(kinds) != len(sizes) or not {*kinds} <= {b"F", b"I", b"U"}:
@@ -104,16 +100,15 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
             field="file",
         )
     if min(sizes + counts + rows) < 0:
-        raise InvalidInputError(f"a number of its header is below zero: {path}", field="file")
+        raise InvalidInputError(f"a number of its header is below zero: {path}")
     if not 0 < sum(counts) <= MOST_COLUMNS:
         raise InvalidInputError(
             f"a point has at least one number, and {MOST_COLUMNS:,} at most, the header of {path} "
-            f"names {sum(counts):,}",
-            field="file",
+            f"names {sum(counts):,}"
         )
     if width * height != points:
         raise InvalidInputError(
-            f"WIDTH {width} times HEIGHT {height} is not POINTS {points}: {path}", field="file"
+            f"WIDTH {width} times HEIGHT {height} is not POINTS {points}: {path}"
         )
     left, record = size - data, sum(a * b for a, b in zip(sizes, counts, strict=False))
     if kind == b"ascii":
@@ -127,8 +122,7 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     if needed > left:
         raise InvalidInputError(
             f"{points:,} points need at least {needed:,} bytes, and {left:,} are there, cut short: "
-            f"{path}",
-            field="file",
+            f"{path}"
         )
 
 

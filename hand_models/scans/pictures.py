@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,29 +29,11 @@ DARK: Final = 0.35
 NAMED: Final = 12
 """Holes whose width is written beside them."""
 
-MARGIN: Final = 0.03
-"""Around the rock, over its longer side."""
-
-LEAST_SPREAD: Final = 1e-2
-"""Half of a scale of colours at least, over what is in its middle, or over one."""
-
-TICKS: Final = 8
-"""Along the rock's longer side, about."""
-
 APART: Final = np.array([0.11, 0.04])
 """How far apart widths are that are written, sideways and upward, as part of the rock's longer
 side."""
 
 COLOURS: Final = "viridis"
-
-ARROW: Final = 0.06
-"""Length of a hand's arrow, as part of the rock's longer side."""
-
-BEYOND: Final = 1.35
-"""Where its rank is written, as part of the arrow."""
-
-NEAR: Final = 0.5
-"""Distance below which ranks are written together, as part of the arrow."""
 
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
@@ -64,18 +46,12 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
         Of the picture; its ending says of what kind.
     title : str
     """
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    axes = figure.add_subplot()
-    colours = _paint(axes, rock.vertices, rock.faces, COLOURS)
-    axes.set_title(title, parse_math=False)
+    axes, colours = _paint(rock.vertices, rock.faces, COLOURS, title)
     axes.plot(0.0, 0.0, "+", color="red", markersize=14, markeredgewidth=2, label="origin")
     _name_holes(axes, rock)
     if rock.holes:
         axes.plot([], [], " ", label="in red: widths of the widest holes")
-    figure.legend(loc="outside lower center", ncols=2)
-    figure.colorbar(colours, ax=axes, shrink=0.7, label="height over the origin, against z [mm]")
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=150)
+    _write(axes, colours, "height over the origin, against z [mm]", path)
 
 
 def _name_holes(axes: Axes, rock: ScannedRock) -> None:
@@ -124,28 +100,22 @@ def plot_holds(
     path : Path
     title : str
     """
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    axes = figure.add_subplot()
-    _paint(axes, *rock, "gray")
-    axes.set_title(title, parse_math=False)
-    shown = axes.scatter(
-        points[:, 1],
-        points[:, 0],
-        c=values,
-        norm=_scale(values),
-        s=36,
-        cmap="plasma",
-        edgecolors="white",
-        linewidths=0.5,
-    )
+    axes, _ = _paint(*rock, "gray", title)
+    style: dict[str, Any] = {"s": 36, "cmap": "plasma", "edgecolors": "white", "linewidths": 0.5}
+    shown = axes.scatter(points[:, 1], points[:, 0], c=values, norm=_scale(values), **style)
     if len(refused):
-        axes.plot(
-            refused[:, 1], refused[:, 0], "x", color="tab:cyan", markersize=5, label="no hold"
-        )
-    _rank(axes, best, ARROW * float(np.ptp(rock.vertices[:, :2], axis=0).max()))
-    if len(refused) or best:
+        y, x = refused[:, 1], refused[:, 0]
+        axes.plot(y, x, "x", color="tab:cyan", markersize=5, label="no hold")
+    _rank(axes, best, 0.06 * float(np.ptp(rock.vertices[:, :2], axis=0).max()))
+    _write(axes, shown, "largest pull-off of any hand there [N]", path)
+
+
+def _write(axes: Axes, colours: Any, label: str, path: Path) -> None:
+    """Write the picture, with a legend if anything has a label and what colours mean."""
+    figure: Any = axes.figure
+    if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower center", ncols=2)
-    figure.colorbar(shown, ax=axes, shrink=0.7, label="largest pull-off of any hand there [N]")
+    figure.colorbar(colours, ax=axes, shrink=0.7, label=label)
     with whole_file(path) as part:
         figure.savefig(part, dpi=150)
 
@@ -161,8 +131,8 @@ def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
             tuple(start),
             arrowprops={"arrowstyle": "-|>", "color": "red", "shrinkA": 0.0, "shrinkB": 0.0},
         )
-        tip = start + BEYOND * way
-        near = [ranks for at, ranks in labels if np.hypot(*(at - tip)) < NEAR * length]
+        tip = start + 1.35 * way
+        near = [ranks for at, ranks in labels if np.hypot(*(at - tip)) < 0.5 * length]
         if near:
             near[0].append(str(rank))
         else:
@@ -182,8 +152,12 @@ def _rank(axes: Axes, best: Sequence[Pose], length: float) -> None:
         axes.plot([], [], color="red", label="the best, ranked: x of H, where inner fingers point")
 
 
-def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarMappable:
+def _paint(
+    vertices: Array, faces: Indices, palette: str, title: str
+) -> tuple[Axes, ScalarMappable]:
     """Draw triangles as the scanner saw them, and return what their colours mean: heights [mm]."""
+    axes = Figure(figsize=(8.0, 7.0), layout="constrained").add_subplot()
+    axes.set_title(title, parse_math=False)
     corners = vertices[faces]
     # what is nearer to the scanner over what is behind it
     corners = corners[np.argsort(-corners[:, :, 2].mean(axis=1), kind="stable")]
@@ -203,9 +177,9 @@ def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarM
         autolim=False,
     )
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    margin = MARGIN * (high - low)[:2].max()
+    margin = 0.03 * (high - low)[:2].max()
     for axis, size in ((axes.xaxis, high[1] - low[1]), (axes.yaxis, high[0] - low[0])):
-        count = round(TICKS * size / (high - low)[:2].max())
+        count = round(8 * size / (high - low)[:2].max())
         axis.set_major_locator(MaxNLocator(count) if count > 1 else FixedLocator([0.0]))
     axes.set(
         xlim=(low[1] - margin, high[1] + margin),
@@ -214,14 +188,14 @@ def _paint(axes: Axes, vertices: Array, faces: Indices, palette: str) -> ScalarM
         xlabel="y of the rock's frame [m]",
         ylabel="x of the rock's frame [m]",
     )
-    return colours
+    return axes, colours
 
 
 def _scale(values: Array) -> Normalize:
     """Return the scale of colours of numbers, which are not spread where they are all but alike."""
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
     middle = 0.5 * (low + high)
-    half = max(0.5 * (high - low), LEAST_SPREAD * max(abs(middle), 1.0))
+    half = max(0.5 * (high - low), 1e-2 * max(abs(middle), 1.0))
     return Normalize(middle - half, middle + half)
 
 

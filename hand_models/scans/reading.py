@@ -9,14 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import (
-    Array,
-    CruxError,
-    InvalidInputError,
-    Pose,
-    check_file,
-    finite_vector,
-)
+from hand_models.base import Array, InvalidInputError, Pose, finite_vector, reading_file
 from hand_models.rock import MESH_ENDINGS, read_vertices
 from hand_models.scans.columns import read_columns
 from hand_models.scans.digits import check_digits
@@ -184,6 +177,7 @@ def _check_numbers(points: Array, read: int, path: Path) -> None:
 
 
 def _raw(path: Path, cell: float | None) -> RawScan:
+    """Return what a file has; an error whose field its reader does not name is of the file."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         does = OTHERS.get(ending, "")
@@ -191,8 +185,7 @@ def _raw(path: Path, cell: float | None) -> RawScan:
             f"{path}: a scan's file ends in {', '.join(ENDINGS)}" + (does and f"; {does}"),
             field="file",
         )
-    check_file(path)
-    try:
+    with reading_file(path):
         match ending:
             case ".npy" | ".npz":
                 return read_numpy(path, cell)
@@ -209,16 +202,6 @@ def _raw(path: Path, cell: float | None) -> RawScan:
         if cell is not None:
             raise InvalidInputError(f"is of grids of heights, {path} has points", field="cell")
         return read(path)
-    except CruxError:
-        raise
-    except UnicodeDecodeError:
-        raise InvalidInputError(f"no text: {path}", field="file") from None
-    except OSError as error:
-        raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
-    except Exception as error:
-        # every reader fails in its own way on what is no scan
-        what = " ".join(str(error).split()) or type(error).__name__
-        raise InvalidInputError(f"cannot read {path}: {what}", field="file") from None
 
 
 def _read_vertices(path: Path) -> RawScan:

@@ -20,14 +20,6 @@ HELD: Final = "tab:blue"
 GRAVITY: Final = "tab:red"
 ASKED: Final = "black"
 
-FLAT: Final = 1e-3
-"""A set narrower than this, relative to its longer side, is drawn as a line."""
-
-
-DRAWN: Final = 64
-"""Directions for an outline of accelerations, at most."""
-
-
 BELOW: Final[dict[str, Any]] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.11), "ncols": 2}
 """Where legends are: beside what is drawn."""
 
@@ -87,7 +79,7 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
 
 def _accelerations(space: BodySpace, view: _View) -> Polygon | None:
     turn = space.question.stance.body.rotation
-    return space.acceleration_section(turn @ view.across, turn[:, 0], DRAWN)
+    return space.acceleration_section(turn @ view.across, turn[:, 0], 64)
 
 
 def symbol_of(axis: str) -> tuple[str, str]:
@@ -137,7 +129,7 @@ def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Poly
 
     gravity = flat(space.question.stance.gravity)
     axes.plot(0.0, 0.0, "o", color=ASKED, markersize=5, label="at rest")
-    if np.linalg.norm(gravity) > FLAT:
+    if np.linalg.norm(gravity) > 1e-3:
         axes.annotate("", tuple(gravity), (0.0, 0.0), arrowprops={
             "arrowstyle": "-|>", "color": GRAVITY, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0,
         })  # fmt: skip

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from hand_models.base import Array, whole_file
-from hand_models.finger import PHALANGES, SettledFinger
+from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
 from hand_models.wrench_spaces import SCALE, WrenchSpace
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 __all__ = ["direction_in_words", "draw_fingers", "draw_wrench_space", "plot_wrench_space"]
-
-PROJECTIONS: Final = ((0, 2), (0, 4), (1, 5))
 
 CONTACTS: Final = {
     "face": ("tab:green", "tile's face"),
@@ -50,23 +48,11 @@ ARROW: Final = 32.0
 MARGINS: Final = np.array([[62.0, 34.0], [30.0, 40.0]])
 """Beside the fingers, before and behind, along and across them [mm]."""
 
-LEAST: Final = 130.0
-"""That a finger's panel shows across it, at least [mm]."""
-
-CELLS: Final = (110, 80)
-"""Points of a finger's plane, along and across it, at which rock is looked for."""
-
-GROUND: Final = 41
-"""Points along each side of the view from above at which the rock's depth is taken."""
-
 SHADES: Final = 15
 """Of the rock's depth, each of 1 mm at least."""
 
 FLAT: Final = 1e-6
 """A set narrower than this along an axis is drawn as a line [N] or [N·m]."""
-
-MOST_ENDS: Final = 40
-"""Directions in which a set is asked how far it reaches where its vertices are too many."""
 
 AROUND: Final = 0.19
 """Half the side of the view from above [m]."""
@@ -123,7 +109,8 @@ def draw_wrench_space(
     seating = settled.seating.rule.replace("_", " ")
     held = f"closing tension of {settled.closing_tension:g} N"
     if preload is not None:
-        held = f"preload of {_listed(preload)} N, wrist floating, at rest"
+        listed = ", ".join(f"{tension:g}" for tension in preload[: 4 if np.ptp(preload) else 1])
+        held = f"preload of {listed} N, wrist floating, at rest"
     upper.suptitle(
         f"{title}: {settled.hold.shape}, {seating}; tile forces on the rock at the {held}",
         parse_math=False,
@@ -132,17 +119,10 @@ def draw_wrench_space(
         vertices = None if outlined else space.vertices()
         if preload is not None:
             rows[1, 0].suptitle("the set linearised at rest, before the wrist has moved")
-        for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), PROJECTIONS, strict=True):
+        for axes, (i, j) in zip(rows[1, 0].subplots(1, 3), ((0, 2), (0, 4), (1, 5)), strict=True):
             points = _outline(space, i, j) if vertices is None else vertices[:, [i, j]]
             _draw_projection(axes, points, i, j)
     return figure
-
-
-def _listed(tensions: Array) -> str:
-    """Return four tensions in words; one if they are alike."""
-    if np.ptp(tensions) == 0.0:
-        return f"{tensions[0]:g}"
-    return ", ".join(f"{tension:g}" for tension in tensions)
 
 
 # Fingers in their planes ------------------------------------------------------------------------
@@ -161,20 +141,17 @@ def draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> N
     """
     loads = settled.tile_loads(tensions)
     largest = max(float(np.hypot(loads[:, 0], loads[:, 1]).max()), 1.0)
-    chains = np.vstack([_chain(finger) for finger in settled.fingers])
+    chains = MM * np.vstack([finger.chain for finger in settled.fingers])
     limits = chains.min(axis=0) - MARGINS[0], chains.max(axis=0) + MARGINS[1]
-    limits[1][1] = max(limits[1][1], limits[0][1] + LEAST)
+    limits[1][1] = max(limits[1][1], limits[0][1] + 130.0)
     # left over right, the inner finger beside the outer one
     for axes, name in zip(
         panels, ("inner_left", "outer_left", "inner_right", "outer_right"), strict=True
     ):
         _draw_finger(axes, settled, FINGERS.index(name), loads, largest, limits)
     shown = [kind for kind in CONTACTS if any(tile.contact == kind for tile in settled.tiles)]
-    handles = [
-        Line2D([], [], color=CONTACTS[kind][0], linewidth=4, label=CONTACTS[kind][1])
-        for kind in shown
-    ]
-    handles.append(Line2D([], [], color=PALM, linewidth=3, label="palm"))
+    named = [(*CONTACTS[kind], 4) for kind in shown] + [(PALM, "palm", 3)]
+    handles = [Line2D([], [], color=c, label=label, linewidth=w) for c, label, w in named]
     panels[0].legend(handles=handles, loc="lower left", fontsize=8)
 
 
@@ -196,7 +173,7 @@ def _draw_finger(
     )
     if section is not None:
         _draw_rock(axes, section, low, high)
-    axes.plot(*_chain(finger).T, "o-", color="0.25", markersize=5, linewidth=2.0)
+    axes.plot(*MM * finger.chain.T, "o-", color="0.25", markersize=5, linewidth=2.0)
     _draw_base(axes, settled, index)
     rows = np.flatnonzero(settled.finger_of == index)
     tiles = dict(zip([settled.tiles[i].phalanx for i in rows], rows.tolist(), strict=True))
@@ -242,13 +219,8 @@ def _draw_tile(axes: Axes, kind: str, ends: Sequence[ArrayLike], **style: Any) -
     axes.plot(*(MM * np.array(ends)).T, color=CONTACTS[kind][0], **style)
 
 
-def _chain(finger: SettledFinger) -> Array:
-    """Return a finger's joints and its tip in (x, z) of F, shape (4, 2) [mm]."""
-    return MM * finger.chain
-
-
 def _draw_rock(axes: Axes, section: Section, low: Array, high: Array) -> None:
-    s, t = (np.linspace(a, b, n) for a, b, n in zip(low, high, CELLS, strict=True))
+    s, t = (np.linspace(a, b, n) for a, b, n in zip(low, high, (110, 80), strict=True))
     clearance = section.clearances((s + 1j * t[:, None]) / MM)
     if clearance.min() < 0.0:
         axes.contourf(s, t, clearance, levels=[-np.inf, 0.0], colors=[ROCK])
@@ -308,9 +280,8 @@ def direction_in_words(along: Array) -> str:
 
 def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
     """Draw the rock's depth, the palm's tiles and the fingers in x and y of H."""
-    hand = settled.hand
-    centre = np.array([0.03, 0.0])
-    x, y = (c + np.linspace(-AROUND, AROUND, GROUND) for c in centre)
+    hand, centre = settled.hand, np.array([0.03, 0.0])
+    x, y = (c + np.linspace(-AROUND, AROUND, 41) for c in centre)
     in_hold = settled.seating.pose.inverse()
     into_rock = in_hold.rotation[:, 2]
     depth = np.array(
@@ -334,7 +305,7 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
     for name, frame, finger in zip(FINGERS, frames, settled.fingers, strict=True):
         ends = MM * (frame.joint + np.outer([-0.06, 0.16], frame.along))
         axes.plot(ends[:, 1], ends[:, 0], "--", color="tab:blue", lw=1.0)
-        places = MM * frame.joint + np.outer(_chain(finger)[:, 0], frame.along)
+        places = MM * frame.joint + np.outer(MM * finger.chain[:, 0], frame.along)
         axes.plot(places[:, 1], places[:, 0], "o-", color="0.25", markersize=4, lw=2.5)
         outward = places[-1] - places[0]
         axes.annotate(
@@ -374,7 +345,7 @@ def _outline(space: WrenchSpace, i: int, j: int) -> Array:
         point = space.extreme(direction)[[i, j]] * units
         return SupportPoint(normal, point)
 
-    polygon = enclose(touching, MOST_ENDS)
+    polygon = enclose(touching, 40)
     return np.zeros((1, 2)) if polygon is None else polygon.inner / units
 
 

@@ -39,47 +39,11 @@ __all__ = ["draw_plan", "plot_plan"]
 SIZE: Final = (14.0, 8.0)
 """Of a picture [inch]."""
 
-ROW: Final = 0.105
-"""Height that a row of a table needs at least [inch]."""
-
 BOTTOM: Final = 0.075
 """Of the panels, over the picture's height."""
 
 TOP: Final = 0.875
 """Of the panels, over the picture's height."""
-
-WORDS: Final = (0.7, BOTTOM, 0.28, TOP - BOTTOM)
-"""Left, bottom, width and height of what is said where there are no loads, over the picture's."""
-
-SPREAD: Final = (0.045, BOTTOM, 0.33, 0.11)
-"""The same of the load factor's spread, under the view from behind."""
-
-ABOVE_SPREAD: Final = 0.3
-"""Where that view begins then, over the picture's height."""
-
-REASON: Final = 0.4
-"""From the upper edge down to the reason [inch]."""
-
-SENTENCE: Final = 180
-"""Letters of a line of the title."""
-
-FILLED: Final = (0.77, 1.1)
-"""Width and height of the view from behind, over the side of the square that it has."""
-
-TICKS: Final = 5
-"""Along its longest axis, about."""
-
-ASIDE: Final = math.radians(32.0)
-"""How far to the side the view from behind is turned."""
-
-ASIDE_STEEP: Final = math.radians(12.0)
-"""The same under a ceiling and on a floor, so that the body is seen between the hands."""
-
-STOOPED: Final = 0.6
-"""How far it is raised over a slab, and lowered under an overhang, over their lean."""
-
-ABOVE: Final = math.radians(20.0)
-"""How far from above the view from behind looks at a vertical wall."""
 
 
 def plot_plan(plan: Plan, question: Question, path: Path) -> None:
@@ -103,14 +67,15 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     scene, seen = scene_of(plan, question), view_directions(question.stance)
     rows = sum(len(hand.fingers) for hand in plan.hands or ())
     joints = joint_utilisations(plan, question.stance)
-    needed = ROW * (rows + len(joints)) / (TOP - BOTTOM)
+    # inches, of which a row of a table needs a tenth
+    needed = 0.105 * (rows + len(joints)) / (TOP - BOTTOM)
     figure = Figure(figsize=(SIZE[0], max(SIZE[1], needed)))
     FigureCanvasAgg(figure)  # which tells how large texts are
     places = {"bottom": BOTTOM, "top": TOP}
     under = 0.0
     if plan.spread is not None and plan.spread.load_factor is not None:
-        draw_spread(figure.add_axes(SPREAD), plan.spread, plan.load_factor)
-        under = ABOVE_SPREAD
+        draw_spread(figure.add_axes((0.045, BOTTOM, 0.33, 0.11)), plan.spread, plan.load_factor)
+        under = 0.3
     space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=under, top=TOP)
     _draw_space(figure, space[0], scene, seen)
     sides = figure.add_gridspec(2, 1, left=0.435, right=0.665, hspace=0.3, **places)
@@ -122,7 +87,7 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     if plan.hands:
         draw_tiles(figure.add_subplot(tables[0]), plan, question)
     else:
-        draw_shortfall(figure.add_axes(WORDS), plan)
+        draw_shortfall(figure.add_axes((0.7, BOTTOM, 0.28, TOP - BOTTOM)), plan)
     if joints:
         draw_joints(figure.add_subplot(tables[1]), joints)
     if plan.hands:
@@ -144,9 +109,10 @@ def _write_title(figure: Figure, plan: Plan) -> None:
         title += f", load factor {plan.load_factor:.2f}"
     elif plan.load_factor_unbounded:
         title += ", load factor unbounded"
-    reason = textwrap.fill(plan.reason, SENTENCE, max_lines=2, placeholder=" …")
+    reason = textwrap.fill(plan.reason, 180, max_lines=2, placeholder=" …")
     figure.suptitle(title, fontsize=12)
-    lower = 1.0 - REASON / figure.get_size_inches()[1]
+    # inches from the upper edge
+    lower = 1.0 - 0.4 / figure.get_size_inches()[1]
     figure.text(0.5, lower, reason, fontsize=9, ha="center", va="top")
 
 
@@ -160,14 +126,16 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
     points = scene.points
     low, high = points.min(axis=0), points.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    step = MaxNLocator(TICKS).tick_values(0.0, float((high - low).max()))[1]
+    step = MaxNLocator(5).tick_values(0.0, float((high - low).max()))[1]
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MultipleLocator(step))
     right = np.cross(seen.ahead, UP)
-    aside = ASIDE_STEEP if seen.steep else ASIDE
+    # less under a ceiling and on a floor, so that the body is seen between the hands
+    aside = math.radians(12.0) if seen.steep else math.radians(32.0)
     camera = -math.cos(aside) * seen.ahead + math.sin(aside) * right
     lean = math.asin(np.clip(seen.into[2], -1.0, 1.0))
-    elevation = ABOVE - STOOPED * lean
+    # from above at a wall, raised over a slab, lowered under an overhang
+    elevation = math.radians(20.0) - 0.6 * lean
     axes.view_init(math.degrees(elevation), math.degrees(math.atan2(camera[1], camera[0])))
     sides = np.maximum(high - low, 1e-3)
     axes.set_box_aspect(sides)
@@ -176,7 +144,7 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
     drawn = proj3d.proj_transform(*corners.T, axes.get_proj())[:2]
     in_axes = axes.transData - axes.transAxes
     across = np.ptp(in_axes.transform(np.column_stack(drawn)), axis=0)
-    axes.set_box_aspect(sides, zoom=float((np.array(FILLED) / across).min()))
+    axes.set_box_aspect(sides, zoom=float((np.array((0.77, 1.1)) / across).min()))
     projection = axes.get_proj()
 
     def flat(points: Array) -> Array:

@@ -35,9 +35,6 @@ __all__ = [
     "view_directions",
 ]
 
-ARROW: Final = 0.5
-"""Length of the longest force arrow in a picture [m]."""
-
 ROUND: Final = 10
 """Points of half the outline of a capsule's end."""
 
@@ -46,12 +43,6 @@ LEANING: Final = 0.3
 
 UP: Final = np.array([0.0, 0.0, 1.0])
 """In W; and z of a hand."""
-
-STEEP: Final = 0.9
-"""Vertical part of the direction into the rock from which on the rock is a ceiling or a floor."""
-
-SAME: Final = 1e-3
-"""How far, relatively, a load may be from the robot's weight and still be called so."""
 
 
 class Surface(NamedTuple):
@@ -157,7 +148,7 @@ class Scene:
     @property
     def scale(self) -> float:
         """Length of the arrow of a force [m/N]."""
-        return ARROW / max(1.0, *(float(np.linalg.norm(arrow.force)) for arrow in self.arrows))
+        return 0.5 / max(1.0, *(float(np.linalg.norm(arrow.force)) for arrow in self.arrows))
 
 
 class ViewDirections(NamedTuple):
@@ -193,7 +184,7 @@ def view_directions(stance: Stance) -> ViewDirections:
     ahead = level[chosen] / np.linalg.norm(level[chosen])
     length = float(np.linalg.norm(into))
     into = into / length if length >= LEANING else ahead
-    return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ UP) >= STEEP))
+    return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ UP) >= 0.9))
 
 
 def scene_of(plan: Plan, question: Question) -> Scene:
@@ -351,7 +342,7 @@ def _load(plan: Plan, question: Question) -> Arrow:
     force, moment = -plan.body_wrench[:3], -plan.body_wrench[3:]
     moment = moment - np.cross(com, force)
     weight = robot.mass * turn.T @ stance.gravity
-    size, about = SAME * max(float(np.linalg.norm(weight)), 1.0), float(np.linalg.norm(moment))
+    size, about = 1e-3 * max(float(np.linalg.norm(weight)), 1.0), float(np.linalg.norm(moment))
     own = np.linalg.norm(force - weight) <= size and about <= size * robot.reach
     text = f"{'weight' if own else 'load'} {np.linalg.norm(force):.0f} N"
     if not own and round(about):

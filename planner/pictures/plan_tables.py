@@ -20,19 +20,8 @@ __all__ = ["draw_joints", "draw_shortfall", "draw_tiles"]
 
 PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
 
-SLANT: Final = 30.0
-"""Of columns' titles that would run together [°]."""
-
-COMPONENTS: Final = ("fx [N]", "fy [N]", "fz [N]", "mx [N·m]", "my [N·m]", "mz [N·m]")
-"""Of a body wrench."""
-
-WRENCH_COLUMNS: Final = ("needed", "nearest", "missing")
-
 FIRST: Final = 24
 """So many lines at most say what leaves no balance."""
-
-LETTERS: Final = 64
-"""Of such a line."""
 
 ENDLESS: Final = 999.0
 """A utilisation that is written no more."""
@@ -111,7 +100,7 @@ def _draw_colours(axes: Any, values: Array, columns: Iterable[str], rows: Iterab
     widest = max(title.get_window_extent().width for title in titles)
     if widest > axes.bbox.width / values.shape[1]:
         for title in titles:
-            title.set(rotation=SLANT, ha="right", rotation_mode="anchor")
+            title.set(rotation=30.0, ha="right", rotation_mode="anchor")
 
 
 def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -148,8 +137,15 @@ def _write_wrenches(axes: Any, values: Array) -> None:
     """Write wrenches, shape (6, 3), as a table whose lines part the rows."""
     words = [[f"{round(value, 1) + 0.0:.1f}" for value in row] for row in values]
     table = axes.table(
-        [[name, *row] for name, row in zip(COMPONENTS, words, strict=True)],
-        colLabels=("", *WRENCH_COLUMNS),
+        [
+            [name, *row]
+            for name, row in zip(
+                ("fx [N]", "fy [N]", "fz [N]", "mx [N·m]", "my [N·m]", "mz [N·m]"),
+                words,
+                strict=True,
+            )
+        ],
+        colLabels=("", *("needed", "nearest", "missing")),
         edges="horizontal",
         bbox=(0.0, 1.0 - GAP - WRENCHES, 0.9, WRENCHES),
     )
@@ -183,9 +179,7 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
         for words, owners in found.items():
             of = ", ".join(owner for owner in owners if owner)
             told = f"{words} ({of})" if of else words
-            lines += textwrap.wrap(
-                told, LETTERS, initial_indent="    ", subsequent_indent="        "
-            )
+            lines += textwrap.wrap(told, 64, initial_indent="    ", subsequent_indent="        ")
     if len(lines) > FIRST:
         lines[FIRST:] = ["…"]
     return lines

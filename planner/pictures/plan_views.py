@@ -57,34 +57,14 @@ DOTS: Final[dict[str, dict[str, Any]]] = {
     "load": {"color": LOAD, "marker": "o", "ms": 8, "zorder": 6},
     "origin": {"color": "black", "marker": "+", "ms": 10, "zorder": 6},
 }
-NEAR_TIPS: Final = 0.05
-"""How near to each other tips of arrows are that share a note, in the views from a side [m]."""
-
-NEAR_NAMES: Final = 0.25
-"""How near to each other hands are whose names become one note there [m]."""
-
-STEP_ASIDE: Final = 0.5
-"""How far a note is moved at a time, over its height."""
-
 STEPS_ASIDE: Final = 10
 """Of these, at most, to each side."""
 
 STEPS_UP: Final = 8
 """Of these, at most, up and down."""
 
-COVERED: Final = 0.6
-"""What a covered dot of a line or an arrow weighs, in steps aside."""
-
-HEAD: Final = 12
-"""As so many dots weighs the head of an arrow."""
-
 PADDING: Final = 1.0
 """Around a note [printer's points]."""
-
-SPACING: Final = 4.0
-"""Of the dots of what is drawn, for what notes cover [printer's points]."""
-
-POINTS_PER_INCH: Final = 72.0
 
 MOVES: Final = np.array(
     [
@@ -97,9 +77,6 @@ MOVES: Final = np.array(
 
 FARNESS: Final = np.hypot(*MOVES.T)
 """Of these moves, shape (n,), in steps."""
-
-FORBIDDEN: Final = 1e3
-"""What it weighs to leave the frame, in steps; twice that to lie on another note."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +136,8 @@ class View:
     def arrow(self, start: Array, step: Array, colour: Any) -> tuple[Array, Array]:
         """Draw an arrow, and return where it is seen to begin and to end, shape (2,) each."""
         begin, tip = self.flat(np.array([start, start + step]))
-        self.seen.extend([np.array([begin, tip]), *np.repeat(tip[None, None], HEAD, axis=0)])
+        # its head weighs as much as a dozen dots
+        self.seen.extend([np.array([begin, tip]), *np.repeat(tip[None, None], 12, axis=0)])
         style = {"arrowstyle": "-|>", "color": colour, "lw": 2.0, "shrinkA": 0.0, "shrinkB": 0.0}
         ends = tuple(tip), tuple(begin)
         self.axes.annotate("", *ends, arrowprops=style, annotation_clip=False, zorder=7)
@@ -203,15 +181,16 @@ class View:
         self.axes.apply_aspect()
         figure = self.axes.figure
         renderer = figure.canvas.get_renderer()
-        point = figure.dpi / POINTS_PER_INCH
-        dots = self._dots(SPACING * point)
+        # pixels in a printer's point
+        point = figure.dpi / 72.0
+        dots = self._dots(4.0 * point)
         frame = figure.bbox if self.deep else self.axes.bbox
         placed = np.zeros((0, 4))
         for note in self.axes.texts:
             if not note.get_text():
                 continue
             box = note.get_window_extent(renderer)
-            shifts = STEP_ASIDE * box.height / (note.get_text().count("\n") + 1) * MOVES
+            shifts = 0.5 * box.height / (note.get_text().count("\n") + 1) * MOVES
             moved = box.padded(PADDING * point).extents + np.tile(shifts, 2)
             apart = (moved[:, None, :2] >= placed[:, 2:]) | (moved[:, None, 2:] <= placed[:, :2])
             free = apart.any(axis=2).all(axis=1)
@@ -219,8 +198,9 @@ class View:
                 axis=1
             )
             under = (dots[None] > moved[:, None, :2]) & (dots[None] < moved[:, None, 2:])
-            costs = FARNESS + COVERED * under.all(axis=2).sum(axis=1)
-            best = int(np.argmin(costs + FORBIDDEN * (2.0 * ~free + ~inside)))
+            # in steps: a covered dot, leaving the frame, and lying on another note
+            costs = FARNESS + 0.6 * under.all(axis=2).sum(axis=1)
+            best = int(np.argmin(costs + 1e3 * (2.0 * ~free + ~inside)))
             note.xyann = tuple(np.add(note.xyann, shifts[best] / point))
             placed = np.vstack([placed, moved[best]])
 
@@ -287,7 +267,7 @@ def _write_names(view: View, scene: Scene) -> None:
     names = [label for label in scene.labels if label.kind == "limb"]
     spots = view.flat(np.array([label.place for label in names]))
     texts = [label.text for label in names]
-    for spot, text in view.merged(spots, texts, ",\n", NEAR_NAMES):
+    for spot, text in view.merged(spots, texts, ",\n", 0.25):
         outward = 1.0 if spot[0] >= middle[0] else -1.0
         view.note(text, spot, (14.0 * outward, -14.0), ha="left" if outward > 0.0 else "right")
     for label in scene.labels:
@@ -309,5 +289,5 @@ def _draw_arrows(view: View, scene: Scene) -> None:
         steps[tuple(tip)] = tip - begin
         tips.append(tip)
         texts.append(arrow.text)
-    for tip, text in view.merged(tips, texts, ", ", NEAR_TIPS):
+    for tip, text in view.merged(tips, texts, ", ", 0.05):
         view.beyond(text, tip, steps[tuple(tip)])

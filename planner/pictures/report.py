@@ -19,14 +19,8 @@ from planner.route import OutOfReach, RouteResult, RouteStage
 
 __all__ = ["draw_route", "summary", "write_report"]
 
-CUT: Final = 2.0
-"""Largest utilisation that a route's picture shows in full."""
-
 STAGE: Final = 0.32
 """Width of a route's picture that a stage needs [inch]."""
-
-WIDTHS: Final = (11.0, 60.0)
-"""Least and largest width of a route's picture [inch]."""
 
 IN_BAR: Final[dict[str, Any]] = {
     "rotation": 90,
@@ -38,15 +32,6 @@ IN_BAR: Final[dict[str, Any]] = {
 """What is written in a bar, from its upper end."""
 
 ON_WHITE: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
-
-BROKEN: Final = (0.7, 0.73)
-"""Where such a bar is seen to be broken, at its left and right edge, over the tallest bar."""
-
-HEADROOM: Final = 1.2
-"""Height of the utilisations' panel, over the tallest bar or the limit: for the crux's name."""
-
-OVER: Final[dict[str, Any]] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-"""Where the legend is: above what is drawn."""
 
 BAND: Final = "0.15"
 """Colour of a spread."""
@@ -194,19 +179,21 @@ def _spread(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
 def draw_route(result: RouteResult) -> Figure:
     """Draw utilisation and load factor along a climb, with its crux, and their spread."""
     index = np.arange(len(result.plans))
-    wide = float(np.clip(STAGE * len(index), *WIDTHS))
+    wide = float(np.clip(STAGE * len(index), *(11.0, 60.0)))
     figure = Figure(figsize=(wide, 6.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     used = np.array([np.nan if p.utilisation is None else p.utilisation for p in result.plans])
     bands = [_band(result.plans, name) for name in ("utilisation", "load_factor")]
     cap = result.route.limits.utilisation
     # what is far beyond the limit is cut off and written in, so that the rest can be seen
-    height = min(float(np.nanmax([*used, *bands[0][1], cap])), CUT) * 1.1
+    height = min(float(np.nanmax([*used, *bands[0][1], cap])), 2.0) * 1.1
     colours = [PHASE_COLOURS[stage.phase] for stage in result.stages]
     upper.bar(index, np.nan_to_num(np.minimum(used, height)), color=colours)
     for i in np.flatnonzero(used > height):
         upper.text(i, 0.97 * height, f"{used[i]:.3g}", color="white", **IN_BAR)
-        upper.plot([i - 0.5, i + 0.5], np.multiply(BROKEN, height), color="white", linewidth=3.0)
+        upper.plot(
+            [i - 0.5, i + 0.5], np.multiply((0.7, 0.73), height), color="white", linewidth=3.0
+        )
     for i in index[np.isnan(used)]:
         upper.bar(i, height, color="none", edgecolor="tab:red", hatch="//")
         upper.text(i, 0.97 * height, result.plans[i].status, bbox=ON_WHITE, **IN_BAR)
@@ -228,12 +215,14 @@ def draw_route(result: RouteResult) -> Figure:
     )
     upper.set(
         ylabel="utilisation [1]",
-        ylim=(0.0, height * HEADROOM),
+        ylim=(0.0, height * 1.2),
     )
     figure.suptitle(result.route.name, parse_math=False)
     for axes, band in zip((upper, lower), bands, strict=True):
         _draw_band(axes, band, _of_draws(result.plans))
-    upper.legend(**OVER, ncols=7, fontsize=8, frameon=False)
+    upper.legend(
+        **{"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}, ncols=7, fontsize=8, frameon=False
+    )
     factor = np.array([np.nan if p.load_factor is None else p.load_factor for p in result.plans])
     lower.plot(index, factor, "o-", color="0.2")
     lower.axhline(1.0, color="tab:red")
