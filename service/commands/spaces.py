@@ -18,7 +18,7 @@ from service.commands.options import (
     stance_argument,
 )
 from service.commands.stances import read_request
-from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest, about_the_same
+from service.requests import Axis, BodySpaceRequest, WrenchSpaceRequest
 from service.tables import DONE, EXIT_STATUS, FAILED, OVERLOADED, progress, say, waiting, writing
 
 if TYPE_CHECKING:
@@ -150,10 +150,14 @@ def body_space(
     from service.answering import explore, robots_of
 
     plan = asked(read_request(stance), hand, robot)
-    request = about_the_same(
-        BodySpaceRequest,
-        plan,
+    request = BodySpaceRequest(
+        v=1,
         id=plan.id,
+        stance=plan.stance,
+        body_wrench=plan.body_wrench,
+        load=plan.load,
+        limits=plan.limits,
+        present=plan.present,
         axes=axes,
         others="free" if projection else "zero" if pure else "needed",
     )

@@ -21,7 +21,7 @@ from service.commands.options import (
     stance_argument,
 )
 from service.commands.stances import read_request
-from service.requests import PlanRequest, StreamRequest, Wrench, about_the_same
+from service.requests import PlanRequest, StreamRequest, Wrench
 from service.tables import BAD_INPUT, DONE, EXIT_STATUS, FAILED, OVERLOADED, note, remark, say
 
 if TYPE_CHECKING:
@@ -110,7 +110,14 @@ def _declared(plan: PlanRequest, radius: float) -> StreamRequest:
         raise UnsupportedError(
             f"{plan.objective} is not for streams; valid is max_margin", field="objective"
         )
-    return about_the_same(StreamRequest, plan, radius=radius)
+    return StreamRequest(
+        v=1,
+        stance=plan.stance,
+        body_wrench=plan.body_wrench,
+        load=plan.load,
+        limits=plan.limits,
+        radius=radius,
+    )
 
 
 def _body_wrench(line: bytes) -> Wrench:
