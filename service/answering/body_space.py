@@ -15,7 +15,7 @@ from service.answering.answers import finite, placed_poses
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
-from service.requests import BodySpaceRequest, PlanRequest, about_the_same
+from service.requests import BodySpaceRequest, PlanRequest
 
 __all__ = ["Explored", "explore"]
 
@@ -53,7 +53,15 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     """
     start = time.perf_counter()
     directions = [_unit(given, f"directions[{i}]") for i, given in enumerate(request.directions)]
-    asked = question(about_the_same(PlanRequest, request), robots)
+    planned = PlanRequest(
+        v=1,
+        stance=request.stance,
+        body_wrench=request.body_wrench,
+        load=request.load,
+        limits=request.limits,
+        present=request.present,
+    )
+    asked = question(planned, robots)
     space = BodySpace(asked)
     modelled = time.perf_counter()
     section = space.section(request.axes, request.others)
@@ -68,15 +76,15 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     turning = _accelerations(space, _ways("xyz", np.eye(6)[3:])) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
     ended = time.perf_counter()
-    planned = space.plan
+    found = space.plan
     reply = BodySpaceReply(
         id=request.id,
         poses=placed_poses(asked.stance),
         robot=asked.stance.robot.name,
-        status=planned.status,
-        reason=planned.reason,
+        status=found.status,
+        reason=found.reason,
         body_wrench=space.needed.tolist(),
-        utilisation=finite(planned.utilisation),
+        utilisation=finite(found.utilisation),
         exact=space.exact,
         linearisation_error=error,
         error=error,
@@ -86,8 +94,8 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         angular_acceleration=turning,
         along=None if linear is None else [one for one in along if one is not None],
         time=Time(modelled - start, ended - modelled, ended - start),
-        warnings=[*planned.warnings, *_warnings(space, linear is not None, error)],
-        findings=list(planned.findings),
+        warnings=[*found.warnings, *_warnings(space, linear is not None, error)],
+        findings=list(found.findings),
     )
     return Explored(space, section, reply)
 

@@ -152,7 +152,14 @@ def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
     if message.points is not None and message.profiles is None:
         return Profile(message.points, numbers)
     if message.profiles is not None and message.points is None:
-        return Profile(msgspec.structs.asdict(message.profiles), numbers)
+        strips = message.profiles
+        outlines = {
+            "outer_left": strips.outer_left,
+            "inner_left": strips.inner_left,
+            "inner_right": strips.inner_right,
+            "outer_right": strips.outer_right,
+        }
+        return Profile(outlines, numbers)
     raise InvalidInputError("give points or profiles, one of them", field="points")
 
 

@@ -155,7 +155,7 @@ def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
     found = []
     for i, message in enumerate(messages):
         with within(f"draws[{i}]"):
-            found.append(own_draw(msgspec.structs.asdict(message)))
+            found.append(own_draw({"hand": message.hand, "surfaces": message.surfaces}))
     return tuple(found) or None
 
 
@@ -236,7 +236,17 @@ def _surface(message: str | requests.Surface, path: str) -> Surface:
     try:
         if isinstance(message, str):
             return Surface.named(message)
-        given = msgspec.structs.asdict(message)
+        given = {
+            "shear_limit": message.shear_limit,
+            "pull_off_limit": message.pull_off_limit,
+            "pull_off_angle": message.pull_off_angle,
+            "lateral_limit": message.lateral_limit,
+            "compression_gain": message.compression_gain,
+            "half_planes": message.half_planes,
+            "lateral_pull_off_ratio": message.lateral_pull_off_ratio,
+            "shear_scatter": message.shear_scatter,
+            "friction": message.friction,
+        }
         return Surface.from_values({name: v for name, v in given.items() if v is not None})
     except InvalidInputError as error:
         raise error.within("surface").within(path) from None

@@ -12,7 +12,7 @@ from hand_models.base import LimitError
 from service.answering.answers import Planned
 from service.answering.streams import brief_set_points
 from service.replies import PlanReply, Reply, SetPointsReply
-from service.requests import Detail, Query, Request
+from service.requests import Detail, PlanRequest, Query, Request, SetPointsRequest
 from service.wire import Format
 
 __all__ = ["fitted"]
@@ -50,14 +50,16 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
     if most is None or len(payload) <= most:
         return reply, payload
     sizes = {}
-    given: Detail | None = getattr(request, "detail", None)
+    given = request.detail if isinstance(request, PlanRequest | SetPointsRequest) else None
     for detail, smaller in _with_less_detail(found, given or DETAILS[0]):
         part = form.encode(smaller)
         if given is None and len(part) <= most:
             return smaller, part
         sizes[f"with detail {detail}"] = len(part)
-    modelled = isinstance(reply, PlanReply) and "model" in getattr(request, "want", ())
-    bare = found.in_detail("full").reply if modelled and isinstance(found, Planned) else reply
+    bare = reply
+    modelled = isinstance(request, PlanRequest) and "model" in request.want
+    if modelled and isinstance(found, Planned) and isinstance(reply, PlanReply):
+        bare = found.in_detail("full").reply
     sizes |= {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
     raise _too_large(len(payload), most, sizes)
 

@@ -16,7 +16,7 @@ from service.answering.answers import cut_reason, finite, placed_poses
 from service.answering.own_models import ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
-from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest, about_the_same
+from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest
 from service.wire import Format
 
 __all__ = ["KEPT", "STREAMS", "Streams", "brief_set_points", "opened", "set_points_reply"]
@@ -55,7 +55,14 @@ def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
             "not for streams, whose tensions change with the wrench; leave it out",
             field="limits.tension_change",
         )
-    asked = question(about_the_same(PlanRequest, request), robots)
+    first = PlanRequest(
+        v=1,
+        stance=request.stance,
+        body_wrench=request.body_wrench,
+        load=request.load,
+        limits=request.limits,
+    )
+    asked = question(first, robots)
     return WrenchStream(asked, radius=request.radius)
 
 

@@ -129,10 +129,14 @@ def body_space(
         raise click.UsageError("give --projection or --pure, not both")
 
     plan = own.asked(stances.read_request(stance))
-    request = requests.about_the_same(
-        requests.BodySpaceRequest,
-        plan,
+    request = requests.BodySpaceRequest(
+        v=1,
         id=plan.id,
+        stance=plan.stance,
+        body_wrench=plan.body_wrench,
+        load=plan.load,
+        limits=plan.limits,
+        present=plan.present,
         axes=axes,
         others="free" if projection else "zero" if pure else "needed",
     )

@@ -88,7 +88,14 @@ def _declared(plan: requests.PlanRequest, radius: float) -> requests.StreamReque
         raise UnsupportedError(
             f"{plan.objective} is not for streams; valid is max_margin", field="objective"
         )
-    return requests.about_the_same(requests.StreamRequest, plan, radius=radius)
+    return requests.StreamRequest(
+        v=1,
+        stance=plan.stance,
+        body_wrench=plan.body_wrench,
+        load=plan.load,
+        limits=plan.limits,
+        radius=radius,
+    )
 
 
 def _body_wrench(line: bytes) -> requests.Wrench:

@@ -22,7 +22,6 @@ from .questions import (
     StreamRequest as StreamRequest,
     Want as Want,
     WrenchSpaceRequest as WrenchSpaceRequest,
-    about_the_same as about_the_same,
 )
 from .request import (
     DEFAULT_DEADLINE as DEFAULT_DEADLINE,

@@ -6,7 +6,7 @@ name (`service.wire.codec`) and not as unknown.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
@@ -35,11 +35,7 @@ __all__ = [
     "StreamRequest",
     "Want",
     "WrenchSpaceRequest",
-    "about_the_same",
 ]
-
-Q = TypeVar("Q", bound=Query)
-
 
 ObjectiveName = Annotated[
     Literal["max_margin", "min_effort"],
@@ -218,18 +214,3 @@ class RouteRequest(Request, frozen=True, kw_only=True):
         Meta(description="of every stance, beside its load factor: as in a plan's request"),
     ] = []
     draws: Draws = []
-
-
-def about_the_same(kind: type[Q], request: Query, **more: Any) -> Q:
-    """Return a question of another kind about the same stance, load, limits and present tensions.
-
-    Parameters
-    ----------
-    kind : type of Query
-    request : Query
-    more : object
-        Fields of the question's own.
-    """
-    shared = ("stance", "body_wrench", "load", "limits", "present")
-    common = {*kind.__struct_fields__} & {*request.__struct_fields__} & {*shared}
-    return kind(v=1, **{name: getattr(request, name) for name in common}, **more)
