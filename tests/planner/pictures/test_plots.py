@@ -19,9 +19,9 @@ from matplotlib.path import Path as MplPath
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Line3D
 
+import planner
 from hand_models import Grasp, Plane, Sphere
 from hand_models.base import Pose
-from planner import solving
 from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
 from planner.pictures.plan_scene import scene_of, view_directions
@@ -158,7 +158,7 @@ def test_a_picture_is_written_in_the_form_of_its_name(ending, begin, tmp_path):
 def test_a_plan_is_not_solved_again_for_its_picture(tmp_path, monkeypatch, capfd):
     solved = []
     monkeypatch.setattr(
-        solving, "plan", lambda question: solved.append(question) or found(question)
+        planner, "plan", lambda question: solved.append(question) or found(question)
     )
     picture = tmp_path / "plan.png"
     assert run(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
