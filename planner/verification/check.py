@@ -149,9 +149,9 @@ def _settled_limits(
     known: HandBatch, places: Sequence[HandOnHold], strength: float
 ) -> SettledLimits:
     preloads = [place.tendon_preload for place in places]
-    told = tuple([None if preload is None else preload.tobytes() for preload in preloads])
+    wound = tuple([None if preload is None else preload.tobytes() for preload in preloads])
     names = tuple([(place.limb, place.wrist) for place in places])
-    key = known.hands, names, told, strength
+    key = known.hands, names, wound, strength
     return KNOWN.get(key, lambda: SettledLimits(known, places, strength))
 
 
@@ -239,8 +239,8 @@ class Check:
         """Check the limbs' joints; return what they bear, by limb."""
         if self.where is None and self.question.stance.joints is None:
             return {}
-        told = dict(zip(self.limbs, wrenches, strict=True))
-        return check_limbs(found, self.question, told, body_wrench, self.where)
+        by_limb = dict(zip(self.limbs, wrenches, strict=True))
+        return check_limbs(found, self.question, by_limb, body_wrench, self.where)
 
     def idle(self, joints: Mapping[str, JointUse]) -> float:
         """Return the largest use of the joints of limbs without a hand."""

@@ -73,8 +73,8 @@ class DriveLimits:
 
         ``hooked``: fingers whose nails hook, and by which angles these have turned [rad].
         """
-        first, told = self._places.first_of_finger, again.arrays
-        f, nail = told.tensions, self._body.nail
+        first, planned = self._places.first_of_finger, again.arrays
+        f, nail = planned.tensions, self._body.nail
         shear, normal, lateral = again.loads.T
         uses = self._per_newton * f
         uses += self._at_zero
@@ -89,7 +89,7 @@ class DriveLimits:
             turned = angles - nail.retraction
             uses[WINCH, hooked] += nail.pulley_radius / self._winch * turned
         yield Residual("use", uses[DRIVEN:].T, self._hand)
-        own, said, hand = uses[:DRIVEN].ravel(), told.drives.ravel(), self._hand_of_drive
+        own, said, hand = uses[:DRIVEN].ravel(), planned.drives.ravel(), self._hand_of_drive
         yield claim(own, said, hand, DRIVE, self._name)
 
     def _name(self, i: int) -> str:

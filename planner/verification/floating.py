@@ -82,8 +82,8 @@ def recompute_floating(
                     unknown.append(finger)
             _check_palm(found, names.limbs[h], known.hands[h], arrays.palms[h], wrist, allowed[h])
     normal, left = balance.solved(fingers)
-    told = known.places.phalanges[unknown]
-    normal[told], left[unknown] = arrays.loads[told, 1], 0.0
+    taken = known.places.phalanges[unknown]
+    normal[taken], left[unknown] = arrays.loads[taken, 1], 0.0
     return fingers.shear, normal, left
 
 

@@ -199,8 +199,8 @@ class JointBalance:
     def recompute(self, again: Recomputed) -> Iterator[Residual]:
         """Yield what loads leave of the balance, of tendons that pull and of joints' stops."""
         names, (shear, normal, _) = self._names, again.loads.T
-        told, tensions, hands = again.arrays.loads, again.arrays.tensions, self._hand_of_finger
-        off = told[:, :2] - again.loads[:, :2]
+        planned, tensions, hands = again.arrays.loads, again.arrays.tensions, self._hand_of_finger
+        off = planned[:, :2] - again.loads[:, :2]
         if len(self._known.places.nails):
             off[self._known.places.nails] = 0.0
         text = " carries {:.6g}, {:.6g} N, not what the plan says"

@@ -113,7 +113,7 @@ class TileLimits:
 
         ``nails``: those that hook, and what is used of them, which the plan says with the tiles'.
         """
-        known, name, told = self._known, self._names.tile, again.arrays
+        known, name, planned = self._known, self._names.tile, again.arrays
         shear, normal, _ = again.loads.T
         bases, pressed = known.places.bases, normal.copy()
         pressed[bases] = known.engagement[bases] * normal[bases + 1]
@@ -123,13 +123,13 @@ class TileLimits:
         if self._framed:
             text, pressed = ": its bare frame would be pulled off", normal * known.touch.framed
             yield Residual("least", pressed, self._of, name, text)
-        planes = self._used(told.half_planes, again.loads) * self._per_share
+        planes = self._used(planned.half_planes, again.loads) * self._per_share
         yield Residual("use", planes, self._of)
         used = np.maximum.reduce(planes, axis=1)
         used[nails] = pulled
-        used, said = np.maximum(used, 0.0), told.tile_utilisations
+        used, said = np.maximum(used, 0.0), planned.tile_utilisations
         yield claim(used, said, self._of, UTILISATION, name, ": utilisation")
-        yield self.recompute_law(told.half_planes, again.loads)
+        yield self.recompute_law(planned.half_planes, again.loads)
 
     def recompute_law(
         self, half_planes: tuple[tuple[HalfPlane, ...], ...], loads: Array
