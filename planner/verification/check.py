@@ -48,7 +48,7 @@ BALANCE: Final = 1e-6
 """Largest error of the balance, relative to the body wrench (moments over a metre)."""
 
 EFFORT: Final = 1e-6
-"""How far the effort may be from what the plan says, relative."""
+"""Largest error of the effort that a plan says, relative."""
 
 
 class SettledLimits:
@@ -156,7 +156,7 @@ def _settled_limits(
 
 
 class Check:
-    """What every plan for a stance must pass, made once for its settled hands.
+    """The check of plans for a stance, made once for its settled hands.
 
     Parameters
     ----------

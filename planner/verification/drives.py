@@ -14,7 +14,7 @@ from planner.verification.residuals import COUNT, Names, Recomputed, Residual, c
 __all__ = ["DriveLimits"]
 
 DRIVE: Final = 1e-9
-"""How far a motor's torque, current or winch angle may be from what the plan says, relative."""
+"""Largest error of a motor's torque, current or winch angle that a plan says, relative."""
 
 DRIVES: Final = ("motor torque", "motor current", "winch angle")
 """Rows of `PlanArrays.drives`."""
@@ -24,11 +24,11 @@ WINCH, DRIVEN, SHEAR, LATERAL, TIP = 2, 3, 6, slice(7, 9), 9
 utilisation, shears of fingers, their lateral reactions to either side, their tips."""
 
 SIDES: Final = np.array([[1.0], [-1.0]])
-"""Of a lateral reaction."""
+"""Signs of a lateral reaction to either side."""
 
 
 class DriveLimits:
-    """What tendons, motors and fingers bear, and where their winches are.
+    """Limits of tendons, motors and fingers, and the angles of their winches.
 
     Parameters
     ----------

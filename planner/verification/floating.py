@@ -30,10 +30,10 @@ from planner.verification.rolling_contacts import Face, slip_of
 __all__ = ["recompute_floating"]
 
 PLACE: Final = 1e-9
-"""How far a contact may be above its phalanx, or below [m]."""
+"""Largest error of a contact's height over its phalanx [m]."""
 
 BEARS: Final = 1e-7
-"""How far along it a contact may be from where its tile bears [m]."""
+"""Largest distance along it of a contact from where its tile bears [m]."""
 
 
 def moved(place: Array, wrist: WristPlan) -> Array:

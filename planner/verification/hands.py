@@ -15,14 +15,14 @@ from planner.verification.residuals import UTILISATION, Names, Recomputed, Resid
 __all__ = ["HandLimits", "check_contacts"]
 
 PULLING: Final = np.array([np.inf, np.inf, 0.0])
-"""Of a hand's force, what does not press."""
+"""Largest components of a hand's force that do not press."""
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
-"""Which way a palm shears and presses along x and z."""
+"""Signs of a palm's shear along x and pressing along z."""
 
 
 class HandLimits:
-    """What palms and whole hands bear, and whether their wrenches are the sums of forces.
+    """Limits of palms and whole hands, and their wrenches as sums of forces.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ SMALL: Final = 1e-300
 """In place of a load that is zero, where something is divided by it [N]."""
 
 SIDES: Final = np.array([1.0, -1.0])
-"""Of a lateral load."""
+"""Signs of a lateral load."""
 
 
 class LimitCurves:
@@ -89,7 +89,7 @@ def _numbers(surface: Surface) -> tuple[float, ...]:
 
 
 class TileLimits:
-    """What tiles bear: friction, the law's surface, and what a plan's half-planes say is used.
+    """Limits of tiles: friction, the law's surface, and what a plan's half-planes say is used.
 
     Parameters
     ----------
