@@ -48,7 +48,7 @@ BALANCE: Final = 1e-6
 """Largest error of the balance, relative to the body wrench (moments over a metre)."""
 
 EFFORT: Final = 1e-6
-"""How far the effort may be from what the plan says, relative."""
+"""Largest error of the effort that a plan says, relative."""
 
 
 class SettledLimits:
@@ -149,14 +149,14 @@ def _settled_limits(
     known: HandBatch, places: Sequence[HandOnHold], strength: float
 ) -> SettledLimits:
     preloads = [place.tendon_preload for place in places]
-    told = tuple([None if preload is None else preload.tobytes() for preload in preloads])
+    wound = tuple([None if preload is None else preload.tobytes() for preload in preloads])
     names = tuple([(place.limb, place.wrist) for place in places])
-    key = known.hands, names, told, strength
+    key = known.hands, names, wound, strength
     return KNOWN.get(key, lambda: SettledLimits(known, places, strength))
 
 
 class Check:
-    """What every plan for a stance must pass, made once for its settled hands.
+    """The check of plans for a stance, made once for its settled hands.
 
     Parameters
     ----------
@@ -239,8 +239,8 @@ class Check:
         """Check the limbs' joints; return what they bear, by limb."""
         if self.where is None and self.question.stance.joints is None:
             return {}
-        told = dict(zip(self.limbs, wrenches, strict=True))
-        return check_limbs(found, self.question, told, body_wrench, self.where)
+        by_limb = dict(zip(self.limbs, wrenches, strict=True))
+        return check_limbs(found, self.question, by_limb, body_wrench, self.where)
 
     def idle(self, joints: Mapping[str, JointUse]) -> float:
         """Return the largest use of the joints of limbs without a hand."""

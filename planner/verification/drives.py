@@ -14,7 +14,7 @@ from planner.verification.residuals import COUNT, Names, Recomputed, Residual, c
 __all__ = ["DriveLimits"]
 
 DRIVE: Final = 1e-9
-"""How far a motor's torque, current or winch angle may be from what the plan says, relative."""
+"""Largest error of a motor's torque, current or winch angle that a plan says, relative."""
 
 DRIVES: Final = ("motor torque", "motor current", "winch angle")
 """Rows of `PlanArrays.drives`."""
@@ -24,11 +24,11 @@ WINCH, DRIVEN, SHEAR, LATERAL, TIP = 2, 3, 6, slice(7, 9), 9
 utilisation, shears of fingers, their lateral reactions to either side, their tips."""
 
 SIDES: Final = np.array([[1.0], [-1.0]])
-"""Of a lateral reaction."""
+"""Signs of a lateral reaction to either side."""
 
 
 class DriveLimits:
-    """What tendons, motors and fingers bear, and where their winches are.
+    """Limits of tendons, motors and fingers, and the angles of their winches.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ class DriveLimits:
 
         ``hooked``: fingers whose nails hook, and by which angles these have turned [rad].
         """
-        first, told = self._places.first_of_finger, again.arrays
-        f, nail = told.tensions, self._body.nail
+        first, planned = self._places.first_of_finger, again.arrays
+        f, nail = planned.tensions, self._body.nail
         shear, normal, lateral = again.loads.T
         uses = self._per_newton * f
         uses += self._at_zero
@@ -89,7 +89,7 @@ class DriveLimits:
             turned = angles - nail.retraction
             uses[WINCH, hooked] += nail.pulley_radius / self._winch * turned
         yield Residual("use", uses[DRIVEN:].T, self._hand)
-        own, said, hand = uses[:DRIVEN].ravel(), told.drives.ravel(), self._hand_of_drive
+        own, said, hand = uses[:DRIVEN].ravel(), planned.drives.ravel(), self._hand_of_drive
         yield claim(own, said, hand, DRIVE, self._name)
 
     def _name(self, i: int) -> str:

@@ -30,10 +30,10 @@ from planner.verification.rolling_contacts import Face, slip_of
 __all__ = ["recompute_floating"]
 
 PLACE: Final = 1e-9
-"""How far a contact may be above its phalanx, or below [m]."""
+"""Largest error of a contact's height over its phalanx [m]."""
 
 BEARS: Final = 1e-7
-"""How far along it a contact may be from where its tile bears [m]."""
+"""Largest distance along it of a contact from where its tile bears [m]."""
 
 
 def moved(place: Array, wrist: WristPlan) -> Array:
@@ -82,8 +82,8 @@ def recompute_floating(
                     unknown.append(finger)
             _check_palm(found, names.limbs[h], known.hands[h], arrays.palms[h], wrist, allowed[h])
     normal, left = balance.solved(fingers)
-    told = known.places.phalanges[unknown]
-    normal[told], left[unknown] = arrays.loads[told, 1], 0.0
+    taken = known.places.phalanges[unknown]
+    normal[taken], left[unknown] = arrays.loads[taken, 1], 0.0
     return fingers.shear, normal, left
 
 

@@ -15,14 +15,14 @@ from planner.verification.residuals import UTILISATION, Names, Recomputed, Resid
 __all__ = ["HandLimits", "check_contacts"]
 
 PULLING: Final = np.array([np.inf, np.inf, 0.0])
-"""Of a hand's force, what does not press."""
+"""Largest components of a hand's force that do not press."""
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
-"""Which way a palm shears and presses along x and z."""
+"""Signs of a palm's shear along x and pressing along z."""
 
 
 class HandLimits:
-    """What palms and whole hands bear, and whether their wrenches are the sums of forces.
+    """Limits of palms and whole hands, and their wrenches as sums of forces.
 
     Parameters
     ----------
@@ -41,28 +41,28 @@ class HandLimits:
 
         ``each``: the wrenches of all forces, shape (T + H, 6).
         """
-        told, names, own = again.arrays, self._names, self._each
-        tiles, palms = len(told.loads), told.palms
-        off = told.forces[:tiles] - (told.loads[:, None] @ told.axes)[:, 0]
+        planned, names, own = again.arrays, self._names, self._each
+        tiles, palms = len(planned.loads), planned.palms
+        off = planned.forces[:tiles] - (planned.loads[:, None] @ planned.axes)[:, 0]
         text = ": force and loads disagree"
         yield Residual("zero", off, self._known.places.hand, names.tile, text)
         wrenches = np.add.reduceat(each[:tiles], self._known.places.first)
         wrenches += each[tiles:]
-        wrenches[:, 3:] += told.palm_moments
+        wrenches[:, 3:] += planned.palm_moments
         text = "the wrench is not the sum of its tiles' and palm's forces"
-        yield Residual("zero", wrenches - told.wrenches, own, names.limb, text)
+        yield Residual("zero", wrenches - planned.wrenches, own, names.limb, text)
         text = "the palm cannot exert {:.6g}, {:.6g}, {:.6g} N"
         numbers = palms[:, 0], palms[:, 1], palms[:, 2]
         yield Residual("zero", palms[:, 1], own, names.limb, text, numbers)
         pressing = palms[:, ::2]
         yield Residual("least", pressing * PALM_SIGNS, own, names.limb, text, numbers)
-        used, said = pressing * self._palm_shares, told.palm_utilisations
+        used, said = pressing * self._palm_shares, planned.palm_utilisations
         yield Residual("use", used, own)
         most = np.maximum.reduce(used, axis=1)
         yield claim(most, said, own, UTILISATION, names.limb, "palm: utilisation")
-        along = told.wrenches[:, :3] @ HELD.T
+        along = planned.wrenches[:, :3] @ HELD.T
         yield Residual("use", along / self._hand_load, own)
-        yield self.recompute_held(told.wrenches, along)
+        yield self.recompute_held(planned.wrenches, along)
 
     def recompute_held(self, wrenches: Array, along: Array | None = None) -> Residual:
         """Return what rows say that hands hold, beyond what they do: across and away from rock.
@@ -83,10 +83,10 @@ class HandLimits:
 def check_contacts(names: Names, arrays: PlanArrays) -> Iterator[str]:
     """Yield what carries a load that cannot, and contacts that are not as the plan says."""
     known, limbs, palms = names.known, names.limbs, arrays.palms
-    for own, told in ((known.points, arrays.points), (known.axes, arrays.axes)):
-        if not (told is own or np.array_equal(told, own)):
+    for own, planned in ((known.points, arrays.points), (known.axes, arrays.axes)):
+        if not (planned is own or np.array_equal(planned, own)):
             hands = np.concatenate((known.places.hand, np.arange(len(palms))))
-            elsewhere = (told != own).reshape(len(own), -1).any(axis=1)
+            elsewhere = (planned != own).reshape(len(own), -1).any(axis=1)
             for i in np.flatnonzero(elsewhere).tolist():
                 if arrays.wrists[hands[i]] is None:
                     yield f"{names.tile(i)} is elsewhere, or turned"
@@ -98,11 +98,11 @@ def check_contacts(names: Names, arrays: PlanArrays) -> Iterator[str]:
         for t in np.flatnonzero(said != shares).tolist():
             yield f"{names.tile(t)}: {shares[t]:.6g} of its spines hold, not {said[t]:.6g}"
     for h, hand in enumerate(known.hands):
-        engaged, told_engaged = hand.palm.engaged, arrays.engaged[h]
-        if not (engaged and told_engaged) and palms[h].any():
+        engaged, planned_engaged = hand.palm.engaged, arrays.engaged[h]
+        if not (engaged and planned_engaged) and palms[h].any():
             yield f"{limbs[h]}: the palm carries a load but touches nothing"
-        if engaged != told_engaged:
-            touching = f"{list(engaged)}, not {list(told_engaged)}"
+        if engaged != planned_engaged:
+            touching = f"{list(engaged)}, not {list(planned_engaged)}"
             yield f"{limbs[h]}: the palm touches with tiles {touching}"
         if hand.tiles != arrays.tiles[h]:
             for t, (tile, each) in enumerate(
@@ -111,5 +111,5 @@ def check_contacts(names: Names, arrays: PlanArrays) -> Iterator[str]:
                 if tile != each:
                     if each.contact == "none" and arrays.forces[t].any():
                         yield f"{names.tile(t)} carries a load but touches nothing"
-                    planned = f"the plan has {' '.join(each)}"
-                    yield f"{names.tile(t)} touches with {tile.contact}; {planned}"
+                    other = f"the plan has {' '.join(each)}"
+                    yield f"{names.tile(t)} touches with {tile.contact}; {other}"

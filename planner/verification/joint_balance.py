@@ -1,4 +1,4 @@
-"""Whether forces on the rock balance joints and tendons (Eqs. 4–8), for the check of plans.
+"""The balance of joints and tendons with forces on the rock (Eqs. 4–8), for the check of plans.
 
 What a plan tells is put into the balance. About joint i, of angle q_i to the phalanx before it, the
 forces F_j on the rock of its own phalanx and those beyond turn as much as what the tendon leaves of
@@ -34,19 +34,19 @@ __all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
 JOINTS: Final = len(PHALANGES)
 
 SIDES: Final = np.array([{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in STOPS])
-"""Which way a joint presses on the limit at which it stands, by code of `STOPS`."""
+"""Signs of a joint's torque on the limit at which it stands, by code of `STOPS`."""
 
 STOP: Final = 1e-6
-"""How much torque a joint's stop may seem to pull, by rounding [N·m]."""
+"""Largest torque that a joint's stop may seem to pull with, by rounding [N·m]."""
 
 BEFORE: Final = np.tri(JOINTS, k=-1)
-"""Of each joint, the phalanges before it."""
+"""Ones where a phalanx (column) is before a joint (row)."""
 
 OUTWARD: Final = np.tri(JOINTS).T
-"""Of each joint, the phalanges that it turns."""
+"""Ones where a joint (row) turns a phalanx (column)."""
 
 CROSS: Final = SKEW.transpose(0, 2, 1).reshape(9, 3)
-"""From p ⊗ F to the moment p × F."""
+"""The map of p ⊗ F to the moment p × F."""
 
 
 def wrenches_of(points: Array, forces: Array) -> Array:
@@ -199,8 +199,8 @@ class JointBalance:
     def recompute(self, again: Recomputed) -> Iterator[Residual]:
         """Yield what loads leave of the balance, of tendons that pull and of joints' stops."""
         names, (shear, normal, _) = self._names, again.loads.T
-        told, tensions, hands = again.arrays.loads, again.arrays.tensions, self._hand_of_finger
-        off = told[:, :2] - again.loads[:, :2]
+        planned, tensions, hands = again.arrays.loads, again.arrays.tensions, self._hand_of_finger
+        off = planned[:, :2] - again.loads[:, :2]
         if len(self._known.places.nails):
             off[self._known.places.nails] = 0.0
         text = " carries {:.6g}, {:.6g} N, not what the plan says"

@@ -1,4 +1,4 @@
-"""What the check of a plan says of limbs: joints, and what is asked of a hand's force and tendons.
+"""The check of limbs: their joints, and what is asked of a hand's force and tendons.
 
 Joints are checked against the robot's URDF itself, by moments about each axis (`LinkTree`), not by
 the Jacobians and the Newton–Euler pass that the program's rows are made of.
@@ -27,20 +27,20 @@ WEIGHT: Final = 1e-9
 """Largest disagreement of the body wrench with the robot's weight and acceleration, relative."""
 
 PLACED: Final = (0.01, 0.05)
-"""How far joints may put a hand from its pose [m], and turn it [rad]."""
+"""Largest distance [m] and angle [rad] of a hand from its pose by its joints."""
 
 TOLD: Final = 1e-5
-"""How far what is told of that may be from it, of joints that were found [m, rad]."""
+"""Largest error of what a plan says of that, of joints that were found [m, rad]."""
 
 BEYOND: Final = 1e-6
-"""How far an angle may be beyond its joint's limit [rad, or m]."""
+"""Largest excess of an angle over its joint's limit [rad, or m]."""
 
 ARM: Final = 1.0
 """Lever at which an error of a hand's loads turns a joint [m]: about a limb's length."""
 
 
 class JointUse(NamedTuple):
-    """What a limb's joints bear.
+    """Loads of a limb's joints.
 
     Attributes
     ----------
@@ -219,7 +219,7 @@ def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
 
 
 class AskedLimits:
-    """What a question asks of its hands: caps on forces, given wrenches, small changes of tensions.
+    """Limits that a question puts on hands: caps, given wrenches, small changes of tensions.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ most = np.maximum.reduce
 
 
 class LoadsCheck:
-    """What loads of a stance do, checked for any body wrench.
+    """The check of loads of a stance, for any body wrench.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What nails that hook do, for the check of plans: balance, friction and strength.
+"""Nails that hook, in the check of plans: balance, friction and strength.
 
 P across a nail follows from the balance about its pin; A along it is a load of its own.
 """

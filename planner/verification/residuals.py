@@ -1,4 +1,4 @@
-"""What a plan's numbers leave of a limit or a law, and whether that is more than rounding.
+"""Residuals of limits and laws in a plan's numbers, and whether they are more than rounding.
 
 Every kind of limit recomputes its residuals from the numbers of a plan (`recompute`), and nothing
 else says what the limit is: the check of a plan judges these, and the check of a stream tabulates
@@ -34,7 +34,7 @@ LOAD: Final = 1e-6
 """Largest disagreement of a tile's load, relative to the largest load of its hand."""
 
 UTILISATION: Final = 1e-6
-"""How far a utilisation may be from what the plan says."""
+"""Largest error of a utilisation that a plan says."""
 
 NEAR: Final = 1e-9
 """Residual below which nothing can be off: the smallest error that is allowed of any."""
@@ -67,7 +67,7 @@ class Recomputed(NamedTuple):
 
 
 class Residual(NamedTuple):
-    """What numbers of a plan leave of one kind of limit.
+    """Numbers that a plan leaves of one kind of limit.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def claim(
 
 
 def is_near(residuals: Iterable[Residual]) -> bool:
-    """Whether no residual can be off by what it may be, whatever the size of the loads."""
+    """Say whether no residual can be off by what it may be, whatever the size of the loads."""
     zero = np.concatenate([r.values for r in residuals if r.kind == "zero"], axis=None)
     least = np.concatenate([r.values for r in residuals if r.kind == "least"], axis=None)
     # both are false of numbers that are not finite; no number exceeds the norm of all

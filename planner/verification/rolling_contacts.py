@@ -19,13 +19,13 @@ from hand_models.sections import Section
 __all__ = ["Face", "slip_of"]
 
 BESIDE: Final = 4e-3
-"""How far beside a contact the rock is looked at, and twice that [m]."""
+"""Distance beside a contact at which the rock is looked at, and at twice that [m]."""
 
 STRAIGHT: Final = 1e-12
 """Turn of the rock's normal below which it is flat [rad]."""
 
 ROUND: Final = 1e-11
-"""How far from a circle or a line rock may be that counts as one [m]."""
+"""Largest distance from a circle or a line of rock that counts as one [m]."""
 
 FLATTEST: Final = 10.0
 """Radius of rock from which on faces slide on it as on a flat, by the model [m]."""

@@ -22,7 +22,7 @@ SMALL: Final = 1e-300
 """In place of a load that is zero, where something is divided by it [N]."""
 
 SIDES: Final = np.array([1.0, -1.0])
-"""Of a lateral load."""
+"""Signs of a lateral load."""
 
 
 class LimitCurves:
@@ -100,7 +100,7 @@ def limiting_shares(known: HandBatch) -> Array:
 
 
 class TileLimits:
-    """What tiles bear: friction, the law's surface, and what a plan's half-planes say is used.
+    """Limits of tiles: friction, the law's surface, and what a plan's half-planes say is used.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class TileLimits:
 
         ``nails``: those that hook, and what is used of them, which the plan says with the tiles'.
         """
-        known, name, told = self._known, self._names.tile, again.arrays
+        known, name, planned = self._known, self._names.tile, again.arrays
         shear, normal, _ = again.loads.T
         bases, pressed = known.places.bases, normal.copy()
         pressed[bases] = known.engagement[bases] * normal[bases + 1]
@@ -136,13 +136,13 @@ class TileLimits:
         if self._framed:
             text, pressed = ": its bare frame would be pulled off", normal * known.touch.framed
             yield Residual("least", pressed, self._of, name, text)
-        planes = self._used(told.half_planes, again.loads) * self._per_share
+        planes = self._used(planned.half_planes, again.loads) * self._per_share
         yield Residual("use", planes, self._of)
         used = np.maximum.reduce(planes, axis=1)
         used[nails] = pulled
-        used, said = np.maximum(used, 0.0), told.tile_utilisations
+        used, said = np.maximum(used, 0.0), planned.tile_utilisations
         yield claim(used, said, self._of, UTILISATION, name, ": utilisation")
-        yield self.recompute_law(told.half_planes, again.loads)
+        yield self.recompute_law(planned.half_planes, again.loads)
 
     def recompute_law(
         self, half_planes: tuple[tuple[HalfPlane, ...], ...], loads: Array
