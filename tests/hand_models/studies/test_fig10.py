@@ -1,43 +1,30 @@
 """The study of the limit curve: its data are the array's, and its claims follow from them."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 
 from hand_models import Surface
-from hand_models.studies import fig10, run_study
+from hand_models.studies import fig10
 from hand_models.tile import SpineArray, directional_strength, inner_half_planes
+from tests.hand_models.studies.runs import check_written, studied
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    steps = []
-    folder = tmp_path_factory.mktemp("fig10")
-    result, files = run_study("fig10", folder, lambda *step: steps.append(step))
-    return result, files, steps
+def study():
+    return studied("fig10")
+
+
+def test_it_writes_its_data_and_its_pictures():
+    check_written("fig10", "fig10", "fig10_tile_shear", "fig10_surface")
 
 
 def claim(result, words):
     (found,) = [c for c in result.claims if words in c.claim]
     return found
-
-
-def test_it_writes_its_data_and_three_pictures(study):
-    result, files, steps = study
-    assert [f.name for f in files] == [
-        "result.json",
-        "fig10.png",
-        "fig10_tile_shear.png",
-        "fig10_surface.png",
-    ]
-    assert all(f.read_bytes().startswith(b"\x89PNG") for f in files[1:])
-    written = json.loads(files[0].read_text(encoding="utf-8"))
-    assert written["data"]["fit_of_mean"] == result.data["fit_of_mean"]
-    assert steps == [(i, 4) for i in range(5)]
 
 
 def test_seventy_trials_scatter_about_the_mean_of_the_array(study):

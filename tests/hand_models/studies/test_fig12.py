@@ -6,26 +6,18 @@ import numpy as np
 import pytest
 
 from hand_models.compliance import Gripper
-from hand_models.studies import run_study
 from hand_models.studies.fig12 import balance_matrix
 from service.commands.cli import run
+from tests.hand_models.studies.runs import check_written, studied
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    steps = []
-    folder = tmp_path_factory.mktemp("fig12")
-    result, files = run_study("fig12", folder, lambda *step: steps.append(step))
-    return result, files, steps
+def study():
+    return studied("fig12")
 
 
-def test_it_writes_its_data_and_a_picture(study):
-    result, files, steps = study
-    assert [f.name for f in files] == ["result.json", "fig12.png"]
-    assert files[1].read_bytes().startswith(b"\x89PNG")
-    written = json.loads(files[0].read_text(encoding="utf-8"))
-    assert written["data"]["shear"] == result.data["shear"]
-    assert steps == [(i, 3) for i in range(4)]
+def test_it_writes_its_data_and_its_pictures():
+    check_written("fig12", "fig12")
 
 
 def test_what_was_fitted_is_told_apart(study):

@@ -1,39 +1,23 @@
 """The study of the wrench space on 300 mm: its hull is one, cut and symmetric as it must be."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
 from hand_models.compliance import Gripper, boundary, search_box
 from hand_models.experiments import UNITS, in_paper_signs
-from hand_models.parameters import hand_table
-from hand_models.studies import fig13, run_study
+from tests.hand_models.studies.runs import check_written, studied
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    steps = []
-    folder = tmp_path_factory.mktemp("fig13")
-    with pytest.MonkeyPatch.context() as patch:
-        for name, few in (("PER_AXIS", 20), ("DIRECTIONS", 40), ("PIECE_DIRECTIONS", 8)):
-            patch.setattr(fig13, name, few)
-        result, files = run_study("fig13", folder, lambda *step: steps.append(step), hand_table())
-    return result, files, steps
+def study():
+    return studied("fig13")
 
 
-def test_it_writes_its_data_and_a_picture(study):
-    result, files, steps = study
-    assert [f.name for f in files] == ["result.json", "fig13.png"]
-    assert files[1].read_bytes().startswith(b"\x89PNG")
-    written = json.loads(files[0].read_text(encoding="utf-8"))
-    assert written["data"]["hull_vertices"] == result.data["hull_vertices"]
-    assert steps == sorted(steps)
-    assert steps[0][0] == 0
-    assert steps[-1] == (1000, 1000)
+def test_it_writes_its_data_and_its_pictures():
+    check_written("fig13", "fig13")
 
 
 def test_the_extents_are_calibration_and_the_rest_is_not(study):

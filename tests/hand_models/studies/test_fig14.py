@@ -1,13 +1,11 @@
 """The study of failure modes and loading planes: shares, planes and sets as they must be."""
 
-import json
-
 import numpy as np
 import pytest
 
 from hand_models.experiments import distance_along
-from hand_models.studies import fig14, run_study
 from hand_models.studies.fig14 import loading_planes
+from tests.hand_models.studies.runs import check_written, studied
 
 pytestmark = pytest.mark.slow
 
@@ -15,24 +13,12 @@ BOX = np.array([[x, z, m] for x in (-40.0, 40.0) for z in (-20.0, 0.0) for m in 
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    steps = []
-    folder = tmp_path_factory.mktemp("fig14")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fig14, "PER_AXIS", 20)
-        patch.setattr(fig14, "DIRECTIONS", 40)
-        result, files = run_study("fig14", folder, lambda *step: steps.append(step))
-    return result, files, steps
+def study():
+    return studied("fig14")
 
 
-def test_it_writes_its_data_and_two_pictures(study):
-    result, files, steps = study
-    assert [f.name for f in files] == ["result.json", "fig14.png", "fig14_planes.png"]
-    assert all(f.read_bytes().startswith(b"\x89PNG") for f in files[1:])
-    written = json.loads(files[0].read_text(encoding="utf-8"))
-    assert written["data"]["surfaces"] == result.data["surfaces"]
-    assert steps == sorted(steps)
-    assert steps[-1] == (1000, 1000)
+def test_it_writes_its_data_and_its_pictures():
+    check_written("fig14", "fig14", "fig14_planes")
 
 
 def test_planes_of_the_fitted_surface_are_calibration_and_all_else_is_a_test(study):

@@ -1,60 +1,34 @@
 """Figs. 15 and 16: what must hold of them however the gripper is calibrated."""
 
-import json
-from unittest.mock import patch
-
 import numpy as np
 import pytest
 
 from hand_models.compliance import gripper_table
 from hand_models.experiments import Conditions, radius_axes, rest_state
 from hand_models.parameters import experiment_table
-from hand_models.studies import as_json, fig15, fig16, load_study, run_study
+from tests.hand_models.studies.runs import check_written, studied
 
 pytestmark = pytest.mark.slow
 
 PROXIMAL, DISTAL = 0, 2
 
 
-def coarse(module, folder, **settings):
-    """Run a study coarsely; return its result, its files and what it told."""
-    told = []
-    with patch.multiple(module, **settings):
-        result, files = run_study(module, folder, lambda done, total: told.append((done, total)))
-    return result, files, told
+@pytest.fixture(scope="module")
+def tensions():
+    return studied("fig15")
 
 
 @pytest.fixture(scope="module")
-def tensions(tmp_path_factory):
-    few = {"TENSIONS": 3, "RAYS": 100, "CUTS": 2, "STARTS": 1}
-    return coarse(fig15, tmp_path_factory.mktemp("fig15"), **few)
+def radii():
+    return studied("fig16")
 
 
-@pytest.fixture(scope="module")
-def radii(tmp_path_factory):
-    return coarse(fig16, tmp_path_factory.mktemp("fig16"), POINTS=3, COARSE_POINTS=2)
-
-
-@pytest.mark.parametrize("name", ["tensions", "radii"])
-def test_results_pictures_and_progress_are_complete(name, request):
-    result, files, told = request.getfixturevalue(name)
-    assert json.loads(files[0].read_text(encoding="utf-8")) == json.loads(
-        json.dumps(as_json(result), allow_nan=False)
-    )
-    assert len(files) > 1
-    assert all(file.read_bytes().startswith(b"\x89PNG") for file in files[1:])
-    totals = {total for _, total in told}
-    assert len(totals) == 1
-    done = [step for step, _ in told]
-    assert done == sorted(done)
-    assert done[-1] == totals.pop()
-    # nothing of these figures was fitted
-    assert {claim.role for claim in result.claims} == {"test"}
-
-
-@pytest.mark.parametrize("name", ["fig15", "fig16"])
-def test_they_are_studies_of_the_command(name):
-    assert load_study(name) in (fig15, fig16)
+@pytest.mark.parametrize(
+    ("name", "pictures"), [("fig15", ["fig15"]), ("fig16", ["fig16", "fig16_lower_tension"])]
+)
+def test_they_write_their_data_and_pictures_and_nothing_was_fitted(name, pictures):
+    check_written(name, *pictures)
+    assert {claim.role for claim in studied(name)[0].claims} == {"test"}
 
 
 def test_curves_are_of_the_printed_surfaces(tensions):

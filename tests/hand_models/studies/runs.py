@@ -1,0 +1,42 @@
+"""Studies that the tests share, run coarsely where they would take minutes."""
+
+import json
+import tempfile
+from contextlib import nullcontext
+from functools import cache
+from pathlib import Path
+from unittest.mock import patch
+
+from hand_models.studies import as_json, load_study, run_study
+
+COARSE = {
+    "fig13": {"PER_AXIS": 20, "DIRECTIONS": 40, "PIECE_DIRECTIONS": 8},
+    "fig14": {"PER_AXIS": 20, "DIRECTIONS": 40},
+    "fig15": {"TENSIONS": 3, "RAYS": 100, "CUTS": 2, "STARTS": 1},
+    "fig16": {"POINTS": 3, "COARSE_POINTS": 2},
+}
+"""Numbers of the studies' modules."""
+
+
+@cache
+def studied(name):
+    """Return a study's result, its files and the steps that it told."""
+    steps, coarse = [], COARSE.get(name)
+    with patch.multiple(load_study(name), **coarse) if coarse else nullcontext():
+        folder = Path(tempfile.mkdtemp()) / "new" / "folder"
+        result, files = run_study(name, folder, lambda *step: steps.append(step))
+    return result, files, steps
+
+
+def check_written(name, *pictures):
+    """Hold a study's files and its progress against its result."""
+    result, files, steps = studied(name)
+    assert [file.name for file in files] == ["result.json", *(f"{each}.png" for each in pictures)]
+    assert set(files[0].parent.iterdir()) == set(files)
+    assert all(file.read_bytes().startswith(b"\x89PNG") for file in files[1:])
+    written = json.loads(files[0].read_text(encoding="utf-8"))
+    assert written == json.loads(json.dumps(as_json(result), allow_nan=False))
+    assert steps == sorted(steps)
+    assert steps[0][0] == 0
+    assert len({total for _, total in steps}) == 1
+    assert steps[-1][0] == steps[-1][1]
