@@ -60,8 +60,8 @@ class Setting(NamedTuple):
         Whether what keeps a stance from a plan is explained; None: as each request says.
     columns : tuple of str or None
         Of the rows that answers are told as; with None they are whole replies.
-    versions : dict of str to str or None
-        Of `PACKAGES`, where it is asked.
+    versions : dict of str to str or None, or None
+        Of `PACKAGES`, where it is asked; None where it is answered by the same installation.
     kind : str
         Of all questions: `service.wire.PLAN` or `ROUTE`.
     make : callable or None
@@ -74,7 +74,7 @@ class Setting(NamedTuple):
     form: Format = Format.JSON
     explain: bool | None = None
     columns: tuple[str, ...] | None = None
-    versions: dict[str, str | None] = {}  # noqa: RUF012 - of a named tuple
+    versions: dict[str, str | None] | None = None
     kind: str = PLAN
     make: Callable[[], Answerer] | None = None
 
@@ -136,14 +136,8 @@ def _answerer(pickled: bytes) -> Answerer:
     from service.answering import MeshFiles, handle, robots_of
 
     setting: Setting = pickle.loads(pickled)
-    there, here = setting.versions, own_versions()
-    other = [name for name in PACKAGES if there.get(name) != here[name]]
-    if other:
-        listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
-        raise CruxError(
-            "where it is to be answered there is {}, and where it is asked {}; answers are equal "
-            "to the last digit only with the same versions on both".format(*listed)
-        )
+    if setting.versions is not None:
+        _check_versions(setting.versions)
     if setting.make is not None:
         return setting.make()
     robots = robots_of(setting.robot)
@@ -167,6 +161,17 @@ def _answerer(pickled: bytes) -> Answerer:
         return found._replace(seconds=time.perf_counter() - start)
 
     return answer
+
+
+def _check_versions(there: dict[str, str | None]) -> None:
+    here = own_versions()
+    other = [name for name in PACKAGES if there.get(name) != here[name]]
+    if other:
+        listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
+        raise CruxError(
+            "where it is to be answered there is {}, and where it is asked {}; answers are equal "
+            "to the last digit only with the same versions on both".format(*listed)
+        )
 
 
 def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanRequest | RouteRequest:

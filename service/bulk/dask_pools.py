@@ -92,9 +92,6 @@ class DaskPool:
         If ``distributed`` is not installed, or ``on`` is no address.
     """
 
-    largest = 64
-    deaths = ALLOWED + 1
-
     def __init__(self, on: Any, workers: int | None, setting: bytes) -> None:
         try:
             import distributed
@@ -163,9 +160,9 @@ class DaskPool:
         threads: dict[str, int] = self._client.nthreads()
         return max(1, sum(threads.values()))
 
-    def put(self, number: int, chunk: bytes, about: Hashable = None) -> None:
+    def put(self, number: int, item: bytes, about: Hashable = None) -> None:
         """Submit a chunk."""
-        future = self._client.submit(answer_chunk, self._setting, chunk, pure=False)
+        future = self._client.submit(answer_chunk, self._setting, item, pure=False)
         self._open[number] = future
         self._await(number, future)
 
@@ -226,7 +223,7 @@ class DaskPool:
             raise CruxError(f"the Dask scheduler at {self._address} is gone")
         error = future.exception(timeout=PATIENCE)
         if isinstance(error, KilledWorker):
-            return Lost(f"{self.deaths} Dask workers died of it")
+            return Lost(f"{ALLOWED + 1} Dask workers died of it")
         if isinstance(error, MemoryError):
             return Lost("a Dask worker had no memory for it")
         if isinstance(error, CruxError):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import msgspec
 
 from planner import LimitName
-from service.bulk import Question, Setting, answered, own_versions, pool_on
+from service.bulk import Question, Setting, answered, pool_on
 from service.processes import worth
 from service.replies import ErrorDetail
 from service.sweeping.design import Design, Point
@@ -119,7 +119,7 @@ def asking(
         workers = worth(count, workers)
         on = "here" if workers == 1 else "processes"
     form = Format.MSGPACK
-    setting = Setting(robot, form=form, versions=own_versions())
+    setting = Setting(robot, form=form)
     with pool_on(on, workers, setting) as pool:
         yield lambda payloads: answered(payloads, pool, form)
 

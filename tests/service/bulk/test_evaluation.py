@@ -45,15 +45,9 @@ def encoded(requests: list[dict]) -> list[bytes]:
     return [msgspec.json.encode(request) for request in requests]
 
 
-class Letters(Workers):
+def letters(log: Path, count: int) -> Workers:
     """Processes that answer letters, some of which kill them."""
-
-    largest = LARGEST
-    deaths = 1
-
-    def __init__(self, log: Path, count: int) -> None:
-        super().__init__(partial(workshop.letters, str(log)), count)
-        self.width = count
+    return Workers(partial(workshop.letters, str(log)), count)
 
 
 SETTING = pickle.dumps(Setting(versions=own_versions()))
@@ -61,9 +55,6 @@ SETTING = pickle.dumps(Setting(versions=own_versions()))
 
 class Shuffled:
     """A pool whose answers come in an order that is given."""
-
-    largest = 4
-    deaths = 1
 
     def __init__(self, width: int, picks: Iterator[int]) -> None:
         self.width, self._picks = width, picks
@@ -122,7 +113,7 @@ def test_questions_without_end_are_taken_as_answers_are(tmp_path):
         for taken in itertools.count(1):
             yield b"%d" % taken
 
-    with Letters(tmp_path / "log", 2) as pool:
+    with letters(tmp_path / "log", 2) as pool:
         found = [answer.payload for answer in itertools.islice(answered(endless(), pool), 3000)]
     assert found == [b"%d" % i for i in range(1, 3001)]
     # those that are out, those that are made at once, and those that wait for one before them
@@ -131,7 +122,7 @@ def test_questions_without_end_are_taken_as_answers_are(tmp_path):
 
 def test_a_process_that_is_killed_costs_nothing(tmp_path):
     asked = [b"%d" % i + (b"?" if i in (0, 70, 71) else b"") for i in range(150)]
-    with Letters(tmp_path / "log", 2) as pool:
+    with letters(tmp_path / "log", 2) as pool:
         found = [answer.payload for answer in answered(asked, pool)]
     assert found == [each.upper() for each in asked]
 
@@ -139,7 +130,7 @@ def test_a_process_that_is_killed_costs_nothing(tmp_path):
 def test_a_question_that_kills_its_processes_is_found_and_lost_alone(tmp_path):
     asked = [b'{"id":"%d"}' % i for i in range(120)]
     asked[100] += b"!"
-    with Letters(tmp_path / "log", 2) as pool:
+    with letters(tmp_path / "log", 2) as pool:
         found = list(answered(asked, pool))
     lost = [i for i, answer in enumerate(found) if not answer.good]
     assert lost == [100]
@@ -151,9 +142,8 @@ def test_a_question_that_kills_its_processes_is_found_and_lost_alone(tmp_path):
 
 
 def test_processes_that_cannot_start_end_the_work():
-    pool = Workers(workshop.nothing, 2)
-    pool.width, pool.largest, pool.deaths = 2, 1, 1
-    with pool, pytest.raises(CruxError, match="processes do not start"):
+    told = pytest.raises(CruxError, match="processes do not start")
+    with Workers(workshop.nothing, 2) as pool, told:
         list(answered([b"{}"], pool))
 
 
@@ -184,7 +174,7 @@ def test_answers_are_in_order_however_chunks_come_back(picks, width):
     pool = Shuffled(width, itertools.cycle(picks or [0]))
     found = list(answered(asked, pool))
     assert [json.loads(answer.payload)["id"] for answer in found] == [str(i) for i in range(40)]
-    assert pool.most <= AHEAD * width * WINDOW * pool.largest
+    assert pool.most <= AHEAD * width * WINDOW * LARGEST
 
 
 # Groups -------------------------------------------------------------------------------------------
@@ -222,7 +212,7 @@ def test_what_a_question_is_about_are_its_rocks_and_its_hands():
 @pytest.mark.slow
 def test_what_is_about_the_same_goes_to_the_process_that_knows_it(tmp_path):
     log = tmp_path / "log"
-    with Letters(log, 2) as pool:
+    with letters(log, 2) as pool:
         for i in range(20):
             pool.put(i, encode_chunk([b"%d~" % (i % 2)]), i % 2)
         left = 20
@@ -237,7 +227,7 @@ def test_what_is_about_the_same_goes_to_the_process_that_knows_it(tmp_path):
 
 
 def test_here_one_question_is_answered_at_a_time():
-    pool = Here(Setting(versions=own_versions()))
+    pool = Here(SETTING)
     taken = []
 
     def asked() -> Iterator[PlanRequest]:
