@@ -42,7 +42,7 @@ from service.wire import REQUEST_KINDS, Answer
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.bulk import Asked, Column, Question, Sink, Table, Tally
+    from service.bulk import Asked, Column, Question, Run, Tally
 
 __all__ = ["answer_rest", "batch", "complain", "exit_status", "place", "writing_answers"]
 
@@ -69,6 +69,11 @@ WORST_FIRST: Final = (FAILED, BAD_INPUT, OVERLOADED, DONE)
     is_flag=True,
     help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
 )
+@click.option(
+    "--export",
+    is_flag=True,
+    help="Write the table of what a batch has answered so far, and ask nothing.",
+)
 @workers_option
 @dask_option
 @click.option(
@@ -85,6 +90,7 @@ def batch(
     file: Path | None,
     columns: str | None,
     resume: bool,
+    export: bool,
     workers: int | None,
     dask: str | None,
     explain: bool | None,
@@ -103,28 +109,27 @@ def batch(
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
-    from service.bulk import Lines, ReplyLines, Rows, evaluate, new_manifest, table_at
+    from service.bulk import Lines, ReplyLines, TableLines, evaluate, exporter_at, new_header
 
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
-    kind = None if file is None else table_at(file)
-    if columns is not None and kind is None:
-        raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field="--columns")
+    is_table = file is not None and exporter_at(file) is not None
+    for given, name in ((columns is not None, "--columns"), (export, "--export")):
+        if given and not is_table:
+            raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field=name)
     if file is not None:
-        _check_output(file, requests, resume, kind)
+        _check_output(file, requests, resume, is_table)
         write_alone(file)
     begun = perf_counter()
     with closing(Lines(requests)) as lines:
-        if kind is None:
-            with writing_answers(file):
-                sink: Sink = ReplyLines(file, as_json, resume, lines)
-        else:
-            assert file is not None
-            explain = bool(explain)
-            chosen = _columns(columns, robot, explain)
-            now = new_manifest([each.name for each in chosen], explain, hand, robot)
-            with writing_answers(file):
-                sink = Rows(kind.opened(file, chosen, now, resume, lines))
+        with writing_answers(file):
+            if file is None or not is_table:
+                sink: Run = ReplyLines(file, as_json, resume, lines)
+            else:
+                explain = bool(explain)
+                chosen = _columns(columns, robot, explain)
+                header = new_header(chosen, explain, hand, robot)
+                sink = TableLines(file, chosen, header, resume or export, lines)
         before = sink.tally.count
         on, workers = place(dask, workers, lines.count - before)
         answers = partial(
@@ -137,7 +142,11 @@ def batch(
             explain=explain,
             columns=sink.columns,
         )
-        answer_rest(lines, answers, sink, file, f"planning {requests}", "requests")
+        if export and isinstance(sink, TableLines):
+            with writing_answers(file):
+                sink.export()
+        else:
+            answer_rest(lines, answers, sink, file, f"planning {requests}", "requests")
         elapsed = perf_counter() - begun
         complain(sink.tally, lambda index: f"line {lines.number(index)}", "lines")
     if not as_json:
@@ -176,7 +185,7 @@ def place(dask: str | None, workers: int | None, left: int) -> tuple[str, int | 
 def answer_rest(
     asked: Asked,
     answers: Callable[[Iterator[Question]], Generator[Answer, None, None]],
-    sink: Sink,
+    sink: Run,
     file: Path | None,
     title: str,
     noun: str,
@@ -189,9 +198,9 @@ def answer_rest(
         All questions, those that are answered among them.
     answers : callable
         Answers questions in order.
-    sink : Sink
+    sink : Run
     file : Path or None
-        Where the sink writes.
+        Where the answers go.
     title : str
         What is done.
     noun : str
@@ -220,10 +229,12 @@ def answer_rest(
         stack.enter_context(sink.open())
 
     def kept() -> str:
-        told = f"{sink.whole} of {asked.count} {noun} are answered"
-        if file is None or (not opened and file.exists()):
-            return told
-        return f"{told} in {file}; --resume goes on"
+        known = f"{sink.tally.count} of {asked.count} {noun} are answered"
+        if sink.file is None or file is None:
+            return known
+        if not opened and (file.exists() or sink.file.exists()):
+            return known
+        return f"{known} in {sink.file}; --resume goes on"
 
     try:
         with ExitStack() as stack:
@@ -247,13 +258,13 @@ def answer_rest(
         raise CruxError(f"{error.message}; {kept()}") from None
 
 
-def _check_output(file: Path, requests: str, resume: bool, kind: type[Table] | None) -> None:
+def _check_output(file: Path, requests: str, resume: bool, is_table: bool) -> None:
     """Refuse a file for answers that is the requests' own, or that nothing can be resumed in."""
     try:
-        if kind is None and file.is_dir():
+        if not is_table and file.is_dir():
             field = "--resume" if resume else "-o"
             raise InvalidInputError(f"{file}: no file that a batch has written", field=field)
-        if resume and kind is None and file.exists() and not file.is_file():
+        if resume and not is_table and file.exists() and not file.is_file():
             raise InvalidInputError(f"{file}: no file that a batch has written", field="--resume")
         given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
         if file.is_file() and os.path.samestat(file.stat(), given):

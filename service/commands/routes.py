@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
     from hand_models.parameters import ParameterTable
     from planner import RobotFile
-    from service.bulk import Sink
+    from service.bulk import Run
     from service.requests import Draw, RouteRequest
 
 __all__ = ["route"]
@@ -234,23 +234,30 @@ def _many(
     as_json: bool,
 ) -> int:
     """Evaluate any number of routes, and keep what they come to."""
-    from service.bulk import ReplyLines, Rows, evaluate, new_manifest, route_columns, table_at
+    from service.bulk import (
+        ReplyLines,
+        TableLines,
+        evaluate,
+        exporter_at,
+        new_header,
+        route_columns,
+    )
 
-    kind = table_at(file)
+    is_table = exporter_at(file) is not None
     routes = _Routes(sources, hand, robot)
     if any(os.path.abspath(name) == os.path.abspath(file) for name in routes.names):
         raise InvalidInputError(f"{file}: is one of the routes", field="-o")
     write_alone(file)
     begun = perf_counter()
     with writing_answers(file):
-        if kind is None:
+        if not is_table:
             if file.exists() and not file.is_file():
                 raise InvalidInputError(f"{file}: is no file", field="-o")
-            sink: Sink = ReplyLines(file, False, resume, routes)
+            sink: Run = ReplyLines(file, False, resume, routes)
         else:
             columns = route_columns()
-            now = new_manifest([each.name for each in columns], not unexplained, hand, robot)
-            sink = Rows(kind.opened(file, columns, now, resume, routes))
+            header = new_header(columns, not unexplained, hand, robot)
+            sink = TableLines(file, columns, header, resume, routes)
     before = sink.tally.count
     on, workers = place(dask, workers, PLANS * (routes.count - before))
     answers = partial(

@@ -112,7 +112,7 @@ def sweep(
     a point failed or was lost.
     """
     from service.answering import robots_of
-    from service.bulk import new_manifest
+    from service.bulk import new_header
     from service.sweeping import (
         Design,
         PointRows,
@@ -142,9 +142,9 @@ def sweep(
     files = {"table": folder / TABLE, "picture": folder / PICTURE}
     write_alone(files["table"], folder)
     with writing_answers(files["table"]):
-        columns = [each.name for each in columns_of(design)]
-        begun = new_manifest(columns, False, hand, robot, about(request, design, seed or 0))
-        sink = PointRows(design, files["table"], begun, resume)
+        what = about(request, design, seed or 0)
+        header = new_header(columns_of(design), False, hand, robot, what)
+        sink = PointRows(design, files["table"], header, resume)
     result = _answered(design, sink, files["table"], stance, workers, dask, robot, tolerance)
     with filling_folder():
         plot_sweep(result, files["picture"], Path(stance).stem, pair)

@@ -11,10 +11,9 @@ from typing import Final
 
 import msgspec
 
-from hand_models.base import InvalidInputError
 from planner import LimitName
 from service import bulk
-from service.bulk import Column, CsvTable, Manifest, Rows
+from service.bulk import Column, Header, TableLines
 from service.replies import ErrorDetail
 from service.requests import PlanRequest
 from service.sweeping.design import Design, Point
@@ -34,8 +33,6 @@ COLUMNS: Final = (
 )
 """After what varies."""
 
-RESUME: Final = "--resume"
-
 
 def columns_of(design: Design) -> tuple[Column, ...]:
     """Return the columns of a design's table: what varies, and what that comes to."""
@@ -50,7 +47,7 @@ def columns_of(design: Design) -> tuple[Column, ...]:
 
 
 def about(request: PlanRequest, design: Design, seed: int) -> dict[str, str]:
-    """Return of what a sweep is, by name, for its manifest."""
+    """Return of what a sweep is, by name, for its header."""
     count = f"{len(design.points)} of seed {seed}" if design.sampled else "none"
     varied = [each.text(sampled=design.sampled) for each in design.variations]
     stance = bulk.digest_of(msgspec.json.encode(request))
@@ -90,15 +87,15 @@ class Points:
         return map(self._design.payload, self._design.points)
 
 
-class PointRows(Rows):
-    """Rows of points, in a file that grows with them.
+class PointRows(TableLines):
+    """Rows of points, beside a table that is written of them.
 
     Parameters
     ----------
     design : Design
     path : Path
-    begun : Manifest
-        As it would be without rows.
+        Of the table.
+    header : Header
     resume : bool
         Whether rows that are there are kept.
 
@@ -113,20 +110,10 @@ class PointRows(Rows):
         If the sweep of that file is another one.
     """
 
-    def __init__(self, design: Design, path: Path, begun: Manifest, resume: bool) -> None:
-        table = CsvTable.opened(path, columns_of(design), begun, resume, Points(design))
-        super().__init__(table)
+    def __init__(self, design: Design, path: Path, header: Header, resume: bool) -> None:
         self._design = design
-        try:
-            known = zip(design.points, table.whole_rows(), strict=False)
-            self.points = [_row_from(design, point, cells) for point, cells in known]
-        except (ValueError, IndexError):
-            self.points = []
-        if len(self.points) != self.whole:
-            raise InvalidInputError(
-                f"{path}: its rows are not those that were written; begin anew without it",
-                field=RESUME,
-            )
+        self.points: list[Row] = []
+        super().__init__(path, columns_of(design), header, resume, Points(design))
 
     @property
     def columns(self) -> None:
@@ -138,6 +125,11 @@ class PointRows(Rows):
         row = row_of(self._design, self._design.points[len(self.points)], payload)
         self.points.append(row)
         return bulk.Row(_cells(row), None if row.error else row.status, row.error)
+
+    def known(self, row: bulk.Row) -> None:
+        """Take note of a point that is answered already."""
+        point = self._design.points[len(self.points)]
+        self.points.append(_row_from(self._design, point, row.values))
 
 
 def _cells(row: Row) -> list[str]:
