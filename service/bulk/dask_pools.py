@@ -157,7 +157,10 @@ class DaskPool:
     @property
     def width(self) -> int:
         """Threads that the workers have now, which come and go."""
-        threads: dict[str, int] = self._client.nthreads()
+        try:
+            threads: dict[str, int] = self._client.nthreads()
+        except OSError:
+            raise self._gone() from None
         return max(1, sum(threads.values()))
 
     def put(self, number: int, item: bytes, about: Hashable = None) -> None:
@@ -178,11 +181,12 @@ class DaskPool:
             If the scheduler is gone, or a worker cannot answer at all.
         """
         while True:
-            self._check_scheduler()
+            if self._client.status != "running":
+                raise self._gone()
             try:
                 number, future = self._done.get(timeout=LOOK)
             except Empty:
-                self._tell_if_alone()
+                self._warn_if_alone()
                 continue
             if number not in self._open:
                 continue
@@ -194,10 +198,12 @@ class DaskPool:
                 # its worker has left with the result: another works it out again
                 self._await(number, future)
                 continue
+            except OSError:
+                raise self._gone() from None
             del self._open[number]
             return [(number, found)]
 
-    def _tell_if_alone(self) -> None:
+    def _warn_if_alone(self) -> None:
         """Say once that there is no worker to wait for."""
         with suppress(OSError):
             self._alone = 0 if self._client.nthreads() else self._alone + 1
@@ -209,9 +215,8 @@ class DaskPool:
                 self._address,
             )
 
-    def _check_scheduler(self) -> None:
-        if self._client.status != "running":
-            raise CruxError(f"the Dask scheduler at {self._address} is gone")
+    def _gone(self) -> CruxError:
+        return CruxError(f"the Dask scheduler at {self._address} is gone")
 
     def _found(self, future: Future[bytes]) -> bytes | Lost:
         from distributed import KilledWorker
@@ -220,7 +225,7 @@ class DaskPool:
             answers: bytes = future.result(timeout=PATIENCE)
             return answers
         if future.cancelled():
-            raise CruxError(f"the Dask scheduler at {self._address} is gone")
+            raise self._gone()
         error = future.exception(timeout=PATIENCE)
         if isinstance(error, KilledWorker):
             return Lost(f"{ALLOWED + 1} Dask workers died of it")
