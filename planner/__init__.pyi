@@ -43,6 +43,7 @@ from .processes import (
     cores as cores,
     ending_in_words as ending_in_words,
     resident as resident,
+    starting_children as starting_children,
 )
 from .question import (
     EARTH as EARTH,

@@ -1,3 +1,4 @@
+from .child_processes import starting_children as starting_children
 from .stations import (
     Lane as Lane,
     Make as Make,

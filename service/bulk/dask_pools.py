@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import logging
 import signal
-from collections.abc import Hashable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from multiprocessing import resource_tracker
+from collections.abc import Hashable
+from contextlib import ExitStack, nullcontext, suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Final, Self
 from urllib.parse import urlsplit
 
 from hand_models.base import CruxError, InvalidInputError, to_install
-from planner import Lost, cores
+from planner import Lost, cores, starting_children
 from service.bulk.chunks import answer_chunk
 
 if TYPE_CHECKING:
@@ -57,21 +56,6 @@ def check_address(address: object) -> None:
             "tcp://HOST:PORT of a Dask scheduler, or its client",
             field="on",
         )
-
-
-@contextmanager
-def _no_interrupts() -> Iterator[None]:
-    """Keep Ctrl-C from threads and processes that begin meanwhile, for good: it is this thread's.
-
-    A shell sends it to all of them, and each worker would tell its traceback.
-    """
-    # which would let it through again when it begins
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class DaskPool:
@@ -138,7 +122,8 @@ class DaskPool:
                 logging.getLogger(name).setLevel(logging.CRITICAL)
         where: Any = self._on
         if where == LOCAL:
-            with _no_interrupts():
+            # a shell sends Ctrl-C to all of them, and each worker would print its traceback
+            with starting_children(signal.SIGINT):
                 where = LocalCluster(
                     n_workers=cores() if self._workers is None else self._workers,
                     threads_per_worker=1,
