@@ -11,7 +11,6 @@ import math
 import os
 from collections import OrderedDict, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
 
@@ -24,9 +23,6 @@ log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 R = TypeVar("R")
-
-Numbered = Lane[tuple[int, T], tuple[int, R]]
-"""Lane of a process whose items and results have their numbers with them."""
 
 SHARE: Final = 4
 """A process has no more ahead than what is left by this and by the processes: less and less, so
@@ -83,8 +79,8 @@ class Workers(Generic[T, R]):
     Parameters
     ----------
     make : callable
-        Called once in each process; returns what turns an item into its result. It, items and
-        results can be pickled. What it raises ends its process.
+        Called once in each process; returns what turns an item into its result, which is not None.
+        It, items and results can be pickled. What it raises ends its process.
     count : int
         How many processes, if any.
     ahead : int, optional
@@ -102,12 +98,11 @@ class Workers(Generic[T, R]):
     """
 
     def __init__(self, make: Make[T, R], count: int, ahead: int = 1) -> None:
-        self._make = partial(_numbered, make)
-        self.width, self._ahead = count, ahead
-        self.hands: dict[Numbered[T, R], dict[int, _Task[T]]] = {}
+        self._make, self.width, self._ahead = make, count, ahead
+        self.hands: dict[Lane[T, R], dict[int, _Task[T]]] = {}
         self.stillborn = 0
         self._queue: deque[_Task[T]] = deque()
-        self._knows: OrderedDict[Hashable, Numbered[T, R]] = OrderedDict()
+        self._knows: OrderedDict[Hashable, Lane[T, R]] = OrderedDict()
         self._unborn = ""
         """Why."""
 
@@ -197,12 +192,12 @@ class Workers(Generic[T, R]):
             while self._queue and lane.ready and len(self.hands[lane]) <= min(self._ahead, share):
                 task = self._chosen(lane)
                 self.hands[lane][task.number] = task
-                lane.give((task.number, task.item))
+                lane.give(task.item)
         lanes = {lane.pipe: lane for lane in self.hands}
         ready = wait(list(lanes), timeout)
         return [each for pipe in ready for each in self._take(lanes[cast(Connection, pipe)])]
 
-    def _take(self, lane: Numbered[T, R]) -> list[tuple[int, R | Lost]]:
+    def _take(self, lane: Lane[T, R]) -> list[tuple[int, R | Lost]]:
         """Return what a process has done, if anything; of one that has died, what is lost.
 
         What it had in work goes first in the queue again, once, and all else that it had.
@@ -219,10 +214,12 @@ class Workers(Generic[T, R]):
         self.stillborn = 0
         if done is None:
             return []
-        del self.hands[lane][done[0]]
-        return [done]
+        # its lane answers one after another
+        number = next(iter(self.hands[lane]))
+        del self.hands[lane][number]
+        return [(number, done)]
 
-    def _chosen(self, lane: Numbered[T, R]) -> _Task[T]:
+    def _chosen(self, lane: Lane[T, R]) -> _Task[T]:
         """Take what a process gets next: what it knows, or else nobody, or else what is first."""
         knows = [self._knows.get(task.about) for task in self._queue]
         i = next((knows.index(one) for one in (lane, None) if one in knows), 0)
@@ -252,7 +249,7 @@ class Workers(Generic[T, R]):
         if self.stillborn == STARTS:
             log.warning(why)
 
-    def _bury(self, lane: Numbered[T, R]) -> str:
+    def _bury(self, lane: Lane[T, R]) -> str:
         """Dismiss a process that has died, and return how it did."""
         status = self._dismiss(lane, PATIENCE)
         how = f"a worker {ending_in_words(status)}"
@@ -262,14 +259,8 @@ class Workers(Generic[T, R]):
             self._miss(f"processes do not start: {how}{hint}")
         return how
 
-    def _dismiss(self, lane: Numbered[T, R], patience: float = 0.0) -> int | None:
+    def _dismiss(self, lane: Lane[T, R], patience: float = 0.0) -> int | None:
         del self.hands[lane]
         for about in [about for about, one in self._knows.items() if one is lane]:
             del self._knows[about]
         return lane.station.kill(patience)
-
-
-def _numbered(make: Make[T, R]) -> Callable[[tuple[int, T]], tuple[int, R]]:
-    """Return what turns an item into its result, both with the item's number."""
-    turn = make()
-    return lambda asked: (asked[0], turn(asked[1]))

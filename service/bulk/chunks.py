@@ -1,4 +1,4 @@
-"""Chunks of questions, and the one function that answers them: bytes in, bytes out.
+"""Chunks of questions, and the one function that answers them.
 
 The same wherever it runs, so that answers are equal to the last digit; their times aside, and what
 a deadline has left out.
@@ -27,10 +27,6 @@ if TYPE_CHECKING:
 __all__ = [
     "Setting",
     "answer_chunk",
-    "decode_answers",
-    "decode_chunk",
-    "encode_answers",
-    "encode_chunk",
     "own_versions",
 ]
 
@@ -84,40 +80,20 @@ def own_versions() -> dict[str, str | None]:
     return {name: installed_version(name) for name in PACKAGES}
 
 
-def encode_chunk(payloads: list[bytes]) -> bytes:
-    """Return encoded questions as a chunk."""
-    return msgspec.msgpack.encode(payloads)
-
-
-def decode_chunk(chunk: bytes) -> list[bytes]:
-    """Return the encoded questions of a chunk."""
-    return msgspec.msgpack.decode(chunk, type=list[bytes])
-
-
-def encode_answers(answers: list[Answer]) -> bytes:
-    """Return the answers to a chunk, in the order of its questions."""
-    return msgspec.msgpack.encode(answers)
-
-
-def decode_answers(answers: bytes) -> list[Answer]:
-    """Return the answers of a chunk, in the order of its questions."""
-    return [Answer(*each) for each in msgspec.msgpack.decode(answers)]
-
-
-def answer_chunk(setting: bytes, chunk: bytes) -> bytes:
+def answer_chunk(setting: bytes, chunk: list[bytes]) -> list[Answer]:
     """Answer a chunk of questions, in whatever process.
 
     Parameters
     ----------
     setting : bytes
         A pickled `Setting`: models and files are built once for each that is new to the process.
-    chunk : bytes
-        Of `encode_chunk`.
+    chunk : list of bytes
+        Encoded questions.
 
     Returns
     -------
-    bytes
-        For `decode_answers`.
+    list of Answer
+        In the order of the questions.
 
     Raises
     ------
@@ -125,7 +101,7 @@ def answer_chunk(setting: bytes, chunk: bytes) -> bytes:
         If other versions of `PACKAGES` ask than are to answer.
     """
     answer = _answerers.get(setting, partial(_answerer, setting))
-    return encode_answers([answer(payload) for payload in decode_chunk(chunk)])
+    return [answer(payload) for payload in chunk]
 
 
 _answerers: BoundedStore[bytes, Answerer] = BoundedStore("bulk settings", SETTINGS)

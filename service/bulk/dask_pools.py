@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 from hand_models.base import CruxError, InvalidInputError, to_install
 from planner import Lost, cores, starting_children
 from service.bulk.chunks import answer_chunk
+from service.wire import Answer
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -92,9 +93,9 @@ class DaskPool:
                 )
         self._on, self._workers, self._setting = on, workers, setting
         self._stack = ExitStack()
-        self._open: dict[int, Future[bytes]] = {}
+        self._open: dict[int, Future[list[Answer]]] = {}
         self._alone = 0
-        self._done: SimpleQueue[tuple[int, Future[bytes]]] = SimpleQueue()
+        self._done: SimpleQueue[tuple[int, Future[list[Answer]]]] = SimpleQueue()
 
     def __enter__(self) -> Self:
         try:
@@ -148,16 +149,16 @@ class DaskPool:
             raise self._gone() from None
         return max(1, sum(threads.values()))
 
-    def put(self, number: int, item: bytes, about: Hashable = None) -> None:
+    def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
         """Submit a chunk."""
         future = self._client.submit(answer_chunk, self._setting, item, pure=False)
         self._open[number] = future
         self._await(number, future)
 
-    def _await(self, number: int, future: Future[bytes]) -> None:
+    def _await(self, number: int, future: Future[list[Answer]]) -> None:
         future.add_done_callback(lambda done: self._done.put((number, done)))
 
-    def collect(self) -> list[tuple[int, bytes | Lost]]:
+    def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
         """Wait until a chunk is answered or lost.
 
         Raises
@@ -203,11 +204,11 @@ class DaskPool:
     def _gone(self) -> CruxError:
         return CruxError(f"the Dask scheduler at {self._address} is gone")
 
-    def _found(self, future: Future[bytes]) -> bytes | Lost:
+    def _found(self, future: Future[list[Answer]]) -> list[Answer] | Lost:
         from distributed import KilledWorker
 
         if future.status == "finished":
-            answers: bytes = future.result(timeout=PATIENCE)
+            answers: list[Answer] = future.result(timeout=PATIENCE)
             return answers
         if future.cancelled():
             raise self._gone()

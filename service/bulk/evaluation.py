@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting, decode_answers, encode_chunk
+from service.bulk.chunks import Setting
 from service.bulk.columns import row_of
 from service.bulk.grouping import about, grouped
 from service.bulk.pools import LARGEST, Here, Pool, pool_on
@@ -181,9 +181,8 @@ class _Work:
             chunk = self.chunks.pop(number)
             self._bytes -= chunk.size
             if not isinstance(result, Lost):
-                answers = decode_answers(result)
-                self._learn(answers)
-                self.early.update(zip(chunk.places, answers, strict=True))
+                self._learn(result)
+                self.early.update(zip(chunk.places, result, strict=True))
             elif len(chunk.places) > 1:
                 for place, payload in zip(*chunk, strict=True):
                     self._give(_Chunk([place], [payload]))
@@ -231,7 +230,7 @@ class _Work:
     def _give(self, chunk: _Chunk, rock: bytes = b"") -> None:
         self.chunks[self._put] = chunk
         self._bytes += chunk.size
-        self._pool.put(self._put, encode_chunk(chunk.payloads), rock or None)
+        self._pool.put(self._put, chunk.payloads, rock or None)
         self._put += 1
 
     def _learn(self, answers: list[Answer]) -> None:

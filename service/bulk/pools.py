@@ -12,6 +12,7 @@ from typing import Any, Final, Protocol, Self
 from hand_models.base import InvalidInputError
 from planner import Lost, Workers, cores
 from service.bulk.chunks import Setting, answer_chunk, own_versions
+from service.wire import Answer
 
 __all__ = ["LARGEST", "Here", "Pool", "pool_on", "whole_number"]
 
@@ -35,10 +36,10 @@ class Pool(Protocol):
 
     def __exit__(self, *error: object) -> None: ...
 
-    def put(self, number: int, item: bytes, about: Hashable = None) -> None:
+    def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
         """Let a chunk be answered; those about the same are best answered in one process."""
 
-    def collect(self) -> list[tuple[int, bytes | Lost]]:
+    def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
         """Wait until some chunks are answered, and return their numbers and answers."""
 
 
@@ -49,7 +50,7 @@ class Here:
 
     def __init__(self, setting: bytes) -> None:
         self._setting = setting
-        self._queue: deque[tuple[int, bytes]] = deque()
+        self._queue: deque[tuple[int, list[bytes]]] = deque()
 
     def __enter__(self) -> Self:
         return self
@@ -57,17 +58,17 @@ class Here:
     def __exit__(self, *error: object) -> None:
         self._queue.clear()
 
-    def put(self, number: int, item: bytes, about: Hashable = None) -> None:
+    def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
         """Keep a chunk until answers are collected."""
         self._queue.append((number, item))
 
-    def collect(self) -> list[tuple[int, bytes | Lost]]:
+    def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
         """Answer a chunk."""
         number, chunk = self._queue.popleft()
         return [(number, answer_chunk(self._setting, chunk))]
 
 
-def _answering(setting: bytes) -> Callable[[bytes], bytes]:
+def _answering(setting: bytes) -> Callable[[list[bytes]], list[Answer]]:
     return partial(answer_chunk, setting)
 
 

@@ -17,7 +17,7 @@ from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
-from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_versions
+from service.bulk.chunks import Setting, own_versions
 from service.bulk.evaluation import AHEAD, WINDOW
 from service.bulk.grouping import About, about, grouped
 from service.bulk.pools import LARGEST, Here
@@ -61,7 +61,7 @@ class Shuffled:
         self._line: list = []
         self.most = 0
 
-    def put(self, number: int, chunk: bytes, about: object = None) -> None:
+    def put(self, number: int, chunk: list[bytes], about: object = None) -> None:
         self._line.append((number, chunk))
 
     def collect(self) -> list:
@@ -71,7 +71,7 @@ class Shuffled:
 
 
 def test_a_chunk_is_answered_as_its_questions_are_alone():
-    answers = decode_answers(answer_chunk(SETTING, encode_chunk(encoded(CASES))))
+    answers = answer_chunk(SETTING, encoded(CASES))
     for answer, request in zip(answers, encoded(CASES), strict=True):
         alone = dispatch.handle("plan", request)
         assert (answer.good, answer.status) == (alone.good, alone.status)
@@ -160,7 +160,7 @@ def test_another_version_is_not_answered():
     for name in ("crux-climb", "numpy", "scipy", "clarabel"):
         setting = pickle.dumps(Setting(versions=own_versions() | {name: "0.0.none"}))
         with pytest.raises(CruxError) as caught:
-            answer_chunk(setting, encode_chunk([]))
+            answer_chunk(setting, [])
         there, here = caught.value.message.split(", and where it is asked ")
         assert there.endswith(f" {name} {own_versions()[name]}")
         assert here.startswith(f"{name} 0.0.none;")
@@ -214,7 +214,7 @@ def test_what_is_about_the_same_goes_to_the_process_that_knows_it(tmp_path):
     log = tmp_path / "log"
     with letters(log, 2) as pool:
         for i in range(20):
-            pool.put(i, encode_chunk([b"%d~" % (i % 2)]), i % 2)
+            pool.put(i, [b"%d~" % (i % 2)], i % 2)
         left = 20
         while left:
             left -= len(pool.collect())
