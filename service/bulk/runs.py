@@ -33,6 +33,9 @@ __all__ = ["Header", "ReplyLines", "Run", "TableLines", "digest_of", "new_header
 REPLY: Final = b'{"v":1,'
 """How each line of replies begins."""
 
+HEADER: Final = b'{"crux":'
+"""How the lines of a table begin."""
+
 RESUME: Final = "--resume"
 
 DIGESTS: Final = ("hand", "robot", "stance")
@@ -311,9 +314,22 @@ class TableLines(Run):
         self._table, self._described, self._export = table, columns, export
         self._numbered = columns[0].name == INDEX
         file = table.with_name(f"{table.name}.jsonl")
-        if resume and not file.exists():
+        if file.exists():
+            self._check_own(file, resume)
+        elif resume:
             self._refuse_other(table)
         super().__init__(file, resume, asked, header)
+
+    @staticmethod
+    def _check_own(file: Path, resume: bool) -> None:
+        """Refuse to write over lines that are no table's."""
+        with file.open("rb") as stream:
+            first = stream.read(len(HEADER))
+        if not HEADER.startswith(first):
+            raise InvalidInputError(
+                f"{file}: no table that a batch has written, or a sweep",
+                field=RESUME if resume else "-o",
+            )
 
     @staticmethod
     def _refuse_other(table: Path) -> None:

@@ -218,9 +218,14 @@ def test_a_table_does_not_write_over_what_is_none(lines, tmp_path, capfd):
     assert run(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
     assert "no table that a batch has written" in complaint(capfd)
     assert notes.read_text() == "notes"
-    notes.with_name("notes.csv.jsonl").write_text("notes\n")
-    assert run(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
-    assert "no table that a batch has written" in complaint(capfd)
+    beside = notes.with_name("notes.csv.jsonl")
+    for text in ("notes\n", "notes", lines.read_text()):
+        beside.write_text(text)
+        # the requests themselves, too
+        for asked, more in ((lines, ["--resume"]), (lines, []), (beside, [])):
+            assert run(["batch", str(asked), "-o", str(notes), *more]) == BAD_INPUT
+            assert "no table that a batch has written" in complaint(capfd)
+        assert beside.read_text() == text
     folder.mkdir()
     (folder / "notes").write_text("notes")
     needs(".parquet")
