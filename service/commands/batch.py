@@ -30,8 +30,8 @@ from service.tables import (
     EXIT_STATUS,
     FAILED,
     OVERLOADED,
-    bulk_progress,
     note,
+    progress,
     say,
     verbosity,
     write_alone,
@@ -238,7 +238,7 @@ def answer_rest(
 
     try:
         with ExitStack() as stack:
-            tell = stack.enter_context(bulk_progress(title))
+            tell = stack.enter_context(progress(title, counted=True))
             stack.enter_context(writing_answers(file))
             found = stack.enter_context(closing(answers(ask())))
             if before == asked.count:

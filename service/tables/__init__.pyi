@@ -1,5 +1,5 @@
-from .advice import print_advice as print_advice, words_of as words_of
 from .body_spaces import print_body_space as print_body_space
+from .extras import print_advice as print_advice, words_of as words_of
 from .layout import console as console, table_of as table_of, unit_of as unit_of
 from .output_lock import write_alone as write_alone
 from .plans import (
@@ -16,7 +16,6 @@ from .terminal import (
     EXIT_STATUS as EXIT_STATUS,
     FAILED as FAILED,
     OVERLOADED as OVERLOADED,
-    bulk_progress as bulk_progress,
     draw_plan as draw_plan,
     filling_folder as filling_folder,
     note as note,

@@ -29,9 +29,8 @@ from service.replies import (
     RobustCapability,
     WrenchSpaceReply,
 )
-from service.tables.clearances import print_clearance
+from service.tables.extras import print_clearance, robust_sentence, spread_sentence, within
 from service.tables.layout import in_colour, short, show, table_of, unit_of
-from service.tables.spreads import robust_sentence, spread_sentence, within
 
 __all__ = ["print_plan", "print_robust", "print_wrench_space"]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 import click
 import msgspec
@@ -25,7 +25,6 @@ __all__ = [
     "EXIT_STATUS",
     "FAILED",
     "OVERLOADED",
-    "bulk_progress",
     "draw_plan",
     "filling_folder",
     "note",
@@ -82,7 +81,7 @@ def say(result: object) -> None:
 def show(reply: PlanReply | BriefPlanReply, as_json: bool) -> int:
     """Write a plan, and return its exit status; what is brief is not for a person."""
     from service.replies import BriefPlanReply
-    from service.tables.advice import print_advice
+    from service.tables.extras import print_advice
     from service.tables.plans import print_plan
 
     if as_json or isinstance(reply, BriefPlanReply):
@@ -142,54 +141,49 @@ def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError
     return InvalidInputError(message, field=field)
 
 
-@contextmanager
-def progress(title: str, *, line: str | None = None) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on standard error while the work lasts; yields what tells it done and total.
+class Progress(Protocol):
+    """Takes how much is done, of how much, and perhaps a few words on it."""
 
-    Where no bar can be shown, the line, if there is one, is written when the first step is told.
+    def __call__(self, done: int, total: int, words: str = "") -> None: ...
+
+
+@contextmanager
+def progress(title: str, *, line: str | None = None, counted: bool = False) -> Iterator[Progress]:
+    """Show a bar on standard error while the work lasts; yields what takes its progress.
+
+    Parameters
+    ----------
+    title : str
+    line : str, optional
+        Written at the first step, where no bar can be shown.
+    counted : bool, optional
+        Whether counts, the time left and words are shown, too.
     """
-    from rich.progress import Progress
+    from rich import progress as bars
 
     screen = console(stderr=True)
     shown = screen.is_terminal and verbosity() >= 0
     lines = [line] if line is not None and not screen.is_terminal else []
-    bar = Progress(console=screen, transient=True, disable=not shown)
+    columns = (
+        bars.TextColumn("{task.description}", markup=False),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TimeRemainingColumn(),
+        bars.TextColumn("{task.fields[words]}", markup=False),
+    )
+    bar = bars.Progress(
+        *(columns if counted else ()), console=screen, transient=True, disable=not shown
+    )
     # before rich 14.3 a bar that is not shown leaves an empty line behind
     with bar if shown else nullcontext():
-        task = bar.add_task(title, total=None)
+        task = bar.add_task(title, total=None, words="")
 
-        def tell(done: int, total: int) -> None:
+        def step(done: int, total: int, words: str = "") -> None:
             if lines:
                 remark(lines.pop())
-            bar.update(task, completed=done, total=total)
+            bar.update(task, completed=done, total=total, words=words)
 
-        yield tell
-
-
-@contextmanager
-def bulk_progress(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a bar with counts and the time left; yields what tells done, total and a few words."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    screen = console(stderr=True)
-    shown = screen.is_terminal and verbosity() >= 0
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[words]}", markup=False),
-    )
-    bar = Progress(*columns, console=screen, transient=True, disable=not shown)
-    with bar if shown else nullcontext():
-        task = bar.add_task(title, total=None, words="")
-        yield lambda done, total, words: bar.update(task, completed=done, total=total, words=words)
+        yield step
 
 
 def waiting(title: str, request: PlanRequest) -> AbstractContextManager[None]:
