@@ -30,14 +30,15 @@ from .prepare import (
     settle_each as settle_each,
 )
 from .processes import (
-    OUT_OF_MEMORY as OUT_OF_MEMORY,
     Lane as Lane,
     Lost as Lost,
     Make as Make,
     Station as Station,
     Workers as Workers,
     cores as cores,
+    ending_in_words as ending_in_words,
     resident as resident,
+    starting_children as starting_children,
 )
 from .question import (
     EARTH as EARTH,

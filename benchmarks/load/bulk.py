@@ -134,7 +134,7 @@ class Run:
 @click.option("--seed", default=0, show_default=True)
 def bulk(count: int, processes: int, seed: int) -> None:
     """Plan mixed stances into Parquet; the same with kills and a resumption; compare the tables."""
-    from pyarrow import dataset
+    from pyarrow import parquet
 
     rng = random.Random(seed)
     folder = Path(tempfile.mkdtemp(prefix="crux-bulk-"))
@@ -152,12 +152,13 @@ def bulk(count: int, processes: int, seed: int) -> None:
     console.print(f"a worker is killed: {first.kill_worker(rng)}")
     at = first.watch(took * rng.uniform(0.5, 0.8))
     first.kill()
-    rows = dataset.dataset(broken).count_rows()
+    # its first line says what the rows are of
+    rows = Path(f"{broken}.jsonl").read_bytes().count(b"\n") - 1
     console.print(f"the command is killed after {at:.1f} s, {rows} rows are whole; {first.told()}")
     second = Run(requests, broken, *flags, "--resume")
     took = second.watch()
     console.print(f"resumed: {count - rows} in {took:.1f} s; {second.told()}")
-    before, after = (dataset.dataset(path).to_table() for path in (whole, broken))
+    before, after = (parquet.read_table(path) for path in (whole, broken))
     indices = after["index"].to_pylist()
     console.print(f"each row once, in order: {indices == list(range(count))}")
     console.print(f"the table is that of the undisturbed run: {after.equals(before)}")

@@ -1,8 +1,9 @@
+from .child_processes import starting_children as starting_children
 from .stations import (
-    OUT_OF_MEMORY as OUT_OF_MEMORY,
     Lane as Lane,
     Make as Make,
     Station as Station,
+    ending_in_words as ending_in_words,
     resident as resident,
 )
 from .workers import Lost as Lost, Workers as Workers, cores as cores

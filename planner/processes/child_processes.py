@@ -48,12 +48,18 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def starting_children() -> Iterator[None]:
+def starting_children(*signals: signal.Signals) -> Iterator[None]:
     """Start processes that call `begin_child`: no signal interrupts that on either side.
 
-    One that arrives here meanwhile is answered at the end; there it waits for `begin_child`. They
-    do their linear algebra on one thread.
+    One that arrives here meanwhile is answered at the end; there it waits for `begin_child`, for
+    good where that is not called. They do their linear algebra on one thread.
+
+    Parameters
+    ----------
+    *signals : Signals
+        By default SIGINT and SIGTERM.
     """
+    signals = signals or SIGNALS
     # or else it is started with the first process, and lets signals in again
     resource_tracker.ensure_running()
     arrived: list[int] = []
@@ -63,10 +69,10 @@ def starting_children() -> Iterator[None]:
 
     handlers: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():
-        for each in SIGNALS:
+        for each in signals:
             if signal.getsignal(each) not in (None, signal.SIG_IGN):
                 handlers[each] = signal.signal(each, later)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
         with _one_thread():
             yield

@@ -19,7 +19,7 @@ from typing import Any, Final, Generic, TypeVar
 
 from planner.processes.child_processes import begin_child, starting_children
 
-__all__ = ["OUT_OF_MEMORY", "Lane", "Make", "Station", "resident"]
+__all__ = ["Lane", "Make", "Station", "ending_in_words", "resident"]
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -183,6 +183,15 @@ class Station(Generic[T, R]):
         for lane in self.lanes:
             lane.close()
         return died
+
+
+def ending_in_words(status: int | None) -> str:
+    """Return in words how a process ended, by what `Station.kill` returned."""
+    if status is None:
+        return "was stopped"
+    if status == OUT_OF_MEMORY:
+        return "had not enough memory"
+    return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
 
 
 def resident(pid: int | None) -> int | None:

@@ -1,7 +1,7 @@
-"""Processes that do one kind of work, kept open; one that dies costs what it had in hand at most.
+"""Processes that do one kind of work, kept open; one that dies costs what it had in work at most.
 
-Work goes out ahead and comes back as it is done. What a process had in hand when it died is tried
-once more, alone: whatever kills its process then is lost, and nothing else is.
+Work goes out ahead and comes back as it is done. What a process had in work when it died is tried
+once more: whatever kills its process then is lost, and nothing else is.
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ from __future__ import annotations
 import logging
 import math
 import os
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from functools import partial
 from multiprocessing.connection import Connection, wait
-from typing import Final, Generic, Self, TypeVar, cast
+from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
 
 from hand_models.base import CruxError
-from planner.processes.stations import Lane, Make, Station
+from planner.processes.stations import Lane, Make, Station, ending_in_words
 
 __all__ = ["Lost", "Workers", "cores"]
 
@@ -25,21 +24,12 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 R = TypeVar("R")
 
-Numbered = Lane[tuple[int, T], tuple[int, R]]
-"""Of a process whose items and results have their indices with them."""
-
-AHEAD: Final = 15
-"""Most items that a process has in hand beside one: they are there before that is done."""
-
 SHARE: Final = 4
-"""These are no more than what is left by this and by the processes: less and less, so that none
-waits long for the last one."""
+"""A process has no more ahead than what is left by this and by the processes: less and less, so
+that none waits long for the last one."""
 
 PATIENCE: Final = 1.0
 """Longest time between the end of a process's pipe and its own [s]."""
-
-NEXT: Final = 1
-"""Items of those that were put which a process has in hand beside one."""
 
 KNOWN: Final = 256
 """Things that items are about of which it is kept which process had them last."""
@@ -67,6 +57,15 @@ class Lost:
         self.reason = reason
 
 
+class _Task(NamedTuple, Generic[T]):
+    """An item with its number, what it is about, and whether a process has died of it."""
+
+    number: int
+    item: T
+    about: Hashable = None
+    tried: bool = False
+
+
 def cores() -> int:
     """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -80,108 +79,79 @@ class Workers(Generic[T, R]):
     Parameters
     ----------
     make : callable
-        Called once in each process; returns what turns an item into its result. It, items and
-        results can be pickled. What it raises ends its process.
+        Called once in each process; returns what turns an item into its result, which is not None.
+        It, items and results can be pickled. What it raises ends its process.
     count : int
         How many processes, if any.
+    ahead : int, optional
+        Most items that a process has beside the one in work.
 
     Attributes
     ----------
+    width : int
+        How many processes.
     hands : dict of Lane to dict
-        Items that each process has in hand by their numbers, the one in work first; of those
-        processes that have been started and are not known to have died.
+        Tasks that each process has by their numbers, the one in work first; of those processes
+        that have been started and are not known to have died.
     stillborn : int
         Processes in a row that could not be started, or have died before they were ready.
     """
 
-    def __init__(self, make: Make[T, R], count: int) -> None:
-        self._make = partial(_numbered, make)
-        self._count = count
-        self.hands: dict[Numbered[T, R], dict[int, T]] = {}
+    def __init__(self, make: Make[T, R], count: int, ahead: int = 1) -> None:
+        self._make, self.width, self._ahead = make, count, ahead
+        self.hands: dict[Lane[T, R], dict[int, _Task[T]]] = {}
         self.stillborn = 0
-        self._line: deque[tuple[int, T, Hashable]] = deque()
-        self._knows: dict[Hashable, Numbered[T, R]] = {}
+        self._queue: deque[_Task[T]] = deque()
+        self._knows: OrderedDict[Hashable, Lane[T, R]] = OrderedDict()
         self._unborn = ""
         """Why."""
 
     def __enter__(self) -> Self:
-        self._hire()
+        self._start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._line.clear()
+        self._queue.clear()
         for lane in list(self.hands):
             self._dismiss(lane)
+
+    @property
+    def _unfinished(self) -> bool:
+        return bool(self._queue) or any(self.hands.values())
 
     def wait(self) -> None:
         """Wait until all processes that have been started are ready, or have died."""
         for lane in [lane for lane in self.hands if not lane.ready]:
-            try:
-                lane.take()
-                self.stillborn = 0
-            except EOFError:
-                self._bury(lane)
+            self._take(lane)
 
-    def each(
-        self, items: Sequence[T], here: Callable[[T], R] | None = None
-    ) -> Iterator[tuple[int, R | Lost]]:
+    def each(self, items: Sequence[T], here: Callable[[T], R]) -> Iterator[tuple[int, R | Lost]]:
         """Yield each item's index and result, as they are done.
 
         Parameters
         ----------
         items : sequence
-        here : callable, optional
+        here : callable
             What this process turns items into results with meanwhile, so that nothing waits for
-            processes to start; it does not try what has cost a process. By default it does none.
+            processes to start; it does not try what has cost a process.
         """
-        todo = deque(range(len(items)))
-        tried: set[int] = set()
-        again: deque[int] = deque()
+        for number, item in enumerate(items):
+            self.put(number, item)
         try:
-            while todo or again or any(self.hands.values()):
-                self._hire()
-                if not self.hands and (here is None or not todo):
-                    for i in (*todo, *again):
-                        yield i, Lost(self._unborn)
+            while self._unfinished:
+                self._start()
+                own = any(not task.tried for task in self._queue)
+                if self.hands:
+                    yield from self._exchange(0.0 if own else None)
+                elif not own:
+                    for task in self._queue:
+                        yield task.number, Lost(self._unborn)
                     return
-                for lane, hand in self.hands.items():
-                    if not lane.ready:
-                        continue
-                    if again and not todo and not hand:
-                        i = again.popleft()
-                        self._give(lane, i, items[i])
-                    share = math.ceil(len(todo) / (SHARE * self._count))
-                    while todo and len(hand) <= min(AHEAD, share):
-                        i = todo.popleft()
-                        self._give(lane, i, items[i])
-                if here is not None and todo:
-                    i = todo.popleft()
-                    yield i, here(items[i])
-                if not self.hands:
-                    continue
-                owed = bool(again) or any(self.hands.values())
-                block = here is None or (owed and not todo)
-                lanes = {lane.pipe: lane for lane in self.hands}
-                for pipe in wait(list(lanes), None if block else 0.0):
-                    lane = lanes[cast(Connection, pipe)]
-                    try:
-                        done = lane.take()
-                        self.stillborn = 0
-                    except EOFError:
-                        hand = self.hands[lane]
-                        how = self._bury(lane)
-                        for i in sorted(hand):
-                            if i in tried:
-                                yield i, Lost(f"its process died, twice; {how}")
-                            else:
-                                tried.add(i)
-                                again.append(i)
-                        continue
-                    if done is not None:
-                        del self.hands[lane][done[0]]
-                        yield done
+                if untried := next((task for task in self._queue if not task.tried), None):
+                    self._queue.remove(untried)
+                    yield untried.number, here(untried.item)
         finally:
             # what nobody waits for any more
+            self._queue.clear()
             for lane in [lane for lane, hand in self.hands.items() if hand]:
                 self._dismiss(lane)
 
@@ -197,13 +167,10 @@ class Workers(Generic[T, R]):
             What it is about: a process that has had something about it before is the first to get
             it, if it has room.
         """
-        self._line.append((number, item, about))
+        self._queue.append(_Task(number, item, about))
 
     def collect(self) -> list[tuple[int, R | Lost]]:
         """Wait until something that was put has its result, and return all that have.
-
-        A process that dies is replaced: what it was at work on is lost, once, and what else it had
-        in hand goes to another.
 
         Raises
         ------
@@ -211,45 +178,63 @@ class Workers(Generic[T, R]):
             If processes do not start.
         """
         found: list[tuple[int, R | Lost]] = []
-        while not found and (self._line or any(self.hands.values())):
-            self._hire()
+        while not found and self._unfinished:
+            self._start()
             if not self.hands:
                 raise CruxError(self._unborn)
-            for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
-                while self._line and lane.ready and len(self.hands[lane]) <= NEXT:
-                    number, item, about = self._chosen(lane)
-                    self._knows.pop(about, None)
-                    self._knows[about] = lane
-                    if len(self._knows) > KNOWN:
-                        del self._knows[next(iter(self._knows))]
-                    self._give(lane, number, item)
-            lanes = {lane.pipe: lane for lane in self.hands}
-            for pipe in wait(list(lanes)):
-                lane = lanes[cast(Connection, pipe)]
-                try:
-                    done = lane.take()
-                    self.stillborn = 0
-                except EOFError:
-                    hand = list(self.hands[lane].items())
-                    lost = Lost(f"its process died; {self._bury(lane)}")
-                    found += [(number, lost) for number, _ in hand[:1]]
-                    self._line.extendleft((number, item, None) for number, item in hand[:0:-1])
-                    continue
-                if done is not None:
-                    del self.hands[lane][done[0]]
-                    found.append(done)
+            found = self._exchange(None)
         return found
 
-    def _chosen(self, lane: Numbered[T, R]) -> tuple[int, T, Hashable]:
-        """Take what a process gets next: what it knows, or else nobody, or else what is first."""
-        knows = [self._knows.get(about) for _, _, about in self._line]
-        i = next((knows.index(one) for one in (lane, None) if one in knows), 0)
-        chosen = self._line[i]
-        del self._line[i]
-        return chosen
+    def _exchange(self, timeout: float | None) -> list[tuple[int, R | Lost]]:
+        """Give processes what they have room for, and return what comes within a time [s]."""
+        for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
+            share = math.ceil(len(self._queue) / (SHARE * self.width))
+            while self._queue and lane.ready and len(self.hands[lane]) <= min(self._ahead, share):
+                task = self._chosen(lane)
+                self.hands[lane][task.number] = task
+                lane.give(task.item)
+        lanes = {lane.pipe: lane for lane in self.hands}
+        ready = wait(list(lanes), timeout)
+        return [each for pipe in ready for each in self._take(lanes[cast(Connection, pipe)])]
 
-    def _hire(self) -> None:
-        while len(self.hands) < self._count and self.stillborn < STARTS:
+    def _take(self, lane: Lane[T, R]) -> list[tuple[int, R | Lost]]:
+        """Return what a process has done, if anything; of one that has died, what is lost.
+
+        What it had in work goes first in the queue again, once, and all else that it had.
+        """
+        try:
+            done = lane.take()
+        except EOFError:
+            tasks = list(self.hands[lane].values())
+            how = self._bury(lane)
+            lost = [task for task in tasks[:1] if task.tried]
+            again = [task._replace(tried=True) for task in tasks[:1] if not task.tried]
+            self._queue.extendleft(reversed([*again, *tasks[1:]]))
+            return [(each.number, Lost(f"its process died, twice; {how}")) for each in lost]
+        self.stillborn = 0
+        if done is None:
+            return []
+        # its lane answers one after another
+        number = next(iter(self.hands[lane]))
+        del self.hands[lane][number]
+        return [(number, done)]
+
+    def _chosen(self, lane: Lane[T, R]) -> _Task[T]:
+        """Take what a process gets next: what it knows, or else nobody, or else what is first."""
+        knows = [self._knows.get(task.about) for task in self._queue]
+        i = next((knows.index(one) for one in (lane, None) if one in knows), 0)
+        task = self._queue[i]
+        del self._queue[i]
+        if task.about is not None:
+            self._knows[task.about] = lane
+            self._knows.move_to_end(task.about)
+            if len(self._knows) > KNOWN:
+                self._knows.popitem(last=False)
+        return task
+
+    def _start(self) -> None:
+        """Start processes in place of those that have died."""
+        while len(self.hands) < self.width and self.stillborn < STARTS:
             try:
                 station = Station(self._make, ahead=True)
             except OSError as error:
@@ -264,36 +249,18 @@ class Workers(Generic[T, R]):
         if self.stillborn == STARTS:
             log.warning(why)
 
-    def _give(self, lane: Numbered[T, R], i: int, item: T) -> None:
-        self.hands[lane][i] = item
-        lane.give((i, item))
-
-    def _bury(self, lane: Numbered[T, R]) -> str:
+    def _bury(self, lane: Lane[T, R]) -> str:
         """Dismiss a process that has died, and return how it did."""
         status = self._dismiss(lane, PATIENCE)
-        how = _ending(status)
+        how = f"a worker {ending_in_words(status)}"
         if not lane.ready:
             # nothing of this house is at work before a process is, but the program's own beginning
             hint = NO_GUARD if status == UNCAUGHT else ""
             self._miss(f"processes do not start: {how}{hint}")
         return how
 
-    def _dismiss(self, lane: Numbered[T, R], patience: float = 0.0) -> int | None:
+    def _dismiss(self, lane: Lane[T, R], patience: float = 0.0) -> int | None:
         del self.hands[lane]
-        self._knows = {about: one for about, one in self._knows.items() if one is not lane}
+        for about in [about for about, one in self._knows.items() if one is lane]:
+            del self._knows[about]
         return lane.station.kill(patience)
-
-
-def _numbered(make: Make[T, R]) -> Callable[[tuple[int, T]], tuple[int, R]]:
-    """Return what turns an item into its result, both with the item's index."""
-    turn = make()
-    return lambda asked: (asked[0], turn(asked[1]))
-
-
-def _ending(status: int | None) -> str:
-    """Return in words how a process ended."""
-    if status is None:
-        return "a worker did not answer"
-    if status < 0:
-        return f"a worker was killed by signal {-status}"
-    return f"a worker ended with status {status}"

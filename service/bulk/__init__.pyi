@@ -1,7 +1,6 @@
 from .chunks import (
     Setting as Setting,
     answer_chunk as answer_chunk,
-    own_versions as own_versions,
 )
 from .columns import (
     Column as Column,
@@ -13,15 +12,15 @@ from .columns import (
 )
 from .dask_pools import LOCAL as LOCAL, check_address as check_address
 from .evaluation import Question as Question, answered as answered, evaluate as evaluate
+from .exports import CSV as CSV, PARQUET as PARQUET, exporter_at as exporter_at
 from .lines import Asked as Asked, Lines as Lines
-from .manifest import Manifest as Manifest, digest_of as digest_of, new_manifest as new_manifest
-from .pools import pool_on as pool_on
-from .sinks import ReplyLines as ReplyLines, Rows as Rows, Sink as Sink
-from .tables import (
-    CSV as CSV,
-    PARQUET as PARQUET,
-    CsvTable as CsvTable,
-    Table as Table,
-    table_at as table_at,
+from .pools import pool_on as pool_on, whole_number as whole_number
+from .runs import (
+    Header as Header,
+    ReplyLines as ReplyLines,
+    Run as Run,
+    TableLines as TableLines,
+    digest_of as digest_of,
+    new_header as new_header,
 )
 from .tally import Tally as Tally

@@ -1,4 +1,4 @@
-"""Chunks of questions, and the one function that answers them: bytes in, bytes out.
+"""Chunks of questions, and the one function that answers them.
 
 The same wherever it runs, so that answers are equal to the last digit; their times aside, and what
 a deadline has left out.
@@ -27,10 +27,6 @@ if TYPE_CHECKING:
 __all__ = [
     "Setting",
     "answer_chunk",
-    "decode_answers",
-    "decode_chunk",
-    "encode_answers",
-    "encode_chunk",
     "own_versions",
 ]
 
@@ -60,8 +56,8 @@ class Setting(NamedTuple):
         Whether what keeps a stance from a plan is explained; None: as each request says.
     columns : tuple of str or None
         Of the rows that answers are told as; with None they are whole replies.
-    versions : dict of str to str or None
-        Of `PACKAGES`, where it is asked.
+    versions : dict of str to str or None, or None
+        Of `PACKAGES`, where it is asked; None where it is answered by the same installation.
     kind : str
         Of all questions: `service.wire.PLAN` or `ROUTE`.
     make : callable or None
@@ -74,7 +70,7 @@ class Setting(NamedTuple):
     form: Format = Format.JSON
     explain: bool | None = None
     columns: tuple[str, ...] | None = None
-    versions: dict[str, str | None] = {}  # noqa: RUF012 - of a named tuple
+    versions: dict[str, str | None] | None = None
     kind: str = PLAN
     make: Callable[[], Answerer] | None = None
 
@@ -84,40 +80,20 @@ def own_versions() -> dict[str, str | None]:
     return {name: installed_version(name) for name in PACKAGES}
 
 
-def encode_chunk(payloads: list[bytes]) -> bytes:
-    """Return encoded questions as a chunk."""
-    return msgspec.msgpack.encode(payloads)
-
-
-def decode_chunk(chunk: bytes) -> list[bytes]:
-    """Return the encoded questions of a chunk."""
-    return msgspec.msgpack.decode(chunk, type=list[bytes])
-
-
-def encode_answers(answers: list[Answer]) -> bytes:
-    """Return the answers to a chunk, in the order of its questions."""
-    return msgspec.msgpack.encode(answers)
-
-
-def decode_answers(answers: bytes) -> list[Answer]:
-    """Return the answers of a chunk, in the order of its questions."""
-    return [Answer(*each) for each in msgspec.msgpack.decode(answers)]
-
-
-def answer_chunk(setting: bytes, chunk: bytes) -> bytes:
+def answer_chunk(setting: bytes, chunk: list[bytes]) -> list[Answer]:
     """Answer a chunk of questions, in whatever process.
 
     Parameters
     ----------
     setting : bytes
         A pickled `Setting`: models and files are built once for each that is new to the process.
-    chunk : bytes
-        Of `encode_chunk`.
+    chunk : list of bytes
+        Encoded questions.
 
     Returns
     -------
-    bytes
-        For `decode_answers`.
+    list of Answer
+        In the order of the questions.
 
     Raises
     ------
@@ -125,7 +101,7 @@ def answer_chunk(setting: bytes, chunk: bytes) -> bytes:
         If other versions of `PACKAGES` ask than are to answer.
     """
     answer = _answerers.get(setting, partial(_answerer, setting))
-    return encode_answers([answer(payload) for payload in decode_chunk(chunk)])
+    return [answer(payload) for payload in chunk]
 
 
 _answerers: BoundedStore[bytes, Answerer] = BoundedStore("bulk settings", SETTINGS)
@@ -136,14 +112,8 @@ def _answerer(pickled: bytes) -> Answerer:
     from service.answering import MeshFiles, handle, robots_of
 
     setting: Setting = pickle.loads(pickled)
-    there, here = setting.versions, own_versions()
-    other = [name for name in PACKAGES if there.get(name) != here[name]]
-    if other:
-        listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
-        raise CruxError(
-            "where it is to be answered there is {}, and where it is asked {}; answers are equal "
-            "to the last digit only with the same versions on both".format(*listed)
-        )
+    if setting.versions is not None:
+        _check_versions(setting.versions)
     if setting.make is not None:
         return setting.make()
     robots = robots_of(setting.robot)
@@ -167,6 +137,17 @@ def _answerer(pickled: bytes) -> Answerer:
         return found._replace(seconds=time.perf_counter() - start)
 
     return answer
+
+
+def _check_versions(there: dict[str, str | None]) -> None:
+    here = own_versions()
+    other = [name for name in PACKAGES if there.get(name) != here[name]]
+    if other:
+        listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
+        raise CruxError(
+            "where it is to be answered there is {}, and where it is asked {}; answers are equal "
+            "to the last digit only with the same versions on both".format(*listed)
+        )
 
 
 def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanRequest | RouteRequest:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import logging
 import signal
-from collections.abc import Hashable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from multiprocessing import resource_tracker
+from collections.abc import Hashable
+from contextlib import ExitStack, nullcontext, suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Final, Self
 from urllib.parse import urlsplit
 
 from hand_models.base import CruxError, InvalidInputError, to_install
-from planner import Lost, cores
+from planner import Lost, cores, starting_children
 from service.bulk.chunks import answer_chunk
+from service.wire import Answer
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -59,21 +59,6 @@ def check_address(address: object) -> None:
         )
 
 
-@contextmanager
-def _no_interrupts() -> Iterator[None]:
-    """Keep Ctrl-C from threads and processes that begin meanwhile, for good: it is this thread's.
-
-    A shell sends it to all of them, and each worker would tell its traceback.
-    """
-    # which would let it through again when it begins
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 class DaskPool:
     """A cluster's workers, each of its threads a place to answer a chunk.
 
@@ -92,9 +77,6 @@ class DaskPool:
         If ``distributed`` is not installed, or ``on`` is no address.
     """
 
-    largest = 64
-    deaths = ALLOWED + 1
-
     def __init__(self, on: Any, workers: int | None, setting: bytes) -> None:
         try:
             import distributed
@@ -111,9 +93,9 @@ class DaskPool:
                 )
         self._on, self._workers, self._setting = on, workers, setting
         self._stack = ExitStack()
-        self._open: dict[int, Future[bytes]] = {}
+        self._open: dict[int, Future[list[Answer]]] = {}
         self._alone = 0
-        self._done: SimpleQueue[tuple[int, Future[bytes]]] = SimpleQueue()
+        self._done: SimpleQueue[tuple[int, Future[list[Answer]]]] = SimpleQueue()
 
     def __enter__(self) -> Self:
         try:
@@ -141,7 +123,8 @@ class DaskPool:
                 logging.getLogger(name).setLevel(logging.CRITICAL)
         where: Any = self._on
         if where == LOCAL:
-            with _no_interrupts():
+            # a shell sends Ctrl-C to all of them, and each worker would print its traceback
+            with starting_children(signal.SIGINT):
                 where = LocalCluster(
                     n_workers=cores() if self._workers is None else self._workers,
                     threads_per_worker=1,
@@ -160,19 +143,22 @@ class DaskPool:
     @property
     def width(self) -> int:
         """Threads that the workers have now, which come and go."""
-        threads: dict[str, int] = self._client.nthreads()
+        try:
+            threads: dict[str, int] = self._client.nthreads()
+        except OSError:
+            raise self._gone() from None
         return max(1, sum(threads.values()))
 
-    def put(self, number: int, chunk: bytes, about: Hashable = None) -> None:
+    def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
         """Submit a chunk."""
-        future = self._client.submit(answer_chunk, self._setting, chunk, pure=False)
+        future = self._client.submit(answer_chunk, self._setting, item, pure=False)
         self._open[number] = future
         self._await(number, future)
 
-    def _await(self, number: int, future: Future[bytes]) -> None:
+    def _await(self, number: int, future: Future[list[Answer]]) -> None:
         future.add_done_callback(lambda done: self._done.put((number, done)))
 
-    def collect(self) -> list[tuple[int, bytes | Lost]]:
+    def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
         """Wait until a chunk is answered or lost.
 
         Raises
@@ -181,11 +167,12 @@ class DaskPool:
             If the scheduler is gone, or a worker cannot answer at all.
         """
         while True:
-            self._check_scheduler()
+            if self._client.status != "running":
+                raise self._gone()
             try:
                 number, future = self._done.get(timeout=LOOK)
             except Empty:
-                self._tell_if_alone()
+                self._warn_if_alone()
                 continue
             if number not in self._open:
                 continue
@@ -197,10 +184,12 @@ class DaskPool:
                 # its worker has left with the result: another works it out again
                 self._await(number, future)
                 continue
+            except OSError:
+                raise self._gone() from None
             del self._open[number]
             return [(number, found)]
 
-    def _tell_if_alone(self) -> None:
+    def _warn_if_alone(self) -> None:
         """Say once that there is no worker to wait for."""
         with suppress(OSError):
             self._alone = 0 if self._client.nthreads() else self._alone + 1
@@ -212,21 +201,20 @@ class DaskPool:
                 self._address,
             )
 
-    def _check_scheduler(self) -> None:
-        if self._client.status != "running":
-            raise CruxError(f"the Dask scheduler at {self._address} is gone")
+    def _gone(self) -> CruxError:
+        return CruxError(f"the Dask scheduler at {self._address} is gone")
 
-    def _found(self, future: Future[bytes]) -> bytes | Lost:
+    def _found(self, future: Future[list[Answer]]) -> list[Answer] | Lost:
         from distributed import KilledWorker
 
         if future.status == "finished":
-            answers: bytes = future.result(timeout=PATIENCE)
+            answers: list[Answer] = future.result(timeout=PATIENCE)
             return answers
         if future.cancelled():
-            raise CruxError(f"the Dask scheduler at {self._address} is gone")
+            raise self._gone()
         error = future.exception(timeout=PATIENCE)
         if isinstance(error, KilledWorker):
-            return Lost(f"{self.deaths} Dask workers died of it")
+            return Lost(f"{ALLOWED + 1} Dask workers died of it")
         if isinstance(error, MemoryError):
             return Lost("a Dask worker had no memory for it")
         if isinstance(error, CruxError):

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_versions
+from service.bulk.chunks import Setting
 from service.bulk.columns import row_of
 from service.bulk.grouping import about, grouped
-from service.bulk.pools import Pool, pool_on
+from service.bulk.pools import LARGEST, Here, Pool, pool_on
 from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
 
@@ -34,9 +34,6 @@ AHEAD: Final = 3
 BYTES: Final = 2**22
 """Of a chunk, but for one of a single question; of those ahead, for each process and window."""
 
-AGAIN: Final = 2
-"""Times that a chunk is tried again before it is halved."""
-
 Question = bytes | PlanRequest | RouteRequest | Answer
 
 
@@ -56,9 +53,9 @@ def evaluate(
     """Answer any number of plan requests or routes, in order, errors in their places.
 
     Questions are taken as there is work for them: some chunks are ahead at most, however many there
-    are. A process that dies is replaced, and its chunk tried again, `AGAIN` times at most; then it
-    is halved, until the question that its process dies of is alone, and ``lost``. To break it off,
-    close it.
+    are. A process that dies is replaced, and its chunk tried once more; of one that is lost again,
+    the questions are asked one by one, and the one of which its processes die, twice, is ``lost``.
+    To break it off, close it.
 
     Parameters
     ----------
@@ -100,18 +97,16 @@ def evaluate(
         If no process can be started, or a cluster is gone: what is not yet answered can be asked
         again.
     """
-    setting = Setting(robot, hand, folder, form, explain, columns, own_versions(), kind)
+    setting = Setting(robot, hand, folder, form, explain, columns, kind=kind)
     with pool_on(on, workers, setting) as pool:
         yield from answered(questions, pool, form, columns)
 
 
 class _Chunk(NamedTuple):
-    """Questions with their places, how often their processes have died, and if they were halved."""
+    """Questions with their places."""
 
-    places: tuple[int, ...]
-    payloads: tuple[bytes, ...]
-    deaths: int = 0
-    halved: bool = False
+    places: list[int]
+    payloads: list[bytes]
 
     @property
     def size(self) -> int:
@@ -165,6 +160,7 @@ class _Work:
         self.early: dict[int, Answer] = {}
         self.chunks: dict[int, _Chunk] = {}
         self._asked = self._put = self._bytes = 0
+        self._largest = 1 if isinstance(pool, Here) else LARGEST
         self._together = 1
         """Questions in a chunk."""
 
@@ -177,24 +173,24 @@ class _Work:
             and self._asked - following <= (AHEAD - 1) * count
             and self._bytes <= (AHEAD - 1) * most
         ):
-            for chunk, rock in self._chunks(self._window(count, most)):
-                self._give(chunk, rock)
+            self._give_all(self._window(count, most))
 
     def collect(self) -> None:
-        """Wait for answers, and try again what has lost its process."""
+        """Wait for answers; the questions of a chunk that is lost are asked one by one."""
         for number, result in self._pool.collect():
             chunk = self.chunks.pop(number)
             self._bytes -= chunk.size
             if not isinstance(result, Lost):
-                answers = decode_answers(result)
-                self._learn(answers)
-                self.early.update(zip(chunk.places, answers, strict=True))
-                continue
-            parts = _again(chunk, self._pool.deaths)
-            for part in parts:
-                self._give(part)
-            if not parts:
-                self._lose(chunk, result)
+                self._learn(result)
+                self.early.update(zip(chunk.places, result, strict=True))
+            elif len(chunk.places) > 1:
+                for place, payload in zip(*chunk, strict=True):
+                    self._give(_Chunk([place], [payload]))
+            else:
+                (place,), (payload,) = chunk
+                name = identifier(payload, self._form)
+                lost = encode_error(LostError(result.reason), self._form, name)
+                self.early[place] = self._reported(lost)
 
     def _window(self, count: int, most: int) -> list[tuple[int, bytes]]:
         """Take new questions, no more than so many or so many bytes."""
@@ -209,71 +205,42 @@ class _Work:
             self._asked, taken = i + 1, taken + 1
             payload = _encoded(question, self._form)
             if isinstance(payload, Answer):
-                self.early[i] = self._told(payload)
+                self.early[i] = self._reported(payload)
             else:
                 found.append((i, payload))
                 size += len(payload)
         return found
 
-    def _chunks(self, window: list[tuple[int, bytes]]) -> Iterator[tuple[_Chunk, bytes]]:
-        """Yield chunks of questions about the same, as far as may be, and their rocks."""
+    def _give_all(self, window: list[tuple[int, bytes]]) -> None:
+        """Give out chunks of questions about the same, as far as may be."""
         abouts = [about(payload, self._form) for _, payload in window]
-        places: list[int] = []
-        payloads: list[bytes] = []
-        rock, size = b"", 0
+        chunk, size, rock = _Chunk([], []), 0, b""
         for k in grouped(abouts):
             place, payload = window[k]
-            if places and (len(places) == self._together or size + len(payload) > BYTES):
-                yield _Chunk(tuple(places), tuple(payloads)), rock
-                places, payloads, size = [], [], 0
-            places.append(place)
-            payloads.append(payload)
             size += len(payload)
+            if chunk.places and (len(chunk.places) == self._together or size > BYTES):
+                self._give(chunk, rock)
+                chunk, size = _Chunk([], []), len(payload)
+            chunk.places.append(place)
+            chunk.payloads.append(payload)
             rock = abouts[k].rock
-        if places:
-            yield _Chunk(tuple(places), tuple(payloads)), rock
+        if chunk.places:
+            self._give(chunk, rock)
 
     def _give(self, chunk: _Chunk, rock: bytes = b"") -> None:
         self.chunks[self._put] = chunk
         self._bytes += chunk.size
-        self._pool.put(self._put, encode_chunk(list(chunk.payloads)), rock)
+        self._pool.put(self._put, chunk.payloads, rock or None)
         self._put += 1
 
     def _learn(self, answers: list[Answer]) -> None:
         """Let chunks be as large as is worth it, at most twice as large as before."""
         each = sum(answer.seconds for answer in answers) / len(answers)
         best = int(PACE / max(each, 1e-6))
-        self._together = max(1, min(best, 2 * self._together, self._pool.largest))
+        self._together = max(1, min(best, 2 * self._together, self._largest))
 
-    def _lose(self, chunk: _Chunk, lost: Lost) -> None:
-        """Answer the question that is alone in a chunk."""
-        (place,), (payload,) = chunk.places, chunk.payloads
-        error = LostError(lost.reason)
-        self.early[place] = self._told(
-            encode_error(error, self._form, identifier(payload, self._form))
-        )
-
-    def _told(self, answer: Answer) -> Answer:
+    def _reported(self, answer: Answer) -> Answer:
         return answer if self._columns is None else row_of(answer, self._form, self._columns)
-
-
-def _again(chunk: _Chunk, deaths: int) -> list[_Chunk]:
-    """Return what is tried in place of a chunk whose process has died; nothing if it is lost.
-
-    A half is halved at once; a question that is alone gets another try: the death of its process
-    may have been no fault of its own.
-    """
-    deaths += chunk.deaths
-    alone = len(chunk.places) == 1
-    if deaths <= (1 if chunk.halved and alone else 0 if chunk.halved else AGAIN):
-        return [chunk._replace(deaths=deaths)]
-    if alone:
-        return []
-    half = len(chunk.places) // 2
-    return [
-        _Chunk(chunk.places[part], chunk.payloads[part], halved=True)
-        for part in (slice(half), slice(half, None))
-    ]
 
 
 def _encoded(question: Question, form: Format) -> bytes | Answer:

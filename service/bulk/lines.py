@@ -1,4 +1,4 @@
-"""Requests of a file, one a line, read as needed, and a digest of those that are answered."""
+"""Requests of a file, one a line, read as needed."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from hashlib import sha256
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
 from hand_models.base import InvalidInputError
 from service.wire import Answer
 
-__all__ = ["Asked", "LineDigest", "Lines"]
+__all__ = ["Asked", "Lines"]
 
 
 class Asked(Protocol):
@@ -85,24 +84,3 @@ class Lines:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-
-class LineDigest:
-    """SHA-256 over the SHA-256 digests of lines, one after another."""
-
-    def __init__(self) -> None:
-        self._all = sha256()
-
-    def copy(self) -> LineDigest:
-        """Return one that goes its own way from here."""
-        found = LineDigest()
-        found._all = self._all.copy()
-        return found
-
-    def add(self, line: bytes) -> None:
-        """Take in a line."""
-        self._all.update(sha256(line).digest())
-
-    def hex(self) -> str:
-        """Return the digest so far."""
-        return self._all.hexdigest()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import operator
 import pickle
 from collections import deque
 from collections.abc import Callable, Hashable
@@ -11,9 +11,10 @@ from typing import Any, Final, Protocol, Self
 
 from hand_models.base import InvalidInputError
 from planner import Lost, Workers, cores
-from service.bulk.chunks import Setting, answer_chunk
+from service.bulk.chunks import Setting, answer_chunk, own_versions
+from service.wire import Answer
 
-__all__ = ["Here", "Pool", "Processes", "pool_on"]
+__all__ = ["LARGEST", "Here", "Pool", "pool_on", "whole_number"]
 
 LARGEST: Final = 64
 """Most questions in a chunk: what is tried again where its process has died."""
@@ -26,14 +27,7 @@ class Pool(Protocol):
     ----------
     width : int
         Chunks that are worked on at a time.
-    largest : int
-        Most questions that a chunk may have.
-    deaths : int
-        Processes that have died of a chunk that is lost.
     """
-
-    largest: int
-    deaths: int
 
     @property
     def width(self) -> int: ...
@@ -42,57 +36,59 @@ class Pool(Protocol):
 
     def __exit__(self, *error: object) -> None: ...
 
-    def put(self, number: int, chunk: bytes, about: Hashable = None) -> None:
+    def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
         """Let a chunk be answered; those about the same are best answered in one process."""
 
-    def collect(self) -> list[tuple[int, bytes | Lost]]:
+    def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
         """Wait until some chunks are answered, and return their numbers and answers."""
 
 
 class Here:
     """The calling process itself; it answers one question at a time."""
 
-    width = largest = deaths = 1
+    width = 1
 
-    def __init__(self, setting: Setting) -> None:
-        self._setting = pickle.dumps(setting)
-        self._line: deque[tuple[int, bytes]] = deque()
+    def __init__(self, setting: bytes) -> None:
+        self._setting = setting
+        self._queue: deque[tuple[int, list[bytes]]] = deque()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._line.clear()
+        self._queue.clear()
 
-    def put(self, number: int, chunk: bytes, about: Hashable = None) -> None:
+    def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
         """Keep a chunk until answers are collected."""
-        self._line.append((number, chunk))
+        self._queue.append((number, item))
 
-    def collect(self) -> list[tuple[int, bytes | Lost]]:
+    def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
         """Answer a chunk."""
-        number, chunk = self._line.popleft()
+        number, chunk = self._queue.popleft()
         return [(number, answer_chunk(self._setting, chunk))]
 
 
-class Processes(Workers[bytes, bytes]):
-    """Processes of this machine; this one only hands out.
-
-    Parameters
-    ----------
-    setting : Setting
-    count : int
-    """
-
-    largest = LARGEST
-    deaths = 1
-
-    def __init__(self, setting: Setting, count: int) -> None:
-        super().__init__(partial(_answering, pickle.dumps(setting)), count)
-        self.width = count
-
-
-def _answering(setting: bytes) -> Callable[[bytes], bytes]:
+def _answering(setting: bytes) -> Callable[[list[bytes]], list[Answer]]:
     return partial(answer_chunk, setting)
+
+
+def whole_number(workers: Any) -> int:
+    """Return a number of processes, checked.
+
+    Raises
+    ------
+    InvalidInputError
+        If it is no whole number of at least 1.
+    """
+    try:
+        count = 0 if isinstance(workers, bool) else operator.index(workers)
+    except TypeError:
+        count = 0
+    if count < 1:
+        raise InvalidInputError(
+            f"must be a whole number of at least 1, got {workers!r}", field="workers"
+        )
+    return count
 
 
 def pool_on(on: Any, workers: int | None, setting: Setting) -> Pool:
@@ -113,16 +109,13 @@ def pool_on(on: Any, workers: int | None, setting: Setting) -> Pool:
         If ``on`` is nothing of that kind, or ``workers`` is given for a cluster that has its own.
     """
     if on == "here":
-        return Here(setting)
-    if workers is not None and (isinstance(workers, bool) or workers < 1):
-        raise InvalidInputError(
-            f"must be a whole number of at least 1, got {workers!r}", field="workers"
-        )
+        return Here(pickle.dumps(setting))
+    count = None if workers is None else whole_number(workers)
     if on == "processes":
-        return Processes(setting, cores() if workers is None else workers)
+        return Workers(partial(_answering, pickle.dumps(setting)), count or cores())
     from service.bulk.dask_pools import DaskPool
 
-    if setting.folder is not None:
-        # which a worker may begin elsewhere
-        setting = setting._replace(folder=type(setting.folder)(os.path.abspath(setting.folder)))
-    return DaskPool(on, workers, pickle.dumps(setting))
+    # a worker may have other packages, and may have begun in another folder
+    folder = None if setting.folder is None else setting.folder.absolute()
+    there = setting._replace(versions=own_versions(), folder=folder)
+    return DaskPool(on, count, pickle.dumps(there))

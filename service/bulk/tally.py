@@ -33,16 +33,6 @@ class Tally:
         self.times: defaultdict[str, array[float]] = defaultdict(lambda: array("d"))
         self.first_bad: tuple[int, ErrorDetail] | None = None
 
-    @classmethod
-    def of(cls, statuses: dict[str, int], kinds: dict[str, int]) -> Tally:
-        """Return the tally of answers whose times are not known any more."""
-        found = cls()
-        found.statuses.update(statuses)
-        found.kinds.update(kinds)
-        found.count = found.statuses.total() + found.kinds.total()
-        found.bad = sum(count for kind, count in kinds.items() if kind in REQUEST_KINDS)
-        return found
-
     def add(
         self, status: str | None, error: ErrorDetail | None = None, seconds: float | None = None
     ) -> None:

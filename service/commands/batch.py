@@ -20,7 +20,7 @@ from hand_models.base import CruxError, InvalidInputError
 from service import bulk, processes, tables, wire
 from service.commands import options
 
-__all__ = ["answer_rest", "batch", "complain", "exit_status", "new_sink", "writing_answers"]
+__all__ = ["answer_rest", "batch", "complain", "exit_status", "new_run", "writing_answers"]
 
 WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables.DONE)
 """Exit statuses: that of a batch is the worst of its requests'."""
@@ -45,6 +45,11 @@ WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables
     is_flag=True,
     help="Go on where a batch that was broken off ended: what FILE answers is not asked again.",
 )
+@click.option(
+    "--export",
+    is_flag=True,
+    help="Write the table of what a batch has answered so far, and ask nothing.",
+)
 @options.workers_options
 @click.option(
     "--explain/--no-explain",
@@ -59,6 +64,7 @@ def batch(
     file: Path | None,
     columns: str | None,
     resume: bool,
+    export: bool,
     parallel: options.Workers,
     explain: bool | None,
     own: options.Own,
@@ -77,18 +83,20 @@ def batch(
     """
     if resume and file is None:
         raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
-    kind = None if file is None else bulk.table_at(file)
-    if columns is not None and kind is None:
-        raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field="--columns")
+    is_table = file is not None and bulk.exporter_at(file) is not None
+    for given, name in ((columns is not None, "--columns"), (export, "--export")):
+        if given and not is_table:
+            raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field=name)
     if file is not None:
-        _check_output(file, requests, resume, kind)
+        _check_output(file, requests, resume, is_table)
         tables.write_alone(file)
     begun = perf_counter()
     with closing(bulk.Lines(requests)) as lines:
-        explain = explain if kind is None else bool(explain)
+        explain = bool(explain) if is_table else explain
         choose = partial(_columns, columns, own.robot, bool(explain))
-        sink = new_sink(
-            file, lines, choose, own, explained=bool(explain), resume=resume, shown=as_json
+        kept = resume or export
+        sink = new_run(
+            file, lines, choose, own, explained=bool(explain), resume=kept, shown=as_json
         )
         before = sink.tally.count
         on, workers = parallel.place(lines.count - before)
@@ -102,7 +110,11 @@ def batch(
             explain=explain,
             columns=sink.columns,
         )
-        answer_rest(lines, answers, sink, file, f"planning {requests}", "requests")
+        if export and isinstance(sink, bulk.TableLines):
+            with writing_answers(file):
+                sink.export()
+        else:
+            answer_rest(lines, answers, sink, file, f"planning {requests}", "requests")
         elapsed = perf_counter() - begun
         complain(sink.tally, lambda index: f"line {lines.number(index)}", "lines")
     if not as_json:
@@ -117,7 +129,7 @@ def writing_answers(file: Path | None) -> AbstractContextManager[None]:
     return nullcontext() if file is None else tables.writing(file, "-o")
 
 
-def new_sink(
+def new_run(
     file: Path | None,
     asked: bulk.Asked,
     columns: Callable[[], Sequence[bulk.Column]],
@@ -126,7 +138,7 @@ def new_sink(
     explained: bool,
     resume: bool,
     shown: bool = False,
-) -> bulk.Sink:
+) -> bulk.Run:
     """Return where answers go: rows of a table or lines of a file, or lines on standard output.
 
     Parameters
@@ -145,20 +157,18 @@ def new_sink(
     shown : bool, optional
         Whether replies go to standard output where there is no file.
     """
-    kind = None if file is None else bulk.table_at(file)
-    if file is None or kind is None:
-        with writing_answers(file):
-            return bulk.ReplyLines(file, shown, resume, asked)
-    chosen = columns()
-    now = bulk.new_manifest([each.name for each in chosen], explained, *own)
     with writing_answers(file):
-        return bulk.Rows(kind.opened(file, chosen, now, resume, asked))
+        if file is None or bulk.exporter_at(file) is None:
+            return bulk.ReplyLines(file, shown, resume, asked)
+        chosen = columns()
+        header = bulk.new_header(chosen, explained, *own)
+        return bulk.TableLines(file, chosen, header, resume, asked)
 
 
 def answer_rest(
     asked: bulk.Asked,
     answers: Callable[[Iterator[Any]], Generator[wire.Answer, None, None]],
-    sink: bulk.Sink,
+    sink: bulk.Run,
     file: Path | None,
     title: str,
     noun: str,
@@ -171,9 +181,9 @@ def answer_rest(
         All questions, those that are answered among them.
     answers : callable
         Answers questions in order.
-    sink : Sink
+    sink : Run
     file : Path or None
-        Where the sink writes.
+        Where the answers go.
     title : str
         What is done.
     noun : str
@@ -202,10 +212,12 @@ def answer_rest(
         stack.enter_context(sink.open())
 
     def kept() -> str:
-        told = f"{sink.whole} of {asked.count} {noun} are answered"
-        if file is None or (not opened and file.exists()):
-            return told
-        return f"{told} in {file}; --resume goes on"
+        known = f"{sink.tally.count} of {asked.count} {noun} are answered"
+        if sink.file is None or file is None:
+            return known
+        if not opened and (file.exists() or sink.file.exists()):
+            return known
+        return f"{known} in {sink.file}; --resume goes on"
 
     try:
         with ExitStack() as stack:
@@ -229,13 +241,13 @@ def answer_rest(
         raise CruxError(f"{error.message}; {kept()}") from None
 
 
-def _check_output(file: Path, requests: str, resume: bool, kind: type[bulk.Table] | None) -> None:
+def _check_output(file: Path, requests: str, resume: bool, is_table: bool) -> None:
     """Refuse a file for answers that is the requests' own, or that nothing can be resumed in."""
     try:
-        if kind is None and file.is_dir():
+        if not is_table and file.is_dir():
             field = "--resume" if resume else "-o"
             raise InvalidInputError(f"{file}: no file that a batch has written", field=field)
-        if resume and kind is None and file.exists() and not file.is_file():
+        if resume and not is_table and file.exists() and not file.is_file():
             raise InvalidInputError(f"{file}: no file that a batch has written", field="--resume")
         given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
         if file.is_file() and os.path.samestat(file.stat(), given):

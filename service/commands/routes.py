@@ -18,7 +18,7 @@ import planner
 from hand_models.base import CruxError, InvalidInputError
 from service import answering, bulk, requests, tables, wire
 from service.commands import options, stances
-from service.commands.batch import answer_rest, complain, exit_status, new_sink
+from service.commands.batch import answer_rest, complain, exit_status, new_run
 
 __all__ = ["route"]
 
@@ -191,7 +191,7 @@ def _many(
     begun = perf_counter()
     if file.suffix.lower() == LINES and file.exists() and not file.is_file():
         raise InvalidInputError(f"{file}: is no file", field="-o")
-    sink = new_sink(
+    sink = new_run(
         file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )
     before = sink.tally.count

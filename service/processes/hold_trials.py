@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
-from service.bulk import Setting, answered, own_versions, pool_on
+from service.bulk import Setting, answered, pool_on
 from service.replies import ErrorReply
 from service.wire import Answer, Format
 
@@ -66,7 +66,7 @@ class HoldTrials:
     ) -> None:
         self._seat = seat
         make = partial(_trying, rock, surface, hand, seat)
-        self._pool = pool_on(on, workers, Setting(versions=own_versions(), make=make))
+        self._pool = pool_on(on, workers, Setting(make=make))
 
     def __enter__(self) -> Self:
         self._pool.__enter__()

@@ -6,7 +6,6 @@ They are bulk work like any other; for as many as are no list, or for a cluster,
 from __future__ import annotations
 
 import gc
-import operator
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Final, Self
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from planner import Workers, cores
-from service.bulk import Setting, answered, own_versions, pool_on
+from service.bulk import Setting, answered, pool_on, whole_number
 from service.replies import BriefPlanReply, ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import Answer, Format
@@ -61,8 +60,8 @@ class Planners:
         hand: ParameterTable | None = None,
         folder: Path | None = None,
     ) -> None:
-        count = cores() if workers is None else _whole(workers)
-        setting = Setting(robot, hand, folder, FORM, versions=own_versions())
+        count = cores() if workers is None else whole_number(workers)
+        setting = Setting(robot, hand, folder, FORM)
         self._pool = pool_on("here" if count == 1 else "processes", count, setting)
         self._closed = False
 
@@ -145,21 +144,8 @@ def worth(count: int, workers: int | None = None) -> int:
         If ``workers`` is no whole number of at least 1.
     """
     if workers is not None:
-        return min(_whole(workers), max(1, count))
+        return min(whole_number(workers), max(1, count))
     return cores() if count >= WORTH_A_PROCESS else 1
-
-
-def _whole(workers: object) -> int:
-    """Return a number of processes, checked."""
-    try:
-        count = 0 if isinstance(workers, bool) else operator.index(workers)  # type: ignore[arg-type]
-    except TypeError:
-        count = 0
-    if count < 1:
-        raise InvalidInputError(
-            f"must be a whole number of at least 1, got {workers!r}", field="workers"
-        )
-    return count
 
 
 @contextmanager

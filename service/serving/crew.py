@@ -7,7 +7,7 @@ import time
 from multiprocessing.connection import Connection
 from typing import Final, Literal
 
-from planner import OUT_OF_MEMORY, Lane, Make, Station, resident
+from planner import Lane, Make, Station, ending_in_words, resident
 from service.processes import Job
 from service.replies import ProcessHealth
 from service.serving.question import Question
@@ -200,7 +200,7 @@ class Crew:
         else:
             self._rest()
         left = [each for each in asked if each is not None and not each.replied]
-        return _ending(station.kill(LAST_MOMENT if dead else 0.0)), left
+        return ending_in_words(station.kill(LAST_MOMENT if dead else 0.0)), left
 
     def left(self) -> list[Question]:
         """Return the questions in work that nobody has replied to."""
@@ -231,12 +231,3 @@ class Crew:
             )
             found.append(state)
         return found
-
-
-def _ending(status: int | None) -> str:
-    """Return in words how a process ended."""
-    if status is None:
-        return "was stopped"
-    if status == OUT_OF_MEMORY:
-        return "had not enough memory"
-    return f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"

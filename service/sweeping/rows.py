@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import msgspec
 
-from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from planner import LimitName
 from service import bulk
-from service.bulk import LOCAL, Column, CsvTable, Rows, evaluate
+from service.bulk import LOCAL, Column, TableLines, evaluate
 from service.processes import worth
 from service.replies import ErrorDetail
 from service.requests import PlanRequest
@@ -121,7 +120,7 @@ class Row(msgspec.Struct, frozen=True):
         return [*point, self.status, self.utilisation, factor, *limit, self.complaint]
 
     @classmethod
-    def read(cls, design: Design, point: Point, cells: Sequence[str]) -> Row:
+    def read(cls, design: Design, point: Point, cells: Sequence[Any]) -> Row:
         """Return the row that was written as cells; an error's field is in its message then.
 
         Raises
@@ -131,7 +130,9 @@ class Row(msgspec.Struct, frozen=True):
         """
         names = [column.name for column in COLUMNS]
         known = dict(zip(names, cells[len(point) :], strict=True))
-        given: dict[str, Any] = {key: value for key, value in known.items() if value}
+        given: dict[str, Any] = {
+            key: value for key, value in known.items() if value not in (None, "")
+        }
         if given.get("load_factor") == "inf":
             given = given | {"load_factor": None, "load_factor_unbounded": True}
         if "limit" in given:
@@ -191,8 +192,8 @@ def write_rows(design: Design, rows: Iterable[Row], path: Path) -> None:
         writer.writerows(row.cells for row in rows)
 
 
-class PointRows(Rows):
-    """Rows of points, in a file that grows with them, and the questions that they answer.
+class PointRows(TableLines):
+    """Rows of points, beside a table that is written of them, and the questions that they answer.
 
     Parameters
     ----------
@@ -220,8 +221,6 @@ class PointRows(Rows):
         If the sweep of that file is another one.
     """
 
-    columns = None
-
     def __init__(
         self,
         request: PlanRequest,
@@ -239,19 +238,9 @@ class PointRows(Rows):
             "--samples": count,
             "--vary": " ".join(each.text(sampled=design.sampled) for each in design.variations),
         }
-        begun = bulk.new_manifest([each.name for each in columns], False, hand, robot, about)
-        table = CsvTable.opened(path, columns, begun, resume, self)
-        super().__init__(table)
-        try:
-            known = zip(design.points, table.whole_rows(), strict=False)
-            self.points = [Row.read(design, point, cells) for point, cells in known]
-        except (ValueError, IndexError):
-            self.points = []
-        if len(self.points) != self.whole:
-            raise InvalidInputError(
-                f"{path}: its rows are not those that were written; begin anew without it",
-                field="--resume",
-            )
+        header = bulk.new_header(columns, False, hand, robot, about)
+        self.points: list[Row] = []
+        super().__init__(path, columns, header, resume, self)
 
     def __iter__(self) -> Iterator[bytes]:
         """Yield the encoded request at each point."""
@@ -259,8 +248,18 @@ class PointRows(Rows):
 
     questions = __iter__
 
+    @property
+    def columns(self) -> None:
+        """None: whole replies are read."""
+        return None
+
     def row(self, payload: bytes) -> bulk.Row:
         """Return the cells of the point that is next."""
         row = row_of(self._design, self._design.points[len(self.points)], payload)
         self.points.append(row)
         return bulk.Row(row.cells, None if row.error else row.status, row.error)
+
+    def known(self, row: bulk.Row) -> None:
+        """Take note of a point that is answered already."""
+        point = self._design.points[len(self.points)]
+        self.points.append(Row.read(self._design, point, row.values))

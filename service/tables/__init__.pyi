@@ -1,5 +1,5 @@
-from .advice import print_advice as print_advice, words_of as words_of
 from .body_spaces import print_body_space as print_body_space
+from .extras import print_advice as print_advice, words_of as words_of
 from .layout import (
     console as console,
     in_order as in_order,

@@ -13,6 +13,7 @@ from rich.markup import escape
 
 import planner
 from service import replies
+from service.tables.extras import robust_sentence, spread_sentence, within
 from service.tables.layout import (
     in_colour,
     in_order,
@@ -23,7 +24,6 @@ from service.tables.layout import (
     text,
     unit_of,
 )
-from service.tables.spreads import robust_sentence, spread_sentence, within
 
 __all__ = ["print_plan", "print_robust", "print_wrench_space"]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 import click
 import msgspec
@@ -78,7 +78,7 @@ def say(result: object) -> None:
 
 def show(reply: replies.PlanReply | replies.BriefPlanReply, as_json: bool) -> int:
     """Write a plan, and return its exit status; what is brief is not for a person."""
-    from service.tables.advice import print_advice
+    from service.tables.extras import print_advice
     from service.tables.plans import print_plan
 
     if as_json or isinstance(reply, replies.BriefPlanReply):
@@ -136,20 +136,23 @@ def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError
     return InvalidInputError(message, field=field)
 
 
+class Progress(Protocol):
+    """Takes how much is done, of how much, and perhaps a few words on it."""
+
+    def __call__(self, done: int, total: int, words: str = "") -> None: ...
+
+
 @contextmanager
-def progress(
-    title: str, *, line: str | None = None, counted: bool = False
-) -> Iterator[Callable[..., None]]:
-    """Show a bar on standard error while the work lasts; yields what tells it done and total.
+def progress(title: str, *, line: str | None = None, counted: bool = False) -> Iterator[Progress]:
+    """Show a bar on standard error while the work lasts; yields what takes its progress.
 
     Parameters
     ----------
     title : str
-        What is done.
     line : str, optional
-        Written when the first step is told, where no bar can be shown.
+        Written at the first step, where no bar can be shown.
     counted : bool, optional
-        Whether counts, the time left and a few words, which are told third, are shown as well.
+        Whether counts, the time left and words are shown, too.
     """
     from rich import progress as bars
 
@@ -168,12 +171,12 @@ def progress(
     with bar if shown else nullcontext():
         task = bar.add_task(title, total=None, words="")
 
-        def tell(done: int, total: int, words: str = "") -> None:
+        def step(done: int, total: int, words: str = "") -> None:
             if lines:
                 remark(lines.pop())
             bar.update(task, completed=done, total=total, words=words)
 
-        yield tell
+        yield step
 
 
 def waiting(title: str, request: PlanRequest) -> AbstractContextManager[None]:

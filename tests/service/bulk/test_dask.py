@@ -142,6 +142,7 @@ def dask(*words: str) -> subprocess.Popen[bytes]:
 @watched
 def test_a_scheduler_that_goes_away_leaves_what_is_whole(tmp_path: Path):
     contact, path, table = (tmp_path / name for name in ("scheduler.json", "q.jsonl", "t.csv"))
+    state = tmp_path / "t.csv.jsonl"
     asked = [wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(2000)]
     path.write_text("".join(json.dumps(each) + "\n" for each in asked))
     scheduler = dask(
@@ -152,11 +153,11 @@ def test_a_scheduler_that_goes_away_leaves_what_is_whole(tmp_path: Path):
     worker = dask("worker", address, "--nthreads", "1")
     try:
         batch = begun("batch", str(path), "-o", str(table), "--dask", address)
-        until(lambda: table.exists() and table.read_bytes().count(b"\n") > 10, batch)
+        until(lambda: state.exists() and state.read_bytes().count(b"\n") > 10, batch)
         scheduler.kill()
         _, error = batch.communicate()
-        rows = table.read_bytes().count(b"\n") - 1
-        kept = f"{rows} of 2000 requests are answered in {table}; --resume goes on"
+        rows = state.read_bytes().count(b"\n") - 1
+        kept = f"{rows} of 2000 requests are answered in {state}; --resume goes on"
         told = f"crux: the Dask scheduler at {address} is gone; {kept}\n"
         assert (batch.returncode, error.decode()) == (FAILED, told)
     finally:
@@ -167,14 +168,14 @@ def test_a_scheduler_that_goes_away_leaves_what_is_whole(tmp_path: Path):
 
 @watched
 def test_an_interrupt_from_a_shell_is_one_line(tmp_path: Path):
-    path, table = tmp_path / "q.jsonl", tmp_path / "t.csv"
+    path, table, state = (tmp_path / name for name in ("q.jsonl", "t.csv", "t.csv.jsonl"))
     asked = [wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(4000)]
     path.write_text("".join(json.dumps(each) + "\n" for each in asked))
     batch = begun("batch", str(path), "-o", str(table), "--dask", "local")
-    until(lambda: table.exists() and table.read_bytes().count(b"\n") > 10, batch)
+    until(lambda: state.exists() and state.read_bytes().count(b"\n") > 10, batch)
     # a shell sends it to all processes
     os.killpg(batch.pid, signal.SIGINT)
     status, error = ended(batch)
-    rows = table.read_bytes().count(b"\n") - 1
-    kept = f"{rows} of 4000 requests are answered in {table}"
+    rows = state.read_bytes().count(b"\n") - 1
+    kept = f"{rows} of 4000 requests are answered in {state}"
     assert (status, error) == (FAILED, f"crux: interrupted: {kept}; --resume goes on\n")

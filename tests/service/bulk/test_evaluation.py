@@ -17,7 +17,7 @@ from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
-from service.bulk.chunks import Setting, decode_answers, encode_chunk, own_versions
+from service.bulk.chunks import Setting, own_versions
 from service.bulk.evaluation import AHEAD, WINDOW
 from service.bulk.grouping import About, about, grouped
 from service.bulk.pools import LARGEST, Here
@@ -45,15 +45,9 @@ def encoded(requests: list[dict]) -> list[bytes]:
     return [msgspec.json.encode(request) for request in requests]
 
 
-class Letters(Workers):
+def letters(log: Path, count: int) -> Workers:
     """Processes that answer letters, some of which kill them."""
-
-    largest = LARGEST
-    deaths = 1
-
-    def __init__(self, log: Path, count: int) -> None:
-        super().__init__(partial(workshop.letters, str(log)), count)
-        self.width = count
+    return Workers(partial(workshop.letters, str(log)), count)
 
 
 SETTING = pickle.dumps(Setting(versions=own_versions()))
@@ -62,15 +56,12 @@ SETTING = pickle.dumps(Setting(versions=own_versions()))
 class Shuffled:
     """A pool whose answers come in an order that is given."""
 
-    largest = 4
-    deaths = 1
-
     def __init__(self, width: int, picks: Iterator[int]) -> None:
         self.width, self._picks = width, picks
         self._line: list = []
         self.most = 0
 
-    def put(self, number: int, chunk: bytes, about: object = None) -> None:
+    def put(self, number: int, chunk: list[bytes], about: object = None) -> None:
         self._line.append((number, chunk))
 
     def collect(self) -> list:
@@ -80,7 +71,7 @@ class Shuffled:
 
 
 def test_a_chunk_is_answered_as_its_questions_are_alone():
-    answers = decode_answers(answer_chunk(SETTING, encode_chunk(encoded(CASES))))
+    answers = answer_chunk(SETTING, encoded(CASES))
     for answer, request in zip(answers, encoded(CASES), strict=True):
         alone = dispatch.handle("plan", request)
         assert (answer.good, answer.status) == (alone.good, alone.status)
@@ -122,7 +113,7 @@ def test_questions_without_end_are_taken_as_answers_are(tmp_path):
         for taken in itertools.count(1):
             yield b"%d" % taken
 
-    with Letters(tmp_path / "log", 2) as pool:
+    with letters(tmp_path / "log", 2) as pool:
         found = [answer.payload for answer in itertools.islice(answered(endless(), pool), 3000)]
     assert found == [b"%d" % i for i in range(1, 3001)]
     # those that are out, those that are made at once, and those that wait for one before them
@@ -131,7 +122,7 @@ def test_questions_without_end_are_taken_as_answers_are(tmp_path):
 
 def test_a_process_that_is_killed_costs_nothing(tmp_path):
     asked = [b"%d" % i + (b"?" if i in (0, 70, 71) else b"") for i in range(150)]
-    with Letters(tmp_path / "log", 2) as pool:
+    with letters(tmp_path / "log", 2) as pool:
         found = [answer.payload for answer in answered(asked, pool)]
     assert found == [each.upper() for each in asked]
 
@@ -139,7 +130,7 @@ def test_a_process_that_is_killed_costs_nothing(tmp_path):
 def test_a_question_that_kills_its_processes_is_found_and_lost_alone(tmp_path):
     asked = [b'{"id":"%d"}' % i for i in range(120)]
     asked[100] += b"!"
-    with Letters(tmp_path / "log", 2) as pool:
+    with letters(tmp_path / "log", 2) as pool:
         found = list(answered(asked, pool))
     lost = [i for i, answer in enumerate(found) if not answer.good]
     assert lost == [100]
@@ -151,9 +142,8 @@ def test_a_question_that_kills_its_processes_is_found_and_lost_alone(tmp_path):
 
 
 def test_processes_that_cannot_start_end_the_work():
-    pool = Workers(workshop.nothing, 2)
-    pool.width, pool.largest, pool.deaths = 2, 1, 1
-    with pool, pytest.raises(CruxError, match="processes do not start"):
+    told = pytest.raises(CruxError, match="processes do not start")
+    with Workers(workshop.nothing, 2) as pool, told:
         list(answered([b"{}"], pool))
 
 
@@ -170,7 +160,7 @@ def test_another_version_is_not_answered():
     for name in ("crux-climb", "numpy", "scipy", "clarabel"):
         setting = pickle.dumps(Setting(versions=own_versions() | {name: "0.0.none"}))
         with pytest.raises(CruxError) as caught:
-            answer_chunk(setting, encode_chunk([]))
+            answer_chunk(setting, [])
         there, here = caught.value.message.split(", and where it is asked ")
         assert there.endswith(f" {name} {own_versions()[name]}")
         assert here.startswith(f"{name} 0.0.none;")
@@ -184,7 +174,7 @@ def test_answers_are_in_order_however_chunks_come_back(picks, width):
     pool = Shuffled(width, itertools.cycle(picks or [0]))
     found = list(answered(asked, pool))
     assert [json.loads(answer.payload)["id"] for answer in found] == [str(i) for i in range(40)]
-    assert pool.most <= AHEAD * width * WINDOW * pool.largest
+    assert pool.most <= AHEAD * width * WINDOW * LARGEST
 
 
 # Groups -------------------------------------------------------------------------------------------
@@ -222,9 +212,9 @@ def test_what_a_question_is_about_are_its_rocks_and_its_hands():
 @pytest.mark.slow
 def test_what_is_about_the_same_goes_to_the_process_that_knows_it(tmp_path):
     log = tmp_path / "log"
-    with Letters(log, 2) as pool:
+    with letters(log, 2) as pool:
         for i in range(20):
-            pool.put(i, encode_chunk([b"%d~" % (i % 2)]), i % 2)
+            pool.put(i, [b"%d~" % (i % 2)], i % 2)
         left = 20
         while left:
             left -= len(pool.collect())
@@ -237,7 +227,7 @@ def test_what_is_about_the_same_goes_to_the_process_that_knows_it(tmp_path):
 
 
 def test_here_one_question_is_answered_at_a_time():
-    pool = Here(Setting(versions=own_versions()))
+    pool = Here(SETTING)
     taken = []
 
     def asked() -> Iterator[PlanRequest]:

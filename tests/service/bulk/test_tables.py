@@ -15,11 +15,10 @@ import pytest
 from hand_models.base import InvalidInputError
 from service.answering import dispatch
 from service.bulk import chosen_columns, columns_of
-from service.bulk.tables import CsvTable, ParquetTable
 from service.commands.cli import run
 from tests.service.commands.test_interruption import limited
-from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint, result
-from tests.suite.helpers.processes import begun, ended, until, watched, workers
+from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint
+from tests.suite.helpers.processes import begun, ended, until, watched
 from tests.suite.helpers.requests import HEAVY, plan_request, wall_request
 
 LIMBS = ("front_right", "rear_right", "rear_left", "front_left")
@@ -46,14 +45,19 @@ def content(path: Path) -> list[dict]:
     if path.suffix == ".csv":
         with path.open(newline="", encoding="utf-8") as file:
             return list(csv.DictReader(file))
-    from pyarrow import dataset
+    from pyarrow import parquet
 
-    return dataset.dataset(path).to_table().to_pylist()
+    return parquet.read_table(path).to_pylist()
 
 
-def manifest(path: Path) -> dict:
-    kind = CsvTable if path.suffix == ".csv" else ParquetTable
-    return json.loads(kind.manifest_path(path).read_text())
+def state(path: Path) -> Path:
+    return path.with_name(f"{path.name}.jsonl")
+
+
+def whole_rows(path: Path) -> int:
+    """Rows that are whole in the state of a table; its first line says what they are of."""
+    there = state(path)
+    return max(there.read_bytes().count(b"\n") - 1, 0) if there.exists() else 0
 
 
 @pytest.mark.parametrize("ending", [".csv", ".parquet"])
@@ -81,16 +85,16 @@ def test_rows_tell_what_replies_do(ending, lines, tmp_path, capfd):
     bad = rows[5]
     assert (bad["id"], bad["status"] or None) == ('bad, "quoted"', None)
     assert (bad["error_kind"], bad["error_field"]) == ("invalid", "stance")
-    assert manifest(path)["complete"]
+    assert whole_rows(path) == COUNT
 
 
 def test_units_are_in_the_schema_of_parquet(lines, tmp_path, capfd):
     pytest.importorskip("pyarrow")
-    from pyarrow import dataset
+    from pyarrow import parquet
 
     path = tmp_path / "table.parquet"
     run(["batch", str(lines), "-o", str(path), "--json"])
-    schema = dataset.dataset(path).schema
+    schema = parquet.read_schema(path)
     for column in columns_of(LIMBS):
         told = {
             key.decode(): text.decode() for key, text in schema.field(column.name).metadata.items()
@@ -130,60 +134,52 @@ def test_explanations_are_in_a_table_if_they_are_asked_for(lines, tmp_path, capf
 
 
 @watched
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-def test_what_is_interrupted_goes_on_and_is_the_same_table(ending, lines, tmp_path, capfd):
+@pytest.mark.parametrize(
+    ("ending", "number"),
+    [(".csv", signal.SIGINT), (".csv", signal.SIGKILL), (".parquet", signal.SIGINT)],
+)
+def test_what_is_ended_by_a_signal_goes_on_and_is_the_same_table(
+    ending, number, lines, tmp_path, capfd
+):
     needs(ending)
     whole, path = tmp_path / f"whole{ending}", tmp_path / f"table{ending}"
     assert run(["batch", str(lines), "-o", str(whole), "--json"]) == BAD_INPUT
     summary = json.loads(capfd.readouterr().out)
     process = begun("batch", str(lines), "-o", str(path), "--workers", "2")
-    kind = CsvTable if ending == ".csv" else ParquetTable
-    until(lambda: len(workers(process)) >= 2 and kind.manifest_path(path).exists(), process)
-    process.send_signal(signal.SIGINT)
+    until(lambda: whole_rows(path) >= 2, process)
+    process.send_signal(number)
     status, error = ended(process)
-    rows = len(content(path)) if manifest(path)["parts"] else 0
-    kept = f"{rows} of {COUNT} requests are answered in {path}; --resume goes on"
-    assert (status, error) == (FAILED, f"crux: interrupted: {kept}\n")
-    again = ["batch", str(lines), "-o", str(path), "--json", "--resume"]
-    assert run(again) == BAD_INPUT
+    rows = whole_rows(path)
+    kept = f"{rows} of {COUNT} requests are answered in {state(path)}; --resume goes on"
+    if number == signal.SIGINT:
+        assert (status, error) == (FAILED, f"crux: interrupted: {kept}\n")
+    assert not path.exists()
+    # what there is can be looked at
+    asked = ["batch", str(lines), "-o", str(path), "--json"]
+    run([*asked, "--export"])
+    assert content(path) == content(whole)[:rows]
+    assert run([*asked, "--resume"]) == BAD_INPUT
     assert content(path) == content(whole)
     # nothing is left to do, and the status is that of all
-    assert run(again) == BAD_INPUT
-    told = json.loads(capfd.readouterr().out.splitlines()[-1])
-    assert {**told, "time": 0, "file": 0} == {**summary, "time": 0, "file": 0}
+    assert run([*asked, "--resume"]) == BAD_INPUT
+    said = json.loads(capfd.readouterr().out.splitlines()[-1])
+    assert {**said, "time": 0, "file": 0} == {**summary, "time": 0, "file": 0}
     assert content(path) == content(whole)
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-def test_what_a_kill_has_left_half_done_is_done_again(ending, lines, tmp_path, capfd, monkeypatch):
-    """Parts of three rows; then what is there when the process is killed just before a manifest."""
-    needs(ending)
-    monkeypatch.setattr("service.bulk.tables.ROWS", 3)
-    whole, path = tmp_path / f"whole{ending}", tmp_path / f"table{ending}"
+@pytest.mark.parametrize("cut", ["in the header", "after the header", "in a row"])
+def test_what_a_kill_has_left_half_done_is_done_again(cut, lines, tmp_path, capfd):
+    whole, path = tmp_path / "whole.csv", tmp_path / "table.csv"
     for each in (whole, path):
         run(["batch", str(lines), "-o", str(each), "--json"])
-    kind = CsvTable if ending == ".csv" else ParquetTable
-    told = manifest(path)
-    if ending == ".csv":
-        data = path.read_bytes().splitlines(keepends=True)
-        told["parts"][0] |= {"rows": 6, "bytes": len(b"".join(data[:7]))}
-        path.write_bytes(b"".join(data[:9]) + data[9][:20])
-    else:
-        assert [part["rows"] for part in told["parts"]] == [3] * (COUNT // 3)
-        told["parts"] = told["parts"][:2]
-        (path / ".part-000003.part.parquet").write_bytes(b"PAR1")
-    from service.bulk import Lines
-    from service.bulk.lines import LineDigest
-
-    digest = LineDigest()
-    for line in list(Lines(str(lines)))[:6]:
-        digest.add(line)
-    told |= {"sha256": digest.hex(), "statuses": {"overloaded": 5}, "errors": {"invalid": 1}}
-    kind.manifest_path(path).write_text(json.dumps(told))
+    data = state(path).read_bytes().splitlines(keepends=True)
+    left = {"in the header": data[0][:30], "after the header": data[0]}
+    state(path).write_bytes(left.get(cut, b"".join(data[:7]) + data[7][:20]))
     capfd.readouterr()
     assert run(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
     assert json.loads(capfd.readouterr().out)["requests"] == COUNT
-    assert content(path) == content(whole)
+    assert path.read_bytes() == whole.read_bytes()
+    assert state(path).read_bytes() == state(whole).read_bytes()
 
 
 def test_a_table_does_not_go_on_with_other_work(lines, tmp_path, capfd):
@@ -201,14 +197,17 @@ def test_a_table_does_not_go_on_with_other_work(lines, tmp_path, capfd):
         assert run([*asked, "--resume", *more]) == BAD_INPUT
         assert words in complaint(capfd)
     text = lines.read_text()
-    for other in (text.replace("r3", "other"), text[: len(text) // 2]):
+    for other, words in (
+        (text.replace("r3", "other"), "answer other requests"),
+        (text[: len(text) // 2], f"has {COUNT} replies"),
+    ):
         lines.write_text(other)
         assert run([*asked, "--resume"]) == BAD_INPUT
-        assert "answer other requests" in complaint(capfd)
+        assert words in complaint(capfd)
     # more requests after those that are answered are the same work
     lines.write_text(text + json.dumps(wall_request() | {"id": "more"}) + "\n")
     assert run([*asked, "--resume"]) == BAD_INPUT
-    assert result(capfd)["optimal"] == 1
+    assert json.loads(capfd.readouterr().out)["optimal"] == 1
     assert path.read_bytes().startswith(before)
     assert [row["id"] for row in content(path)][-1] == "more"
 
@@ -219,20 +218,42 @@ def test_a_table_does_not_write_over_what_is_none(lines, tmp_path, capfd):
     assert run(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
     assert "no table that a batch has written" in complaint(capfd)
     assert notes.read_text() == "notes"
+    beside = notes.with_name("notes.csv.jsonl")
+    for text in ("notes\n", "notes", lines.read_text()):
+        beside.write_text(text)
+        # the requests themselves, too
+        for asked, more in ((lines, ["--resume"]), (lines, []), (beside, [])):
+            assert run(["batch", str(asked), "-o", str(notes), *more]) == BAD_INPUT
+            assert "no table that a batch has written" in complaint(capfd)
+        assert beside.read_text() == text
     folder.mkdir()
     (folder / "notes").write_text("notes")
     needs(".parquet")
     for more in ([], ["--resume"]):
         assert run(["batch", str(lines), "-o", str(folder), *more]) == BAD_INPUT
-        assert "no table that a batch has written" in complaint(capfd)
+        assert "is a folder; remove it" in complaint(capfd)
     assert [path.name for path in folder.iterdir()] == ["notes"]
+
+
+def test_a_table_of_an_older_version_is_begun_anew(lines, tmp_path, capfd):
+    path = tmp_path / "table.csv"
+    path.write_text("index,id\n")
+    path.with_name("table.csv.manifest.json").write_text("{}")
+    for more in (["--resume"], ["--export"]):
+        assert run(["batch", str(lines), "-o", str(path), *more]) == BAD_INPUT
+        assert "was begun by an older version" in complaint(capfd)
+    assert path.read_text() == "index,id\n"
+    assert run(["batch", str(lines), "-o", str(path)]) == BAD_INPUT
+    assert len(content(path)) == COUNT
 
 
 def test_a_full_disk_leaves_whole_rows(lines, tmp_path, capfd):
     path = tmp_path / "table.csv"
-    status, error = limited("batch", str(lines), "-o", str(path), size=4000)
-    kept = f"0 of {COUNT} requests are answered in {path}; --resume goes on"
-    assert (status, error) == (FAILED, f"crux: cannot write {path}: File too large; {kept}\n")
+    status, error = limited("batch", str(lines), "-o", str(path), size=8000)
+    kept = f"{whole_rows(path)} of {COUNT} requests are answered in {state(path)}"
+    expected = f"crux: cannot write {path}: File too large; {kept}; --resume goes on\n"
+    assert (status, error) == (FAILED, expected)
+    assert 0 < whole_rows(path) < COUNT
     assert run(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
     assert [int(row["index"]) for row in content(path)] == list(range(COUNT))
 
@@ -282,18 +303,24 @@ def test_answers_stay_where_no_others_take_their_place(
     assert path.read_text() == "answers\n"
 
 
-def test_a_table_goes_on_that_a_full_disk_left_without_a_row(lines, tmp_path, capfd, monkeypatch):
+def test_a_table_that_a_full_disk_kept_from_being_written_is_exported_later(
+    lines, tmp_path, capfd, monkeypatch
+):
     path = tmp_path / "table.csv"
 
-    def full(*_):
+    def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as there:
-        there.setattr(CsvTable, "_append", full)
+        there.setattr("csv.writer", full)
         assert run(["batch", str(lines), "-o", str(path)]) == FAILED
     assert "--resume goes on" in complaint(capfd)
-    assert run(["batch", str(lines), "-o", str(path), "--resume"]) == BAD_INPUT
+    assert not path.exists()
+    run(["batch", str(lines), "-o", str(path), "--export"])
     assert len(content(path)) == COUNT
+    capfd.readouterr()
+    assert run(["batch", str(lines), "--export"]) == BAD_INPUT
+    assert "--export: needs a table" in complaint(capfd)
 
 
 def test_less_is_said_of_a_batch(lines, tmp_path, capfd):

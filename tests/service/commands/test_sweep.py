@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import signal
 from pathlib import Path
 
@@ -162,8 +161,8 @@ def test_what_is_answered_is_kept(
     with pytest.raises(Interrupted) as caught:
         run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
     table = tmp_path / "sweep.csv"
-    assert str(caught.value) == f"1 of 4 points are answered in {table}; --resume goes on"
-    assert table.read_bytes().count(b"\n") == 2
+    assert str(caught.value) == f"1 of 4 points are answered in {table}.jsonl; --resume goes on"
+    assert whole_rows(tmp_path) == 1
     assert not (tmp_path / "sweep.png").exists()
 
 
@@ -183,10 +182,8 @@ WIDE = ["--vary", "load.mass=60:140:30", "--vary", "body.position.0=-0.06:0.06:4
 
 STOPPING = """
 import itertools, threading
-from service.bulk.tables import CsvTable
 from service.sweeping import rows
 
-CsvTable.seconds = 0.0  # rows are kept at once
 evaluate = rows.evaluate
 
 def first(questions, **options):
@@ -199,9 +196,10 @@ rows.evaluate = first
 """What makes a sweep stop after 400 points, and stay until it is killed."""
 
 
-def manifest(folder: Path) -> dict:
-    path = folder / "sweep.csv.manifest.json"
-    return json.loads(path.read_text()) if path.exists() else {"parts": []}
+def whole_rows(folder: Path) -> int:
+    """Points that are whole in the state of a sweep; its first line says what they are of."""
+    path = folder / "sweep.csv.jsonl"
+    return max(path.read_bytes().count(b"\n") - 1, 0) if path.exists() else 0
 
 
 @pytest.mark.slow
@@ -219,12 +217,12 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
     assert process.stdout.readline() == b"400 are answered\n"
     process.kill()
     ended(process)
-    done = sum(part["rows"] for part in manifest(folder)["parts"])
+    done = whole_rows(folder)
     assert 0 < done <= 400
-    assert not manifest(folder)["complete"]
+    assert not (folder / "sweep.csv").exists()
     # a row that is cut off, as a kill in the middle of writing leaves it
-    with (folder / "sweep.csv").open("ab") as file:
-        file.write(b"60.0,-0.0")
+    with (folder / "sweep.csv.jsonl").open("ab") as file:
+        file.write(b'{"values":["60.0')
     asked = []
 
     def counting(questions, **options):
@@ -239,7 +237,7 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
     told = result(capfd)
     assert told | {"files": 0} == summary | {"files": 0}
     assert (folder / "sweep.csv").read_bytes() == (whole / "sweep.csv").read_bytes()
-    assert manifest(folder)["complete"]
+    assert whole_rows(folder) == 1200
     assert (folder / "sweep.png").exists()
     # nothing is left to do
     assert run(again) == DONE
@@ -314,11 +312,11 @@ def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(
     capfd.readouterr()
     assert run(["sweep", "wall-700", *given, "--resume"]) == BAD_INPUT
     assert "was begun with another stance; begin anew without it" in complaint(capfd)
-    table = tmp_path / "sweep.csv"
-    table.write_text("\n".join(table.read_text().replace(",", "").splitlines()) + 99 * "\n")
+    lines = tmp_path / "sweep.csv.jsonl"
+    lines.write_text(lines.read_text().replace('"optimal",', ""))
     assert run(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
-    capfd.readouterr()
-    (tmp_path / "sweep.csv.manifest.json").unlink()
+    assert "no row of this table" in complaint(capfd)
+    lines.unlink()
     assert run(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
     assert "no table that a batch has written, or a sweep" in complaint(capfd)
     # one that never began begins
@@ -332,7 +330,9 @@ def test_a_sweep_goes_on_after_a_full_disk(
     varied = ["--vary", "load.mass=60:120:40", "-o", str(folder)]
     status, error = limited("sweep", "wall-300", *varied, size=2000)
     table = folder / "sweep.csv"
-    kept = f"0 of 40 points are answered in {table}; --resume goes on"
+    done = whole_rows(folder)
+    kept = f"{done} of 40 points are answered in {table}.jsonl; --resume goes on"
+    assert 0 < done < 40
     assert (status, error) == (FAILED, f"crux: cannot write {table}: File too large; {kept}\n")
     assert run(["sweep", "wall-300", *varied, "--json", "--resume"]) == DONE
     assert result(capfd)["answered"] == 40

@@ -228,7 +228,7 @@ def test_a_process_that_dies_costs_its_own_question(
 ) -> None:
     answer = client.ask({"signal": int(number), "id": "mine"})
     assert (kind(answer), answer["id"]) == ("lost", "mine")
-    assert f"was ended by signal {int(number)}" in answer["error"]["message"]
+    assert f"was killed by signal {int(number)}" in answer["error"]["message"]
     assert "pid" in client.ask({"echo": 1})
     site.wait_until(client, all_up)
 

@@ -71,13 +71,12 @@ def reversers() -> Callable[[bytes], bytes]:
     return lambda item: item[::-1]
 
 
-def letters(log: str) -> Callable[[bytes], bytes]:
+def letters(log: str) -> Callable[[list[bytes]], list]:
     """Answers chunks of bulk work with their own letters.
 
     ``!`` kills its process whenever it comes, ``?`` the first time that it does; ``~`` takes a
     while. All are logged.
     """
-    from service.bulk.chunks import decode_chunk, encode_answers
     from service.wire import Answer
 
     def answer(payload: bytes) -> Answer:
@@ -90,4 +89,4 @@ def letters(log: str) -> Callable[[bytes], bytes]:
             time.sleep(0.2)
         return Answer(payload.upper(), "", seconds=1e-4)
 
-    return lambda chunk: encode_answers([answer(each) for each in decode_chunk(chunk)])
+    return lambda chunk: [answer(each) for each in chunk]

@@ -1,20 +1,48 @@
-"""How sure a plan is, for a person: with no more digits than that leaves."""
+"""What a plan may have beside itself, for a person: advice, and how sure it is."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import islice
 from typing import Final
 
-from planner import Quantiles, RobustLoadFactor, Spread
+from rich.console import Console
 
-__all__ = ["robust_sentence", "spread_sentence", "within"]
+from planner import Advice, Quantiles, RobustLoadFactor, Spread
+from service.replies import PlanReply
+
+__all__ = [
+    "print_advice",
+    "robust_sentence",
+    "spread_sentence",
+    "within",
+    "words_of",
+]
 
 MOST_DIGITS: Final = 3
 """After the point, however small the spread."""
 
 CORRELATED: Final = 10
 """Draws of which it is said on what they hang most: of a few, chance makes a correlation."""
+
+MOST: Final = 3
+"""Changes shown; the best first."""
+
+
+def words_of(advice: Advice, *, holding: bool = False) -> str:
+    """Return what one change would do, of a stance that is ``holding`` already, or is not."""
+    what = "would be better" if holding else "would hold" if advice.holds else "would help"
+    return f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}"
+
+
+def print_advice(reply: PlanReply, out: Console) -> None:
+    """Print what would make a plan's stance hold, or be better, where that was looked for."""
+    holding = reply.status == "optimal"
+    for advice in islice(reply.advice or (), MOST):
+        out.print(words_of(advice, holding=holding), markup=False)
+    if reply.advice == [] and "advice" not in reply.unfinished:
+        out.print("of all changes that were tried none would help")
 
 
 def within(value: float, spread: Quantiles | None) -> str:

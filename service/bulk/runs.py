@@ -1,0 +1,401 @@
+"""The state of a run: a file of JSON lines, one an answer, that only grows.
+
+Its whole lines are what is done, whatever has ended the run; a last one that is cut off is asked
+again. Lines are replies, or rows of a table with what they answer.
+"""
+
+from __future__ import annotations
+
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from hashlib import blake2b, sha256
+from io import FileIO
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import msgspec
+
+from hand_models.base import InvalidInputError, installed_version
+from hand_models.parameters import ParameterTable
+from planner import RobotFile, Time
+from service.bulk.columns import INDEX, Column, Row
+from service.bulk.exports import exporter_at
+from service.bulk.lines import Asked
+from service.bulk.tally import Tally
+from service.replies import ErrorDetail
+from service.wire import Format, identifier
+
+__all__ = ["Header", "ReplyLines", "Run", "TableLines", "digest_of", "new_header"]
+
+REPLY: Final = b'{"v":1,'
+"""How each line of replies begins."""
+
+HEADER: Final = b'{"crux":'
+"""How the lines of a table begin."""
+
+RESUME: Final = "--resume"
+
+DIGESTS: Final = ("hand", "robot", "stance")
+"""Names of what a header has a digest of."""
+
+OLD_MANIFESTS: Final = ("{}.manifest.json", "{}/_manifest.json")
+"""Files of versions before runs were lines, beside a table or in its folder."""
+
+
+class _Outcome(NamedTuple):
+    """What the tally takes of an answer: its status or its error, and its time [s]."""
+
+    status: str | None
+    error: ErrorDetail | None
+    seconds: float | None = None
+
+
+class Run(ABC):
+    """Answers in the order of their questions, in a file that only grows.
+
+    Parameters
+    ----------
+    file : Path or None
+        Of the lines; None where nothing is kept.
+    resume : bool
+        Whether the lines that are there are kept.
+    asked : Asked
+        All questions, those that the file answers among them.
+    header : Header, optional
+        First line of the file.
+
+    Attributes
+    ----------
+    columns : tuple of str or None
+        As `service.bulk.evaluate` takes them.
+    tally : Tally
+        Of all answers, with those that were there before.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file's lines do not answer these questions.
+    OSError
+        If it cannot be read.
+    """
+
+    def __init__(
+        self, file: Path | None, resume: bool, asked: Asked, header: Header | None = None
+    ) -> None:
+        self.file, self._header = file, header
+        self.tally = Tally()
+        self._out: FileIO | None = None
+        self._kept = 0
+        if file is not None and resume and file.exists():
+            self._kept = self._read(file, asked)
+
+    @property
+    def columns(self) -> tuple[str, ...] | None:
+        return None
+
+    @contextmanager
+    def open(self) -> Iterator[None]:
+        """Be ready to write while this is entered; `OSError` where that cannot be."""
+        if self.file is None:
+            yield
+            return
+        with self.file.open("r+b" if self._kept else "wb", buffering=0) as out:
+            if self._kept:
+                # what is cut off
+                out.truncate(self._kept)
+                out.seek(self._kept)
+            elif self._header is not None:
+                _append(msgspec.json.encode(self._header) + b"\n", out)
+            self._out = out
+            yield
+
+    def write(self, question: bytes, payload: bytes, seconds: float) -> None:
+        """Take the answer to the next question; `OSError` where it cannot be written."""
+        # before it is written, so that next to nothing is between a line and its count
+        line, outcome = self._line(question, payload, seconds)
+        if self._out is not None:
+            _append(line, self._out)
+        self.tally.add(*outcome)
+
+    @abstractmethod
+    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
+        """Return the line of an answer, and what is to be counted."""
+
+    @abstractmethod
+    def _read_line(self, line: bytes, question: bytes, where: str) -> _Outcome:
+        """Return what is to be counted of a line, if it is an answer to a question."""
+
+    def _read(self, file: Path, asked: Asked) -> int:
+        """Count what the whole lines of a file are, and return their bytes."""
+        heads = self._header is not None
+        with file.open("rb") as stream:
+            count = sum(line.endswith(b"\n") for line in stream) - heads
+            if count < 0:
+                # ended before its first line was whole
+                return 0
+            stream.seek(0)
+            if self._header is not None:
+                self._header.check(stream.readline(), file)
+            if count > asked.count:
+                raise InvalidInputError(
+                    f"{file} has {count} replies, and there are {asked.count} requests; "
+                    "is it of another batch?",
+                    field=RESUME,
+                )
+            for number, question in enumerate(islice(asked, count), start=1 + heads):
+                outcome = self._read_line(stream.readline(), question, f"{file}, line {number}")
+                self.tally.add(*outcome)
+            kept = stream.tell()
+            last = stream.readline()
+        if last and not heads and not last.startswith(REPLY[: len(last)]):
+            raise InvalidInputError(f"{file}: its end is of no reply", field=RESUME)
+        return kept
+
+
+def _append(line: bytes, out: FileIO) -> None:
+    written = 0
+    try:
+        while written < len(line):
+            written += out.write(line[written:])
+    except BaseException:
+        # a line that is cut off would be read by nobody
+        with suppress(OSError):
+            out.truncate(out.seek(0, 2) - written)
+        raise
+
+
+class _Reply(msgspec.Struct):
+    """What the tally needs to know of a reply."""
+
+    id: str | None = None
+    status: str | None = None
+    time: Time | None = None
+    error: ErrorDetail | None = None
+
+    @property
+    def outcome(self) -> _Outcome:
+        seconds = None if self.time is None else self.time.total
+        return _Outcome(self.status, self.error, seconds)
+
+
+class ReplyLines(Run):
+    """Replies, one a line, in a file, on standard output, or nowhere.
+
+    Parameters
+    ----------
+    file : Path or None
+    shown : bool
+        Whether they go to standard output where there is no file.
+    resume : bool
+    asked : Asked
+        As of `Run`.
+    """
+
+    def __init__(self, file: Path | None, shown: bool, resume: bool, asked: Asked) -> None:
+        super().__init__(file, resume, asked)
+        self._shown = shown and file is None
+
+    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
+        reply = msgspec.json.decode(payload, type=_Reply)
+        line = payload + b"\n"
+        if self._shown:
+            sys.stdout.buffer.write(line)
+            sys.stdout.buffer.flush()
+        return line, reply.outcome
+
+    def _read_line(self, line: bytes, question: bytes, where: str) -> _Outcome:
+        try:
+            reply = msgspec.json.decode(line, type=_Reply)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise InvalidInputError(f"{where}: no reply", field=RESUME) from None
+        name = identifier(question, Format.JSON)
+        if reply.id != name:
+            raise InvalidInputError(
+                f"{where}: answers {reply.id!r}, and the request is {name!r}; "
+                "is it of another batch?",
+                field=RESUME,
+            )
+        if reply.status is None and reply.error is None:
+            raise InvalidInputError(f"{where}: no reply", field=RESUME)
+        return reply.outcome
+
+
+class Header(msgspec.Struct):
+    """Say what the rows of a table are of.
+
+    ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``: what else
+    the work is of, by name; of `DIGESTS` a `digest_of` it.
+    """
+
+    crux: str | None
+    columns: list[str]
+    explain: bool
+    hand: str | None = None
+    robot: str | None = None
+    v: int = 2
+    about: dict[str, str] = {}
+
+    def check(self, before: bytes, path: Path) -> None:
+        """Refuse a line that is the header of other work, and say what has changed."""
+        try:
+            there = msgspec.json.decode(before, type=Header)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise InvalidInputError(
+                f"{path}: no table that a batch has written, or a sweep", field=RESUME
+            ) from None
+        known, wanted = there._compared(), self._compared()
+        for name in dict.fromkeys([*known, *wanted]):
+            values = known.get(name), wanted.get(name)
+            if values[0] != values[1]:
+                which = "" if name in DIGESTS else f" ({values[0]!r}, now {values[1]!r})"
+                raise InvalidInputError(
+                    f"{path}: was begun with another {name}{which}; begin anew without it",
+                    field=RESUME,
+                )
+
+    def _compared(self) -> dict[str, Any]:
+        """Return what it says by name, in the order in which that is compared."""
+        named = {name: getattr(self, name) for name in ("v", "crux", "hand", "robot", "explain")}
+        return named | self.about | {"columns": self.columns}
+
+
+def new_header(
+    columns: Iterable[Column],
+    explain: bool,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    about: dict[str, str] | None = None,
+) -> Header:
+    """Return the header of a table that is to be begun, or gone on with."""
+    own_robot = None if robot is None else digest_of((robot.toml, robot.urdf))
+    own_hand = None if hand is None else digest_of(sorted(hand.sections.items()))
+    names = [each.name for each in columns]
+    return Header(installed_version(), names, explain, own_hand, own_robot, about=about or {})
+
+
+def digest_of(value: Any) -> str:
+    """Return a digest of plain values."""
+    return sha256(repr(value).encode()).hexdigest()
+
+
+class _RowLine(Row, omit_defaults=True, kw_only=True):
+    """A row as a line: with a digest of the question that it answers."""
+
+    asked: str
+
+
+class TableLines(Run):
+    """Rows of a table, in a file of lines beside it, ``TABLE.jsonl``; the table is its export.
+
+    Parameters
+    ----------
+    table : Path
+        ``.csv`` or ``.parquet``.
+    columns : sequence of Column
+    header : Header
+    resume : bool
+    asked : Asked
+        As of `Run`.
+    """
+
+    def __init__(
+        self,
+        table: Path,
+        columns: Sequence[Column],
+        header: Header,
+        resume: bool,
+        asked: Asked,
+    ) -> None:
+        export = exporter_at(table)
+        assert export is not None
+        self._table, self._described, self._export = table, columns, export
+        self._numbered = columns[0].name == INDEX
+        file = table.with_name(f"{table.name}.jsonl")
+        if file.exists():
+            self._check_own(file, resume)
+        elif resume:
+            self._refuse_other(table)
+        super().__init__(file, resume, asked, header)
+
+    @staticmethod
+    def _check_own(file: Path, resume: bool) -> None:
+        """Refuse to write over lines that are no table's."""
+        with file.open("rb") as stream:
+            first = stream.read(len(HEADER))
+        if not HEADER.startswith(first):
+            raise InvalidInputError(
+                f"{file}: no table that a batch has written, or a sweep",
+                field=RESUME if resume else "-o",
+            )
+
+    @staticmethod
+    def _refuse_other(table: Path) -> None:
+        """Refuse to go on with a table that has no lines beside it."""
+        if any(Path(name.format(table)).exists() for name in OLD_MANIFESTS):
+            raise InvalidInputError(
+                f"{table}: was begun by an older version, and cannot be gone on with; begin anew "
+                "without it",
+                field=RESUME,
+            )
+        if table.exists():
+            raise InvalidInputError(
+                f"{table}: no table that a batch has written, or a sweep", field=RESUME
+            )
+
+    @property
+    def columns(self) -> tuple[str, ...] | None:
+        return tuple(column.name for column in self._described)
+
+    def row(self, payload: bytes) -> Row:
+        """Return what the table says of an answer."""
+        return msgspec.msgpack.decode(payload, type=Row)
+
+    def known(self, row: Row) -> None:
+        """Take note of a row that is there already."""
+
+    @contextmanager
+    def open(self) -> Iterator[None]:
+        """Be ready to write while this is entered, and write the table when all is answered."""
+        with super().open():
+            yield
+        self.export()
+
+    def export(self) -> None:
+        """Write the table of what is answered, whole or not at all; `OSError` as `open`."""
+        self._export(self._table, self._described, self._rows())
+
+    def _rows(self) -> Iterator[list[Any]]:
+        assert self.file is not None
+        with self.file.open("rb") as lines:
+            for i, line in enumerate(islice(lines, 1, 1 + self.tally.count)):
+                values = msgspec.json.decode(line, type=_RowLine).values
+                yield [i, *values] if self._numbered else values
+
+    def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
+        row = self.row(payload)
+        line = _RowLine(row.values, row.status, row.error, asked=_digest(question))
+        return msgspec.json.encode(line) + b"\n", _Outcome(row.status, row.error, seconds)
+
+    def _read_line(self, line: bytes, question: bytes, where: str) -> _Outcome:
+        try:
+            row = msgspec.json.decode(line, type=_RowLine)
+            whole = len(row.values) + self._numbered == len(self._described)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            whole = False
+        if not whole:
+            raise InvalidInputError(f"{where}: no row of this table", field=RESUME)
+        if row.asked != _digest(question):
+            raise InvalidInputError(
+                f"{where}: its rows answer other requests than those given now; "
+                "is it of another batch?",
+                field=RESUME,
+            )
+        self.known(row)
+        return _Outcome(row.status, row.error)
+
+
+def _digest(question: bytes) -> str:
+    return blake2b(question, digest_size=8).hexdigest()
