@@ -1,4 +1,5 @@
 from .filled_holes import FilledCells as FilledCells, filled_cells as filled_cells
+from .grids import Triangles as Triangles, drawn_out as drawn_out, grid as grid
 from .holds import (
     Cylinder as Cylinder,
     Edge as Edge,
@@ -15,11 +16,8 @@ from .mesh_files import (
 )
 from .profile import Profile as Profile
 from .triangles import (
-    Triangles as Triangles,
     connected as connected,
-    drawn_out as drawn_out,
     edges_of as edges_of,
-    grid as grid,
     grouped as grouped,
     weld as weld,
 )

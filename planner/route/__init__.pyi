@@ -4,5 +4,5 @@ from .climb import (
     Route as Route,
     RouteResult as RouteResult,
     RouteStage as RouteStage,
-    evaluate as evaluate,
 )
+from .evaluation import evaluate as evaluate

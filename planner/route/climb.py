@@ -9,17 +9,14 @@ the limb lifts (a stance without that hand); then it takes the new hold:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Final, Literal
 
 from msgspec import structs
 
-from hand_models.base import Array, InvalidInputError, Pose, within
+from hand_models.base import Array, InvalidInputError, Pose
 from hand_models.parameters import Draw
-from planner.prepare import settle_hand
-from planner.processes import Lost, Workers, cores
 from planner.question import (
     SOLVE,
     HandOnHold,
@@ -32,21 +29,13 @@ from planner.question import (
     known_limbs,
 )
 from planner.result import Finding, LoadFactorStatus, Plan
-from planner.robots import UnreachableError
-from planner.solving import plan
 
-__all__ = ["Move", "OutOfReach", "Route", "RouteResult", "RouteStage", "evaluate"]
+__all__ = ["Move", "OutOfReach", "Route", "RouteResult", "RouteStage", "in_route", "stages"]
 
 Phase = Literal["start", "shift", "lift", "place"]
 
 JointAngles = Array | Literal["solve"]
 """Of a limb [rad], or that they are to be found."""
-
-WORTH_A_PROCESS: Final = 40
-"""Stages below this many are planned faster here than in processes that must first start."""
-
-AHEAD: Final = 15
-"""Most stages that a process has beside the one in work, while this process plans one itself."""
 
 LEAST_KNOWN: Final[tuple[LoadFactorStatus, ...]] = (
     "none",
@@ -257,7 +246,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
             angles = None if joints is None else _on_rock(joints, on_rock)
             stance = replace(route.start, hands=tuple(held), body=body, joints=angles)
         except InvalidInputError as error:
-            raise _in_route(error, paths) from None
+            raise in_route(error, paths) from None
         caps = {limb: cap for limb, cap in route.limits.per_hand.items() if limb in on_rock}
         question = Question(
             stance,
@@ -327,64 +316,7 @@ def _on_rock(
     return found if any(not isinstance(angles, str) for angles in found.values()) else SOLVE
 
 
-def evaluate(
-    route: Route,
-    workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> RouteResult:
-    """Plan every stance of a climb.
-
-    Parameters
-    ----------
-    route : Route
-    workers : int, optional
-        Processes, this one among them; as many as there are cores where the route is long enough
-        to be worth it.
-    progress : callable, optional
-        Called with (stages done, stages in all).
-
-    Raises
-    ------
-    InvalidInputError
-        If a stance cannot be understood; ``field`` says which move's.
-    """
-    todo = tuple(stages(route))
-    if workers is None:
-        workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
-    plans: dict[int, Plan | OutOfReach] = {}
-    count = min(workers, len(todo)) - 1
-    with Workers(partial(_planning, todo), count, AHEAD) as processes:
-        for i, found in processes.each(range(len(todo)), _planning(todo)):
-            # a stage that has cost a process is planned here
-            answer = _plan_stage(todo[i]) if isinstance(found, Lost) else found
-            if isinstance(answer, InvalidInputError):
-                raise answer
-            plans[i] = answer
-            if progress is not None:
-                progress(len(plans), len(todo))
-    return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
-
-
-Answer = Plan | OutOfReach | InvalidInputError
-
-
-def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:
-    """Return what plans a stage, in each process."""
-    return lambda index: _plan_stage(todo[index])
-
-
-def _plan_stage(stage: RouteStage) -> Answer:
-    try:
-        if stage.phase == "place":
-            _must_touch(stage)
-        return plan(stage.question)
-    except UnreachableError as error:
-        return OutOfReach(error.message)
-    except InvalidInputError as error:
-        return _in_route(error, stage.paths)
-
-
-def _in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInputError:
+def in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInputError:
     """Return the error of a stage's question with its field as the route tells it."""
     place = (error.field or "").removeprefix("stance.")
     for part, path in paths.items():
@@ -392,13 +324,3 @@ def _in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInpu
         if place.startswith(part) and rest[:1] in ("", ".", "["):
             error.field = path + rest
     return error
-
-
-def _must_touch(stage: RouteStage) -> None:
-    """Refuse a move that ends in the air."""
-    stance = stage.question.stance
-    i = next(i for i, hand in enumerate(stance.hands) if hand.limb == stage.limb)
-    with within(f"hands[{i}]"):
-        settled = settle_hand(stance.hands[i], stance)
-        if not (settled.holding.any() or settled.palm.engaged):
-            raise InvalidInputError(f"{stage.limb} touches nothing there", field="hold")

@@ -46,7 +46,7 @@ OLD_MANIFESTS: Final = ("{}.manifest.json", "{}/_manifest.json")
 
 
 class _Outcome(NamedTuple):
-    """What the tally takes of an answer: its status or its error, and its time [s]."""
+    """What the tally takes of an answer; the time is in s."""
 
     status: str | None
     error: ErrorDetail | None

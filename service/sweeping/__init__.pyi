@@ -1,6 +1,6 @@
 from .border import TOLERANCE as TOLERANCE, Border as Border, Held as Held, held as held
 from .design import Design as Design
 from .pictures import plot_sweep as plot_sweep
+from .results import Sweep as Sweep, sweep as sweep, with_borders as with_borders
 from .rows import PointRows as PointRows, Row as Row, asking as asking
-from .sweep import Sweep as Sweep, sweep as sweep, with_borders as with_borders
 from .variation import Variation as Variation, word_of as word_of

@@ -16,8 +16,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hand_models.base import Array, whole_file
+from service.sweeping.results import Sweep
 from service.sweeping.rows import Row, State
-from service.sweeping.sweep import Sweep
 from service.sweeping.variation import Value, word_of
 
 __all__ = ["plot_sweep"]

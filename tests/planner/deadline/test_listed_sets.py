@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from hand_models.base import broken_off_by
-from hand_models.rock import Mesh
-from hand_models.rock.triangles import Triangles, grid, weld
+from hand_models.rock import Mesh, Triangles, grid, weld
 from service.answering import handle
 from tests.suite.helpers.requests import wall_request
 

@@ -1,0 +1,90 @@
+"""A route evaluated: every stage planned, here or in processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Final
+
+from hand_models.base import InvalidInputError, within
+from planner.prepare import settle_hand
+from planner.processes import Lost, Workers, cores
+from planner.result import Plan
+from planner.robots import UnreachableError
+from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_route, stages
+from planner.solving import plan
+
+__all__ = ["evaluate"]
+
+WORTH_A_PROCESS: Final = 40
+"""Stages below this many are planned faster here than in processes that must first start."""
+
+AHEAD: Final = 15
+"""Most stages that a process has beside the one in work, while this process plans one itself."""
+
+
+def evaluate(
+    route: Route,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> RouteResult:
+    """Plan every stance of a climb.
+
+    Parameters
+    ----------
+    route : Route
+    workers : int, optional
+        Processes, this one among them; as many as there are cores where the route is long enough
+        to be worth it.
+    progress : callable, optional
+        Called with (stages done, stages in all).
+
+    Raises
+    ------
+    InvalidInputError
+        If a stance cannot be understood; ``field`` says which move's.
+    """
+    todo = tuple(stages(route))
+    if workers is None:
+        workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
+    plans: dict[int, Plan | OutOfReach] = {}
+    count = min(workers, len(todo)) - 1
+    with Workers(partial(_planning, todo), count, AHEAD) as processes:
+        for i, found in processes.each(range(len(todo)), _planning(todo)):
+            # a stage that has cost a process is planned here
+            answer = _plan_stage(todo[i]) if isinstance(found, Lost) else found
+            if isinstance(answer, InvalidInputError):
+                raise answer
+            plans[i] = answer
+            if progress is not None:
+                progress(len(plans), len(todo))
+    return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
+
+
+Answer = Plan | OutOfReach | InvalidInputError
+
+
+def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:
+    """Return what plans a stage, in each process."""
+    return lambda index: _plan_stage(todo[index])
+
+
+def _plan_stage(stage: RouteStage) -> Answer:
+    try:
+        if stage.phase == "place":
+            _must_touch(stage)
+        return plan(stage.question)
+    except UnreachableError as error:
+        return OutOfReach(error.message)
+    except InvalidInputError as error:
+        return in_route(error, stage.paths)
+
+
+def _must_touch(stage: RouteStage) -> None:
+    """Refuse a move that ends in the air."""
+    stance = stage.question.stance
+    i = next(i for i, hand in enumerate(stance.hands) if hand.limb == stage.limb)
+    with within(f"hands[{i}]"):
+        settled = settle_hand(stance.hands[i], stance)
+        if not (settled.holding.any() or settled.palm.engaged):
+            raise InvalidInputError(f"{stage.limb} touches nothing there", field="hold")
