@@ -42,7 +42,7 @@ DIGESTS: Final = ("hand", "robot", "stance")
 """Names of what a header has a digest of."""
 
 OLD_MANIFESTS: Final = ("{}.manifest.json", "{}/_manifest.json")
-"""Files of versions before runs were lines, beside a table or in its folder."""
+"""Files of versions before runs were lines."""
 
 
 class _Outcome(NamedTuple):
@@ -114,7 +114,6 @@ class Run(ABC):
 
     def write(self, question: bytes, payload: bytes, seconds: float) -> None:
         """Take the answer to the next question; `OSError` where it cannot be written."""
-        # before it is written, so that next to nothing is between a line and its count
         line, outcome = self._line(question, payload, seconds)
         if self._out is not None:
             _append(line, self._out)
