@@ -21,7 +21,7 @@ from tests.suite.helpers.stances import ask, on_wall
 LAWS = {"straight line": 1.0, "square root": 0.5, "square": 2.0}
 """Exponents with which strength falls from pure shear to φ_max."""
 
-BUNDLED = ("wall-300", "wall-300-floating")
+BUNDLED = ("wall-300", "overhang", "wall-700", "wall-300-joints")
 
 
 def under(question: Question, exponent: float, planes: int = 1) -> Question:
@@ -68,7 +68,9 @@ def complaints(question: Question, answer: Plan) -> list[str]:
     return list(Check(question, known).problems(*numbers, answer.effort))
 
 
-@pytest.mark.parametrize("name", [BUNDLED[0], pytest.param(BUNDLED[1], marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", [*BUNDLED, pytest.param("wall-300-floating", marks=pytest.mark.slow)]
+)
 def test_bundled_plans_follow_the_law_and_stay_inside_its_curve(name):
     question = questions.question(read_request(name))
     used = {}
