@@ -321,9 +321,9 @@ def _over(drive: Drive, share: Array, active: Flags, shears: Array, normals: Arr
     """Return by how much contacts pull more than they hold [N], not above 0 where they hold."""
     pull = np.maximum(-normals, 0.0)
     caught, share = share > 0.0, np.maximum(share, ROUNDING)
-    most, least, angle, friction = (drive.limits[:, i, None] for i in range(4))
+    most, least, steepest, exponent, friction = (drive.limits[:, i, None] for i in range(5))
     shear, pulls = shears / share, pull / share
-    strength = pull_strength(most, least, angle, np.arctan2(pulls, shear))
+    strength = pull_strength(most, least, steepest, exponent, np.arctan2(pulls, shear))
     # the drag that a pull needs at last: without a tension nothing would stay that springs pull
     drag = drive.drag * drive.closing[:, None]
     beyond = np.maximum(np.hypot(shear, pulls) - strength, friction * pulls - drag)

@@ -105,8 +105,8 @@ class Drive(NamedTuple):
         Tension at the end.
     depth : ndarray, shape (n, 3)
         How far tiles are pressed in.
-    limits : ndarray, shape (n, 4)
-        f_max, f_min, φ_max and μ of the surfaces.
+    limits : ndarray, shape (n, 5)
+        `Surface.straight_law` and μ of the surfaces.
     torque : ndarray, shape (n,)
         About the proximal joint at the closing tension.
     stiffness, preload, lower, upper : ndarray, shape (n, 3)
@@ -131,7 +131,7 @@ class Drive(NamedTuple):
         closing = np.array([closing.tension for closing in closings])
         pull = losses * np.array(model.pulley_radii)
         surfaces = [closing.surface for closing in closings]
-        limits = [(s.shear_limit, s.pull_off_limit, s.pull_off_angle, s.friction) for s in surfaces]
+        limits = [(*surface.straight_law, surface.friction) for surface in surfaces]
         springs = (model.joint_stiffness, model.joint_preload, model.joint_lower, model.joint_upper)
         stiffness, preload, lower, upper = (np.tile(each, (len(closing), 1)) for each in springs)
         return cls(

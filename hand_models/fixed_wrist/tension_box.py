@@ -110,10 +110,7 @@ def _tile_tension_limit(settled: SettledHand, t: int) -> float:
     of_whole = settled.loads[t] / settled.engagement[t]
 
     def excess(f: Array) -> Array:
-        load = of_whole[:, 0, None] + of_whole[:, 1, None] * f
-        angle = np.arctan2(-load[1], load[0])
-        strength = settled.surface.strength(np.clip(angle, -np.pi / 2, np.pi / 2))
-        return np.asarray(np.hypot(load[0], load[1]) - strength)
+        return settled.surface.excess(*(of_whole[:, 0, None] + of_whole[:, 1, None] * f))
 
     start = settled.closing_tension
     stop = max(10.0 * settled.hand.maximum_tension, 10.0 * start)

@@ -9,6 +9,13 @@ as keeps them all inside,
 
     a_Y = c max_d ((1 / F(d) − (a t + b p) / c) / y),    d = (t, p, y).
 
+The chord itself is moved inward where the curve between its ends has a dent (c = the least of
+F(φ) (a cos φ + b sin φ)), as under laws that fall fast at first.
+
+Both extremes are bounded, not sampled (`hand_models.tile.direction_boxes`): f_s and λ never rise
+with φ, so that in a box of directions F lies between two bounds. Half-planes lie inside the surface
+by construction, whatever its law.
+
 A convex region runs straight from its farthest lateral load to its farthest pull, so what a tile
 loses sideways under pull-off is lost in pure lateral load too; pressing gives it back. The outer
 region has the same normals, moved out until they touch: c = max_d F(d) (a t + b p + a_Y y).
@@ -20,12 +27,13 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hand_models.base import Array
-from hand_models.tile.surface import Surface
+from hand_models.tile.direction_boxes import DirectionBoxes, bounded
 
 __all__ = [
     "BoundsGap",
@@ -49,11 +57,52 @@ ZOOMS: Final = 8
 """Grids of a search in all."""
 
 MARGIN: Final = 1e-4
-"""Relative allowance for what a search may have missed: near pure pull-off, where all θ are one,
-half the square of its first step in φ."""
+"""Relative allowance for what a search may have missed, and up to which bounds are brought."""
+
+WIDE_MARGIN: Final = 2e-3
+"""The same for tiles that hold more sideways than along the drag, bounded in a whole sector."""
+
+ROUNDING: Final = 1e-12
+"""The same for chords whose ends, on the curve, are what comes nearest."""
+
+SAMPLES: Final = 2049
+"""Angles at which a chord is held against the curve, before that is bounded."""
 
 LEAST_LATERAL: Final = 1e-3
 """Share of a load out of the finger plane from which on the search looks."""
+
+
+class TileLaw(Protocol):
+    """What half-planes need of a law: numbers of `Surface`, and F and its parts, f_s and λ.
+
+    Neither part may rise with φ. Laws that are equal have equal hashes.
+    """
+
+    @property
+    def shear_limit(self) -> float: ...
+    @property
+    def pull_off_limit(self) -> float: ...
+    @property
+    def pull_off_angle(self) -> float: ...
+    @property
+    def lateral_limit(self) -> float: ...
+    @property
+    def compression_gain(self) -> float: ...
+    @property
+    def half_planes(self) -> int: ...
+    def __hash__(self) -> int: ...
+
+    def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
+        """Return F(φ, θ) [N]."""
+        ...
+
+    def straight_strength(self, angle: ArrayLike) -> Array:
+        """Return f_s(φ) [N]."""
+        ...
+
+    def sideways_share(self, angle: ArrayLike) -> Array:
+        """Return λ(φ)."""
+        ...
 
 
 class HalfPlane(NamedTuple):
@@ -94,15 +143,15 @@ class BoundsGap(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def inner_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
+def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     """Return half-planes whose intersection lies inside the limit surface, for shear T ≥ 0.
 
     Returns
     -------
     tuple of HalfPlane
-        The one that bounds shear, then the chords from pure shear to φ_max. The last chord runs on
-        beyond φ_max; where it would leave the curve there (which stays at f_min), one more chord,
-        down to pure pull-off, closes the region.
+        The one that bounds shear, then the chords from pure shear to φ_max, moved inward where the
+        curve has a dent. The last chord runs on beyond φ_max; where it would leave the curve there
+        (which stays at f_min), one more chord, down to pure pull-off, closes the region.
     """
     nodes = _nodes(surface)
     # a gain steeper than the first chord would cut into the side of pull-off
@@ -117,14 +166,14 @@ def inner_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
     for (start, end), sector in zip(
         itertools.pairwise(nodes), itertools.pairwise(sectors), strict=True
     ):
-        shear, pull, capacity = _chord(start, end)
+        shear, pull, capacity = _inside(surface, _chord(start, end), sector)
         sideways = _lateral_coefficient(surface, (shear, pull, capacity), sector)
         pieces.append(HalfPlane("pull_off", shear, -pull, sideways, capacity))
     return tuple(pieces)
 
 
 @lru_cache(maxsize=256)
-def outer_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
+def outer_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     """Return half-planes of the inner ones' normals that hold the whole limit surface, for T ≥ 0.
 
     Where pressing raises the strength faster than a normal allows, it is tilted as far as needed.
@@ -163,7 +212,7 @@ def directional_strength(pieces: Sequence[HalfPlane], directions: Array) -> Arra
     return found
 
 
-def bounds_gap(surface: Surface, directions: Array) -> BoundsGap:
+def bounds_gap(surface: TileLaw, directions: Array) -> BoundsGap:
     """Return the gap between inner half-planes, limit surface and outer half-planes.
 
     Parameters
@@ -187,7 +236,7 @@ def bounds_gap(surface: Surface, directions: Array) -> BoundsGap:
     )
 
 
-def _nodes(surface: Surface) -> list[tuple[float, float]]:
+def _nodes(surface: TileLaw) -> list[tuple[float, float]]:
     """Return the ends of the chords, (shear T, pull P) on the curve of Eq. 21 [N]."""
     angles = np.linspace(0.0, surface.pull_off_angle, int(surface.half_planes) + 1)
     radii = surface.strength(angles)
@@ -209,22 +258,67 @@ def _chord(start: tuple[float, float], end: tuple[float, float]) -> tuple[float,
     return a, b, a * start[0] + b * start[1]
 
 
-def _lateral_coefficient(
-    surface: Surface, chord: tuple[float, float, float], sector: tuple[float, float]
-) -> float:
-    """Return the least a_Y that keeps a chord inside the surface over its sector."""
+def _inside(
+    surface: TileLaw, chord: tuple[float, float, float], sector: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Return a chord as it is if it is inside the curve over its sector, or moved inward."""
     a, b, c = chord
 
-    def needed(angle: Array, azimuth: Array) -> Array:
+    def over(box: DirectionBoxes) -> Array:
+        return c / (surface.straight_strength(box.steep) * box.line(a, b)[0])
+
+    ends = np.linspace(*sector, SAMPLES)
+    found = float(over(DirectionBoxes(ends, ends, 0.0 * ends, 0.0 * ends)).max())
+    near = 1.0 + ROUNDING
+    most = bounded(
+        over,
+        DirectionBoxes.over(sector, (0.0, 0.0)),
+        near if found <= near else found * (1.0 + MARGIN),
+    )
+    return chord if most <= near else (a, b, c / most)
+
+
+def _lateral_coefficient(
+    surface: TileLaw, chord: tuple[float, float, float], sector: tuple[float, float]
+) -> float:
+    """Return the least a_Y that keeps a chord inside the surface over its sector.
+
+    What it is to be at least, (c / F(d) − cos η (a cos ω + b sin ω)) / sin η, is written as
+
+        (c / f_s − H) / sin η + H tan(η / 2) + c / f_s X / (1 − X) / sin η,
+
+    with H = a cos ω + b sin ω and F = f_s (1 − X), and has no pole at η = 0: as the chord is inside
+    the curve, c / f_s(φ) ≤ c / f_s(ω) ≤ H. For tiles that hold no more sideways than along the drag
+    it is largest at the sector's ends: at a φ it is convex in tan(θ / 2), or rises with it.
+    """
+    a, b, c = chord
+
+    def needed(box: DirectionBoxes) -> Array:
+        least, most = box.line(a, b)
+        strong, weak = (surface.straight_strength(angle) for angle in (box.flat, box.steep))
+        loss = 1.0 - surface.sideways_share(box.steep)
+        (low, high), sine = box.aside(), np.sin(box.far)
+        # of X / sin η, the least where it is negative
+        lost = np.where(loss > 0.0, loss * high / weak, loss * low / strong)
+        lost = lost / (1.0 - loss * np.where(loss > 0.0, high * sine, low * np.sin(box.near)))
+        found = np.minimum(c / weak - least, 0.0) / sine + c * lost
+        return np.asarray(found + np.maximum(most, 0.0) * np.tan(0.5 * box.far))
+
+    def at(angle: Array, azimuth: Array) -> Array:
         t, p, y = _direction(angle, azimuth)
         need = c / surface.strength(angle, azimuth) - (a * t + b * p)
         # close to the finger plane the chord is inside anyway
         return np.where(y > LEAST_LATERAL, need / np.maximum(y, LEAST_LATERAL), -np.inf)
 
-    return _largest(needed, surface.pull_off_angle, sector) * (1.0 + MARGIN)
+    found, turns = _largest(at, surface.pull_off_angle, sector), (0.0, math.pi / 2)
+    if surface.lateral_limit > surface.shear_limit:
+        boxes = DirectionBoxes.over(sector, turns)
+        return bounded(needed, boxes, found * (1.0 + WIDE_MARGIN))
+    edges = [DirectionBoxes.over((end, end), turns) for end in sector if end > 0.0]
+    return bounded(needed, DirectionBoxes(*np.concatenate(edges, axis=1)), found * (1.0 + MARGIN))
 
 
-def _support(surface: Surface, normal: tuple[float, float, float]) -> float:
+def _support(surface: TileLaw, normal: tuple[float, float, float]) -> float:
     """Return the largest load along (a, b, a_Y) on the surface [N]."""
 
     def along(angle: Array, azimuth: Array) -> Array:

@@ -2,9 +2,10 @@
 
 A tile loaded in the finger plane at the angle φ from pure shear toward pull-off lets go at (Eq. 21)
 
-    f_s(φ) = f_max − (f_max − f_min) φ / φ_max,        0 ≤ φ ≤ φ_max,
+    f_s(φ) = f_max − (f_max − f_min) (φ / φ_max)ᵖ,        0 ≤ φ ≤ φ_max,
 
-and at f_min beyond φ_max (``assumed``: nothing is published there). Out of the finger plane, at the
+with p = 1, and at f_min beyond φ_max (``assumed``: nothing is published there); other exponents p
+are other laws. Out of the finger plane, at the
 azimuth θ in the tile's plane from the drag, it holds
 
     F(φ, θ) = f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)],
@@ -41,6 +42,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable, surface_table
+from hand_models.tile.half_planes import HalfPlane, inner_half_planes
 
 __all__ = ["Surface", "engaged_share", "pull_strength", "surface_names"]
 
@@ -73,6 +75,9 @@ class Surface:
         Standard deviation of ``shear_limit`` from place to place [N].
     friction : float
         μ, Coulomb friction of a tile that is dragged away from the finger's base.
+    pull_off_exponent : float
+        p, how strength falls from ``shear_limit`` to ``pull_off_limit``: 1 is Eq. 21's straight
+        line over the angle.
     name : str or None
         Of the preset; None for a caller's own numbers. Surfaces of equal numbers are equal whatever
         their names.
@@ -87,6 +92,7 @@ class Surface:
     lateral_pull_off_ratio: float = 1.0
     shear_scatter: float = 0.0
     friction: float = 0.0
+    pull_off_exponent: float = 1.0
     name: str | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -132,6 +138,13 @@ class Surface:
                 f"must be at most {bounds.friction:g}, got {self.friction:g}: newtons of drag for "
                 "each newton of pull-off",
                 field="friction",
+            )
+        most = bounds.pull_off_exponent
+        if not 1.0 / most <= self.pull_off_exponent <= most:
+            raise InvalidInputError(
+                f"must be in [{1.0 / most:g}, {most:g}], got {self.pull_off_exponent:g}: strength "
+                "must fall all the way from pure shear to pull_off_angle",
+                field="pull_off_exponent",
             )
         if not 0.0 < self.lateral_pull_off_ratio <= 1.0:
             raise InvalidInputError(
@@ -223,21 +236,57 @@ class Surface:
             Force magnitude [N]; infinite where pressing alone grows faster than the strength used.
         """
         phi = np.asarray(angle, dtype=float)
-        ratio = np.clip(phi / self.pull_off_angle, 0.0, 1.0)
-        pulling = pull_strength(self.shear_limit, self.pull_off_limit, self.pull_off_angle, phi)
-        kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
-        share = self.lateral_limit / self.shear_limit * kept
         sideways = 1.0 - np.maximum(np.cos(azimuth), 0.0)
-        pulling = pulling * (1.0 - (1.0 - share) * np.cos(np.maximum(phi, 0.0)) * sideways)
+        lost = (1.0 - self.sideways_share(phi)) * np.cos(np.maximum(phi, 0.0)) * sideways
+        pulling = self.straight_strength(phi) * (1.0 - lost)
         # in the tile's plane ≤ F(0, θ) + γ N along the direction φ < 0
         slope = np.cos(phi) + self.compression_gain * np.sin(phi)
         with np.errstate(divide="ignore"):
             pressing = np.where(slope > 0.0, pulling / np.maximum(slope, 0.0), np.inf)
         return np.where(phi >= 0.0, pulling, pressing)
 
+    def straight_strength(self, angle: ArrayLike) -> Array:
+        """Return f_s(φ) [N], which never rises with φ [rad]; f_max under pressing."""
+        return pull_strength(*self.straight_law, angle)
+
+    @property
+    def straight_law(self) -> tuple[float, float, float, float]:
+        """What f_s(φ) depends on, as `pull_strength` takes it: f_max, f_min, φ_max and p."""
+        return self.shear_limit, self.pull_off_limit, self.pull_off_angle, self.pull_off_exponent
+
+    def sideways_share(self, angle: ArrayLike) -> Array:
+        """Return λ(φ), strength sideways over that along the drag; it never rises with φ [rad]."""
+        ratio = np.clip(np.asarray(angle) / self.pull_off_angle, 0.0, 1.0)
+        kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
+        return np.asarray(self.lateral_limit / self.shear_limit * kept)
+
+    def excess(self, shear: ArrayLike, normal: ArrayLike, lateral: ArrayLike = 0.0) -> Array:
+        """Return by how much loads of a whole tile are beyond the surface [N], negative inside.
+
+        Parameters
+        ----------
+        shear, normal, lateral : array_like
+            T, N and Y [N]; broadcast. Dragged backwards, a tile holds what it holds without drag.
+        """
+        forward, pull = np.maximum(shear, 0.0), -np.asarray(normal, dtype=float)
+        angle = np.arctan2(pull, np.hypot(forward, lateral))
+        strength = self.strength(angle, np.arctan2(np.abs(lateral), forward))
+        return np.asarray(np.hypot(np.hypot(shear, lateral), pull) - strength)
+
+    def inner(self, count: int | None = None) -> tuple[HalfPlane, ...]:
+        """Return half-planes inside the surface, `inner_half_planes`.
+
+        ``count``: straight pieces from pure shear to φ_max; ``half_planes`` by default.
+        """
+        return inner_half_planes(self if count is None else replace(self, half_planes=count))
+
 
 def pull_strength(
-    shear_limit: ArrayLike, pull_off_limit: ArrayLike, pull_off_angle: ArrayLike, angle: ArrayLike
+    shear_limit: ArrayLike,
+    pull_off_limit: ArrayLike,
+    pull_off_angle: ArrayLike,
+    pull_off_exponent: ArrayLike,
+    angle: ArrayLike,
 ) -> Array:
     """Return f_s(φ) of Eq. 21 for tiles of many surfaces [N]; f_max under pressing.
 
@@ -247,12 +296,14 @@ def pull_strength(
         f_max and f_min [N].
     pull_off_angle : array_like
         φ_max [rad].
+    pull_off_exponent : array_like
+        p.
     angle : array_like
         φ [rad]; broadcast with the others.
     """
     most = np.asarray(shear_limit)
     ratio = np.clip(np.asarray(angle) / np.asarray(pull_off_angle), 0.0, 1.0)
-    return np.asarray(most - (most - np.asarray(pull_off_limit)) * ratio)
+    return np.asarray(most - (most - np.asarray(pull_off_limit)) * ratio**pull_off_exponent)
 
 
 def engaged_share(gap: ArrayLike, travel: float) -> Array:
@@ -294,6 +345,7 @@ def _from_ratios(shear_limit: float, section: str, table: ParameterTable) -> Sur
         lateral_pull_off_ratio=ratio("lateral_pull_off_ratio"),
         shear_scatter=shear_limit * ratio("scatter_ratio"),
         friction=ratio("friction"),
+        pull_off_exponent=ratio("pull_off_exponent"),
     )
 
 
@@ -303,6 +355,7 @@ class _Bounds(NamedTuple):
     lateral_ratio: float
     compression_gain: float
     friction: float
+    pull_off_exponent: float
     tile_strength: float
 
 

@@ -84,6 +84,9 @@ def _strengthened(trials: Trials, which: Sequence[int], factor: float) -> Change
 def _surface(hand: HandOnHold, factor: float) -> dict[str, Any]:
     """Return the numbers of a hand's surface, as strong."""
     numbers = {name: value for name, value in asdict(hand.surface).items() if name != "name"}
+    if numbers["pull_off_exponent"] == 1.0:
+        # Eq. 21's, which every surface has unless it says so
+        del numbers["pull_off_exponent"]
     for name in ("shear_limit", "pull_off_limit", "lateral_limit"):
         numbers[name] = float(numbers[name] * factor)
     return numbers

@@ -31,7 +31,9 @@ class LimitCurves:
     The same surface as `Surface.strength`, written in the load itself instead of its direction:
     with a the load in the tile's plane and r its size, cos φ = a / r and cos θ = T / a, so that
 
-        f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)] = f_s(φ) [1 − (1 − λ(φ)) (a − T) / r].
+        f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)] = f_s(φ) [1 − (1 − λ(φ)) (a − T) / r],
+
+    and the exponent with which f_s falls that of the surface.
 
     Parameters
     ----------
@@ -47,8 +49,10 @@ class LimitCurves:
         numbers = [_numbers(surface) for surface in surfaces]
         of_each = np.array(numbers).T.take(of_tile, 1)
         of_each[[0, 2]] *= shares
-        # f_s, and 1 − λ: at φ = 0, and what they lose up to φ_max; −1 / φ_max; γ
-        self._flat, self._loss, (self._per_radian, self._gain) = np.split(of_each, [2, 4])
+        # f_s, and 1 − λ: at φ = 0, and what they lose up to φ_max; −1 / φ_max; γ; p
+        self._flat, self._loss, (self._per_radian, self._gain, self._exponent) = np.split(
+            of_each, [2, 4]
+        )
 
     def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
         """Return how far loads are beyond their surfaces, pressing ones in the tiles' planes [N].
@@ -71,13 +75,14 @@ class LimitCurves:
         # pressed, a tile holds what it does in its own plane, and more by the gain
         size = np.hypot(along, pull)
         ratio = np.minimum(np.arctan2(pull, along) * self._per_radian, 1.0)
-        straight, aside = self._flat - self._loss * ratio
+        straight = self._flat[0] - self._loss[0] * ratio**self._exponent
+        aside = self._flat[1] - self._loss[1] * ratio
         strength = straight * (1.0 - aside * ((along - shear) / (size + SMALL)))
         return np.asarray(size - self._gain * (normal - pull) - (1.0 + relative) * strength)
 
 
 def _numbers(surface: Surface) -> tuple[float, ...]:
-    """Return f_s and 1 − λ at φ = 0, what they lose up to φ_max, −1 / φ_max, γ."""
+    """Return f_s and 1 − λ at φ = 0, what they lose up to φ_max, −1 / φ_max, γ, p."""
     share = surface.lateral_limit / surface.shear_limit
     return (
         surface.shear_limit,
@@ -86,6 +91,7 @@ def _numbers(surface: Surface) -> tuple[float, ...]:
         share * (surface.lateral_pull_off_ratio - 1.0),
         -1.0 / surface.pull_off_angle,
         surface.compression_gain,
+        surface.pull_off_exponent,
     )
 
 

@@ -59,6 +59,9 @@ LateralShare = Annotated[float, Meta(ge=1e-3, le=1.0)]
 Friction = Annotated[
     float, Meta(ge=0.0, le=1e3, description="of a tile dragged backwards: T ≥ −friction N")
 ]
+Exponent = Annotated[
+    float, Meta(ge=0.25, le=4.0, description="strength falls by (angle / pull_off_angle)^this; 1")
+]
 Scatter = Annotated[float, Meta(ge=0.0, le=1e5, description="standard deviation, of one tile [N]")]
 Count = Annotated[int, Meta(ge=1, le=64)]
 
@@ -149,3 +152,4 @@ class Surface(Strict, frozen=True, kw_only=True):
     lateral_pull_off_ratio: LateralShare | None = None
     shear_scatter: Scatter | None = None
     friction: Friction | None = None
+    pull_off_exponent: Exponent | None = None

@@ -19,6 +19,9 @@ from hand_models.tile import (
 )
 from tests.suite.helpers.shares import given_some
 
+LINEAR = st.just(1.0)
+"""The exponent of Eq. 21."""
+
 DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 7201)[1:]
 """Loading angles φ, from pressing (< 0) through pure shear (0) to pure pull-off (π/2)."""
 
@@ -31,8 +34,10 @@ def law(surface, angles):
             along = math.cos(angle) + surface.compression_gain * math.sin(angle)
             radii.append(surface.shear_limit / along if along > 0.0 else math.inf)
         elif angle < surface.pull_off_angle:
-            slope = (surface.shear_limit - surface.pull_off_limit) / surface.pull_off_angle
-            radii.append(surface.shear_limit - slope * angle)
+            lost = (angle / surface.pull_off_angle) ** surface.pull_off_exponent
+            radii.append(
+                surface.shear_limit - (surface.shear_limit - surface.pull_off_limit) * lost
+            )
         else:
             radii.append(surface.pull_off_limit)
     return np.array(radii)
@@ -98,7 +103,7 @@ def area_between(surface):
 
 
 @st.composite
-def surfaces(draw):
+def surfaces(draw, exponents=LINEAR):
     shear_limit = draw(st.floats(0.5, 500.0))
     return Surface(
         shear_limit=shear_limit,
@@ -108,11 +113,16 @@ def surfaces(draw):
         compression_gain=draw(st.sampled_from([0.0, 0.0, 0.3, 1.5])),
         half_planes=draw(st.integers(1, 16)),
         lateral_pull_off_ratio=draw(st.one_of(st.just(1.0), st.floats(0.02, 1.0))),
+        pull_off_exponent=draw(exponents),
     )
 
 
-@given_some(20, 60, surfaces())
-def test_strength_is_the_linear_law_of_the_loading_angle(surface):
+laws = st.one_of(st.just(1.0), st.sampled_from([0.5, 2.0]), st.floats(0.25, 4.0))
+"""Exponents with which strength falls toward pull-off: Eq. 21's, a root, a square, any."""
+
+
+@given_some(20, 60, surfaces(laws))
+def test_strength_is_the_declared_law_of_the_loading_angle(surface):
     angles = DIRECTIONS[:: len(DIRECTIONS) // 200]
     np.testing.assert_allclose(surface.strength(angles), law(surface, angles), rtol=1e-9)
 
@@ -127,7 +137,7 @@ def test_strength_by_hand():
     assert surface.strength(-math.pi / 4) == pytest.approx(120.0 * math.sqrt(2.0))
 
 
-@given_some(20, 150, surfaces())
+@given_some(20, 150, surfaces(laws))
 def test_half_planes_stay_inside_the_law_in_every_direction(surface):
     assert (reach(surface, DIRECTIONS) <= law(surface, DIRECTIONS) * (1.0 + 1e-9)).all()
 
@@ -208,7 +218,7 @@ def test_strength_out_of_the_finger_plane_by_hand():
 
 
 @settings(max_examples=60, deadline=None)
-@given(surfaces())
+@given(surfaces(laws))
 def test_strength_is_the_boat_shaped_surface(surface):
     directions = random_directions(500)
     angle = np.arcsin(-directions[:, 1])
@@ -230,7 +240,7 @@ def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(nam
     assert (directional_strength(outer_half_planes(surface), directions) >= exact).all()
 
 
-@given_some(20, 150, surfaces(), st.integers(0, 1000))
+@given_some(20, 150, surfaces(laws), st.integers(0, 1000))
 def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
     directions = np.concatenate([random_directions(2000, seed), edge_directions(surface)])
     exact = boat(surface, directions)
@@ -240,6 +250,34 @@ def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
     assert (
         directional_strength(outer_half_planes(surface), directions) >= exact * (1.0 - 1e-9)
     ).all()
+
+
+def test_a_chord_across_a_dent_is_moved_inward_until_it_touches():
+    """Strength that falls with the root of the angle: half-planes lie inside all the same."""
+    rock = replace(Surface.named("rock"), pull_off_exponent=0.5)
+    ends = rock.straight_strength(np.array([0.0, rock.pull_off_angle]))
+    for count in (1, 2, 5):
+        _, *pieces = rock.inner(count)
+        for i, piece in enumerate(pieces[:count]):
+            angles = np.linspace(i, i + 1, 20_001) / count * rock.pull_off_angle
+            reaches = piece.capacity / (
+                piece.a_shear * np.cos(angles) - piece.a_normal * np.sin(angles)
+            )
+            kept = (reaches / law(rock, angles)).max()
+            assert 1.0 - 3e-4 <= kept <= 1.0 + 1e-12
+        # where the curve begins to fall at once, a chord through its ends would be outside
+        first = pieces[0]
+        assert first.capacity / first.a_shear < ends[0] * (0.999 if count == 5 else 0.99)
+
+
+@given_some(30, 200, surfaces(laws), st.integers(0, 10**6))
+def test_excess_is_what_a_load_is_beyond_the_surface(surface, seed):
+    directions = random_directions(200, seed)
+    reaches = boat(surface, directions)
+    directions, reaches = directions[reaches < 1e6], reaches[reaches < 1e6]
+    for size in (0.5, 1.0, 1.5):
+        found = surface.excess(*(size * reaches * directions.T))
+        np.testing.assert_allclose(found, (size - 1.0) * reaches, rtol=1e-6, atol=1e-6)
 
 
 @given_some(20, 60, surfaces())
@@ -298,7 +336,7 @@ def test_what_one_straight_line_costs_sideways():
     assert reaches[0] / 68.1 == pytest.approx(1.0 / least, rel=0.01)
 
 
-@given_some(20, 50, surfaces())
+@given_some(20, 50, surfaces(laws))
 def test_purely_sideways_no_piece_goes_beyond_the_lateral_limit(surface):
     for piece in inner_half_planes(surface):
         assert 0.0 < piece.capacity / piece.a_lateral <= surface.lateral_limit * (1.0 + 1e-9)
@@ -357,6 +395,10 @@ def test_own_values_follow_from_shear_alone_by_the_default_ratios():
         ({"shear_limit": 60.0, "shear_scatter": -1.0}, "shear_scatter"),
         ({"shear_limit": 60.0, "lateral_pull_off_ratio": 0.0}, "lateral_pull_off_ratio"),
         ({"shear_limit": 60.0, "lateral_pull_off_ratio": 1.1}, "lateral_pull_off_ratio"),
+        ({"shear_limit": 60.0, "pull_off_exponent": 0.0}, "pull_off_exponent"),
+        ({"shear_limit": 60.0, "pull_off_exponent": -1.0}, "pull_off_exponent"),
+        ({"shear_limit": 60.0, "pull_off_exponent": 11.0}, "pull_off_exponent"),
+        ({"shear_limit": 60.0, "pull_off_exponent": math.nan}, "pull_off_exponent"),
         ({"shear_limit": 60.0, "half_planes": 0}, "half_planes"),
         ({"shear_limit": 60.0, "half_planes": 65}, "half_planes"),
         ({"shear_limit": 60.0, "half_planes": 2.5}, "half_planes"),

@@ -251,9 +251,8 @@ def faults(on_hold: OnHold, closed: ClosedFinger) -> list[str]:
         if contact.kind == "none" and (normal[i] != 0.0 or shear[i] != 0.0):
             wrong.append(f"phalanx {i} is loaded in the air")
         if normal[i] < -FEW:
-            most, least = surface.shear_limit, surface.pull_off_limit
             angle = math.atan2(-normal[i], shear[i])
-            most = share * float(pull_strength(most, least, surface.pull_off_angle, angle))
+            most = share * float(pull_strength(*surface.straight_law, angle))
             if math.hypot(shear[i], normal[i]) > most * (1.0 + 1e-6) + FEW:
                 wrong.append(f"phalanx {i} is held with {normal[i]:.3g} N of {most:.3g} N")
             if shear[i] < -surface.friction * normal[i] - FEW:

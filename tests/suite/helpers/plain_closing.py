@@ -336,8 +336,8 @@ class PlainFinger:
             pull = -normals[j]
             if mode != HELD or pull < 1e-8 or not within[j]:
                 continue
-            limits = s.shear_limit, s.pull_off_limit, s.pull_off_angle
-            strength = shares[j] * float(pull_strength(*limits, math.atan2(pull, shears[j])))
+            angle = math.atan2(pull, shears[j])
+            strength = shares[j] * float(pull_strength(*s.straight_law, angle))
             beyond = max(math.hypot(pull, shears[j]) - strength, s.friction * pull - drags[j])
             if beyond > worst:
                 worst, which = beyond, j
