@@ -24,6 +24,13 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 R = TypeVar("R")
 
+AHEAD: Final = 15
+"""Most items that a process has beside the one in work, where this process works, too: they are
+there before it is done."""
+
+NEXT: Final = 1
+"""The same where this process only gives out and takes in."""
+
 SHARE: Final = 4
 """A process has no more ahead than what is left by this and by the processes: less and less, so
 that none waits long for the last one."""
@@ -83,8 +90,6 @@ class Workers(Generic[T, R]):
         It, items and results can be pickled. What it raises ends its process.
     count : int
         How many processes, if any.
-    ahead : int, optional
-        Most items that a process has beside the one in work.
 
     Attributes
     ----------
@@ -97,8 +102,8 @@ class Workers(Generic[T, R]):
         Processes in a row that could not be started, or have died before they were ready.
     """
 
-    def __init__(self, make: Make[T, R], count: int, ahead: int = 1) -> None:
-        self._make, self.width, self._ahead = make, count, ahead
+    def __init__(self, make: Make[T, R], count: int) -> None:
+        self._make, self.width = make, count
         self.hands: dict[Lane[T, R], dict[int, _Task[T]]] = {}
         self.stillborn = 0
         self._queue: deque[_Task[T]] = deque()
@@ -141,7 +146,7 @@ class Workers(Generic[T, R]):
                 self._start()
                 own = any(not task.tried for task in self._queue)
                 if self.hands:
-                    yield from self._exchange(0.0 if own else None)
+                    yield from self._exchange(AHEAD, 0.0 if own else None)
                 elif not own:
                     for task in self._queue:
                         yield task.number, Lost(self._unborn)
@@ -182,14 +187,17 @@ class Workers(Generic[T, R]):
             self._start()
             if not self.hands:
                 raise CruxError(self._unborn)
-            found = self._exchange(None)
+            found = self._exchange(NEXT, None)
         return found
 
-    def _exchange(self, timeout: float | None) -> list[tuple[int, R | Lost]]:
-        """Give processes what they have room for, and return what comes within a time [s]."""
+    def _exchange(self, ahead: int, timeout: float | None) -> list[tuple[int, R | Lost]]:
+        """Give processes what they have room for, and return what comes within a time [s].
+
+        Each may have so many items ahead, beside the one in work.
+        """
         for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
             share = math.ceil(len(self._queue) / (SHARE * self.width))
-            while self._queue and lane.ready and len(self.hands[lane]) <= min(self._ahead, share):
+            while self._queue and lane.ready and len(self.hands[lane]) <= min(ahead, share):
                 task = self._chosen(lane)
                 self.hands[lane][task.number] = task
                 lane.give(task.item)

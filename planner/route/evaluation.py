@@ -19,9 +19,6 @@ __all__ = ["evaluate"]
 WORTH_A_PROCESS: Final = 40
 """Stages below this many are planned faster here than in processes that must first start."""
 
-AHEAD: Final = 15
-"""Most stages that a process has beside the one in work, while this process plans one itself."""
-
 
 def evaluate(
     route: Route,
@@ -48,8 +45,7 @@ def evaluate(
     if workers is None:
         workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
     plans: dict[int, Plan | OutOfReach] = {}
-    count = min(workers, len(todo)) - 1
-    with Workers(partial(_planning, todo), count, AHEAD) as processes:
+    with Workers(partial(_planning, todo), min(workers, len(todo)) - 1) as processes:
         for i, found in processes.each(range(len(todo)), _planning(todo)):
             # a stage that has cost a process is planned here
             answer = _plan_stage(todo[i]) if isinstance(found, Lost) else found

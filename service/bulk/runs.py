@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from hashlib import blake2b, sha256
+from hashlib import blake2b
 from io import FileIO
 from itertools import islice
 from pathlib import Path
@@ -18,28 +18,20 @@ from typing import Any, Final, NamedTuple
 
 import msgspec
 
-from hand_models.base import InvalidInputError, installed_version
-from hand_models.parameters import ParameterTable
-from planner import RobotFile, Time
+from hand_models.base import InvalidInputError
+from planner import Time
 from service.bulk.columns import INDEX, Column, Row
 from service.bulk.exports import exporter_at
+from service.bulk.headers import HEADER, RESUME, Header
 from service.bulk.lines import Asked
 from service.bulk.tally import Tally
 from service.replies import ErrorDetail
 from service.wire import Format, identifier
 
-__all__ = ["Header", "ReplyLines", "Run", "TableLines", "digest_of", "new_header"]
+__all__ = ["ReplyLines", "Run", "TableLines"]
 
 REPLY: Final = b'{"v":1,'
 """How each line of replies begins."""
-
-HEADER: Final = b'{"crux":'
-"""How the lines of a table begin."""
-
-RESUME: Final = "--resume"
-
-DIGESTS: Final = ("hand", "robot", "stance")
-"""Names of what a header has a digest of."""
 
 OLD_MANIFESTS: Final = ("{}.manifest.json", "{}/_manifest.json")
 """Files of versions before runs were lines."""
@@ -220,64 +212,6 @@ class ReplyLines(Run):
         if reply.status is None and reply.error is None:
             raise InvalidInputError(f"{where}: no reply", field=RESUME)
         return reply.outcome
-
-
-class Header(msgspec.Struct):
-    """Say what the rows of a table are of.
-
-    ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``: what else
-    the work is of, by name; of `DIGESTS` a `digest_of` it.
-    """
-
-    crux: str | None
-    columns: list[str]
-    explain: bool
-    hand: str | None = None
-    robot: str | None = None
-    v: int = 2
-    about: dict[str, str] = {}
-
-    def check(self, before: bytes, path: Path) -> None:
-        """Refuse a line that is the header of other work, and say what has changed."""
-        try:
-            there = msgspec.json.decode(before, type=Header)
-        except (msgspec.DecodeError, UnicodeDecodeError):
-            raise InvalidInputError(
-                f"{path}: no table that a batch has written, or a sweep", field=RESUME
-            ) from None
-        known, wanted = there._compared(), self._compared()
-        for name in dict.fromkeys([*known, *wanted]):
-            values = known.get(name), wanted.get(name)
-            if values[0] != values[1]:
-                which = "" if name in DIGESTS else f" ({values[0]!r}, now {values[1]!r})"
-                raise InvalidInputError(
-                    f"{path}: was begun with another {name}{which}; begin anew without it",
-                    field=RESUME,
-                )
-
-    def _compared(self) -> dict[str, Any]:
-        """Return what it says by name, in the order in which that is compared."""
-        named = {name: getattr(self, name) for name in ("v", "crux", "hand", "robot", "explain")}
-        return named | self.about | {"columns": self.columns}
-
-
-def new_header(
-    columns: Iterable[Column],
-    explain: bool,
-    hand: ParameterTable | None,
-    robot: RobotFile | None,
-    about: dict[str, str] | None = None,
-) -> Header:
-    """Return the header of a table that is to be begun, or gone on with."""
-    own_robot = None if robot is None else digest_of((robot.toml, robot.urdf))
-    own_hand = None if hand is None else digest_of(sorted(hand.sections.items()))
-    names = [each.name for each in columns]
-    return Header(installed_version(), names, explain, own_hand, own_robot, about=about or {})
-
-
-def digest_of(value: Any) -> str:
-    """Return a digest of plain values."""
-    return sha256(repr(value).encode()).hexdigest()
 
 
 class _RowLine(Row, omit_defaults=True, kw_only=True):

@@ -1,0 +1,83 @@
+"""The first line of a table's rows: what they are of, so that no other work goes on with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from hand_models.base import InvalidInputError, installed_version
+from hand_models.parameters import ParameterTable
+from planner import RobotFile
+from service.bulk.columns import Column
+
+__all__ = ["HEADER", "RESUME", "Header", "digest_of", "new_header"]
+
+RESUME: Final = "--resume"
+
+HEADER: Final = b'{"crux":'
+"""How the lines of a table begin."""
+
+DIGESTS: Final = ("hand", "robot", "stance")
+"""Names of what a header has a digest of."""
+
+
+class Header(msgspec.Struct):
+    """Say what the rows of a table are of.
+
+    ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``: what else
+    the work is of, by name; of `DIGESTS` a `digest_of` it.
+    """
+
+    crux: str | None
+    columns: list[str]
+    explain: bool
+    hand: str | None = None
+    robot: str | None = None
+    v: int = 2
+    about: dict[str, str] = {}
+
+    def check(self, before: bytes, path: Path) -> None:
+        """Refuse a line that is the header of other work, and say what has changed."""
+        try:
+            there = msgspec.json.decode(before, type=Header)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise InvalidInputError(
+                f"{path}: no table that a batch has written, or a sweep", field=RESUME
+            ) from None
+        known, wanted = there._compared(), self._compared()
+        for name in dict.fromkeys([*known, *wanted]):
+            values = known.get(name), wanted.get(name)
+            if values[0] != values[1]:
+                which = "" if name in DIGESTS else f" ({values[0]!r}, now {values[1]!r})"
+                raise InvalidInputError(
+                    f"{path}: was begun with another {name}{which}; begin anew without it",
+                    field=RESUME,
+                )
+
+    def _compared(self) -> dict[str, Any]:
+        """Return what it says by name, in the order in which that is compared."""
+        named = {name: getattr(self, name) for name in ("v", "crux", "hand", "robot", "explain")}
+        return named | self.about | {"columns": self.columns}
+
+
+def new_header(
+    columns: Iterable[Column],
+    explain: bool,
+    hand: ParameterTable | None,
+    robot: RobotFile | None,
+    about: dict[str, str] | None = None,
+) -> Header:
+    """Return the header of a table that is to be begun, or gone on with."""
+    own_robot = None if robot is None else digest_of((robot.toml, robot.urdf))
+    own_hand = None if hand is None else digest_of(sorted(hand.sections.items()))
+    names = [each.name for each in columns]
+    return Header(installed_version(), names, explain, own_hand, own_robot, about=about or {})
+
+
+def digest_of(value: Any) -> str:
+    """Return a digest of plain values."""
+    return sha256(repr(value).encode()).hexdigest()
