@@ -14,12 +14,10 @@ from .mesh_files import (
     read_vertices as read_vertices,
 )
 from .profile import Profile as Profile
+from .surface import Triangles as Triangles, drawn_out as drawn_out, grid as grid
 from .triangles import (
-    Triangles as Triangles,
     connected as connected,
-    drawn_out as drawn_out,
     edges_of as edges_of,
-    grid as grid,
     grouped as grouped,
     weld as weld,
 )

@@ -8,24 +8,22 @@ another, so that the chains of a cut follow from the edges' names, without compa
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, go_on
+from hand_models.rock.surface import Triangles
 
 __all__ = [
     "TriangleCells",
-    "Triangles",
     "borders",
     "bridge",
     "connected",
     "cut",
-    "drawn_out",
     "edges_of",
-    "grid",
     "grouped",
     "weld",
     "without_spikes",
@@ -38,32 +36,6 @@ resolves, and above the rounding of coordinates of 10⁴ m."""
 
 SIDE: Final = 0.03
 """Of a cell of triangles; what is found does not depend on it [m]."""
-
-
-class Triangles(NamedTuple):
-    """Vertices, shape (n, 3) [m], and faces, shape (m, 3), counterclockwise from outside."""
-
-    vertices: Array
-    faces: Indices
-
-
-def grid(points: Array) -> Triangles:
-    """Return the triangles between points (n, m, 3), two for each cell."""
-    rows, columns, _ = points.shape
-    place = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (
-        part.ravel() for part in (place[:-1, :-1], place[1:, :-1], place[:-1, 1:], place[1:, 1:])
-    )
-    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
-    return Triangles(points.reshape(-1, 3), faces)
-
-
-def drawn_out(outline: Array, low: float, high: float) -> Triangles:
-    """Return the surface of an outline (x, z), shape (n, 2), drawn out from y = low to high.
-
-    The rock is on its left, seen along y.
-    """
-    return grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)]))
 
 
 def edges_of(faces: Indices) -> Indices:
