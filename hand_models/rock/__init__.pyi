@@ -1,5 +1,4 @@
 from .filled_holes import FilledCells as FilledCells, filled_cells as filled_cells
-from .grids import Triangles as Triangles, drawn_out as drawn_out, grid as grid
 from .holds import (
     Cylinder as Cylinder,
     Edge as Edge,
@@ -15,6 +14,7 @@ from .mesh_files import (
     read_vertices as read_vertices,
 )
 from .profile import Profile as Profile
+from .surface import Triangles as Triangles, drawn_out as drawn_out, grid as grid
 from .triangles import (
     connected as connected,
     edges_of as edges_of,

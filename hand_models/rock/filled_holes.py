@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.parameters import scan_table
-from hand_models.rock.grids import Triangles
+from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import edges_of
 
 __all__ = ["FilledCells", "filled_cells"]

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, Pose, check_positive
 from hand_models.parameters import scan_table
-from hand_models.rock.grids import Triangles, drawn_out, grid
+from hand_models.rock.surface import Triangles, drawn_out, grid
 from hand_models.sections import PARALLEL, Section, Swept, cut_of, entry_distances
 
 __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.base import Array, InvalidInputError, Pose, go_on
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
-from hand_models.rock.grids import Triangles
 from hand_models.rock.smoothing import OutlinedHold
+from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import (
     TriangleCells,
     borders,

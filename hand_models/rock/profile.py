@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
-from hand_models.rock.grids import Triangles, drawn_out
 from hand_models.rock.smoothing import OutlinedHold, Scale
+from hand_models.rock.surface import Triangles, drawn_out
 from hand_models.sections import PARALLEL
 
 __all__ = ["STRIPS", "Profile"]

@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, go_on
-from hand_models.rock.grids import Triangles
+from hand_models.rock.surface import Triangles
 
 __all__ = [
     "TriangleCells",

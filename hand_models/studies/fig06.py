@@ -102,15 +102,15 @@ def _check(
     loads = np.array([curve["load_over_friction"] for curve in data["curves"]])
     first = (loads >= loads.max(axis=1, keepdims=True) * (1.0 - EXACT)).argmax(axis=1)
     off = np.abs(FRICTIONS[first] - [curve["best_friction"] for curve in data["curves"]]).max()
-    told = f"first at it within {off:.3f}, curves' step {step:.2f}"
-    text.check("equation_2", told, off <= step)
+    given = f"first at it within {off:.3f}, curves' step {step:.2f}"
+    text.check("equation_2", given, off <= step)
     softer = experiment.springs[0]
     matched = share_load([2.0 * softer, softer], experiment.preload_stiffness, 2.0 / 3.0)
     shares = float(matched.tile_stiffness[0] / matched.tile_stiffness[1])
     text.check("matched", shares, abs(shares - 2.0) <= EXACT)
     shifted = differences[:, 2].min()
-    told = f"its share grows by {100 * shifted:.1f} % of the load or more"
-    text.check("shift", told, shifted > 0.0)
+    given = f"its share grows by {100 * shifted:.1f} % of the load or more"
+    text.check("shift", given, shifted > 0.0)
     off = max(abs(gains[a, b] - gains[b, a]) for a, b in pairs)
     text.check("order", f"differ by {off:.0e}", off <= EXACT)
 

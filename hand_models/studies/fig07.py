@@ -75,15 +75,15 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     for name, summary in data["variants"].items():
         least, largest = (100.0 * summary[end] for end in ("least", "largest"))
         count = f"{summary['reach_printed']} of {summary['configurations']}"
-        told = f"{least:+.0f} to {largest:+.0f} %; {count} reach 24 %"
-        text.check("gain", told, summary["least"] >= PRINTED_GAIN, rods=name)
+        given = f"{least:+.0f} to {largest:+.0f} %; {count} reach 24 %"
+        text.check("gain", given, summary["least"] >= PRINTED_GAIN, rods=name)
         hurt = ", ".join("".join(map(str, s)) for s in summary["hurts"]) or "none"
-        told = f"least {least:+.1f} %; hurt: {hurt}"
-        text.check("helpful", told, summary["least"] >= 0.0, rods=name)
+        given = f"least {least:+.1f} %; hurt: {hurt}"
+        text.check("helpful", given, summary["least"] >= 0.0, rods=name)
         found = _discrepancy_correlations(experiment, unlike, name)
-        told = ", ".join(f"{what} {r:+.2f}" for what, (r, _) in found.items())
+        given = ", ".join(f"{what} {r:+.2f}" for what, (r, _) in found.items())
         significant = all(r > 0.0 and p < SIGNIFICANT for r, p in found.values())
-        text.check("discrepancies", told, significant, rods=name)
+        text.check("discrepancies", given, significant, rods=name)
     return text.result(data)
 
 

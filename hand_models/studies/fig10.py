@@ -59,7 +59,7 @@ DIRECTIONS: Final = 100_000
 """Random directions for volumes."""
 
 COUNTS: Final = (1, 2, 4, 8)
-"""Half-planes for which the gap is told."""
+"""Half-planes for which the gap is listed."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -187,8 +187,8 @@ def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str,
     error = np.mean(data["array"]["deviation"][within_law(CURVE, limit)]) / math.sqrt(REPEATS)
     for name, key in (("linear_in_angle", "fit_of_mean"), ("straight", "cartesian_line_of_mean")):
         line = data[key]
-        told = f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}"
-        text.check(name, told, line["worst"] <= error, error=error)
+        given = f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}"
+        text.check(name, given, line["worst"] <= error, error=error)
     fitted, planned = data["fit_of_trials"]["shear_limit"], surface.shear_limit
     text.check("shear_limit", fitted, abs(fitted - planned) <= error, claimed=planned)
     ratio, at_limit = surface.pull_off_limit / planned, float(array.share(limit))
@@ -206,14 +206,14 @@ def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str,
     few = [cell for cell in data["tile_shear"] if cell["spines"] < LEAST_SPINES]
     for cells, name in ((enough, "strength_of_many"), (few, "strength_of_few")):
         off = [abs(cell["simulated_mean"] - cell["mean"]) / cell["error"] for cell in cells]
-        told = f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less"
-        text.check(name, told, max(off) <= 1.0)
+        given = f"{sum(o <= 1.0 for o in off)} of {len(off)}; off by {max(off):.2f} bars or less"
+        text.check(name, given, max(off) <= 1.0)
     for concrete in ("fine", "coarse"):
         cells = [cell for cell in enough if cell["concrete"] == concrete]
         ratios = [cell["simulated_deviation"] / cell["error"] for cell in cells]
-        told = f"{min(ratios):.2f} to {max(ratios):.2f}"
+        given = f"{min(ratios):.2f} to {max(ratios):.2f}"
         holds = min(ratios) >= 0.5 and max(ratios) <= 1.5
-        text.check("scatter", told, holds, concrete=concrete)
+        text.check("scatter", given, holds, concrete=concrete)
     more = data["hull_over_surface"]
     text.check("not_convex", more, more > 1.01)
 

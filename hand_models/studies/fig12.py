@@ -149,9 +149,9 @@ def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -
             read, got = np.array(data["read_off"][f"{kind}_{end}"]), data[kind][at]
             near = np.abs(got - read) <= np.maximum(NEAR_SHARE * read, NEAR_FORCE)
             there = data["pull"][at]
-            told = f"{_listed(got)} N; pulled by {there:g} N"
+            given = f"{_listed(got)} N; pulled by {there:g} N"
             holds = (at == 0 or there == data["pull_of_figure"]) and near.all()
-            text.check("ends", told, holds, kind=kind, where=where, read=_listed(read))
+            text.check("ends", given, holds, kind=kind, where=where, read=_listed(read))
     for kind, signs, course in (
         ("shear", (1, 1, 1), "shear forces increase gradually on every phalanx"),
         ("normal", (-1, 0, -1), "the normal forces of proximal and distal phalanx decrease"),
@@ -161,9 +161,9 @@ def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -
         total = data[kind][-1] - data[kind][0]
         rising = data[kind][:, meant] * np.array(signs)[meant]
         back = float((np.maximum.accumulate(rising) - rising).max())
-        told = ", ".join(f"{PHALANGES[i]} {total[i]:+.2f}" for i in meant) + " N"
-        told += f"; {back:.1g} N back on the way" if back > 0.0 else ""
-        text.check("course", told, (rising[-1] > rising[0]).all(), course=course)
+        given = ", ".join(f"{PHALANGES[i]} {total[i]:+.2f}" for i in meant) + " N"
+        given += f"; {back:.1g} N back on the way" if back > 0.0 else ""
+        text.check("course", given, (rising[-1] > rising[0]).all(), course=course)
     for kind, span in zip(KINDS, table.vector("fig12", "sensor_range"), strict=True):
         within = table.scalar("fig12", "sensor_accuracy") * span
         fitted = np.polynomial.polynomial.polyfit(data["pull"], data[kind], 1)
@@ -171,22 +171,22 @@ def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -
         off = float(np.abs(data[kind] - straight).max())
         text.check("straight", f"off by up to {off:.2g} N", off <= within, kind=kind, within=within)
     condition, least = data["condition"], data["condition_printed"]
-    told = f"{condition.min():.0f} to {condition.max():.0f}"
-    text.check("condition", told, condition.min() > least, least=least)
+    given = f"{condition.min():.0f} to {condition.max():.0f}"
+    text.check("condition", given, condition.min() > least, least=least)
 
 
 def _check_slip(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
     slip = data["slip"]
     first, used = slip["phalanx"], slip["utilisation_by_phalanx"]
-    told = f"{first}, at {slip['pull']:.1f} N ({slip['way'].replace('_', ' ')})"
-    text.check("first", told, first in ("proximal", "distal"))
-    told = ", ".join(f"{name} {u:.2f}" for name, u in zip(PHALANGES, used, strict=True))
-    text.check("middle", told, used[1] < 1.0)
+    given = f"{first}, at {slip['pull']:.1f} N ({slip['way'].replace('_', ' ')})"
+    text.check("first", given, first in ("proximal", "distal"))
+    given = ", ".join(f"{name} {u:.2f}" for name, u in zip(PHALANGES, used, strict=True))
+    text.check("middle", given, used[1] < 1.0)
     shift, own = table.scalar("fig12", "base_shift"), slip["base_shift"]
     furthest = data["base_shift_elsewhere"]["shift"].max()
-    told = f"{1e3 * own:.2f} mm; pulled aside, up to {1e3 * furthest:.2f} mm"
+    given = f"{1e3 * own:.2f} mm; pulled aside, up to {1e3 * furthest:.2f} mm"
     holds = abs(max(own, furthest) - shift) <= NEAR_SHIFT * shift
-    text.check("base", told, holds, shift=1e3 * shift, near=100 * NEAR_SHIFT)
+    text.check("base", given, holds, shift=1e3 * shift, near=100 * NEAR_SHIFT)
 
 
 def _listed(values: Array) -> str:

@@ -61,7 +61,7 @@ GRID: Final = 81
 
 STEPS: Final = 1000
 SEARCHED, PULLED, LISTED = 100, 300, 980
-"""Of the progress told, and where the search ends, the pulls, and the list of sets."""
+"""Steps of progress in all, and at the end of the search, of the pulls, and of the list of sets."""
 
 SYMMETRIC: Final = 1e-6
 """Of its extents, by how much a hull may be off its mirror image."""
@@ -238,15 +238,15 @@ def _check(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None
     for (name, extent), unit in zip(names, ("N", "N", "N·m"), strict=True):
         read, got = table.scalar("fig13", name), data["extents_of_wrenches"][name]
         whole, pulled = data["extents"][name], data["extents_of_pulls"][name]
-        told = (
+        given = (
             f"{got:.3g} {unit} ({100 * (got / read - 1):+.0f} %); of straight pulls {pulled:.3g}, "
             f"of the whole hull's part F_z ≤ 0 {whole:.3g}"
         )
         holds, near = abs(got / read - 1.0) <= NEAR, 100 * NEAR
-        text.check("extent", told, holds, extent=extent, near=near, read=read, unit=unit)
+        text.check("extent", given, holds, extent=extent, near=near, read=read, unit=unit)
     off = np.abs(np.array(data["edge"]["moment"]) - data["edge"]["printed"])
-    told = f"off by {off.max():.2f} at most, {off.mean():.2f} on average"
-    text.check("edge", told, off.max() <= NEAR_EDGE and off.mean() <= NEAR_EDGE_ON_AVERAGE)
+    given = f"off by {off.max():.2f} at most, {off.mean():.2f} on average"
+    text.check("edge", given, off.max() <= NEAR_EDGE and off.mean() <= NEAR_EDGE_ON_AVERAGE)
     force_x, force_z, printed = data["side"].values()
     holds = abs(force_z / printed - 1.0) <= NEAR_SIDE
     text.check("side", f"{force_z:.3g} N", holds, force_x=force_x, printed=printed)
@@ -255,11 +255,11 @@ def _check(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None
     forces, best, strength, without = data["positive_moment"].values()
     share = float((best > 0.0).sum() / max(len(best), 1))
     middle = len(forces) // 2
-    told = (
+    given = (
         f"for {100 * share:.0f} % of F_x up to {forces.max(initial=0.0):.1f} N; strength at half "
         f"of that from {np.nan_to_num(without[middle]):.1f} to {strength[middle]:.1f} N"
     )
-    text.check("positive_moment", told, share == 1.0)
+    text.check("positive_moment", given, share == 1.0)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:

@@ -53,7 +53,7 @@ PLANES: Final = 181
 
 STEPS: Final = 1000
 SEARCHED: Final = 100
-"""Of the progress told, and of each surface's when the search ends."""
+"""Steps of progress in all, and of each surface at the end of its search."""
 
 ABOUT: Final = 0.25
 """A figure printed as "about" is met within this share of it."""
@@ -176,17 +176,17 @@ def _check_failures(text: StudyText, near: dict[str, Any], far: dict[str, Any]) 
     proximal = phalanges.count("proximal") > 0.5 * len(phalanges)
     text.check("proximal_first", _listed(near), proximal)
     arms, distal = np.abs(wrenches[:, 2] / wrenches[:, 0]), np.array(phalanges) == "distal"
-    told, small = "no distal failure", False
+    given, small = "no distal failure", False
     if distal.any():
         here, others = np.median(arms[distal]), np.median(arms[~distal])
-        told = f"median M_y : F_x {1e3 * here:.1f} mm, {1e3 * others:.1f} mm where others fail"
+        given = f"median M_y : F_x {1e3 * here:.1f} mm, {1e3 * others:.1f} mm where others fail"
         small = bool(here < others)
-    text.check("distal_where", told, small)
+    text.check("distal_where", given, small)
     limits = [entry for entry in far["shares"] if entry["way"] not in (DRAGGED, UNBALANCED)]
     mine = sum(entry["share"] for entry in limits if entry["phalanx"] == "proximal")
     letting_go = mine / sum(entry["share"] for entry in limits) if limits else 0.0
-    told = f"{_listed(far)}; of tiles that let go {100 * letting_go:.1f} %"
-    text.check("proximal_only", told, set(far["pulls"]["phalanx"]) == {"proximal"})
+    given = f"{_listed(far)}; of tiles that let go {100 * letting_go:.1f} %"
+    text.check("proximal_only", given, set(far["pulls"]["phalanx"]) == {"proximal"})
 
 
 def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: ParameterTable) -> None:
@@ -200,25 +200,25 @@ def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: Parame
             best, printed = planes[f"best_for_{name}"], table.scalar("fig14", f"{name}_ratio")
             there = np.interp(1.0 / printed, planes["arm"], planes[name]) / best[name]
             ratio = best["ratio"]
-            told = (
+            given = (
                 f"{ratio:.3g} : 1 (M_y : F_x {1e3 * best['arm']:.1f} mm); at {printed:g} : 1 "
                 f"{100 * there:.1f} % of the best; best of straight pulls "
                 f"{surface['best_pulls'][name]['ratio']:.3g} : 1"
             )
             holds = abs(ratio - printed) <= ABOUT * printed
             words: dict[str, Any] = {"where": where, "aim": aim, "printed": printed}
-            text.check("best_plane", told, holds, role=role, about=100 * ABOUT, **words)
+            text.check("best_plane", given, holds, role=role, about=100 * ABOUT, **words)
             ratios.append(ratio)
         force, moment = ratios
-        told = f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment"
-        text.check("higher_for_force", told, 0.0 < moment < force, where=where)
+        given = f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment"
+        text.check("higher_for_force", given, 0.0 < moment < force, where=where)
     anchor, best = table.scalar("fig14", "anchor"), surfaces[0]["planes"]["best_for_force"]
     span = "nowhere else"
     if best["arms_as_good"]:
         span = "from {:.2f} to {:.2f} cm".format(*(100 * arm for arm in best["arms_as_good"]))
-    told = f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}"
+    given = f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}"
     holds = abs(best["arm"] - anchor) <= ABOUT * anchor
-    text.check("anchor", told, holds, anchor=100 * anchor, about=100 * ABOUT)
+    text.check("anchor", given, holds, anchor=100 * anchor, about=100 * ABOUT)
 
 
 def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any]) -> None:
@@ -226,10 +226,10 @@ def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any])
         of = [surface["extents"][name] / near["extents"][name] for name in near["extents"]]
         size = surface["volume"] / near["volume"]
         shares = zip(("F_x", "F_z", "M_y"), of, strict=True)
-        told = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
-        told += f", volume {100 * size:.0f} % of that on 300 mm"
+        given = ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares)
+        given += f", volume {100 * size:.0f} % of that on 300 mm"
         tensions = {"far": surface["tension"], "near": near["tension"]}
-        text.check("smaller", told, max(*of, size) < 1.0, **tensions)
+        text.check("smaller", given, max(*of, size) < 1.0, **tensions)
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:

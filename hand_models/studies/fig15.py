@@ -161,40 +161,40 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     for curve in (strong, weak):
         best, moderate = curve.best("volume"), curve.last // 2
         widened = curve["volume"][moderate] / curve["volume"][0]
-        told = f"{widened:.3g} times as much at {tried[moderate]:g} N as at {tried[0]:g} N"
-        text.check("moderate", told, widened > 1.0, where=curve.name)
-        told = f"{tried[best]:g} N of {tried[0]:g} to {tried[curve.last]:g} N"
-        text.check("not_large", told, 0 < best < curve.last, where=curve.name)
+        given = f"{widened:.3g} times as much at {tried[moderate]:g} N as at {tried[0]:g} N"
+        text.check("moderate", given, widened > 1.0, where=curve.name)
+        given = f"{tried[best]:g} N of {tried[0]:g} to {tried[curve.last]:g} N"
+        text.check("not_large", given, 0 < best < curve.last, where=curve.name)
     most, sheared = weak["normal"][weak.last], weak["normal"][weak.best("shear")]
-    told = f"{most:.1f} N at {tried[weak.last]:g} N, "
-    told += f"{sheared:.1f} N at {tried[weak.best('shear')]:g} N"
-    text.check("normal_on_flat", told, most > sheared, where=weak.name)
+    given = f"{most:.1f} N at {tried[weak.last]:g} N, "
+    given += f"{sheared:.1f} N at {tried[weak.best('shear')]:g} N"
+    text.check("normal_on_flat", given, most > sheared, where=weak.name)
     for curve in (weak, strong):
         best = curve.best("shear")
         after = curve["shear"][best : curve.last + 1]
         falls = bool((np.diff(after) <= SLACK * after[0]).all())
-        told = f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
-        told += f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily")
+        given = f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
+        given += f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily")
         holds = len(after) > 1 and falls and after[-1] < (1.0 - SLACK) * after[0]
-        text.check("reduces_shear", told, holds, where=curve.name)
+        text.check("reduces_shear", given, holds, where=curve.name)
     for force in FORCES:
         high, low = strong[force][both], weak[force][both]
         ratios = low / high
-        told = f"{ratios.min():.2f} to {ratios.max():.2f} times that on {strong.name}"
-        text.check("lower", told, (low < high).all(), force=force)
-        told = (
+        given = f"{ratios.min():.2f} to {ratios.max():.2f} times that on {strong.name}"
+        text.check("lower", given, (low < high).all(), force=force)
+        given = (
             f"by {np.ptp(low):.1f} N, on {strong.name} by {np.ptp(high):.1f} N, over the tensions "
             "at which both hold"
         )
-        text.check("less_sensitive", told, np.ptp(low) < np.ptp(high), force=force)
+        text.check("less_sensitive", given, np.ptp(low) < np.ptp(high), force=force)
     curved, flat = (float(np.mean(curve["pressed_share"][both])) for curve in (strong, weak))
-    told = f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold"
-    text.check("normal_share", told, curved > flat, strong=strong.name, weak=weak.name)
+    given = f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold"
+    text.check("normal_share", given, curved > flat, strong=strong.name, weak=weak.name)
     beyond = [strong[key][i] for i in range(strong.best("shear"), strong.last + 1) for key in WHO]
     others = sorted({p for found in beyond for p in found} - {"proximal", "distal"})
     ends = sum("proximal" in found or "distal" in found for found in beyond)
-    told = f"at {ends} of {len(beyond)} limits; also: {', '.join(others) or 'nobody'}"
-    text.check("ends_fail", told, 2 * ends > len(beyond), where=strong.name)
+    given = f"at {ends} of {len(beyond)} limits; also: {', '.join(others) or 'nobody'}"
+    text.check("ends_fail", given, 2 * ends > len(beyond), where=strong.name)
 
 
 class _Curve:

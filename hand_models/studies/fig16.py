@@ -106,20 +106,20 @@ def _check(text: StudyText, data: dict[str, Any]) -> None:
         middle, distal = np.meshgrid(usual["x"]["values"], usual["y"]["values"])
         fails = usual["state"] != "holds"
         above, below = fails[distal > middle], fails[distal <= middle]
-        told = f"{above.mean():.0%} of those where it is, {below.mean():.0%} of the others"
-        text.check("distal_larger", told, above.mean() > below.mean(), surface=name)
+        given = f"{above.mean():.0%} of those where it is, {below.mean():.0%} of the others"
+        text.check("distal_larger", given, above.mean() > below.mean(), surface=name)
         text.check("every_larger", f"{above.mean():.0%}", above.all(), surface=name)
     for name in SURFACES:
         cell = data["in_use"][name]["usual"]
-        told = ", ".join([cell["state"], *(f"{m} {v:.1f} N" for m, v in cell["limits"].items())])
+        given = ", ".join([cell["state"], *(f"{m} {v:.1f} N" for m, v in cell["limits"].items())])
         holds = cell["state"] == "holds" and all(v > 0.0 for v in cell["limits"].values())
-        text.check("in_use", told, holds, surface=name)
+        text.check("in_use", given, holds, surface=name)
     for name in SURFACES:
         high, low = maps[name], states[name]
         tension, lower = (found["conditions"]["tension"] for found in (high, low))
-        told = f"{low['failing']:.1%}, {high['failing']:.1%} at {tension:g} N"
+        given = f"{low['failing']:.1%}, {high['failing']:.1%} at {tension:g} N"
         fewer = low["failing"] < high["failing"]
-        text.check("lower_tension", told, fewer, surface=name, tension=tension, lower=lower)
+        text.check("lower_tension", given, fewer, surface=name, tension=tension, lower=lower)
     for name, measure in itertools.product(SURFACES, MEASURES_SHOWN):
         high, low = maps[name]["limits"][measure], data["maps_at_lower_tension"][name]
         # cell by cell of the coarser map
@@ -128,16 +128,16 @@ def _check(text: StudyText, data: dict[str, Any]) -> None:
         ratios = (low["limits"][measure] / thinned)[thinned > 0.0]
         ratios = ratios[np.isfinite(ratios)]
         ratio = float(np.median(ratios)) if len(ratios) else float("nan")
-        told, tension = (
+        given, tension = (
             f"{ratio:.2f} of it ({len(ratios)} cells)",
             maps[name]["conditions"]["tension"],
         )
         text.check(
-            "lower_limits", told, ratio < 1.0, surface=name, measure=measure, tension=tension
+            "lower_limits", given, ratio < 1.0, surface=name, measure=measure, tension=tension
         )
     moved = np.abs(1e-3 * data["normal_slopes"]) > UNMOVED
-    told = ", ".join(f"{name} {n}" for name, n in zip(PHALANGES, moved.sum(axis=0), strict=True))
-    text.check("every_force", told, moved.all())
+    given = ", ".join(f"{name} {n}" for name, n in zip(PHALANGES, moved.sum(axis=0), strict=True))
+    text.check("every_force", given, moved.all())
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:

@@ -13,9 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import scipy
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
 from hand_models.hand import SettledHand
-from hand_models.rock import grid
+from hand_models.rock import Triangles, grid
 from planner.pictures.rock_patches import rock_patch
 from planner.prepare import settle_hand
 from planner.question import HandOnHold, Question, Stance
@@ -54,13 +54,20 @@ class Surface(NamedTuple):
         All but rock are convex.
     name : str
         The limb of rock and of a palm.
-    triangles : ndarray, shape (n, 3, 3)
+    vertices : ndarray, shape (n, 3)
         [m]
+    faces : ndarray of int, shape (m, 3)
     """
 
     kind: str
     name: str
-    triangles: Array
+    vertices: Array
+    faces: Indices
+
+    @property
+    def triangles(self) -> Array:
+        """Corners of the triangles, shape (m, 3, 3) [m]."""
+        return np.asarray(self.vertices[self.faces])
 
 
 class Line(NamedTuple):
@@ -141,7 +148,7 @@ class Scene:
     def points(self) -> Array:
         """All places, with the tips of arrows, shape (n, 3) [m]."""
         parts = [self.origin, *(arrow.start + self.scale * arrow.force for arrow in self.arrows)]
-        parts += [surface.triangles for surface in self.surfaces]
+        parts += [surface.vertices for surface in self.surfaces]
         parts += [line.points for line in self.lines] + [dots.points for dots in self.dots]
         return np.vstack([np.reshape(part, (-1, 3)) for part in parts])
 
@@ -197,10 +204,11 @@ def scene_of(plan: Plan, question: Question) -> Scene:
     for hand, known, rock in zip(stance.hands, settled, _rocks(stance.hands, settled), strict=True):
         kind, into_world = known.hand, hand.pose.apply
         x, y = np.abs(kind.palm_tiles[:, :2]).max(axis=0) + kind.palm_tile_size / 2.0
-        a, b, c, d = into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
+        palm = into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
+        apart = np.arange(3 * len(rock)).reshape(-1, 3)
         surfaces += [
-            Surface("rock", hand.limb, rock),
-            Surface("palm", hand.limb, np.array([(a, b, c), (a, c, d)])),
+            Surface("rock", hand.limb, rock.reshape(-1, 3), apart),
+            Surface("palm", hand.limb, palm, np.array([(0, 1, 2), (0, 2, 3)])),
         ]
         frames = kind.frames(known.grasp.outer_rotation)
         lines += [
@@ -285,7 +293,7 @@ def _body(plan: Plan, stance: Stance) -> list[Surface]:
         kinds += ["link"] * (len(ends) - len(kinds))
     placed = stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3)
     found = [
-        Surface(kind, "", _capsule(start, end, radius))
+        Surface(kind, "", *_capsule(start, end, radius))
         for kind, (start, end), radius in zip(kinds, placed, radii.tolist(), strict=True)
     ]
     if "body" not in kinds:
@@ -293,12 +301,12 @@ def _body(plan: Plan, stance: Stance) -> list[Surface]:
         if plan.joints is not None:
             chains = [robot.link_chain(plan.joints, limb) for limb in robot.limbs]
             hull += [stance.body.apply(chain[0]) for chain in chains]
-        found.append(Surface("body", "", _hull(np.array(hull))))
+        found.append(Surface("body", "", *_hull(np.array(hull))))
     return found
 
 
-def _capsule(start: Array, end: Array, radius: float) -> Array:
-    """Return a capsule's triangles, shape (n, 3, 3) [m]."""
+def _capsule(start: Array, end: Array, radius: float) -> Triangles:
+    """Return a capsule's surface [m]."""
     length = float(np.linalg.norm(end - start))
     along = (end - start) / length if length else UP
     aside = np.linalg.svd(along[None])[2][1]
@@ -307,12 +315,11 @@ def _capsule(start: Array, end: Array, radius: float) -> Array:
     around = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
     half = np.sin(rise)[:, None, None] * around, np.cos(rise)[:, None, None] * along
     beyond, before = half[0] + half[1], (half[0] - half[1])[::-1]
-    vertices, faces = grid(np.concatenate([end + radius * beyond, start + radius * before]))
-    return np.asarray(vertices[faces])
+    return grid(np.concatenate([end + radius * beyond, start + radius * before]))
 
 
-def _hull(points: Array) -> Array:
-    """Return the triangles of the hull of points (n, 3), whether it is solid, flat or a line."""
+def _hull(points: Array) -> Triangles:
+    """Return the hull of points (n, 3), whether it is solid, flat or a line."""
     off = points - points.mean(axis=0)
     axes = np.linalg.svd(off)[2]
     for dimensions in (3, 2):
@@ -321,12 +328,12 @@ def _hull(points: Array) -> Array:
         except (scipy.spatial.QhullError, ValueError):
             continue
         if dimensions == 3:
-            return np.asarray(points[hull.simplices])
+            return Triangles(points, hull.simplices.astype(np.intp))
         first, *others = hull.vertices
-        return np.array([points[[first, i, j]] for i, j in pairwise(others)])
+        return Triangles(points, np.array([(first, i, j) for i, j in pairwise(others)]))
     along = off @ axes[0]
-    ends = points[[int(along.argmin()), int(along.argmax())]]
-    return np.array([(ends[0], ends[1], ends[1])])
+    low, high = int(along.argmin()), int(along.argmax())
+    return Triangles(points, np.array([(low, high, high)]))
 
 
 def _load(plan: Plan, question: Question) -> Arrow:

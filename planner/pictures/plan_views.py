@@ -114,14 +114,12 @@ class View:
             self.axes.plot(*self.place(points).T, clip_on=False, linestyle="none", **style)
             self.seen.extend(self.flat(points)[:, None])
 
-    def fill(self, polygons: Iterable[Array], **style: Any) -> None:
-        corners = [self.place(polygon) for polygon in polygons]
-        if corners:
-            # of one length, since axes of three dimensions fill up with numbers at random
-            most = max(map(len, corners))
-            corners = [np.pad(each, ((0, most - len(each)), (0, 0)), "edge") for each in corners]
+    def fill(self, polygons: Array, **style: Any) -> None:
+        """Fill polygons, shape (n, k, 3)."""
+        if len(polygons):
+            corners = self.place(polygons.reshape(-1, 3)).reshape(*polygons.shape[:2], -1)
             collection = Poly3DCollection if self.deep else PolyCollection
-            self.axes.add_collection(collection(corners, clip_on=False, **style))
+            self.axes.add_collection(collection(list(corners), clip_on=False, **style))
 
     def rock(self, triangles: Array) -> None:
         """Draw lit triangles, shape (n, 3, 3), the farthest first."""
@@ -220,8 +218,12 @@ def draw_scene(view: View, scene: Scene) -> None:
     """Draw rock, hands, limbs, forces and names."""
     view.rock(np.concatenate([s.triangles for s in scene.surfaces if s.kind == "rock"]))
     for kind, style in OUTLINES.items():
-        drawn = [s.triangles for s in scene.surfaces if s.kind == kind and len(s.triangles)]
-        view.fill([silhouette(triangles, view.look) for triangles in drawn], **style)
+        drawn = [s.vertices for s in scene.surfaces if s.kind == kind]
+        outlines = [silhouette(vertices, view.look) for vertices in drawn]
+        # of one length, the last corner as often as it takes
+        corners = np.arange(max(map(len, outlines), default=0))
+        alike = [each[np.minimum(corners, len(each) - 1)] for each in outlines]
+        view.fill(np.array(alike), **style)
     for line in scene.lines:
         view.line(line.points, **LINES[line.kind])
     for dots in scene.dots:
@@ -237,12 +239,12 @@ def draw_scene(view: View, scene: Scene) -> None:
     view.untangle()
 
 
-def silhouette(triangles: Array, look: Array) -> Array:
+def silhouette(vertices: Array, look: Array) -> Array:
     """Return the corners of a convex surface's outline as seen in parallel, in order.
 
     Parameters
     ----------
-    triangles : ndarray, shape (n, 3, 3)
+    vertices : ndarray, shape (n, 3)
         [m]
     look : ndarray, shape (3,)
         Unit direction.
@@ -252,13 +254,12 @@ def silhouette(triangles: Array, look: Array) -> Array:
     ndarray, shape (m, 3)
         Two ends where it is seen edge-on [m].
     """
-    corners = triangles.reshape(-1, 3)
-    flat = corners @ np.linalg.svd(look[None])[2][1:].T
+    flat = vertices @ np.linalg.svd(look[None])[2][1:].T
     try:
-        return np.asarray(corners[scipy.spatial.ConvexHull(flat).vertices])
+        return np.asarray(vertices[scipy.spatial.ConvexHull(flat).vertices])
     except scipy.spatial.QhullError:
         along = flat @ np.linalg.svd(flat - flat.mean(axis=0))[2][0]
-        return np.asarray(corners[[along.argmin(), along.argmax()]])
+        return np.asarray(vertices[[along.argmin(), along.argmax()]])
 
 
 def _write_names(view: View, scene: Scene) -> None:

@@ -2,11 +2,13 @@
 
 import json
 import tempfile
+import tomllib
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from unittest.mock import patch
 
+from hand_models import experiments
 from hand_models.studies import as_json, load_study, run_study
 
 COARSE = {
@@ -36,6 +38,12 @@ def check_written(name, *pictures):
     assert all(file.read_bytes().startswith(b"\x89PNG") for file in files[1:])
     written = json.loads(files[0].read_text(encoding="utf-8"))
     assert written == json.loads(json.dumps(as_json(result), allow_nan=False))
+    # all that is worded is held against the model
+    table = tomllib.loads((Path(experiments.__file__).parent / "studies.toml").read_text("utf-8"))
+    told = [claim.claim for claim in result.claims]
+    for entry in table[name]["claims"].values():
+        assert any(claim.startswith(entry["claim"].partition("{")[0]) for claim in told)
+    assert result.data["not_tested"] == table[name]["not_tested"]
     assert steps == sorted(steps)
     assert steps[0][0] == 0
     assert len({total for _, total in steps}) == 1

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from hand_models.base import broken_off_by
-from hand_models.rock import Mesh, Triangles, grid, weld
+from hand_models.rock import Mesh
+from hand_models.rock.surface import Triangles, grid
+from hand_models.rock.triangles import weld
 from service.answering import handle
 from tests.suite.helpers.requests import wall_request
 

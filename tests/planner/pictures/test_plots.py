@@ -516,17 +516,15 @@ def test_a_scene_has_all_capsules_as_triangles_that_face_outward():
 def test_the_outline_of_a_convex_surface_is_the_hull_of_how_it_is_seen():
     look = np.array([0.6, 0.0, -0.8])
     across = np.linalg.svd(look[None])[2][1:].T
-    corners = np.random.default_rng(0).normal(size=(40, 3, 3))
-    seen, flat = silhouette(corners, look) @ across, corners.reshape(-1, 3) @ across
+    corners = np.random.default_rng(0).normal(size=(120, 3))
+    seen, flat = silhouette(corners, look) @ across, corners @ across
     hull = MplPath(np.vstack([seen, seen[:1]]))
     assert 3 < len(seen) < 40
     assert hull.contains_points(flat, radius=1e-9).sum() + hull.contains_points(
         flat, radius=-1e-9
     ).sum() >= len(flat)
     # a square seen edge-on is a line between two of its corners
-    square = np.array(
-        [[(0.0, 0, 0), (1.0, 0, 0), (1.0, 1, 0)], [(0.0, 0, 0), (1, 1, 0), (0, 1, 0)]]
-    )
+    square = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)])
     line = silhouette(square, np.array([0.0, 1.0, 0.0]))
     np.testing.assert_allclose(np.sort(line[:, 0]), [0.0, 1.0])
 

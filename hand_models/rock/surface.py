@@ -1,4 +1,4 @@
-"""Triangles between points in rows: the surfaces of holds."""
+"""Surfaces as triangles: between points of a grid, and of outlines that are drawn out."""
 
 from __future__ import annotations
 
