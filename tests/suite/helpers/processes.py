@@ -24,7 +24,8 @@ def begun(*arguments: str, before: str = "", **more: object) -> subprocess.Popen
     return subprocess.Popen(
         [sys.executable, "-c", f"{before}\nfrom service.commands import main; main()", *arguments],
         cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
+        # a command whose files cannot grow would leave half of its modules' code
+        env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80", "PYTHONDONTWRITEBYTECODE": "1"},
         start_new_session=True,
         **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | more,
     )
