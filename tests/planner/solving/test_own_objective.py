@@ -5,6 +5,7 @@ from dataclasses import replace
 import cvxpy as cp
 import numpy as np
 import pytest
+from msgspec import structs
 
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner.programs import SLACK
@@ -99,7 +100,7 @@ def test_a_plan_that_it_finds_wrong_or_does_not_prove_never_leaves(objective, wo
 
 
 def test_where_the_limits_cannot_be_kept_the_plan_of_least_utilisation_leaves():
-    heavy = replace(QUESTION, load=replace(QUESTION.load, mass=400.0))
+    heavy = replace(QUESTION, load=structs.replace(QUESTION.load, mass=400.0))
     answer, least = plan(replace(heavy, objective=LeastSum())), plan(heavy)
     assert answer.status == least.status == "overloaded"
     assert answer.utilisation == least.utilisation

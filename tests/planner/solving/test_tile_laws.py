@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planner.verification.recomputation import LimitCurves
 
 from planner.prepare import HandBatch, settle_hand
 from planner.question import Question
 from planner.result import Plan, PlanArrays
 from planner.solving import plan
 from planner.verification import Check
+from planner.verification.tiles import LimitCurves
 from service.answering import questions
 from service.commands.stances import read_request
 from tests.suite.helpers.stances import ask, on_wall

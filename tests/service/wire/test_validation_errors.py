@@ -214,12 +214,6 @@ INVALID = [
         "load.payloads[1].link",
         "give link or limb, and not both",
     ),
-    (
-        ("limits",),
-        {"joint_torque": {"rear_left": 1.0, "front_left": [0.0, 0.0]}},
-        "limits.joint_torque.front_left",
-        "must be at least 0.001 N·m",
-    ),
     (("limits",), {"tension_change": 9.0}, "limits.tension_change", "present tensions are needed"),
     (("present",), {"front_left": [9.0, 9.0, 9.0]}, "present.front_left", "length 4"),
     (
