@@ -170,7 +170,8 @@ class Finding(Struct, frozen=True):
     kind : str
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
         ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit``,
-        ``hand_adds_nothing`` or, where joints are known, ``link_in_rock`` and ``links_collide``.
+        ``hand_adds_nothing`` or, where joints are known, ``link_in_rock``, ``links_collide``,
+        ``mass_below_limbs`` and ``com_off_posture``.
     field : str
         Its place in the question, such as ``stance.hands[0].pose.orientation``.
     message : str
