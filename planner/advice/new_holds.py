@@ -1,8 +1,8 @@
 """Where a limb had better take hold that holds nothing, or something else: if rock is there.
 
-The rock is like that under a hand of the stance, and lies in the hand alike. A rock that hands share
-stands in W once, so that a hand on it is like none. Places are on a plane
-through the hands, whose normal is the mean of their palms', on a grid in the limb's reach.
+The rock is like that under a hand of the stance, and lies in the hand alike. A rock that hands
+share stands in W once, so that no hold is like one on it. Places are on a plane through the hands,
+whose normal is the mean of their palms', on a grid in the limb's reach.
 """
 
 from __future__ import annotations

@@ -58,7 +58,8 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
         sizes[f"with detail {detail}"] = len(part)
     modelled = isinstance(reply, PlanReply) and "model" in getattr(request, "want", ())
     bare = found.in_detail("full").reply if modelled and isinstance(found, Planned) else reply
-    sizes |= {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
+    without = {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
+    sizes |= {words: size for words, size in without.items() if size < len(payload)}
     raise _too_large(len(payload), most, sizes)
 
 
@@ -81,7 +82,7 @@ def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
         for field in fields(reply)
         if field.name in (*WANTED, ALONG)
     }
-    there = [name for name in blank if getattr(reply, name) not in (None, UNSET)]
+    there = [name for name in blank if getattr(reply, name) not in (None, UNSET, [])]
     if bare is not reply:
         yield "without model in want", bare
     for name in there:
