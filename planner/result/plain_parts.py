@@ -265,6 +265,8 @@ class RobustLoadFactor(Struct, frozen=True):
         The same of that.
     places : int
         Of each hand.
+    reasons : dict of str to str
+        Why a hand cannot be at the first of its places where it cannot, by limb.
     """
 
     draws: int
@@ -279,6 +281,7 @@ class RobustLoadFactor(Struct, frozen=True):
     hundredth: float
     hundredth_interval: list[float]
     places: int
+    reasons: dict[str, str] = {}
 
 
 class Tile(Struct, frozen=True):

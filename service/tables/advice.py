@@ -27,5 +27,6 @@ def print_advice(reply: PlanReply, out: Console) -> None:
     holding = reply.status == "optimal"
     for advice in islice(reply.advice or (), MOST):
         out.print(words_of(advice, holding=holding), markup=False)
-    if reply.advice == [] and "advice" not in reply.unfinished:
+    doubtful = any(each.kind == "unit" for each in reply.findings)
+    if reply.advice == [] and "advice" not in reply.unfinished and not doubtful:
         out.print("of all changes that were tried none would help")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 from planner import Quantiles, RobustLoadFactor, Spread
@@ -50,15 +51,16 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
     said = f"nine in ten above {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
     said += f"99 in 100 above {robust.hundredth:.3f}"
     said += f"; {robust.without} hold nothing" if robust.without else ""
-    said += _refused(robust.refused)
+    said += _refused(robust.refused, robust.reasons)
     return (
         f"load factor with each hand up to {1e3 * robust.position:g} mm and "
         f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} draws:\n{said}"
     )
 
 
-def _refused(limbs: Mapping[str, int]) -> str:
-    each = ", ".join(f"{limb} in {n}" for limb, n in limbs.items())
+def _refused(limbs: Mapping[str, int], reasons: Mapping[str, str] = MappingProxyType({})) -> str:
+    why = {limb: f" ({reason})" for limb, reason in reasons.items()}
+    each = ", ".join(f"{limb} in {n}{why.get(limb, '')}" for limb, n in limbs.items())
     return f"; hands that cannot be there: {each}" if each else ""
 
 

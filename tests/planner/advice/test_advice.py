@@ -352,3 +352,14 @@ def test_no_hold_is_like_one_on_a_rock_that_hands_share():
         trials = Trials(asked.bare(), try_stance)
         assert all(bool(NewHold(trials, limb).likes) != shared for limb in limbs)
         assert shared or any(every_hold(trials, limbs[0]))
+
+
+def test_nothing_is_advised_that_is_far_from_holding_or_while_a_unit_is_in_doubt():
+    asked = ask(on_wall(Plane(), outer_rotation=0.0), "advice")
+    answer = plan(asked)
+    assert answer.status == "infeasible"
+    assert all(each.utilisation < 5.0 for each in answer.advice)
+    in_millimetres = replace(asked, load=Load(com=(0.33, -0.82, -132.9)))
+    answer = plan(in_millimetres)
+    assert answer.advice == ()
+    assert answer.warnings[-1] == "no advice is looked for while a unit is in doubt: load.com"

@@ -17,6 +17,7 @@ from planner.robots import robosimian
 from planner.solving import KnownStance, plan, robust
 from service.answering.questions import question
 from service.commands.stances import read_request
+from service.tables.spreads import robust_sentence
 from tests.suite.helpers.stances import ask, on_wall
 
 POSITION, ANGLE = 0.002, 0.02
@@ -206,6 +207,9 @@ def test_hands_that_cannot_be_there_are_named():
     found = plan(asked).robust
     assert set(found.refused) == {"front_left"}
     assert 0 < found.refused["front_left"] <= found.without
+    (reason,) = found.reasons.values()
+    assert "rock" in reason
+    assert f"front_left in {found.refused['front_left']} ({reason})" in robust_sentence(found)
 
 
 def test_where_no_draw_is_held_there_is_none(monkeypatch):
