@@ -39,7 +39,7 @@ MANY: Final = ("pair", "combination")
 """Kinds of several changes together."""
 
 WORST: Final = 5.0
-"""Utilisation up to which a change that does not make it hold is told: beyond, it is far from it."""
+"""Utilisation below which a change is told that does not make the stance hold."""
 
 NEAR: Final = 2.5
 """Utilisation up to which small changes of every hand are tried."""

@@ -208,7 +208,7 @@ def test_hands_that_cannot_be_there_are_named():
     assert set(found.refused) == {"front_left"}
     assert 0 < found.refused["front_left"] <= found.without
     (reason,) = found.reasons.values()
-    assert "rock" in reason
+    assert "inside" in reason
     assert f"front_left in {found.refused['front_left']} ({reason})" in robust_sentence(found)
 
 
