@@ -50,7 +50,11 @@ def main(endpoint: str, stance: Path) -> None:
     settings.insert_json5("mode", '"client"')
     settings.insert_json5("connect/endpoints", json.dumps([endpoint]))
     request = json.loads(stance.read_text(encoding="utf-8"))
-    with zenoh.open(settings) as session:
+    try:
+        session = zenoh.open(settings)
+    except zenoh.ZError as error:
+        raise SystemExit(f"no service answers at {endpoint}: {error}") from None
+    with session:
         service = Asking(session)
         plan = service.ask("plan", request | {"detail": "set_points"})
         if "error" in plan:

@@ -1,4 +1,4 @@
-from .meshing import mesh_scan as mesh_scan, too_large as too_large
+from .meshing import mesh_scan as mesh_scan, too_large as too_large, too_small as too_small
 from .outliers import drop_outliers as drop_outliers
 from .pictures import plot_holds as plot_holds, plot_rock as plot_rock
 from .reading import ENDINGS as ENDINGS, read_scan as read_scan

@@ -55,7 +55,9 @@ def read_columns(path: Path) -> RawScan:
     first line with the count of the others is left out. Decimals may follow a comma, unless commas
     part the columns, too. What is empty is not finite.
     """
-    lines = [line for line in _text(path).splitlines() if line.strip() and line.strip()[0] != "#"]
+    whole = _text(path).splitlines()
+    places = [i for i, line in enumerate(whole) if line.strip() and line.strip()[0] != "#"]
+    lines = [whole[i] for i in places]
     if lines and _is_count(lines[0], len(lines) - 1):
         del lines[0]
     if not lines:
@@ -74,7 +76,8 @@ def read_columns(path: Path) -> RawScan:
         return RawScan(np.empty((0, 3)))
     if names is None:
         _check_unnamed(lines, style, width, path)
-    return RawScan(_read(lines, style, columns, path))
+    numbers = [place + 1 for place in places[-len(lines) :]]
+    return RawScan(_read(lines, numbers, style, columns, path))
 
 
 def _text(path: Path) -> str:
@@ -179,7 +182,14 @@ def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) 
             )
 
 
-def _read(lines: Sequence[str], style: _Style, columns: Sequence[int], path: Path) -> Array:
+def _read(
+    lines: Sequence[str],
+    numbers: Sequence[int],
+    style: _Style,
+    columns: Sequence[int],
+    path: Path,
+) -> Array:
+    """Return the numbers of columns; ``numbers``: those of the lines in the file."""
     if style == _Style(None, ".") or style.mark:
         text = "\n".join(lines)
         if style.decimal == ",":
@@ -193,12 +203,14 @@ def _read(lines: Sequence[str], style: _Style, columns: Sequence[int], path: Pat
         except ValueError:
             pass  # slower, for what has empty cells
     found = np.empty((len(lines), len(columns)))
-    for i, line in enumerate(lines):
-        cells = _cells(line, style)
+    for i, (number, line) in enumerate(zip(numbers, lines, strict=True)):
+        cells, told = _cells(line, style), f"line {number}, {line.strip()[:60]!r},"
         if len(cells) <= max(columns):
             raise InvalidInputError(
-                f"line {i + 1} of the points has {len(cells)} columns, {line.strip()[:60]!r}: "
-                f"{path}"
+                f"{told} has {len(cells)} columns, {max(columns) + 1} are needed: {path}"
             )
-        found[i] = [_number(cells[column], style) for column in columns]
+        try:
+            found[i] = [_number(cells[column], style) for column in columns]
+        except ValueError as error:
+            raise InvalidInputError(f"{told} is no point, {error}: {path}") from None
     return found

@@ -21,9 +21,9 @@ from hand_models.scans.frame import axes_along, in_scan, start_on
 from hand_models.scans.holes import Gaps
 from hand_models.scans.kept import keep_triangles
 from hand_models.scans.rock import ScannedRock
-from hand_models.scans.scan import UNITS, Scan
+from hand_models.scans.scan import UNITS, Scan, Unit
 
-__all__ = ["Triangulated", "mesh_scan", "too_large", "triangulated", "wider_holes"]
+__all__ = ["Triangulated", "mesh_scan", "too_large", "too_small", "triangulated", "wider_holes"]
 
 STEPS: Final = 3
 """Steps that are told: thinned, triangulated, parted from holes."""
@@ -200,6 +200,24 @@ def too_large(extent: float) -> str:
         f"{extent:.4g} m across, and a hold may be {largest:g} m; is it {unit}to be "
         "scaled (--width), or cut to what hands reach?"
     )
+
+
+def too_small(extent: float, unit: Unit) -> str:
+    """Return what may be wrong with rock that is smaller than a palm, in words; else nothing.
+
+    Parameters
+    ----------
+    extent : float
+        Of its longest side [m].
+    unit : {'m', 'cm', 'mm'}
+        In which the file was read.
+    """
+    if extent >= SMALLEST:
+        return ""
+    largest, number = scan_table().scalar("scan", "largest"), extent / UNITS[unit]
+    fit = [other for other in UNITS if SMALLEST <= number * UNITS[other] <= largest]
+    asked = f"in {' or '.join(fit)} (--unit), or " if fit else ""
+    return f"{extent:.3g} m across, less than a palm is long; is it {asked}to be scaled (--width)?"
 
 
 def wider_holes(hole: float) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from hand_models.parameters import scan_table
@@ -20,8 +21,12 @@ KEPT: Final = 0.95
 """Part of what was covered that has to be covered still: dropped points may be of the rim."""
 
 
+FEWER: Final = 0.5
+"""Part of the holes and steps that a remedy may leave at most, if none leaves as few as meant."""
+
+
 class Remedy(NamedTuple):
-    """Option that leaves few of the holes and steps of a scan, as it was tried.
+    """Options that leave few of the holes and steps of a scan, as they were tried.
 
     Attributes
     ----------
@@ -29,12 +34,15 @@ class Remedy(NamedTuple):
     value : float
         Of it: standard deviations, or [m].
     left : int
-        Holes and steps that it leaves.
+        Holes and steps that are left.
+    std_ratio : float, optional
+        Standard deviations beyond which points are dropped too, where a wider hole needs that.
     """
 
     option: str
     value: float
     left: int
+    std_ratio: float | None = None
 
 
 def remedy(
@@ -42,9 +50,10 @@ def remedy(
 ) -> Remedy | None:
     """Return what would leave a scan in one piece with few holes and steps, None if nothing does.
 
-    Few are a tenth of those that it has or of those that are many, and it has to cover half of its
-    outline, and as much as it did. Tried are dropping points that stand alone (`drop_outliers`),
-    unless some were dropped, and bridging holes up to the palm's width.
+    Few are a tenth of those that it has or of those that are many, else half of them; they are
+    never many, and it has to cover half of its outline, and as much as it did. Tried are dropping
+    points that stand alone (`drop_outliers`), unless some were dropped, bridging holes up to the
+    palm's width, and both together.
 
     Parameters
     ----------
@@ -58,20 +67,34 @@ def remedy(
         As of `mesh_scan`.
     """
     table = scan_table()
-    count = max(len(rock.holes) + len(rock.steps), table.scalar("mesh", "many_holes"))
-    enough = table.scalar("mesh", "left_holes") * count
+    many, open_ = table.scalar("mesh", "many_holes"), len(rock.holes) + len(rock.steps)
+    enough = min(table.scalar("mesh", "left_holes") * max(open_, many), many)
     covered = max(KEPT * rock.covered, table.scalar("mesh", "least_covered"))
-
-    def tried(option: str, value: float, gaps: Gaps, wide: float) -> Remedy | None:
+    helping = []
+    for option, value, std_ratio, gaps in _trials(scan, hole, spacing):
+        wide = value if option == "hole" else hole
         left = sum(map(len, gaps.left(wide)))
-        helps = left <= enough and gaps.covered(wide) >= covered
-        return Remedy(option, value, left) if helps else None
-
-    if not scan.outliers and len(scan.points) > table.scalar("outliers", "neighbours"):
-        gaps = triangulated(drop_outliers(scan, STD_RATIO), spacing).gaps
-        found = tried("std_ratio", STD_RATIO, gaps, hole)
-        if found is not None:
+        if gaps.covered(wide) < covered:
+            continue
+        found = Remedy(option, value, left, std_ratio)
+        if left <= enough:
             return found
+        if left <= min(FEWER * open_, many):
+            helping.append(found)
+    return min(helping, key=lambda each: each.left, default=None)
+
+
+def _trials(
+    scan: Scan, hole: float, spacing: float | None
+) -> Iterator[tuple[str, float, float | None, Gaps]]:
+    """Yield an option, its value, the ratio of dropped points beside it, and what is then open."""
+    dropped = None
+    if not scan.outliers and len(scan.points) > scan_table().scalar("outliers", "neighbours"):
+        dropped = triangulated(drop_outliers(scan, STD_RATIO), spacing).gaps
+        yield "std_ratio", STD_RATIO, None, dropped
     gaps = triangulated(scan, spacing).gaps
-    each = (tried("hole", wider, gaps, wider) for wider in wider_holes(hole))
-    return next((found for found in each if found is not None), None)
+    for wider in wider_holes(hole):
+        yield "hole", wider, None, gaps
+    if dropped is not None:
+        for wider in wider_holes(hole):
+            yield "hole", wider, STD_RATIO, dropped

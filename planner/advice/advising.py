@@ -38,6 +38,9 @@ MASS: Final = 5
 MANY: Final = ("pair", "combination")
 """Kinds of several changes together."""
 
+WORST: Final = 5.0
+"""Utilisation below which a change is told that does not make the stance hold."""
+
 NEAR: Final = 2.5
 """Utilisation up to which small changes of every hand are tried."""
 
@@ -130,7 +133,8 @@ def _ranked(trials: Trials) -> list[Tried]:
     def told(tried: Tried) -> bool:
         # on its way to one that holds the search tries others
         found = not trials.helped or trials.holds(tried.utilisation)
-        return tried.utilisation < (1.0 - WORTH) * base and (found or tried.change.kind not in MANY)
+        enough = tried.utilisation < min((1.0 - WORTH) * base, WORST)
+        return enough and (found or tried.change.kind not in MANY)
 
     found, seen = [], set()
     for tried in sorted(filter(told, trials.found), key=rank):

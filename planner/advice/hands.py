@@ -138,7 +138,7 @@ def fingers(turn: float) -> str:
 def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
     """Return one hand with another grasp, if its rock can stay where it is."""
     stance = prepared.question.stance
-    hand, rock = stance.hands[index], _rock(prepared, index)
+    hand, rock = stance.hands[index], rock_pose(prepared, index)
     grasp: Grasp = structs.replace(hand.grasp, outer_rotation=turn)
     size = abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT
     changes: dict[str, Any] = {hand_path(index, "grasp.outer_rotation"): turn}
@@ -198,7 +198,7 @@ def _moved(
             except InvalidInputError:
                 return None
             changes[hand_path(index, "place")] = None
-        changes[hand_path(index, "hold.pose")] = pose_message(_rock(prepared, index))
+        changes[hand_path(index, "hold.pose")] = pose_message(rock_pose(prepared, index))
         if hand.hold_in_hand is not None:
             changes[hand_path(index, "hold.pose_in_hand")] = None
         changes |= unseated(hand, index)
@@ -213,6 +213,6 @@ def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:
     return {hand_path(index, name): None for name, given in said.items() if given}
 
 
-def _rock(prepared: PreparedStance, index: int) -> Pose:
+def rock_pose(prepared: PreparedStance, index: int) -> Pose:
     """Return where a hand's rock is in W."""
     return prepared.question.stance.hands[index].pose @ prepared.batch.hands[index].seating.pose

@@ -1,20 +1,22 @@
 """Where a limb had better take hold that holds nothing, or something else: if rock is there.
 
-The rock is like that under a hand of the stance, and lies in the hand alike. Places are on a plane
-through the hands, whose normal is the mean of their palms', on a grid in the limb's reach.
+The rock is like that under a hand of the stance, and lies in the hand alike. A rock that hands
+share stands in W once, so that no hold is like one on it. Places are on a plane through the hands,
+whose normal is the mean of their palms', on a grid in the limb's reach.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import permutations
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Pose, turns_about
 from planner.advice.changes import Change, hand_path, pose_message
-from planner.advice.hands import GRASPS, HAND, fingers, unseated
+from planner.advice.hands import GRASPS, HAND, fingers, rock_pose, unseated
 from planner.advice.trials import Trials, Tried
 from planner.prepare import PreparedStance
 
@@ -40,6 +42,10 @@ AROUND: Final = tuple(math.radians(turn) for turn in range(-135, 181, 45))
 
 BETWEEN: Final = math.pi / 4.0
 """By how much more, after that [rad]."""
+
+
+SAME: Final = 1e-6
+"""Difference of two rocks' places [m], or axes, up to which they are one: rounding of poses."""
 
 
 class _Hold(NamedTuple):
@@ -83,9 +89,10 @@ class NewHold:
 
     @property
     def likes(self) -> list[int]:
-        """Hands that it may be like."""
-        limbs = self.prepared.limbs
-        return [i for i in sorted(range(len(limbs)), key=limbs.__getitem__) if i != self.index]
+        """Hands that it may be like; on a rock that hands share it is known what is elsewhere."""
+        limbs, shared = self.prepared.limbs, _sharing(self.prepared)
+        likes = [i for i in range(len(limbs)) if i != self.index and i not in shared]
+        return sorted(likes, key=limbs.__getitem__)
 
     def probe(self, turns: Sequence[float]) -> None:
         """Try it like each hand, turned from that, at the first place."""
@@ -190,6 +197,19 @@ def try_new_holds(trials: Trials, most: int = 1) -> None:
     searches.sort(key=lambda search: search.best[0].utilisation if search.best else math.inf)
     for search in searches[:most]:
         search.refine()
+
+
+def _sharing(prepared: PreparedStance) -> set[int]:
+    """Return the hands whose rock, where it stands in W, is that of another hand."""
+    hands = prepared.question.stance.hands
+    poses = [rock_pose(prepared, i) for i in range(len(hands))]
+    return {
+        i
+        for i, j in permutations(range(len(hands)), 2)
+        if hands[i].hold == hands[j].hold
+        and np.allclose(poses[i].position, poses[j].position, rtol=0.0, atol=SAME)
+        and np.allclose(poses[i].rotation, poses[j].rotation, rtol=0.0, atol=SAME)
+    }
 
 
 def _places(prepared: PreparedStance, limb: str) -> Iterator[Array]:

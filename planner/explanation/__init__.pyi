@@ -32,6 +32,7 @@ from .sentences import (
 )
 from .stance_warnings import (
     joint_sentences as joint_sentences,
+    load_findings as load_findings,
     off_sentences as off_sentences,
     scene_findings as scene_findings,
     warnings as warnings,

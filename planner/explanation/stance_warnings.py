@@ -13,7 +13,7 @@ from planner.question import Question, Stance
 from planner.result import Finding
 from planner.scene import findings, link_findings, scene_of
 
-__all__ = ["joint_sentences", "off_sentences", "scene_findings", "warnings"]
+__all__ = ["joint_sentences", "load_findings", "off_sentences", "scene_findings", "warnings"]
 
 SWINGS: Final = 1e-3
 """Torque from which on a joint without a motor is said to move [N·m]: a smaller one is nothing but
@@ -61,6 +61,37 @@ def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:
     scene, where = scene_of(prepared.question.stance, prepared.batch.hands), prepared.where
     odd = findings(scene)
     return odd if where is None else (*odd, *link_findings(scene, where.angles))
+
+
+def load_findings(question: Question, where: Posture | None) -> tuple[Finding, ...]:
+    """Return what is odd about a load where joints are known: limbs weigh more, or it is elsewhere.
+
+    The joints bear the limbs as the robot's file has them, whatever the load is.
+    """
+    load, robot = question.load, question.stance.robot
+    if where is None or question.body_wrench is not None:
+        return ()
+    found = []
+    if load.mass is not None and load.mass < robot.limb_mass:
+        message = (
+            f"load.mass: {load.mass:.4g} kg are less than the limbs and hands weigh, "
+            f"{robot.limb_mass:.4g} of {robot.mass:.4g} kg: the body is taken to weigh "
+            f"{load.mass - robot.limb_mass:.4g} kg, and the joints bear the limbs as they are; a "
+            "lighter robot takes other masses in its URDF"
+        )
+        found.append(Finding("mass_below_limbs", "load.mass", message, load.mass, "kg"))
+    if load.com is not None:
+        com = where.weights.com
+        away = float(np.linalg.norm(np.asarray(load.com) - com))
+        if away > OFF_CENTRE:
+            place = ", ".join(f"{value:z.3f}" for value in com)
+            message = (
+                f"load.com: it is {away:.2g} m from the posture's centre of mass, ({place}) in B: "
+                "all mass is taken where com says, and the joints bear the limbs where they are; "
+                "leave com out to weigh the posture, or give a payload"
+            )
+            found.append(Finding("com_off_posture", "load.com", message, away, "m"))
+    return tuple(found)
 
 
 def off_sentences(where: Posture | None) -> tuple[str, ...]:

@@ -170,7 +170,8 @@ class Finding(Struct, frozen=True):
     kind : str
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
         ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit``,
-        ``hand_adds_nothing`` or, where joints are known, ``link_in_rock`` and ``links_collide``.
+        ``hand_adds_nothing`` or, where joints are known, ``link_in_rock``, ``links_collide``,
+        ``mass_below_limbs`` and ``com_off_posture``.
     field : str
         Its place in the question, such as ``stance.hands[0].pose.orientation``.
     message : str
@@ -264,6 +265,8 @@ class RobustLoadFactor(Struct, frozen=True):
         The same of that.
     places : int
         Of each hand.
+    reasons : dict of str to str
+        Why a hand cannot be at the first of its places where it cannot, by limb.
     """
 
     draws: int
@@ -278,6 +281,7 @@ class RobustLoadFactor(Struct, frozen=True):
     hundredth: float
     hundredth_interval: list[float]
     places: int
+    reasons: dict[str, str] = {}
 
 
 class Tile(Struct, frozen=True):

@@ -284,6 +284,11 @@ class Robot:
         rates[:6] = self._to_body.T @ spatial
         return rates
 
+    @property
+    def limb_mass(self) -> float:
+        """What all limbs weigh with their hands [kg]."""
+        return sum(mass for mass, _, _ in self._limb_weights.values())
+
     def com_at(self, angles: Angles) -> Array:
         """Return the centre of mass of the robot with its hands in B, shape (3,) [m]."""
         centre = pin.centerOfMass(self.model, self.data, self.configuration(angles))

@@ -44,8 +44,13 @@ NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.
 STEEPEST: Final = 1e3
 """Largest multiplier of a coupled joint that is taken for one."""
 
+UNITS: Final = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "value"): "kg"}
+"""Of attributes of elements."""
+
 XACRO: Final = "/xacro"
 """What the namespace of xacro ends with."""
+
+COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
 
 EXPAND: Final = (
     "this is a xacro, which is not expanded; expand it: xacro ROBOT.urdf.xacro > ROBOT.urdf "
@@ -209,7 +214,7 @@ def parse_urdf(text: str) -> Urdf:
         raise InvalidInputError(f"must be a URDF, which is XML: {error}") from None
     if root.tag != "robot":
         raise InvalidInputError(f"must be a URDF, whose root is <robot>, got <{root.tag}>")
-    _require_expanded(root)
+    _require_expanded(root, text)
     links = [_name(element) for element in root.findall("link")]
     _distinct("link", links)
     joints = [_joint(element, set(links)) for element in root.findall("joint")]
@@ -234,8 +239,10 @@ def parse_urdf(text: str) -> Urdf:
     return replace(tree, links={link.name: link for link in map(_link, root.findall("link"))})
 
 
-def _require_expanded(root: ElementTree.Element) -> None:
+def _require_expanded(root: ElementTree.Element, text: str) -> None:
     """Refuse a file with elements of xacro, or with values that xacro is to put in."""
+    if "<xacro:" in COMMENT.sub("", text):
+        raise InvalidInputError(f"must be a URDF; {EXPAND}")
     for element in root.iter():
         space = element.tag.rpartition("}")[0] if isinstance(element.tag, str) else ""
         values = [value for name, value in element.items() if name != "filename"]
@@ -270,7 +277,9 @@ def _numbers(
     if len(numbers) != count or not all(abs(number) <= largest for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"
         got = shorten(raw, 100, placeholder=" …")
-        raise InvalidInputError(f"{place} must be {wanted} within ±{largest:g}, got {got!r}")
+        unit = UNITS.get((element.tag, attribute))
+        range_ = f"±{largest:g}" + (f" {unit}" if unit else "")
+        raise InvalidInputError(f"{place} must be {wanted} within {range_}, got {got!r}")
     return numbers
 
 

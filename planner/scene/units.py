@@ -95,6 +95,7 @@ def unit_findings(question: Question) -> tuple[Finding, ...]:
         *_surfaces(stance),
         *_tensions(question),
         *_caps(question),
+        *_hand_wrenches(stance),
     )
     # a robot that is odd itself is no measure of others
     return found if robot else (*found, *_load(question), *_holds(stance), *_joints(question))
@@ -108,8 +109,9 @@ def wrench_findings(question: Question) -> tuple[Finding, ...]:
     return tuple(_wrench(stance, wrench))
 
 
-def _finding(field: str, message: str, value: float, unit: str) -> Finding:
-    return Finding(UNIT, field, message, value, unit)
+def _finding(field: str, message: str, value: float, unit: str, whose: str = "") -> Finding:
+    """Return a finding whose message begins with whose number it is: a limb's, else the field's."""
+    return Finding(UNIT, field, f"{whose or field}: {message}", value, unit)
 
 
 # What the body weighs -----------------------------------------------------------------------------
@@ -235,10 +237,11 @@ def _surfaces(stance: Stance) -> Iterator[Finding]:
             continue
         slip = "of a tile, or of a whole hand" if strength > strongest else "in N"
         message = (
-            f"{hand.limb}: a tile is taken to hold {strength:.4g} N in shear, the presets have "
+            f"a tile is taken to hold {strength:.4g} N in shear, the presets have "
             f"{weakest:.3g} to {strongest:.3g} N: is it {slip}?"
         )
-        yield _finding(f"stance.hands[{i}].surface.shear_limit", message, strength, "N")
+        field = f"stance.hands[{i}].surface.shear_limit"
+        yield _finding(field, message, strength, "N", hand.limb)
 
 
 @cache
@@ -254,10 +257,10 @@ def _holds(stance: Stance) -> Iterator[Finding]:
         name, size = _width(hand.hold)
         if size > most:
             message = (
-                f"{hand.limb}: the hold's {name} is {size:.3g} m, and limbs reach "
+                f"the hold's {name} is {size:.3g} m, and limbs reach "
                 f"{stance.robot.reach:.2g} m: is it in m?"
             )
-            yield _finding(f"stance.hands[{i}].hold.{name}", message, size, "m")
+            yield _finding(f"stance.hands[{i}].hold.{name}", message, size, "m", hand.limb)
 
 
 def _width(hold: Hold) -> tuple[str, float]:
@@ -286,11 +289,11 @@ def _tensions(question: Question) -> Iterator[Finding]:
             given.append((f"stance.hands[{i}].tendon_preload", hand.tendon_preload))
         if tension is not None and _force_unit(tension / closing) == "kgf":
             message = (
-                f"{hand.limb}: it closes with {tension:.4g} N, hands do with {closing:.3g} N: is "
+                f"it closes with {tension:.4g} N, hands do with {closing:.3g} N: is "
                 "it in N, or in kgf?"
             )
             field = f"stance.hands[{i}].grasp.closing_tension"
-            yield _finding(field, message, tension, "N")
+            yield _finding(field, message, tension, "N", hand.limb)
     for field, tensions in given:
         largest = float(np.max(tensions))
         if largest > 2.0 * most or 0.0 < largest < NONE * closing:
@@ -311,10 +314,22 @@ def _caps(question: Question) -> Iterator[Finding]:
         least = min(abs(end) for end in ends if end)
         if least < THOUSANDTH * held:
             message = (
-                f"{limb}: {least:.3g} N is next to nothing of the {held:.3g} N that a hand holds: "
+                f"{least:.3g} N is next to nothing of the {held:.3g} N that a hand holds: "
                 "is it in N?"
             )
-            yield _finding(f"limits.per_hand.{limb}.largest_force", message, least, "N")
+            yield _finding(f"limits.per_hand.{limb}.largest_force", message, least, "N", limb)
+
+
+def _hand_wrenches(stance: Stance) -> Iterator[Finding]:
+    held = stance.robot.hand.structure.hand_load
+    for i, hand in enumerate(stance.hands):
+        force = max((abs(each) for each in (hand.wrench or ())[:3] if each), default=0.0)
+        if 0.0 < force < THOUSANDTH * held:
+            message = (
+                f"the largest force that it is to exert is {force:.3g} N, and a hand holds "
+                f"{held:.3g} N: is it in N, or in kN?"
+            )
+            yield _finding(f"stance.hands[{i}].wrench", message, force, "N", hand.limb)
 
 
 def _joints(question: Question) -> Iterator[Finding]:
@@ -334,10 +349,10 @@ def _joints(question: Question) -> Iterator[Finding]:
         if field not in told:
             told.add(field)
             message = (
-                f"{limb}: its strongest joint is to bear {most:.4g} N·m, and the robot's weight on "
+                f"its strongest joint is to bear {most:.4g} N·m, and the robot's weight on "
                 f"the Earth at its reach turns with {usual:.3g} N·m: is it in N·m?"
             )
-            yield _finding(field, message, most, "N·m")
+            yield _finding(field, message, most, "N·m", limb)
 
 
 def _largest(limits: float | Sequence[float] | Array, sliding: Iterable[bool]) -> float | None:

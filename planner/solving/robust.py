@@ -72,7 +72,8 @@ def find_robust_load_factor(
         Whether a limb without a hand cannot bear itself.
     """
     try:
-        places = [_places(prepared, i) for i in range(len(prepared.limbs))]
+        reasons: dict[str, str] = {}
+        places = [_places(prepared, i, reasons) for i in range(len(prepared.limbs))]
         taken = np.array([_taken(limb) for limb in prepared.limbs])
         factors = _factors(prepared, places, taken, overloaded)
         deadline.check(LATE)
@@ -98,17 +99,24 @@ def find_robust_load_factor(
         hundredth=hundredth,
         hundredth_interval=_interval(factors, taken, HUNDREDTH),
         places=PLACES,
+        reasons=reasons,
     )
 
 
-def _places(prepared: PreparedStance, i: int) -> Places:
-    """Return the sets of a hand at its places, with what the stance adds to them."""
+def _places(prepared: PreparedStance, i: int, reasons: dict[str, str]) -> Places:
+    """Return the sets of a hand at its places, with what the stance adds to them.
+
+    ``reasons``: takes why the hand cannot be at the first place where it cannot, by limb.
+    """
     stance, settled = prepared.question.stance, prepared.batch.hands[i]
     hand, cap = stance.robot.hand, prepared.question.limits.tendon_tension
     added, found = prepared.hands.added[i], list[WrenchSpace | None]()
     where = scattered_places(prepared.limbs[i], PLACES, SEED)
     for outcomes in closed_about(hand, settled, where, hand.seat_scatter):
         there = [each for each in outcomes if isinstance(each, SettledHand)]
+        for each in outcomes:
+            if not isinstance(each, SettledHand):
+                reasons.setdefault(prepared.limbs[i], each.message)
         spaces = iter(wrench_spaces(there, cap))
         found += [
             added.on(next(spaces)) if isinstance(each, SettledHand) else None for each in outcomes

@@ -263,8 +263,15 @@ class KnownStance:
 
 
 def with_advice(question: Question, answer: Plan) -> Plan:
-    """Return a question's plan with advice; what time was left out is reported as ever."""
+    """Return a question's plan with advice; what time was left out is reported as ever.
+
+    There is none while a number may be in another unit, which a warning says.
+    """
     start = time.perf_counter()
+    odd = [each.field for each in answer.findings if each.kind == "unit"]
+    if odd:
+        told = f"no advice is looked for while a unit is in doubt: {', '.join(odd)}"
+        return replace(answer, advice=(), warnings=(*answer.warnings, told))
     found, whole = advise(question, try_stance)
     seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings
     if not whole and seconds is not None:

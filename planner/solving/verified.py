@@ -13,6 +13,7 @@ from planner.explanation import (
     LimitUse,
     joint_name,
     joint_sentences,
+    load_findings,
     off_sentences,
     scene_findings,
     warnings,
@@ -85,12 +86,13 @@ def prepare_checks(prepared: PreparedStance) -> Checks:
     InvalidInputError
         If the stance cannot be; the field is relative to the question.
     """
-    odd = (*scene_findings(prepared), *unit_findings(prepared.question))
+    question, where = prepared.question, prepared.where
+    odd = (*scene_findings(prepared), *unit_findings(question), *load_findings(question, where))
     oddities = (
         *(each.message for each in odd),
-        *warnings(prepared.question.stance, prepared.batch),
-        *off_sentences(prepared.where),
-        *joint_sentences(prepared.question, prepared.where),
+        *warnings(question.stance, prepared.batch),
+        *off_sentences(where),
+        *joint_sentences(question, where),
     )
     return Checks.of(prepared)._replace(findings=odd, oddities=oddities)
 

@@ -60,7 +60,8 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
     modelled = isinstance(request, PlanRequest) and "model" in request.want
     if modelled and isinstance(found, Planned) and isinstance(reply, PlanReply):
         bare = found.in_detail("full").reply
-    sizes |= {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
+    without = {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
+    sizes |= {words: size for words, size in without.items() if size < len(payload)}
     raise _too_large(len(payload), most, sizes)
 
 
@@ -83,7 +84,7 @@ def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
         for field in fields(reply)
         if field.name in (*WANTED, ALONG)
     }
-    there = [name for name in blank if getattr(reply, name) not in (None, UNSET)]
+    there = [name for name in blank if getattr(reply, name) not in (None, UNSET, [])]
     if bare is not reply:
         yield "without model in want", bare
     for name in there:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import statistics
 from array import array
 from collections import Counter, defaultdict
+from typing import Final
 
 from service.replies import ErrorDetail
 from service.wire import REQUEST_KINDS
 
 __all__ = ["Tally"]
+
+
+NAMED: Final = 5
+"""Questions that are bad input, of which it is told where they are, after the first."""
 
 
 class Tally:
@@ -24,6 +29,8 @@ class Tally:
         How long plans have taken, by status [s].
     bad, first_bad : int, (int, ErrorDetail) or None
         Errors that are their requests' fault; the index and error of the first.
+    further_bad : list of int
+        Indices of those after the first, `NAMED` at most.
     """
 
     def __init__(self) -> None:
@@ -32,6 +39,7 @@ class Tally:
         self.kinds: Counter[str] = Counter()
         self.times: defaultdict[str, array[float]] = defaultdict(lambda: array("d"))
         self.first_bad: tuple[int, ErrorDetail] | None = None
+        self.further_bad: list[int] = []
 
     def add(
         self, status: str | None, error: ErrorDetail | None = None, seconds: float | None = None
@@ -41,7 +49,10 @@ class Tally:
             self.kinds[error.kind] += 1
             if error.kind in REQUEST_KINDS:
                 self.bad += 1
-                self.first_bad = self.first_bad or (self.count, error)
+                if self.first_bad is None:
+                    self.first_bad = self.count, error
+                elif len(self.further_bad) < NAMED:
+                    self.further_bad.append(self.count)
         elif status is not None:
             self.statuses[status] += 1
             if seconds is not None:

@@ -269,7 +269,7 @@ def _columns(
 
 
 def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
-    """Name the first question that is bad input, and how many more are.
+    """Name the first question that is bad input, how many more are, and where the next ones are.
 
     Parameters
     ----------
@@ -284,6 +284,9 @@ def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
         index, error = tally.first_bad
         field = "" if error.field is None else f"{error.field}: "
         more = f"; {tally.bad - 1} more {noun} are bad input" if tally.bad > 1 else ""
+        if named := [where(each) for each in tally.further_bad]:
+            rest = ", …" if tally.bad - 1 > len(named) else ""
+            more += f": {', '.join(named)}{rest}"
         tables.note(f"{where(index)}: {field}{error.message}{more}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -9,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from hand_models import parameters, scans
-from hand_models.base import InvalidInputError, Pose
+from hand_models.base import Array, InvalidInputError, Pose
 from service import tables
 from service.commands import options
 
@@ -153,7 +154,7 @@ def rock(
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
     if neighbours is not None and std_ratio is None:
         raise InvalidInputError("is of outliers, which --std-ratio drops", field="neighbours")
-    if output.exists() and output.samefile(file):
+    if output.exists() and file.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself", field="--output")
     with tables.progress(f"meshing {file.name}") as tell:
         scan = scans.read_scan(file, **reading)
@@ -165,7 +166,7 @@ def rock(
         if picture is not None:
             with tables.writing(picture):
                 scans.plot_rock(made, picture, file.name)
-        warnings = _warnings(scan, made, hole, spacing)
+        warnings = _warnings(scan, made, hole, spacing, reading)
     source = click.get_current_context().get_parameter_source("up")
     assumed = source is not ParameterSource.COMMANDLINE
     if as_json:
@@ -214,7 +215,11 @@ def _summary(made: scans.ScannedRock) -> dict[str, Any]:
 
 
 def _warnings(
-    scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: float | None
+    scan: scans.Scan,
+    made: scans.ScannedRock,
+    hole: float,
+    spacing: float | None,
+    reading: Mapping[str, Any],
 ) -> list[str]:
     """Return what may not be meant, and its cause where that can be told."""
     found = []
@@ -236,7 +241,26 @@ def _warnings(
     ]
     if not made.filled and made.extent.max() > NUMBERS.scalar("scan", "largest"):
         found.append(_why_large(made))
-    return found
+    if small := scans.too_small(float(made.extent.max()), reading["unit"]):
+        found.append(small)
+    return [*found, *_far_away(made.pose)]
+
+
+def _far_away(pose: Pose) -> Iterator[str]:
+    """Yield what to do about a pose that no request may have, as in map coordinates."""
+    import numpy as np
+
+    farthest = NUMBERS.scalar("scan", "farthest")
+    place = pose.position
+    if np.abs(place).max() <= farthest:
+        return
+    start = np.where(np.abs(place) > farthest, np.round(place, -3), 0.0)
+    yield (
+        f"the pose is more than {farthest:,.0f} m from the file's origin, and a request's "
+        f"positions go no farther: let the stance's world begin at ({_numbers(start, 0)}), and "
+        "subtract that from all its positions; there the pose is "
+        f"{_pose(Pose(place - start, pose.rotation))}"
+    )
 
 
 def _advice(scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: float | None) -> str:
@@ -247,10 +271,12 @@ def _advice(scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: flo
     if found is None:
         widest = NUMBERS.scalar("mesh", "widest_bridge")
         return (
-            f"; neither dropping stray points nor a --hole up to {widest:g} helps: "
+            f"; neither dropping stray points nor a --hole up to {widest:g}, nor both, helps: "
             "rock is to be scanned more closely, or from another side"
         )
     how = {"std_ratio": "without stray points, --std-ratio", "hole": "with --hole"}[found.option]
+    if found.std_ratio is not None:
+        how = f"without stray points, --std-ratio {found.std_ratio:g}, and {how}"
     return f": {how} {found.value:g}, {found.left} holes and steps are left"
 
 
@@ -297,7 +323,8 @@ def _print_rock(
     ]
     if not made.outliers:
         del rows[2]
-    tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
+    if tables.verbosity() >= 0:
+        tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
     out.print(f"pose {_pose(made.pose)}", markup=False, soft_wrap=True)
     for warning in warnings:
         out.print(f"warning: {warning}", markup=False)
@@ -314,8 +341,9 @@ def _sizes(what: str, sizes: list[float], hole: float) -> tuple[str, str]:
 
 
 def _pose(pose: Pose) -> str:
-    place, turn = (
-        ", ".join(f"{number:z.{digits}f}" for number in vector)
-        for vector, digits in ((pose.position, PLACE), (pose.quaternion(), ORIENTATION))
-    )
+    place, turn = _numbers(pose.position, PLACE), _numbers(pose.quaternion(), ORIENTATION)
     return f'{{"position": [{place}], "orientation": [{turn}]}}'
+
+
+def _numbers(vector: Array, digits: int) -> str:
+    return ", ".join(f"{number:z.{digits}f}" for number in vector)

@@ -139,11 +139,11 @@ class CruxClient:
                 raise
 
     def _opened(self, config: zenoh.Config, wait: float | None) -> zenoh.Session:
-        if wait is None:
-            return open_session(config)
         try:
-            return open_session(patient(config, wait))
+            return open_session(config if wait is None else patient(config, wait))
         except NoServiceError as error:
+            if wait is None:
+                raise NoServiceError(f"{error}; {START_ONE}, or wait for it (--wait)") from None
             raise self._not_come(wait, f" ({error})") from None
 
     def _await(self, wait: float, begun: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Final, Self
 
@@ -18,6 +19,9 @@ Value = float | bool | str | None
 WORDS: Final[dict[str, Value]] = {"true": True, "false": False, "null": None}
 
 FORM: Final = "must be PATH=LOW:HIGH:COUNT or PATH=VALUE,VALUE,..."
+
+LIKE_A_RANGE: Final = re.compile(r"-?[\d.]+ *(-|–|\.\.|to) *-?[\d.]+")
+"""Two numbers that are parted by something else than colons."""
 
 MOST_VALUES: Final = 10_000
 """Of one range."""
@@ -137,4 +141,6 @@ def _value(text: str, path: str) -> Value:
             return kind(text)
         except ValueError:
             continue
+    if LIKE_A_RANGE.fullmatch(text):
+        raise InvalidInputError(f"{FORM}, got {text!r}", field=path)
     return WORDS.get(text, text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import islice
+from types import MappingProxyType
 from typing import Final
 
 from rich.console import Console
@@ -41,7 +42,8 @@ def print_advice(reply: PlanReply, out: Console) -> None:
     holding = reply.status == "optimal"
     for advice in islice(reply.advice or (), MOST):
         out.print(words_of(advice, holding=holding), markup=False)
-    if reply.advice == [] and "advice" not in reply.unfinished:
+    doubtful = any(each.kind == "unit" for each in reply.findings)
+    if reply.advice == [] and "advice" not in reply.unfinished and not doubtful:
         out.print("of all changes that were tried none would help")
 
 
@@ -78,15 +80,16 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
     said = f"nine in ten above {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
     said += f"99 in 100 above {robust.hundredth:.3f}"
     said += f"; {robust.without} hold nothing" if robust.without else ""
-    said += _refused(robust.refused)
+    said += _refused(robust.refused, robust.reasons)
     return (
         f"load factor with each hand up to {1e3 * robust.position:g} mm and "
         f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} draws:\n{said}"
     )
 
 
-def _refused(limbs: Mapping[str, int]) -> str:
-    each = ", ".join(f"{limb} in {n}" for limb, n in limbs.items())
+def _refused(limbs: Mapping[str, int], reasons: Mapping[str, str] = MappingProxyType({})) -> str:
+    why = {limb: f" ({reason})" for limb, reason in reasons.items()}
+    each = ", ".join(f"{limb} in {n}{why.get(limb, '')}" for limb, n in limbs.items())
     return f"; hands that cannot be there: {each}" if each else ""
 
 

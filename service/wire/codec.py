@@ -128,6 +128,8 @@ class Format(Enum):
         MalformedError
             If they are none.
         """
+        if not payload:
+            raise MalformedError(f"empty: nothing was sent, a {kind.__name__} is needed")
         try:
             if self is Format.JSON:
                 return msgspec.json.decode(payload, type=kind)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
@@ -12,7 +13,7 @@ import msgspec
 from msgspec import inspect
 
 from hand_models.base import InvalidInputError
-from service.wire.places import Place, Step, field_names, places_at
+from service.wire.places import Place, Step, entered, field_names, places_at
 
 __all__ = ["validation_error"]
 
@@ -34,8 +35,18 @@ WORDS: Final = {
     "None": "null",
 }
 OUT_OF_RANGE: Final = re.compile(r"^Expected `(?:float|int)[^`]*` [<>]")
+OF_LENGTH: Final = re.compile(r"Expected `(?:array|str|object)` of length [<>= ]*\d+")
 LONG: Final = re.compile(r"\d+\.\d{6,}")
 Decoder = Callable[[Any], object]
+
+CIRCLE: Final = 360.0
+"""Size of a number up to which an angle that is out of range may be in degrees."""
+
+MANY: Final = 10.0
+"""Size of a number from which on a length that is out of range may be in mm."""
+
+FARTHEST: Final = 1e4
+"""Farthest that a position may be from its frame's origin: beyond it are map coordinates [m]."""
 
 LONGEST: Final = 400
 """Characters of a message: it may quote the request."""
@@ -71,7 +82,8 @@ def validation_error(
     if of_field := OF_FIELD.fullmatch(complaint):
         unknown, name = of_field.groups()
         field = f"{field}.{name}"
-        message = "missing"
+        only = _values(place.kind for place in entered(places, name))
+        message = f"missing; valid: {', '.join(only)}" if only and not unknown else "missing"
         if unknown:
             known = field_names(types if where is None else _tagged(types, document(), where))
             message = f"unknown field; known are {', '.join(known)}"
@@ -84,7 +96,13 @@ def validation_error(
         if OUT_OF_RANGE.search(complaint):
             # a bound such as π is told as such, not with all digits of a double
             message = LONG.sub(lambda number: f"{float(number[0]):.6g}", message)
-            message += _in_units(places)
+            unit = _unit_of(places)
+            message += f", in {unit}" if unit else ""
+            message += _got(document, where, unit)
+        elif OF_LENGTH.fullmatch(complaint) and where is not None:
+            given = _given(document, where)
+            if isinstance(given, list | str | dict):
+                message += f", got {len(given)}"
     return _clip(field.removeprefix(".")) or None, _clip(message)
 
 
@@ -178,12 +196,38 @@ def _plain(match: re.Match[str]) -> str:
     return " or ".join(WORDS.get(word, word) for word in match[1].split(" | "))
 
 
-def _in_units(places: Iterable[Place]) -> str:
-    """Say what unit a number at these places has, if they agree on one."""
+def _unit_of(places: Iterable[Place]) -> str | None:
+    """Return the unit that a number at these places has, if they agree on one."""
     numbers = (inspect.FloatType, inspect.IntType)
     units = {place.units for place in places if isinstance(place.kind, numbers)}
     (first, *others) = units or {()}
-    return f", in {first[0]}" if len(first) == 1 and not others else ""
+    return first[0] if len(first) == 1 and not others else None
+
+
+def _given(document: Callable[[], Any], where: Iterable[str | int]) -> Any:
+    """Return what a document has at a place; None where that cannot be told."""
+    try:
+        return _at(document(), where)
+    except (LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _got(document: Callable[[], Any], where: Iterable[str | int] | None, unit: str | None) -> str:
+    """Say which number was out of range, and in which other unit it is likely to be."""
+    value = None if where is None else _given(document, where)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return ""
+    asked = ""
+    if unit == "rad" and abs(value) <= CIRCLE:
+        asked = f"; in degrees? {value:g}° are {math.radians(value):.4g} rad"
+    elif unit == "m" and abs(value) > FARTHEST:
+        asked = (
+            "; in map coordinates or mm? The stance's world may begin anywhere: subtract one "
+            "offset from all its positions"
+        )
+    elif unit == "m" and abs(value) >= MANY:
+        asked = "; in mm?"
+    return f", got {value:.10g}{asked}"
 
 
 def _values(types: Iterable[inspect.Type]) -> list[str]:

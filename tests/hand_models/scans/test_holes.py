@@ -130,7 +130,7 @@ def test_what_is_advised_leaves_what_was_said(seed, apart, tmp_path):
 def test_stray_points_are_told_before_bridges(tmp_path):
     scan = scanned(strays(80), tmp_path)
     found = remedy(scan, mesh_scan(scan), 0.02)
-    assert found == ("std_ratio", 2.0, 0)
+    assert found == ("std_ratio", 2.0, 0, None)
 
 
 @pytest.mark.parametrize("width", [0.08, 0.1])
@@ -143,3 +143,19 @@ def test_nothing_is_advised_where_nothing_helps(width, tmp_path):
     rock = mesh_scan(scan)
     assert len(rock.holes) == 25
     assert remedy(scan, rock, 0.02) is None
+
+
+def test_strays_and_lines_far_apart_need_both(tmp_path):
+    points = lines(0, 0.03)
+    far = np.random.default_rng(1).uniform([-0.3, 0.3, -0.3], [0.3, 0.9, 0.3], (90, 3))
+    scan = scanned(np.vstack([points, far]), tmp_path)
+    rock = mesh_scan(scan)
+    found = remedy(scan, rock, 0.02)
+    assert found is not None
+    assert (found.option, found.std_ratio) == ("hole", 2.0)
+    again = mesh_scan(drop_outliers(scan, 2.0), hole=found.value)
+    assert len(again.holes) + len(again.steps) == found.left <= 50
+    # who has bridged holes already is told to drop points, even where a tenth is not reached
+    bridged = remedy(scan, mesh_scan(scan, hole=found.value), found.value)
+    assert bridged is not None
+    assert "std_ratio" in (bridged.option, bridged.std_ratio and "std_ratio")

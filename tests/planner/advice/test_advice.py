@@ -16,6 +16,7 @@ from hand_models.rock import Plane
 from planner import advice
 from planner.advice import changed
 from planner.advice.body import BodySearch, slope
+from planner.advice.new_holds import NewHold, every_hold
 from planner.advice.trials import PLANS, WITHOUT, Trials
 from planner.deadline import DeadlineError
 from planner.explanation import scene_findings
@@ -334,3 +335,31 @@ def test_random_overloaded_stances_are_helped_by_what_was_promised():
             assert math.isfinite(there.utilisation)
     # 167 of the first 200 are; the first 30 stand for them here
     assert helped >= 22
+
+
+def test_no_hold_is_like_one_on_a_rock_that_hands_share():
+    """What is elsewhere on it is known: a copy of it under another hand would stand in W twice."""
+    request = msgspec.to_builtins(heavier("wall", 125.0))
+    stance = request["stance"]
+    held = stance["hands"][0]["pose"]
+    for shared in (False, True):
+        if shared:
+            stance["rocks"] = {"wall": {"shape": "plane", "pose": held}}
+        for hand in stance["hands"]:
+            hand["hold"] = {"shape": "rock", "rock": "wall"} if shared else {"shape": "plane"}
+        asked = question(msgspec.convert(request, PlanRequest))
+        limbs = asked.stance.robot.limbs
+        trials = Trials(asked.bare(), try_stance)
+        assert all(bool(NewHold(trials, limb).likes) != shared for limb in limbs)
+        assert shared or any(every_hold(trials, limbs[0]))
+
+
+def test_nothing_is_advised_that_is_far_from_holding_or_while_a_unit_is_in_doubt():
+    asked = ask(on_wall(Plane(), outer_rotation=0.0), "advice")
+    answer = plan(asked)
+    assert answer.status == "infeasible"
+    assert all(each.utilisation < 5.0 for each in answer.advice)
+    in_millimetres = replace(asked, load=Load(com=(0.33, -0.82, -132.9)))
+    answer = plan(in_millimetres)
+    assert answer.advice == ()
+    assert answer.warnings[-1] == "no advice is looked for while a unit is in doubt: load.com"

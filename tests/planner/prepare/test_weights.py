@@ -268,3 +268,24 @@ def test_the_bundled_robot_has_the_links_that_payloads_name():
     robot = robosimian()
     for link in LINKS:
         check_carrier(robot, Payload(1.0, link=link))
+
+
+def test_a_load_that_does_not_fit_the_posture_is_told():
+    asked = question(read_request("wall-300-joints"))
+    robot, com = asked.stance.robot, prepare_stance(asked).where.weights.com
+    for load, kinds in (
+        (Load(), []),
+        (Load(mass=robot.mass - 5.0), []),
+        (Load(mass=robot.limb_mass + 0.1), []),
+        (Load(mass=robot.limb_mass - 0.1), ["mass_below_limbs"]),
+        (Load(mass=30.0), ["mass_below_limbs"]),
+        (Load(com=(com[0] + 0.04, com[1], com[2])), []),
+        (Load(com=(com[0] + 0.155, com[1], com[2])), ["com_off_posture"]),
+    ):
+        answer = plan(replace(asked, load=load))
+        found = [each for each in answer.findings if each.field.startswith("load")]
+        assert [each.kind for each in found] == kinds
+        assert all(each.message in answer.warnings for each in found)
+    # without joints, and beside a body wrench, nothing is known of it, or asked
+    bare = replace(asked, stance=replace(asked.stance, joints=None))
+    assert plan(replace(bare, load=Load(mass=60.0))).findings == ()

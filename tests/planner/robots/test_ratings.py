@@ -85,7 +85,12 @@ def test_plans_say_that_efforts_are_taken():
     assert not any("URDF" in text for text in plan(unknown).warnings)
 
 
-SPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro", "http://wiki.ros.org/xacro")
+SPACES = (
+    "http://www.ros.org/wiki/xacro",
+    "http://ros.org/wiki/xacro",
+    "http://wiki.ros.org/xacro",
+    "http://other",
+)
 XACRO = [
     *(("<robot ", f'<robot xmlns:xacro="{space}" ', "<xacro:arm/>") for space in SPACES),
     ("<robot ", "<robot ", '<xacro:arm side="left"/>'),

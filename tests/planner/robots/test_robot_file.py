@@ -271,7 +271,11 @@ def test_what_no_limb_can_do_without(missing):
             'mass value="2_0"',  # 20 for Python, and no mass at all for Pinocchio
             "urdf: link 'thigh': value of <mass> must be a num",
         ),
-        ('xyz="0.6 0 0"', 'xyz="600 0 0"', "urdf: joint 'knee': xyz of <origin> must be 3 numbers"),
+        (
+            'xyz="0.6 0 0"',
+            'xyz="600 0 0"',
+            "urdf: joint 'knee': xyz of <origin> must be 3 numbers within ±100 m, got '600 0 0'",
+        ),
         (
             'xyz="0.6 0 0"',
             'xyz="${l} 0 0"',

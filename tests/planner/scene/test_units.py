@@ -128,6 +128,12 @@ WRONG = {
     "present tensions in kN": (present(0.037), "present.front_left"),
     "present tensions in mN": (present(37000.0), "present.front_left"),
     "present tensions in gf": (present(3773.0), "present.front_left"),
+    "a hand's wrench in kN": (
+        lambda asked: replace(
+            asked, stance=with_hand(asked.stance, 2, wrench=(None, None, -0.2, None, None, None))
+        ),
+        "stance.hands[2].wrench",
+    ),
     "joint torque in N·mm": (joint_limits(200000.0), "limits.joint_torque"),
     "joint torque in kN·m": (joint_limits(0.2), "limits.joint_torque"),
     "joint torques in N·mm": (
@@ -181,6 +187,10 @@ def test_another_unit_is_told_with_its_field(slip, base):
     make, field = WRONG[slip]
     found = told(make(asked))
     assert found[0] == field
+    # who reads the words alone is told whose number it is
+    words = [each.message for each in (*unit_findings(make(asked)), *wrench_findings(make(asked)))]
+    limbs = asked.stance.robot.limbs
+    assert all(each.startswith((field, *limbs)) for each in words)
     # all hands are on rock of that strength
     assert len(found) == (len(asked.stance.hands) if "strength of a tile" in slip else 1)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from service.tables.spreads import robust_sentence
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.fixed_wrist import scattered_places
@@ -206,6 +207,9 @@ def test_hands_that_cannot_be_there_are_named():
     found = plan(asked).robust
     assert set(found.refused) == {"front_left"}
     assert 0 < found.refused["front_left"] <= found.without
+    (reason,) = found.reasons.values()
+    assert "inside" in reason
+    assert f"front_left in {found.refused['front_left']} ({reason})" in robust_sentence(found)
 
 
 def test_where_no_draw_is_held_there_is_none(monkeypatch):

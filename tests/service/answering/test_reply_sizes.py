@@ -158,6 +158,12 @@ def test_of_a_body_space_directions_may_be_left_out() -> None:
     assert others == {"without directions": pytest.approx(size, abs=CLOCK)}
 
 
+def test_what_is_not_there_is_not_said_to_be_left_out() -> None:
+    request = {"v": 1, "stance": wall_request()["stance"], "max_reply_bytes": 1000}
+    _, _, others = error_of(answered(request, Format.JSON, "body_space"))
+    assert others == {}
+
+
 @pytest.mark.parametrize("form", Format)
 def test_a_stream_that_nobody_would_hear_of_is_not_kept(form: Format) -> None:
     streams = Streams()

@@ -96,7 +96,11 @@ def test_an_endpoint_that_is_taken_is_not_served(
 def test_a_query_where_nobody_listens(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
     flags = flags_to(free_endpoint())
     assert run(["query", stance_file(wall_request()), *flags, "--json"]) == FAILED
-    assert no_session(capfd)
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.splitlines()[-1].startswith("crux: no zenoh session: ")
+    assert "start one with `crux serve`" in err
+    assert "--wait" in err
 
 
 def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:

@@ -13,6 +13,7 @@ import trimesh
 
 from service.commands.cli import run
 from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
+from tests.suite.helpers.replies import refusal
 from tests.suite.helpers.requests import put, wall_request
 from tests.suite.helpers.scans import relief, wall, write_cloud
 
@@ -131,6 +132,7 @@ def test_rock_is_not_written_over_its_scan(
     [
         (["none.pcd", "-o", "rock.ply"], "file: no such file: none.pcd"),
         (["wall.dxf", "-o", "rock.ply"], "file: wall.dxf: a scan's file ends in"),
+        (["none.csv", "-o", "there.ply"], "file: no such file: none.csv"),
         (["none.pcd"], "Missing option '-o'"),
         (["none.pcd", "-o", "rock.stl"], "must end in .ply"),
         (["none.pcd", "-o", "none/rock.ply"], "no such folder"),
@@ -153,6 +155,7 @@ def test_what_is_wrong_is_told_in_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.ply").write_text("")
     assert run(["rock", *arguments]) == BAD_INPUT
     assert words in complaint(capfd)
     assert not (tmp_path / "rock.ply").exists()
@@ -164,6 +167,10 @@ def test_a_file_in_the_wrong_unit_is_warned_of(
     file = write_cloud(tmp_path / "wall.xyz", 100.0 * wall(0.01))
     assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--hole", "3"]) == DONE
     assert "m across, and a hold may be 10 m" in capfd.readouterr().out
+    file = write_cloud(tmp_path / "wall.xyz", wall(0.004))
+    assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--unit", "mm"]) == DONE
+    said = " ".join(capfd.readouterr().out.split())
+    assert " m across, less than a palm is long; is it in m (--unit)" in said
 
 
 @pytest.mark.parametrize("up", ["z", pytest.param("y", marks=pytest.mark.slow)])
@@ -227,6 +234,18 @@ def test_a_printed_pose_has_the_digits_that_a_millimetre_needs(
     for name, within in (("position", 1e-6), ("orientation", 1e-7)):
         assert pose[name] == pytest.approx(told["pose"][name], rel=0.0, abs=within)
     assert told["pose"]["position"][1] == pytest.approx(5310843.75, abs=0.05)
+    # no request goes so far: where its world is to begin is told, and the pose there
+    shifted = json.loads(re.findall(r"there the pose is (\{.*?\})", out)[0])
+    assert "let the stance's world begin at (402000, 5311000, 0)" in out
+    assert shifted["position"] == pytest.approx(
+        np.subtract(told["pose"]["position"], [402000, 5311000, 0]), abs=1e-5
+    )
+    kind, field, message = refusal(put(wall_request(), ("stance", "body"), told["pose"]))
+    assert (kind, field) == ("invalid", "stance.body.position[0]")
+    assert "got 402117.25; in map coordinates" in message
+    assert (
+        refusal(put(wall_request(), ("stance", "body"), shifted | {"x": 1}))[1] == "stance.body.x"
+    )
 
 
 def test_stray_points_are_told_and_dropped(
@@ -272,7 +291,9 @@ def test_the_triangles_of_a_file_are_kept(
     mesh.invert()
     mesh.update_faces(mesh.triangles_center[:, 0] < 0.0)
     mesh.export(path)
-    out = printed([str(path), "-o", str(output), "--view", "1,0,0"], capfd)
+    out = printed([str(path), "-o", str(output), "--view", "1,0,0", "-q"], capfd)
+    assert "points read" not in out
+    assert out.startswith("pose {")
     assert "showed their backs to that view" in out
 
 

@@ -266,7 +266,9 @@ def test_lines_are_replies_or_errors_in_order(batch_file, capfd):
         "overloaded",
     ]
     assert [reply["id"] for reply in replies] == ["a", None, "c", "b"]
-    assert err == ("crux: line 3: not json: Input data was truncated; 1 more lines are bad input\n")
+    assert err == (
+        "crux: line 3: not json: Input data was truncated; 1 more lines are bad input: line 5\n"
+    )
     alone = dispatch.plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
     assert replies[0]["utilisation"] == pytest.approx(alone.utilisation, rel=1e-9)
 

@@ -42,6 +42,8 @@ def test_values_are_numbers_or_words_as_they_are_written() -> None:
     ("text", "words"),
     [
         ("load.mass", "PATH=LOW:HIGH:COUNT"),
+        ("load.mass=60-180", "PATH=LOW:HIGH:COUNT"),
+        ("load.mass=60..180", "PATH=LOW:HIGH:COUNT"),
         ("=1,2", "PATH=LOW:HIGH:COUNT"),
         ("load.mass=", "PATH=LOW:HIGH:COUNT"),
         ("load.mass=1:2", "PATH=LOW:HIGH:COUNT"),

@@ -111,6 +111,9 @@ def test_errors_do_not_grow_with_the_request() -> None:
 def test_malformed_errors_are_the_callers() -> None:
     with pytest.raises(MalformedError, match="not json"):
         decode_request(b"{", PlanRequest)
+    for form in Format:
+        with pytest.raises(MalformedError, match="nothing was sent, a PlanRequest is needed"):
+            decode_request(b"", PlanRequest, form)
     with pytest.raises(InvalidInputError, match=r"limb: missing"):
         decode_request(
             msgspec.json.encode({"v": 1, "stance": flat_request()["stance"]}), WrenchSpaceRequest
