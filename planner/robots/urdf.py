@@ -50,8 +50,6 @@ UNITS: Final = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "valu
 XACRO: Final = "/xacro"
 """What the namespace of xacro ends with."""
 
-COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
-
 EXPAND: Final = (
     "this is a xacro, which is not expanded; expand it: xacro ROBOT.urdf.xacro > ROBOT.urdf "
     "(from ROS, or from pip install xacro)"
@@ -241,7 +239,7 @@ def parse_urdf(text: str) -> Urdf:
 
 def _require_expanded(root: ElementTree.Element, text: str) -> None:
     """Refuse a file with elements of xacro, or with values that xacro is to put in."""
-    if "<xacro:" in COMMENT.sub("", text):
+    if "<xacro:" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
         raise InvalidInputError(f"must be a URDF; {EXPAND}")
     for element in root.iter():
         space = element.tag.rpartition("}")[0] if isinstance(element.tag, str) else ""
@@ -277,9 +275,8 @@ def _numbers(
     if len(numbers) != count or not all(abs(number) <= largest for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"
         got = shorten(raw, 100, placeholder=" …")
-        unit = UNITS.get((element.tag, attribute))
-        range_ = f"±{largest:g}" + (f" {unit}" if unit else "")
-        raise InvalidInputError(f"{place} must be {wanted} within {range_}, got {got!r}")
+        within = f"±{largest:g} {UNITS.get((element.tag, attribute), '')}".rstrip()
+        raise InvalidInputError(f"{place} must be {wanted} within {within}, got {got!r}")
     return numbers
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from service.tables.spreads import robust_sentence
+from service.tables.extras import robust_sentence
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.fixed_wrist import scattered_places
