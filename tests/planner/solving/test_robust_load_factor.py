@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from service.tables.extras import robust_sentence
 
 from hand_models.base import InvalidInputError, Pose
 from hand_models.fixed_wrist import scattered_places
@@ -18,6 +17,7 @@ from planner.robots import robosimian
 from planner.solving import KnownStance, plan, robust
 from service.answering.questions import question
 from service.commands.stances import read_request
+from service.tables.extras import robust_sentence
 from tests.suite.helpers.stances import ask, on_wall
 
 POSITION, ANGLE = 0.002, 0.02
