@@ -206,15 +206,15 @@ def parse_urdf(text: str) -> Urdf:
         If it is no XML, an unexpanded xacro, no tree, or a number is missing, not finite or absurd;
         the message names the link or joint.
     """
+    if "<xacro:" in COMMENT.sub("", text):
+        raise InvalidInputError(f"must be a URDF; {EXPAND}")
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
-        if "xacro:" in text:
-            raise InvalidInputError(f"must be a URDF; {EXPAND}") from None
         raise InvalidInputError(f"must be a URDF, which is XML: {error}") from None
     if root.tag != "robot":
         raise InvalidInputError(f"must be a URDF, whose root is <robot>, got <{root.tag}>")
-    _require_expanded(root, text)
+    _require_expanded(root)
     links = [_name(element) for element in root.findall("link")]
     _distinct("link", links)
     joints = [_joint(element, set(links)) for element in root.findall("joint")]
@@ -239,10 +239,8 @@ def parse_urdf(text: str) -> Urdf:
     return replace(tree, links={link.name: link for link in map(_link, root.findall("link"))})
 
 
-def _require_expanded(root: ElementTree.Element, text: str) -> None:
+def _require_expanded(root: ElementTree.Element) -> None:
     """Refuse a file with elements of xacro, or with values that xacro is to put in."""
-    if "<xacro:" in COMMENT.sub("", text):
-        raise InvalidInputError(f"must be a URDF; {EXPAND}")
     for element in root.iter():
         space = element.tag.rpartition("}")[0] if isinstance(element.tag, str) else ""
         values = [value for name, value in element.items() if name != "filename"]
@@ -277,9 +275,8 @@ def _numbers(
     if len(numbers) != count or not all(abs(number) <= largest for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"
         got = shorten(raw, 100, placeholder=" …")
-        unit = UNITS.get((element.tag, attribute))
-        range_ = f"±{largest:g}" + (f" {unit}" if unit else "")
-        raise InvalidInputError(f"{place} must be {wanted} within {range_}, got {got!r}")
+        most = f"{largest:g} {UNITS.get((element.tag, attribute), '')}".strip()
+        raise InvalidInputError(f"{place} must be {wanted} within ±{most}, got {got!r}")
     return numbers
 
 
