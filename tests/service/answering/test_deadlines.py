@@ -67,7 +67,7 @@ def test_ids_are_echoed(key: str) -> None:
 def test_no_deadline_is_longer_than_ten_minutes(key: str, seconds: float) -> None:
     error = answered(key, asked(key, deadline=seconds))["error"]
     assert (error["kind"], error["field"]) == ("invalid", "deadline")
-    assert error["message"] == "expected a number <= 600.0, in s"
+    assert error["message"] == f"expected a number <= 600.0, in s, got {seconds:.0f}"
 
 
 def refused(reply: dict) -> bool:
