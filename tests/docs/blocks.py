@@ -162,11 +162,21 @@ def not_printed(told: str, printed: str) -> str | None:
 
 
 def alike(one: str, other: str) -> bool:
-    """Whether two lines are the same but for spaces, times, and 2 % or 0.005 of their numbers."""
+    """Whether two lines are the same but for spaces, times, and what rounding does to numbers.
+
+    That is 0.1 % of what ``one`` tells, or one of its last digit.
+    """
     first, second = (
         NUMBER.split(" ".join(TIME.sub("<time>", line).split())) for line in (one, other)
     )
     if first[::2] != second[::2]:
         return False
-    pairs = zip(map(float, first[1::2]), map(float, second[1::2]), strict=True)
-    return all(abs(a - b) <= max(0.02 * abs(a), 0.0051) for a, b in pairs)
+    return all(
+        abs(float(told) - float(printed)) <= max(1e-3 * abs(float(told)), 1.01 * _last(told))
+        for told, printed in zip(first[1::2], second[1::2], strict=True)
+    )
+
+
+def _last(number: str) -> float:
+    """Return what one of the last digit of a number is."""
+    return float(10.0 ** -len(number.partition(".")[2]))
