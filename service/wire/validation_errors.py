@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
@@ -217,6 +218,8 @@ def _got(document: Callable[[], Any], where: Iterable[str | int] | None, unit: s
     value = None if where is None else _given(document, where)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return ""
+    if isinstance(value, int) and value.bit_length() > sys.float_info.max_exp:
+        return ", got an integer beyond all floats"
     asked = ""
     if unit == "rad" and abs(value) <= CIRCLE:
         asked = f"; in degrees? {value:g}° are {math.radians(value):.4g} rad"

@@ -86,7 +86,7 @@ class ByHand:
         self.hard[f"{finger}/{phalanx}/dragged_backwards"] = (
             {tension: -more_shear - friction * pressed[1]},
             0.0,
-            shear + friction * pressed[0],
+            shear + friction * pressed[0] + settled.drag_allowances[t],
         )
         engagement = settled.engagement[t]
         share = engagement / self.shares[finger]
@@ -102,7 +102,11 @@ class ByHand:
             signs = (("+", 1.0), ("-", -1.0)) if settled.grasp.lateral else (("", 0.0),)
             for sign, factor in signs:
                 sideways = {lateral: factor * piece.a_lateral * share} if sign else {}
-                self.limits[name + sign] = row | sideways, at_zero, engagement * piece.capacity
+                self.limits[name + sign] = (
+                    row | sideways,
+                    at_zero,
+                    settled.limit_shares[t] * piece.capacity,
+                )
 
     def add_tendons(self, most: float) -> None:
         drive = self.settled.hand.drive

@@ -122,7 +122,9 @@ def test_hard_limits_hold_at_any_utilisation(seeds):
                 for i, tile in enumerate(finger.tiles):
                     # a base tile is pressed as the proximal phalanx after it is
                     pressed = max(normals[i + 1], 0.0) if tile.phalanx == "base" else tile.normal
-                    assert tile.shear >= -friction * pressed - tiny
+                    # with few spines on the rock it may be dragged back by half a share at most
+                    few = 0.05 * place.surface.shear_limit
+                    assert tile.shear >= -friction * pressed - few - tiny
                     if tile.contact == "none":
                         assert not any(tile.force)
 
