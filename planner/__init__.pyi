@@ -50,6 +50,7 @@ from .question import (
     Objective as Objective,
     Question as Question,
     Stance as Stance,
+    Want as Want,
 )
 from .result import (
     Advice as Advice,

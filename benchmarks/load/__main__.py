@@ -7,12 +7,11 @@ import random
 import signal
 import statistics
 import subprocess
-import sys
 import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import click
@@ -34,11 +33,10 @@ from benchmarks.load.asking import (
     spoilt,
 )
 from benchmarks.load.bulk import bulk
-from benchmarks.load.others import greedy, starve, starved, unread
+from benchmarks.load.others import greedy, process, starve, starved, unread
 from hand_models.base import stores
 from planner import processes as proc
 from service.answering import dispatch
-from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.served import Served, free_endpoint
 
 ECHO = "echo/plan"
@@ -61,22 +59,9 @@ def served(*flags: str) -> Iterator[Served]:
             console.print(f"its log has {len(err.splitlines())} lines; the last: {err[-300:]}")
 
 
-@contextmanager
-def other(command: str, endpoint: str) -> Iterator[None]:
+def other(command: str, endpoint: str) -> AbstractContextManager[subprocess.Popen[bytes]]:
     """A process of this module until this is left."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.load", command, endpoint],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )
-    try:
-        assert process.stdout is not None
-        assert process.stdout.readline()
-        yield
-    finally:
-        process.kill()
-        process.wait()
+    return process("-m", "benchmarks.load", command, endpoint)
 
 
 @click.group()

@@ -180,14 +180,13 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     pressed, base = loads[:, :, 1].copy(), layout.bases
     pressed[:, base] = _of_tiles(hands, "engagement")[:, base, None] * pressed[:, base + 1]
     drags = loads[:, :, 0] + friction * pressed
+    drags[:, :, 0] += _of_tiles(hands, "drag_allowances")
     H, h = np.zeros((*shape, len(layout.columns))), np.zeros(shape)
     H[:, :TENDONS, :TENDONS] = -EACH_TENDON
     k = TENDONS
     for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
         row, along = k + np.arange(len(tiles)), kept[:, tiles]
         H[:, row, layout.finger_of[tiles]], h[:, row] = -along[:, :, 1], along[:, :, 0]
-        if tiles is layout.touching:
-            h[:, row] += _of_tiles(hands, "drag_allowances")[:, tiles]
         k += len(tiles)
     if layout.stops:
         row, stopped = k + np.arange(len(layout.stops)), [finger for finger, _ in layout.stops]

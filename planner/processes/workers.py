@@ -229,7 +229,7 @@ class Workers(Generic[T, R]):
 
     def _chosen(self, lane: Lane[T, R]) -> _Task[T]:
         """Take what a process gets next: what it knows, or else nobody, or else what is first."""
-        knows = [self._knows.get(task.about) for task in self._queue]
+        knows = [self._knows.get(task.about) for task in self._queue] if self._knows else []
         i = next((knows.index(one) for one in (lane, None) if one in knows), 0)
         task = self._queue[i]
         del self._queue[i]

@@ -5,12 +5,11 @@ from .draws import (
 )
 from .limits import BodyRange as BodyRange, ForceCap as ForceCap, Limits as Limits
 from .load import Load as Load, Weights as Weights
+from .names import Objective as Objective, Want as Want
 from .question import (
     MOST_DRAWS as MOST_DRAWS,
-    Objective as Objective,
     OwnObjective as OwnObjective,
     Question as Question,
-    Want as Want,
 )
 from .stance import (
     EARTH as EARTH,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Final, Literal, Protocol, get_args
+from typing import ClassVar, Final, Protocol
 
 from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
 from hand_models.hand import FINGERS
@@ -12,14 +12,10 @@ from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
 from planner.question.limits import BodyRange, Limits, no_torque
 from planner.question.load import Load, Weights
+from planner.question.names import OBJECTIVES, WANTS, Objective, Want
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
-__all__ = ["MOST_DRAWS", "Objective", "OwnObjective", "Question", "Want"]
-
-Objective = Literal["max_margin", "min_effort"]
-
-OBJECTIVES: Final = get_args(Objective)
-"""What a plan may be the best in."""
+__all__ = ["MOST_DRAWS", "OwnObjective", "Question"]
 
 
 class OwnObjective(Protocol):
@@ -27,11 +23,6 @@ class OwnObjective(Protocol):
 
     name: ClassVar[str]
 
-
-Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
-
-WANTS: Final = get_args(Want)
-"""What may be wanted beside a plan."""
 
 MOST_DRAWS: Final = 100
 """Of a caller's own: each costs a plan and a load factor."""

@@ -12,7 +12,12 @@ from .columns import (
 )
 from .dask_pools import LOCAL as LOCAL, check_address as check_address
 from .evaluation import Question as Question, answered as answered, evaluate as evaluate
-from .exports import CSV as CSV, PARQUET as PARQUET, exporter_at as exporter_at
+from .exports import (
+    CSV as CSV,
+    PARQUET as PARQUET,
+    exporter_at as exporter_at,
+    write_csv as write_csv,
+)
 from .headers import Header as Header, digest_of as digest_of, new_header as new_header
 from .lines import Asked as Asked, Lines as Lines
 from .pools import pool_on as pool_on, whole_number as whole_number

@@ -11,7 +11,7 @@ from typing import Any, Final
 from hand_models.base import InvalidInputError, to_install, whole_file
 from service.bulk.columns import INDEX, Column
 
-__all__ = ["CSV", "PARQUET", "exporter_at"]
+__all__ = ["CSV", "PARQUET", "exporter_at", "write_csv"]
 
 CSV: Final = ".csv"
 PARQUET: Final = ".parquet"
@@ -31,7 +31,7 @@ def exporter_at(path: Path) -> Exporter | None:
     InvalidInputError
         If it cannot be written, or a folder is there.
     """
-    exporter = {CSV: _write_csv, PARQUET: _write_parquet}.get(path.suffix.lower())
+    exporter = {CSV: write_csv, PARQUET: _write_parquet}.get(path.suffix.lower())
     if exporter is _write_parquet:
         try:
             import pyarrow.parquet  # noqa: F401
@@ -46,7 +46,8 @@ def exporter_at(path: Path) -> Exporter | None:
     return exporter
 
 
-def _write_csv(path: Path, columns: Sequence[Column], rows: Iterable[list[Any]]) -> None:
+def write_csv(path: Path, columns: Sequence[Column], rows: Iterable[list[Any]]) -> None:
+    """Write CSV, with the columns' names in its first line; `OSError` where that cannot be."""
     with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([each.name for each in columns])

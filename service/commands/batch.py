@@ -34,7 +34,7 @@ WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables
     "file",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Where the answers go: FILE.csv and FILE.parquet (a folder) are tables, any other file "
+    help="Where the answers go: FILE.csv and FILE.parquet are tables, any other file "
     "has the replies, one a line.",
 )
 @click.option(

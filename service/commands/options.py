@@ -52,7 +52,7 @@ Command = Callable[..., Any]
 PICTURES: Final = (".png", ".pdf", ".svg")
 TABLES: Final = (".csv", ".parquet", ".json", ".jsonl")
 HAND_FILE: Final = ".toml"
-EXTRAS: Final[tuple[requests.Want, ...]] = ("load_factor", "prices")
+EXTRAS: Final[tuple[planner.Want, ...]] = ("load_factor", "prices")
 """What the command line asks for besides the plan."""
 
 LONGEST: Final = 1e6
@@ -198,7 +198,7 @@ class Wanted(NamedTuple):
 
 
 def with_extras(
-    request: requests.PlanRequest, *further: requests.Want, whole: bool = True
+    request: requests.PlanRequest, *further: planner.Want, whole: bool = True
 ) -> requests.PlanRequest:
     """Return a request that wants what the command line shows besides the plan, and more, too.
 

@@ -57,7 +57,7 @@ def plan(
     as_json: bool,
 ) -> int:
     """Make one plan, without the network."""
-    further: dict[requests.Want, bool] = {
+    further: dict[planner.Want, bool] = {
         "robust": robust,
         "clearance": clearance,
         "advice": advice_folder is not None,

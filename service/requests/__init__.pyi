@@ -20,7 +20,6 @@ from .questions import (
     SetPointsRequest as SetPointsRequest,
     SpaceWant as SpaceWant,
     StreamRequest as StreamRequest,
-    Want as Want,
     WrenchSpaceRequest as WrenchSpaceRequest,
 )
 from .request import (

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from hand_models.base import Coordinate, Name, Strict
-from planner import BodyRange, Limits, Load
+from planner import BodyRange, Limits, Load, Objective, Want
 from service.requests.request import (
     Detail,
     Identifier,
@@ -33,12 +33,11 @@ __all__ = [
     "SetPointsRequest",
     "SpaceWant",
     "StreamRequest",
-    "Want",
     "WrenchSpaceRequest",
 ]
 
 ObjectiveName = Annotated[
-    Literal["max_margin", "min_effort"],
+    Objective,
     Meta(description="least utilisation, or least effort within limits.utilisation"),
 ]
 Explain = Annotated[
@@ -48,7 +47,6 @@ Explain = Annotated[
         "limits that together do; without it, the same status is there sooner"
     ),
 ]
-Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
 SpaceWant = Literal["robust", "half_spaces", "vertices"]

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import msgspec
 
-from hand_models.base import InvalidInputError, whole_file
+from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
+from service.bulk import write_csv
 from service.requests import PlanRequest
 from service.sweeping.border import TOLERANCE, Border, borders
 from service.sweeping.design import Design
-from service.sweeping.rows import Row, asking, rows_at, write_rows
+from service.sweeping.rows import Row, asking, columns_of, rows_at
 from service.sweeping.variation import Variation
 
 if TYPE_CHECKING:
@@ -66,8 +67,7 @@ class Sweep(NamedTuple):
         OSError
             If it cannot be written.
         """
-        with whole_file(path) as part:
-            write_rows(self.design, self.rows, part)
+        write_csv(path, columns_of(self.design), (row.cells for row in self.rows))
 
     def summary(self) -> dict[str, Any]:
         """Return what a program needs to know: what varied, how many hold, and the borders."""

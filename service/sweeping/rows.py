@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
     from planner import RobotFile
 
-__all__ = ["Ask", "PointRows", "Row", "State", "asking", "rows_at", "write_rows"]
+__all__ = ["Ask", "PointRows", "Row", "State", "asking", "columns_of", "rows_at"]
 
 Ask = Callable[[Iterable[bytes]], Generator[Answer, None, None]]
 """Yields the answers to encoded requests, in order."""
@@ -182,14 +181,6 @@ def columns_of(design: Design) -> tuple[Column, ...]:
         ),
         *COLUMNS,
     )
-
-
-def write_rows(design: Design, rows: Iterable[Row], path: Path) -> None:
-    """Write a whole table."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([each.name for each in columns_of(design)])
-        writer.writerows(row.cells for row in rows)
 
 
 class PointRows(TableLines):

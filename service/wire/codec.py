@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from contextlib import suppress
 from enum import Enum
 from functools import partial
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar, get_args
 
 import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, LimitError, UnsupportedError
+from planner import Objective
 from service.replies import ErrorDetail, ErrorReply
 from service.requests import Identifier, ReplyBytes, SetPointsRequest, StreamRequest
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
@@ -70,7 +71,7 @@ LATER: Final = {"confidence": "leave it out: tile limits are nominal"}
 """Fields that later versions will have, and what to tell who gives them."""
 
 LATER_VALUES: Final = {
-    ("objective", "max_reliability"): "valid are max_margin and min_effort",
+    ("objective", "max_reliability"): f"valid are {' and '.join(get_args(Objective))}",
 }
 """The same of values of fields."""
 

@@ -116,15 +116,18 @@ def test_hard_limits_hold_at_any_utilisation(seeds):
             assert hand.palm.force[0] <= tiny
             assert hand.palm.force[1] == 0.0
             assert hand.palm.force[2] >= -tiny
+            # with few spines on the rock a tile may be dragged back a little
+            few = place.surface.shear_limit * (hand.limit_shares - hand.engagement)
+            back = {(t.finger, t.phalanx): most for t, most in zip(hand.tiles, few, strict=True)}
             for finger in hand.fingers:
                 assert finger.tendon_tension >= 0.0
                 normals = [tile.normal for tile in finger.tiles]
                 for i, tile in enumerate(finger.tiles):
                     # a base tile is pressed as the proximal phalanx after it is
                     pressed = max(normals[i + 1], 0.0) if tile.phalanx == "base" else tile.normal
-                    # with few spines on the rock it may be dragged back by half a share at most
-                    few = 0.05 * place.surface.shear_limit
-                    assert tile.shear >= -friction * pressed - few - tiny
+                    assert (
+                        tile.shear >= -friction * pressed - back[finger.name, tile.phalanx] - tiny
+                    )
                     if tile.contact == "none":
                         assert not any(tile.force)
 
