@@ -75,7 +75,7 @@ class SettledLimits:
         }
         self._balance = JointBalance(names, self.wound)
         self._tiles, self._hands = TileLimits(names), HandLimits(names)
-        self._drives = DriveLimits(names, strength)
+        self._drives = DriveLimits(names, self._balance.left, strength)
         self._nails = NailLimits(names)
         self._each = np.arange(len(places))
 

@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, Indices
-from planner.verification.joint_balance import tendons_of
 from planner.verification.residuals import COUNT, Names, Recomputed, Residual, claim
 
 __all__ = ["DriveLimits"]
@@ -33,11 +32,13 @@ class DriveLimits:
     Parameters
     ----------
     names : Names
+    left : ndarray, shape (T,)
+        Part of a tendon's tension that is left at each tile.
     strength : float
         What every tendon may hold [N].
     """
 
-    def __init__(self, names: Names, strength: float) -> None:
+    def __init__(self, names: Names, left: Array, strength: float) -> None:
         known = names.known
         hands, index, body = known.hands, known.places, known.hands[0].hand
         self._names, self._places, self._body = names, index, body
@@ -46,8 +47,8 @@ class DriveLimits:
         aside = np.add.reduceat(aside, index.first_of_finger)
         # fingers without rock have no reaction
         self._aside = SIDES / np.where(aside > 0.0, aside, np.inf)
-        drive, (_, left, _, _) = body.drive, tendons_of(index, body)
-        self._winch, nail = drive.winch_radius, body.nail
+        drive, nail = body.drive, body.nail
+        self._winch = drive.winch_radius
         # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
         travel = drive.pulley_ratio / drive.tile_stiffness / self._winch
         torque = self._winch / drive.gear_ratio / drive.efficiency

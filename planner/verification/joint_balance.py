@@ -115,6 +115,8 @@ class JointBalance:
 
     Attributes
     ----------
+    left : ndarray, shape (T,)
+        Part of a tendon's tension that is left at each tile; of nails zero.
     held : ndarray of bool, shape (F, 3), or None
         Joints that a stop holds, or whose finger bears nothing; None where none are.
     stop_fingers, stop_joints : ndarray of int, shape (k,)
@@ -125,7 +127,7 @@ class JointBalance:
         known = names.known
         hands, places, touch = known.hands, known.places, known.touch
         self._names, self._known, body = names, known, hands[0].hand
-        self._pull, _, gain, engaged = tendons_of(places, body)
+        self._pull, self.left, gain, engaged = tendons_of(places, body)
         self._closing = np.array(known.closing_tensions)
         self._shear = engaged * self._closing.take(places.hand) * known.engagement
         self._gain = gain * known.engagement
@@ -135,8 +137,8 @@ class JointBalance:
         along = np.array([frame.along for frame in frames])
         across = along[:, [1, 0, 2]] * [-1.0, 1.0, 0.0]
         # the proximal joints' axes as rows for wrenches; what is added per metre along and inward
-        outward = np.cross(across, [frame.joint for frame in frames])
-        self._first_axes = np.hstack([outward, -across])[:, None]
+        turning = wrenches_of(np.array([frame.joint for frame in frames]), -across)
+        self._first_axes = np.roll(turning, 3, axis=1)[:, None]
         self._turns = np.zeros((len(frames), 2, 6))
         self._turns[:, 0, 2], self._turns[:, 1, :3] = -1.0, along
         directions = np.stack((np.cos(known.angles), np.sin(known.angles)), axis=2)
@@ -162,17 +164,16 @@ class JointBalance:
             self._sides = sides[self.stop_fingers, self.stop_joints]
 
         # two tensions tell all, as shears, normals and balances are affine in them
-        rest, loaded = (self.fingers(np.full(len(self._pull), f)) for f in (0.0, 1.0))
+        ends = self.fingers(np.repeat([[0.0], [1.0]], len(self._pull), axis=1))
         try:
-            (normal, left), (slope, change) = self.solved(rest), self.solved(loaded)
+            normals, left = self.solved(ends)
         except np.linalg.LinAlgError:
             # nothing is what it should be, so that every plan is refused
-            normal, slope = np.full((2, len(rest.shear)), np.nan)
-            left, change = np.full((2, *rest.torques.shape), np.nan)
-        self._at_zero, self._per_newton = np.zeros((2, len(normal), 3))
-        self._at_zero[:, :2] = np.column_stack((rest.shear, normal))
-        self._per_newton[:, :2] = np.column_stack((loaded.shear - rest.shear, slope - normal))
-        self._left_at_zero, self._left_per_newton = left, change - left
+            normals, left = np.full(ends.shear.shape, np.nan), np.full(ends.torques.shape, np.nan)
+        both = np.stack((ends.shear, normals), axis=2)
+        self._at_zero, self._per_newton = np.zeros((2, normals.shape[1], 3))
+        self._at_zero[:, :2], self._per_newton[:, :2] = both[0], both[1] - both[0]
+        self._left_at_zero, self._left_per_newton = left[0], left[1] - left[0]
 
     def loads(self, tensions: Array, lateral: Array) -> tuple[Array, Array]:
         """Return what tensions (F,) of tendons do to hands at rest.
@@ -226,6 +227,8 @@ class JointBalance:
     def solved(self, fingers: Fingers) -> tuple[Array, Array]:
         """Solve the balance of the joints that are free for the normals.
 
+        Shears and torques of the fingers may have further axes in front, and so has what is found.
+
         Returns
         -------
         normal : ndarray, shape (T,)
@@ -238,11 +241,11 @@ class JointBalance:
         numpy.linalg.LinAlgError
             If contacts do not hold the joints that are free.
         """
-        phalanges, points = self._known.places.phalanges, fingers.points[: len(fingers.shear)]
-        along = wrenches_of(points, fingers.axes[:, 0] * fingers.shear[:, None])
+        phalanges, points = self._known.places.phalanges, fingers.points[: len(fingers.axes)]
+        along = wrenches_of(points, fingers.axes[:, 0])[phalanges]
         into = wrenches_of(points, fingers.axes[:, 1])
         rows = self._axes_of(fingers.joints)
-        left = fingers.torques - _turned(rows, along[phalanges])
+        left = fingers.torques - _turned(rows, along * fingers.shear[..., phalanges, None])
         turns = rows @ into[phalanges].transpose(0, 2, 1) * OUTWARD
         A, b = turns.copy(), left.copy()
         if self.held is not None:
@@ -251,18 +254,18 @@ class JointBalance:
             if not np.array_equal(which, idle):
                 raise np.linalg.LinAlgError("contacts do not hold the joints that are free")
             # in place of the balance of a joint that is held, the normal of what bears nothing is 0
-            A[which, held], b[which, held] = 0.0, 0.0
+            A[which, held], b[..., which, held] = 0.0, 0.0
             A[which, held, phalanx] = 1.0
-        normals = np.linalg.solve(A, b[:, :, None])
-        normal = np.zeros(len(fingers.shear))
-        normal[phalanges] = normals[:, :, 0]
-        return normal, left - (turns @ normals)[:, :, 0]
+        normals = np.linalg.solve(A, b[..., None])
+        normal = np.zeros(fingers.shear.shape)
+        normal[..., phalanges] = normals[..., 0]
+        return normal, left - (turns @ normals)[..., 0]
 
     def fingers(self, tensions: Array) -> Fingers:
-        """Return the fingers at rest, with their tendons' tensions (F,)."""
+        """Return the fingers at rest, with their tendons' tensions (…, F)."""
         known = self._known
-        shear = self._shear + self._gain * tensions.take(known.places.finger)
-        torques = self._pull * tensions[:, None] + self._rest
+        shear = self._shear + self._gain * tensions[..., known.places.finger]
+        torques = self._pull * tensions[..., None] + self._rest
         return Fingers(shear, torques, self._joints, known.points, known.axes)
 
     def _axes_of(self, joints: Array) -> Array:
@@ -271,5 +274,5 @@ class JointBalance:
 
 
 def _turned(axes: Array, wrenches: Array) -> Array:
-    """Return what wrenches of each finger's phalanges turn its joints with, shape (F, 3) [N·m]."""
-    return np.asarray(np.add.reduce(axes * (OUTWARD @ wrenches), axis=2))
+    """Return what wrenches of each finger's phalanges turn its joints with, shape (…, F, 3)."""
+    return np.asarray(np.add.reduce(axes * (OUTWARD @ wrenches), axis=-1))
