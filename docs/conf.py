@@ -24,6 +24,7 @@ extensions = [
     "numpydoc",
     "sphinx_click",
 ]
+myst_enable_extensions = ["dollarmath"]
 smartquotes = False  # which would make a dash of --hand
 html_theme = "furo"
 html_title = f"crux {release}"
