@@ -7,6 +7,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from docutils.nodes import SkipNode
+from latex2mathml.converter import convert as latex_to_mathml
+
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
@@ -25,6 +28,7 @@ extensions = [
     "sphinx_click",
 ]
 myst_enable_extensions = ["dollarmath"]
+html_math_renderer = "mathml"
 smartquotes = False  # which would make a dash of --hand
 html_theme = "furo"
 html_title = f"crux {release}"
@@ -43,9 +47,23 @@ def skip_alias(app: Any, what: str, name: str, value: Any, skip: bool, options: 
     return skip or (value.__doc__ or "").startswith("Alias for field number")
 
 
+def inline_formula(translator: Any, node: Any) -> None:
+    """Write a formula within a sentence as MathML, which browsers show without a script."""
+    translator.body.append(latex_to_mathml(node.astext()))
+    raise SkipNode
+
+
+def display_formula(translator: Any, node: Any) -> None:
+    """Write a formula on a line of its own as MathML."""
+    formula = latex_to_mathml(node.astext(), display="block")
+    translator.body.append(f'<div style="margin: 0.8em 0">{formula}</div>')
+    raise SkipNode
+
+
 def setup(app: Any) -> None:
-    """Take part in what autodoc does."""
+    """Take part in what autodoc does, and write formulas."""
     app.connect("autodoc-skip-member", skip_alias)
+    app.add_html_math_renderer("mathml", (inline_formula, None), (display_formula, None))
 
 
 write_all(HERE / "reference" / "generated")
