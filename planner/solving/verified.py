@@ -79,8 +79,6 @@ class Checks(NamedTuple):
 def prepare_checks(prepared: PreparedStance) -> Checks:
     """Return what recovering and checking plans of a stance needs, and what is odd about it.
 
-    It changes nothing that threads share, so it may run beside a solver.
-
     Raises
     ------
     InvalidInputError
