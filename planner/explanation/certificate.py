@@ -142,7 +142,7 @@ def certify(
         irreducible=irreducible,
         irreducible_up_to=up_to,
         sufficient=sufficient_alone(system, irreducible),
-        spaces=dict(zip(limbs, spaces, strict=True)),
+        wrench_spaces=dict(zip(limbs, spaces, strict=True)),
     )
 
 
@@ -200,7 +200,7 @@ def certify_idle(used: LimitUse, cap: float, alone: bool | None) -> Certificate:
         irreducible=(used.name,),
         irreducible_up_to=None,
         sufficient=None if alone is None else (used.name,) * alone,
-        spaces={},
+        wrench_spaces={},
     )
 
 

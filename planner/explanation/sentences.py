@@ -260,7 +260,7 @@ def overload_sentence(certificate: Certificate | None, *, floating: Collection[s
     return sentence
 
 
-def _blamed(certificate: Certificate) -> tuple[LimitName, ...]:
+def _blamed(certificate: Certificate) -> Sequence[LimitName]:
     """Return what a certificate puts the blame on."""
     return certificate.irreducible or certificate.blocking
 

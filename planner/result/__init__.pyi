@@ -1,4 +1,5 @@
 from .advice import Advice as Advice, AdviceKind as AdviceKind
+from .certificate import CertificateOf as CertificateOf
 from .floating_load_recovery import recover_floating_hand as recover_floating_hand
 from .hand_plan import HandPlan as HandPlan, PlanArrays as PlanArrays, WristPlan as WristPlan
 from .load_recovery import LoadRecovery as LoadRecovery
@@ -10,6 +11,7 @@ from .plain_parts import (
     LimitName as LimitName,
     LoadFactor as LoadFactor,
     LoadFactorStatus as LoadFactorStatus,
+    Palm as Palm,
     Price as Price,
     RobustLoadFactor as RobustLoadFactor,
     Solver as Solver,

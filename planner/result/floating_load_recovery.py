@@ -10,8 +10,9 @@ from hand_models.hand import SettledHand
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch
-from planner.result.hand_plan import HandPlan, PalmPlan, WristPlan
+from planner.result.hand_plan import HandPlan, WristPlan
 from planner.result.load_recovery import drawn_tendons
+from planner.result.plain_parts import Palm
 
 __all__ = ["recover_floating_hand"]
 
@@ -43,7 +44,7 @@ def recover_floating_hand(
     drawn = np.add.reduceat(at_rest, known.places.first_of_finger)
     joints, losses, nails = drawn_tendons(known)
     shear, pressing = found.palm[0]
-    palm = PalmPlan(
+    palm = Palm(
         position=settled.palm.centre,
         force=np.array([-shear, 0.0, pressing]),
         moment=np.zeros(3),

@@ -1,4 +1,4 @@
-"""What every reply has, the reply to a request that failed, and what an operator is told.
+"""What replies share, the reply to a request that failed, and what an operator is told.
 
 Replies are lenient, so that they may gain fields. Poses and vectors as in the requests; forces and
 moments are on the rock and in H unless said otherwise. A value that does not exist is null; what
@@ -15,13 +15,18 @@ __all__ = [
     "AXES",
     "ErrorDetail",
     "ErrorReply",
+    "Generator",
     "HealthReply",
     "LastFailure",
     "PlacedFrame",
     "ProcessHealth",
     "Reply",
+    "Row",
+    "Seating",
     "StanceReply",
     "Vector",
+    "WrenchSet",
+    "Wrist",
 ]
 
 AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -48,6 +53,72 @@ class StanceReply(Reply, kw_only=True):
     """A reply about a stance; ``poses``: H in W of hands that were given by a place on a rock."""
 
     poses: dict[str, PlacedFrame] | UnsetType = UNSET
+
+
+class Seating(Struct):
+    """Where the hold is in H, and how that was found.
+
+    ``backed_off``: how far the hand moved off the rock along -z of H, so that its open fingers
+    are clear [m].
+    """
+
+    rule: str
+    pose: PlacedFrame
+    backed_off: float = 0.0
+
+
+class Wrist(Struct, kw_only=True):
+    """How a hand's wrist is; all but ``mode`` are null where it is fixed.
+
+    ``twist``: where it goes from the pose that was given, about that pose [m, rad]. ``palm``:
+    ``off``, ``drags``, ``presses`` or ``drags_and_presses``. ``rounds``: how often the hands' sets
+    were linearised. ``error``: how far the set of the last step was off at its end [N, moments over
+    0.1 m]; the plan is exact. Of a wrench space, how far it is off at most where it reaches
+    farthest along the axes.
+    """
+
+    mode: str
+    twist: Vector | None = None
+    palm: str | None = None
+    rounds: int | None = None
+    error: float | None = None
+
+
+class Generator(Struct):
+    """A column of a hand's wrench space: a load, and the wrench per newton of it.
+
+    Of a floating hand a component of its wrist's twist, and the wrench per metre or radian.
+    """
+
+    name: str
+    wrench: Vector
+
+
+class Row(Struct, kw_only=True):
+    """An inequality of a hand's wrench space.
+
+    ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
+    for ``motor_torque`` and ``joint_torque`` in newton-metres, for ``motor_current`` in amperes.
+    ``hard`` rows: coefficients · y at most capacity, whatever the utilisation.
+    """
+
+    name: str
+    kind: str
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    joint: str | None = None
+    coefficients: Vector
+    constant: float
+    capacity: float
+
+
+class WrenchSet(Struct, kw_only=True):
+    """A hand's wrenches, origin + Σ y · generator, for the loads y that the rows allow."""
+
+    origin: Vector
+    generators: list[Generator]
+    rows: list[Row]
 
 
 class ErrorDetail(Struct):
