@@ -22,7 +22,7 @@ from service.answering.answers import (
     wrist_reply,
 )
 from service.answering.own_models import ROBOTS, Robots
-from service.answering.questions import stance
+from service.answering.stances import stance
 from service.replies import AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest
 

@@ -16,6 +16,7 @@ CHECKED = (
     "planner/explanation/certificate.py",
     "service/answering/answers.py",
     "service/answering/questions.py",
+    "service/answering/stances.py",
 )
 """The modules in which the planner's values and messages are made and meet."""
 
