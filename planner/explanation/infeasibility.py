@@ -13,13 +13,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array
 from planner.explanation.active_limits import ALIKE
 from planner.explanation.farkas_program import FarkasProgram, Multipliers
 from planner.programs import UNLIMITED
@@ -47,11 +46,10 @@ WEIGHS: Final = 1e-6
 """Multipliers below this, of which all add up to about one, do not count."""
 
 
-@dataclass(frozen=True, eq=False)
 class HardRowSystem:
     """The hard rows of all hands, with their names, and the balance; nondimensional.
 
-    Attributes
+    Parameters
     ----------
     G, g : ndarray, shapes (nb, M), (nb,)
         What all loads z give the balance, G z + g.
@@ -62,6 +60,9 @@ class HardRowSystem:
     names : tuple of LimitName, length n
     given : tuple of LimitName, length nb − 6
         Whose given wrench each further row of the balance is.
+
+    Attributes
+    ----------
     goal : ndarray, shape (nb,)
         What G z is to be.
     constraints : tuple of LimitName
@@ -72,33 +73,24 @@ class HardRowSystem:
         What finds multipliers that prove.
     """
 
-    G: Array
-    g: Array
-    wrench: Array
-    H: Array
-    h: Array
-    names: tuple[LimitName, ...]
-    given: tuple[LimitName, ...]
-
-    goal: Array = field(init=False)
-    constraints: tuple[LimitName, ...] = field(init=False)
-    owners: Indices = field(init=False)
-    program: FarkasProgram = field(init=False)
-    _places: dict[LimitName, int] = field(init=False)
-
-    def __post_init__(self) -> None:
-        names = (*self.names, *self.given)
-        places = {name: i for i, name in enumerate(dict.fromkeys(names))}
-        goal = np.asarray(self.wrench - self.g)
-        made = {
-            "goal": goal,
-            "constraints": tuple(places),
-            "owners": np.array([places[name] for name in names], dtype=np.intp),
-            "program": FarkasProgram(self.G, goal, self.H, self.h),
-            "_places": places,
-        }
-        for name, value in made.items():
-            object.__setattr__(self, name, value)
+    def __init__(
+        self,
+        G: Array,
+        g: Array,
+        wrench: Array,
+        H: Array,
+        h: Array,
+        names: Sequence[LimitName],
+        given: Sequence[LimitName],
+    ) -> None:
+        self.G, self.g, self.wrench, self.H, self.h = G, g, wrench, H, h
+        self.goal = np.asarray(wrench - g)
+        self.names, self.given = names, given
+        whose = (*names, *given)
+        self.constraints = tuple(dict.fromkeys(whose))
+        self._places = {name: i for i, name in enumerate(self.constraints)}
+        self.owners = np.array([self._places[name] for name in whose], dtype=np.intp)
+        self.program = FarkasProgram(G, self.goal, H, h)
 
     def rows_of(
         self, constraints: Iterable[LimitName], *, balance: bool = True

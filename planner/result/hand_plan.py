@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -113,7 +112,7 @@ class HandPlan:
     nail_planes: Mapping[int, tuple[HalfPlane, ...]] = field(default_factory=dict)
     wrist: WristPlan | None = None
 
-    @cached_property
+    @property
     def fingers(self) -> list[Finger]:
         """The hand finger by finger, in the order of `FINGERS`, with the model of its tiles."""
         return self.finger_by_finger(model=True)
