@@ -28,9 +28,7 @@ from .sentences import (
 from .warnings import (
     far_wrists as far_wrists,
     idle_preloads as idle_preloads,
-    joint_sentences as joint_sentences,
-    load_findings as load_findings,
-    off_sentences as off_sentences,
+    oddities as oddities,
     scene_findings as scene_findings,
     strained_preloads as strained_preloads,
     warnings as warnings,

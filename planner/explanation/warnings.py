@@ -12,14 +12,12 @@ from hand_models.rock import Hold
 from planner.prepare import HandBatch, Posture, PreparedStance
 from planner.question import Question, Stance
 from planner.result import Finding, HandPlan
-from planner.scene import findings, link_findings, scene_of
+from planner.scene import findings, link_findings, scene_of, unit_findings
 
 __all__ = [
     "far_wrists",
     "idle_preloads",
-    "joint_sentences",
-    "load_findings",
-    "off_sentences",
+    "oddities",
     "scene_findings",
     "strained_preloads",
     "warnings",
@@ -45,6 +43,25 @@ BACKWARDS: Final = 1e-3
 
 LIMIT: Final = 1.0 + 1e-6
 """Utilisation beyond which a hand is overloaded at rest."""
+
+
+def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+    """Return what is odd about a stance and its question: findings, and all warnings in words.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance cannot be; the field is relative to the question.
+    """
+    question, where = prepared.question, prepared.where
+    odd = (*scene_findings(prepared), *unit_findings(question), *_load_findings(question, where))
+    words = (
+        *(each.message for each in odd),
+        *warnings(question.stance, prepared.batch),
+        *_off_sentences(where),
+        *_joint_sentences(question, where),
+    )
+    return odd, words
 
 
 def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
@@ -90,7 +107,7 @@ def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:
     return odd if where is None else (*odd, *link_findings(scene, where.angles))
 
 
-def load_findings(question: Question, where: Posture | None) -> tuple[Finding, ...]:
+def _load_findings(question: Question, where: Posture | None) -> tuple[Finding, ...]:
     """Return what is odd about a load where joints are known: limbs weigh more, or it is elsewhere.
 
     The joints bear the limbs as the robot's file has them, whatever the load is.
@@ -121,7 +138,7 @@ def load_findings(question: Question, where: Posture | None) -> tuple[Finding, .
     return tuple(found)
 
 
-def off_sentences(where: Posture | None) -> tuple[str, ...]:
+def _off_sentences(where: Posture | None) -> tuple[str, ...]:
     """Return which hands no joint angles put exactly where they hold, and how near some come."""
     off = {} if where is None else where.off
     return tuple(
@@ -131,7 +148,7 @@ def off_sentences(where: Posture | None) -> tuple[str, ...]:
     )
 
 
-def joint_sentences(question: Question, where: Posture | None) -> tuple[str, ...]:
+def _joint_sentences(question: Question, where: Posture | None) -> tuple[str, ...]:
     """Return what is taken from the URDF for want of a rating, and which limbs would swing.
 
     Where joints are not known, how far the centre of mass may be from where it is taken.
