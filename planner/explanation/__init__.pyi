@@ -25,7 +25,7 @@ from .sentences import (
     overload_sentence as overload_sentence,
     shortfall_sentence as shortfall_sentence,
 )
-from .warnings import (
+from .stance_warnings import (
     far_wrists as far_wrists,
     idle_preloads as idle_preloads,
     oddities as oddities,

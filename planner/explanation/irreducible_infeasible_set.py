@@ -17,8 +17,14 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices
-from planner.explanation.farkas_program import Multipliers
-from planner.explanation.infeasibility import BODY, WEIGHS, Chosen, HardRowSystem, ranked
+from planner.explanation.infeasibility import (
+    BODY,
+    WEIGHS,
+    Chosen,
+    HardRowSystem,
+    Multipliers,
+    ranked,
+)
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 

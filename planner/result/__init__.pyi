@@ -1,8 +1,10 @@
 from .advice import Advice as Advice, AdviceKind as AdviceKind
 from .certificate import CertificateOf as CertificateOf
-from .floating_load_recovery import recover_floating_hand as recover_floating_hand
 from .hand_plan import HandPlan as HandPlan, PlanArrays as PlanArrays, WristPlan as WristPlan
-from .load_recovery import LoadRecovery as LoadRecovery
+from .load_recovery import (
+    LoadRecovery as LoadRecovery,
+    recover_floating_hand as recover_floating_hand,
+)
 from .plain_parts import (
     Clearance as Clearance,
     Distance as Distance,
