@@ -171,7 +171,9 @@ def brief_plan_reply(
 def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
     """Return what a hand is to do, and also what it carries if ``whole``."""
     torque, current, angle = hand.drives.tolist()
-    points = replies.HandSetPoints(hand.limb, hand.tensions.tolist(), angle)
+    points = replies.HandSetPoints(
+        limb=hand.limb, tensions=hand.tensions.tolist(), winch_angle=angle
+    )
     if whole:
         points.motor_torque, points.motor_current = torque, current
         points.wrench = hand.wrench.tolist()
@@ -234,7 +236,9 @@ def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
 
 
 def _frame(pose: Pose) -> replies.PlacedFrame:
-    return replies.PlacedFrame(pose.position.tolist(), pose.quaternion().tolist())
+    return replies.PlacedFrame(
+        position=pose.position.tolist(), orientation=pose.quaternion().tolist()
+    )
 
 
 def seating_reply(seating: Seating) -> replies.Seating:
@@ -254,7 +258,7 @@ def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
     return replies.WrenchSet(
         origin=space.origin.tolist(),
         generators=[
-            replies.Generator(name, column)
+            replies.Generator(name=name, wrench=column)
             for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
         ],
         rows=[

@@ -126,7 +126,10 @@ def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
     return [
         replies.ClosingSequence(
             finger=closing.finger,
-            stages=[replies.ClosingStage(s.part, s.starts, s.ends) for s in closing.stages],
+            stages=[
+                replies.ClosingStage(part=each.part, starts=each.starts, ends=each.ends)
+                for each in closing.stages
+            ],
             in_order=bool(closing.in_order),
             closure=closing.closure,
             nearby=list(there.closures),

@@ -71,9 +71,11 @@ def with_rocks(message: requests.Stance, robots: Robots = ROBOTS) -> tuple[Stanc
     with within("stance"):
         _check_costs(message)
         build = builder_of(message.robot, robots)
-        with within("hand"):
-            own = None if message.hand is None else own_hand(ParameterTable.of(message.hand))
-            robot = build(own)
+        if message.hand is None:
+            robot = build(None)
+        else:
+            with within("hand"):
+                robot = build(own_hand(ParameterTable.of(message.hand)))
         rocks = _rocks(message, robot.hand.table)
         found = Stance(
             hands=tuple(hands_on_rocks(message.hands, robot.hand, rocks, "hands")),
