@@ -107,11 +107,9 @@ def certify(
         found: tuple[Array, Array] | None = _polished(system, missing)
     else:
         found = _contradiction(system, limbs)
-    proven = found is not None and system.proves(*found)
-    if not proven:
+    if found is None or not system.proves(*found):
         found = _multipliers(system, known, capped=cap is not None)
-        proven = found is not None and system.proves(*found)
-    if found is None or not proven:
+    if found is None or not system.proves(*found):
         return None
     direction, multipliers = found
     weights = system.weights(direction, multipliers)
@@ -222,7 +220,7 @@ def _in_order(
 
 
 def _is_own(name: LimitName, limits: Limits) -> bool:
-    """Whether the caller has set a limit."""
+    """Return whether the caller has set a limit."""
     if name.limit == TENDON_TENSION:
         return limits.tendon_tension is not None
     if name.limit in (JOINT_TORQUE, JOINT_FORCE, PASSIVE_JOINT):

@@ -270,7 +270,7 @@ class HardRowSystem:
         return float(direction @ self.g + multipliers @ self.h + leak)
 
     def proves(self, direction: Array, multipliers: Array) -> bool:
-        """Whether the multipliers show that no loads balance."""
+        """Return whether the multipliers show that no loads balance."""
         return self.bound(direction, multipliers) < float(direction @ self.wrench)
 
     def proven_up_to(self, direction: Array, multipliers: Array) -> float:

@@ -194,7 +194,7 @@ def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
 
 
 class BodyRange(Strict, frozen=True):
-    """How far an advice may move the body from where it is.
+    """The range in which an advice may move the body from where it is.
 
     Attributes
     ----------

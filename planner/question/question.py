@@ -1,4 +1,4 @@
-"""What is asked of a stance: what the body needs, what is best, and what must not be."""
+"""Questions about a stance: what the body needs, what is best, and what must not be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the body, its hands and its joints are."""
+"""Stances: the places of the body, its hands and its joints."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ __all__ = ["HandPlan", "PlanArrays", "WristPlan"]
 
 @dataclass(frozen=True, eq=False)
 class WristPlan:
-    """Where the wrist of a floating hand goes.
+    """The way that the wrist of a floating hand goes.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From a solution to what each tile, tendon, motor and palm carries.
+"""Recover what each tile, tendon, motor and palm carries from a solution.
 
 Loads y of hands with fixed wrists are read all at once, by where everything is in them; of a
 floating hand the model itself says what it carries where its wrist goes.
@@ -57,7 +57,7 @@ ZERO: Final = np.zeros(1)
 
 
 class _LoadLayout(NamedTuple):
-    """Where everything is in the loads and in the limit rows of all hands.
+    """The places of everything in the loads and in the limit rows of all hands.
 
     Attributes
     ----------

@@ -90,7 +90,7 @@ wrench is too much, or none can be held; it was not asked for, or a deadline cam
 
 
 class LoadFactor(NamedTuple):
-    """What was found of a load factor.
+    """The outcome of a search for a load factor.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class LoadFactor(NamedTuple):
 
     @property
     def status(self) -> LoadFactorStatus:
-        """What is known of it, where it was asked for."""
+        """Status of the search, where it was asked for."""
         if self.unbounded:
             return "unbounded"
         if self.factor is not None:
@@ -119,7 +119,7 @@ class LoadFactor(NamedTuple):
 
 
 class Solver(Struct, frozen=True):
-    """Which solver ended how.
+    """The solver, and how it ended.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Solver(Struct, frozen=True):
 
 
 class Time(Struct, frozen=True):
-    """Where the time went [s]."""
+    """The time that each part took [s]."""
 
     model: float
     solve: float

@@ -161,7 +161,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SetPoints:
-    """What tendons are to hold. Arrays are of all hands, in the stance's order.
+    """The tensions that tendons are to hold. Arrays are of all hands, in the stance's order.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From the planner's plan, with its arrays, to a reply of plain numbers, whole or brief."""
+"""Turn the planner's plan, with its arrays, into a reply of plain numbers, whole or brief."""
 
 from __future__ import annotations
 

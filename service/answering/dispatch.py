@@ -1,4 +1,4 @@
-"""From the bytes of a query to the bytes of its answer, whatever the bytes are."""
+"""Answer the bytes of a query by the bytes of its answer, whatever the bytes are."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _climb(asked: RouteRequest, robots: Robots, _: Streams) -> Reply:
 
 
 class _Service(NamedTuple):
-    """What is asked at a key, and who answers, given the request, the robots and the streams."""
+    """A kind of request, and what answers it, given the request, the robots and the streams."""
 
     request: type[Request]
     answer: Callable[[Any, Robots, Streams], Reply | Planned]

@@ -1,4 +1,4 @@
-"""What one hand of a stance can carry, on its way from a request to a reply."""
+"""Wrench spaces: what one hand of a stance can carry, from a request to a reply."""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ class PlanReply(StanceReply, kw_only=True):
 
 
 class HandSetPoints(Struct):
-    """What one hand is to do: tensions [N], motors [N·m, A], its wrench on the rock in H.
+    """Set-points of one hand: tensions [N], motors [N·m, A], its wrench on the rock in H.
 
     ``winch_angle``: from the open finger [rad]. The hand's ``utilisation`` is only of a plan. With
     ``"detail": "set_points"`` there are tensions and winches alone.

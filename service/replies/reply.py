@@ -1,4 +1,4 @@
-"""What replies share, the reply to a request that failed, and what an operator is told.
+"""Parts that replies share, the reply to a request that failed, and the state for an operator.
 
 Replies are lenient, so that they may gain fields. Poses and vectors as in the requests; forces and
 moments are on the rock and in H unless said otherwise. A value that does not exist is null; what
@@ -36,7 +36,7 @@ Vector = list[float]
 
 
 class Reply(Struct, kw_only=True):
-    """What every reply has. ``id``: the request's, where there was one that could be read."""
+    """The fields of every reply. ``id``: the request's, where there was one that could be read."""
 
     v: int = 1
     id: str | None = None
@@ -56,7 +56,7 @@ class StanceReply(Reply, kw_only=True):
 
 
 class Seating(Struct):
-    """Where the hold is in H, and how that was found.
+    """The place of the hold in H, and the rule by which it was found.
 
     ``backed_off``: how far the hand moved off the rock along -z of H, so that its open fingers
     are clear [m].
@@ -68,7 +68,7 @@ class Seating(Struct):
 
 
 class Wrist(Struct, kw_only=True):
-    """How a hand's wrist is; all but ``mode`` are null where it is fixed.
+    """The state of a hand's wrist; all but ``mode`` are null where it is fixed.
 
     ``twist``: where it goes from the pose that was given, about that pose [m, rad]. ``palm``:
     ``off``, ``drags``, ``presses`` or ``drags_and_presses``. ``rounds``: how often the hands' sets
@@ -122,7 +122,7 @@ class WrenchSet(Struct, kw_only=True):
 
 
 class ErrorDetail(Struct):
-    """What is wrong, and with which field; ``retry_after``: when to ask again [s]."""
+    """The fault, and the field to blame; ``retry_after``: when to ask again [s]."""
 
     kind: str
     field: str | None
@@ -149,7 +149,7 @@ class ProcessHealth(Struct, kw_only=True):
 
 
 class LastFailure(Struct, kw_only=True):
-    """What failed last: the kind of error, of which key or process, and when (Unix time).
+    """The last failure: the kind of error, of which key or process, and when (Unix time).
 
     ``id``: the question's.
     """
@@ -161,7 +161,7 @@ class LastFailure(Struct, kw_only=True):
 
 
 class HealthReply(Reply, kw_only=True):
-    """How a service is.
+    """The state of a service.
 
     ``uptime``: [s]; ``replied``: questions so far; ``waiting``: questions, by the kind of queue.
     """

@@ -25,7 +25,7 @@ __all__ = [
 
 
 class Contact(Struct):
-    """Where a finger tile meets the rock, and the axes of its loads.
+    """The place where a finger tile meets the rock, and the axes of its loads.
 
     ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``
     where tendon and springs hold it without contact; null where contacts hold it.
@@ -50,7 +50,7 @@ class ClosingStage(Struct):
 
 
 class ClosingSequence(Struct):
-    """How a finger has closed: its nail, its joints from the base outward, its tiles.
+    """The way a finger has closed: its nail, its joints from the base outward, its tiles.
 
     ``in_order``: whether nail and joints move one after the other. ``closure``: how it has ended:
     ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped`` or ``straight``. ``nearby``: how else
@@ -90,7 +90,7 @@ class HalfSpaces(Struct):
 
 
 class AxisCapability(Struct):
-    """How far a set reaches along an axis.
+    """The reach of a set along an axis.
 
     ``pure``: the most of it with every other component zero, null where there is none. ``extent``:
     the most of it with whatever else. Below zero, so much of the opposite is always there.
@@ -101,7 +101,7 @@ class AxisCapability(Struct):
 
 
 class RobustCapability(Struct, kw_only=True):
-    """How far a set reaches along each axis where the hand is not quite where it was put.
+    """The reach of a set along each axis where the hand is not quite where it was put.
 
     Closed anew at so many ``draws`` of its place, to either side by at most ``position`` along each
     axis of H [m] and ``angle`` about each [rad]; ``without``: at so many of them it cannot be, or
@@ -120,7 +120,7 @@ class RobustCapability(Struct, kw_only=True):
 
 
 class WrenchSpaceReply(StanceReply, kw_only=True):
-    """What one hand can carry, at utilisation 1: if nothing, ``capability`` is null.
+    """The wrenches that one hand can carry, at utilisation 1: if none, ``capability`` is null.
 
     ``vertices`` and ``half_spaces`` are null where they were not asked for, or where they were left
     out, as ``warnings`` tell. ``dimension`` is null where nothing is left, or where even that would
@@ -146,7 +146,7 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
 
 
 class BodyCapability(Struct, kw_only=True):
-    """How far body wrenches that are held go along an axis of B; null where there are none.
+    """The reach of body wrenches that are held along an axis of B; null where there are none.
 
     ``more``: beyond the body wrench asked for, which has to be held. ``pure``: with every other
     component zero. ``extent``: with whatever else. Below zero, so much of the opposite is always
@@ -185,7 +185,7 @@ class Acceleration(Struct, kw_only=True):
 
 
 class BodySpaceReply(StanceReply, kw_only=True):
-    """What a stance can hold within the utilisation asked for.
+    """The body wrenches that a stance can hold within the utilisation asked for.
 
     ``status``, ``reason``, ``utilisation``: of the plan for the body wrench asked for.
     ``acceleration``: by axis of W; null where the body cannot be held at rest or its wrench was

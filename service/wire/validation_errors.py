@@ -1,4 +1,4 @@
-"""From msgspec's complaint to the field to blame and what would be valid there, by its schema."""
+"""Turn msgspec's complaint into the field to blame and what would be valid there, by its schema."""
 
 from __future__ import annotations
 
@@ -254,7 +254,7 @@ def _values(types: Iterable[inspect.Type]) -> list[str]:
 
 
 class Place(NamedTuple):
-    """What may stand at a place: a type without its metadata, and the units of its numbers."""
+    """A type that may stand at a place, without its metadata, and the units of its numbers."""
 
     kind: inspect.Type
     units: tuple[str, ...]
