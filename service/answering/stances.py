@@ -111,10 +111,10 @@ def hands_on_rocks(
     for at, each in zip(paths, messages, strict=True):
         given |= {f"{at}.hold.pose": each.hold.pose, f"{at}.pose": each.pose}
         given[f"{at}.hold.pose_in_hand"] = each.hold.pose_in_hand
-    poses, surfaces, hands = poses_of(given), dict[str, Surface](), list[HandOnHold]()
+    poses, hands = poses_of(given), list[HandOnHold]()
     for at, message in zip(paths, messages, strict=True):
         try:
-            hands.append(_hand(message, at, poses, kind.table, rocks, surfaces))
+            hands.append(_hand(message, at, poses, kind.table, rocks))
         except InvalidInputError as error:
             raise error.within(at) from None
     placed = [i for i, hand in enumerate(hands) if hand.at is not None]
@@ -131,7 +131,6 @@ def _hand(
     poses: Mapping[str, Pose],
     numbers: ParameterTable,
     rocks: Rocks,
-    presets: dict[str, Surface],
 ) -> HandOnHold:
     """Return a hand on its hold; one with a place stands at its rock's pose until it is placed.
 
@@ -145,14 +144,8 @@ def _hand(
     numbers : ParameterTable
         Of the robot's hands.
     rocks : Rocks
-    presets : dict of str to Surface
-        Those that hands before it are on, by name.
     """
-    if isinstance(message.surface, str) and message.surface in presets:
-        surface = presets[message.surface]
-    else:
-        surface = _surface(message.surface)
-        presets |= {message.surface: surface} if isinstance(message.surface, str) else {}
+    surface = _surface(message.surface)
     pose, in_hand = poses.get(f"{at}.pose"), poses.get(f"{at}.hold.pose_in_hand")
     try:
         hold, hold_pose = _placed_hold(message, poses.get(f"{at}.hold.pose"), numbers, rocks)
