@@ -10,7 +10,6 @@ from contextlib import ExitStack
 from benchmarks.measured_stances import question_of, request
 from benchmarks.race import WARM, Race, Way, race
 from benchmarks.results import Line, Table, times
-from planner import deadline
 from planner.solving import plan
 from service.processes import Planners
 
@@ -20,7 +19,6 @@ BATCH = 128
 """Stances in a batch, all of them new."""
 
 PROCESSES = "`plan_many`, processes"
-ONE_CORE = "`plan_many`, processes, nothing beside the solver"
 THREADS = "`plan`, threads"
 
 
@@ -55,44 +53,29 @@ def batches(rounds: int, tick: Callable[[], object]) -> Race:
             ways[THREADS, workers] = lambda k, pool=pool, asked=questions: list(
                 pool.map(plan, asked[k])
             )
-        alone = stack.enter_context(Planners(1))
-        kept = [[request(i, twin=1) for i in numbers(k)] for k in range(rounds + WARM)]
-
-        def one_core(number: int) -> None:
-            begin, deadline.begin_overlap = deadline.begin_overlap, lambda: None
-            try:
-                alone.plan_many(kept[number])
-            finally:
-                deadline.begin_overlap = begin
-
-        ways[ONE_CORE, 1] = one_core
         return race(ways, rounds, tick)
 
 
 def batch_tables(timed: Race) -> list[Table]:
-    """Plans a second, over those of one worker, and of one that keeps to one core."""
+    """Plans a second, over those of one worker."""
     lines = [
         Line(
             f"{name}: {workers}",
             (
                 f"{BATCH / timed.median((name, workers)):.0f}",
-                "" if name == ONE_CORE else times(1.0 / timed.ratio((name, workers), (name, 1))),
-                times(1.0 / timed.ratio((name, workers), (ONE_CORE, 1))),
+                times(1.0 / timed.ratio((name, workers), (name, 1))),
             ),
         )
         for name, workers in sorted(timed.times)
     ]
     title = f"Batches of {BATCH} new stances of four hands"
-    note = "A single plan has its check prepared on a second core while its solver runs."
-    return [Table(title, ("plans a second", "× one worker", "× one core"), lines, note)]
+    return [Table(title, ("plans a second", "× one worker"), lines)]
 
 
 def rates(timed: Race) -> dict[str, list[tuple[int, float]]]:
     """Workers and plans a second of each kind."""
     found: dict[str, list[tuple[int, float]]] = {}
     for name, workers in sorted(timed.times):
-        if name == ONE_CORE:
-            continue
         rate = BATCH / timed.median((name, workers))
         found.setdefault(name.replace("`", ""), []).append((workers, rate))
     return found

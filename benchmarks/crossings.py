@@ -1,7 +1,7 @@
-"""How many modules one plan passes, and how often it goes from one to another.
+"""How many modules one plan passes, and how often it goes from one to another, bytes to bytes.
 
-``python -m benchmarks.crossings``, from a checkout. Of a new stance of a shape that is known,
-from the closed hands on.
+``python -m benchmarks.crossings``, from a checkout. From the bytes of a request for a new stance,
+of a shape that is known, to the bytes of its reply, in a process that has answered before.
 """
 
 from __future__ import annotations
@@ -12,13 +12,16 @@ from collections import Counter
 from types import FrameType
 from typing import Any, NamedTuple
 
-from hand_models.rock import Cylinder
-from planner.prepare.settled_stance import settle_stance
-from planner.question import Load
-from planner.solving import plan
-from tests.suite.helpers.stances import PLACES, ask, on_wall
+import msgspec
+
+from service.answering import handle
+from service.wire import PLAN
+from tests.suite.helpers.requests import wall_request
 
 OWN = ("hand_models.", "planner.", "service.")
+
+MASS = 60.0
+"""Of the robot [kg]: it holds, and what does not is explained, too."""
 
 
 class Passed(NamedTuple):
@@ -28,36 +31,38 @@ class Passed(NamedTuple):
     crossings: Counter[tuple[str, str]]
 
 
+def own_name(frame: FrameType | None) -> str:
+    """Name of the project's module that a frame is of, or nearest below it; none elsewhere."""
+    while frame is not None and not frame.f_globals.get("__name__", "").startswith(OWN):
+        frame = frame.f_back
+    return "" if frame is None else frame.f_globals["__name__"]
+
+
 def passed(diameter: float) -> Passed:
-    """Plan a stance on logs of this diameter, and watch."""
-    light = Load(mass=60.0)  # it holds: what does not is explained, too
-    question = ask(on_wall(Cylinder(diameter), limbs=tuple(PLACES)), load=light)
-    settle_stance(question.stance)
+    """Plan a stance on logs of this diameter [m], and watch."""
+    request = wall_request(MASS)
+    for hand in request["stance"]["hands"]:
+        hand["hold"] = {"shape": "cylinder", "diameter": diameter}
+    payload = msgspec.json.encode(request)
     found = Passed(Counter(), Counter())
 
-    closed = False
-
     def watch(frame: FrameType, event: str, _: Any) -> None:
-        nonlocal closed
         name = frame.f_globals.get("__name__", "")
-        closed |= event == "return" and frame.f_code is settle_stance.__code__
-        if event != "call" or not closed or not name.startswith(OWN):
+        if event != "call" or not name.startswith(OWN):
             return
         found.modules[name] += 1
-        caller = frame.f_back
-        while caller is not None and not caller.f_globals.get("__name__", "").startswith(OWN):
-            caller = caller.f_back
-        before = "" if caller is None else caller.f_globals["__name__"]
+        before = own_name(frame.f_back)
         if before != name:
             found.crossings[before, name] += 1
 
     threading.setprofile(watch)
     sys.setprofile(watch)
     try:
-        plan(question)
+        answer = handle(PLAN, payload)
     finally:
         sys.setprofile(None)
         threading.setprofile(None)  # type: ignore[arg-type]
+    assert answer.status == "optimal"
     return found
 
 
@@ -67,8 +72,8 @@ def main() -> None:
     found = passed(0.31)
     print(f"{len(found.modules)} modules, {found.crossings.total()} crossings between them,")
     print(f"{len(found.crossings)} of them distinct; {found.modules.total()} calls")
-    for name, count in found.modules.most_common(12):
-        print(f"{count:5} {name}")
+    for (before, name), count in found.crossings.most_common(20):
+        print(f"{count:5} {before or 'the caller'} → {name}")
 
 
 if __name__ == "__main__":

@@ -55,6 +55,7 @@ from .question import (
 from .result import (
     Advice as Advice,
     Certificate as Certificate,
+    CertificateOf as CertificateOf,
     Clearance as Clearance,
     Distance as Distance,
     Finding as Finding,
@@ -62,6 +63,7 @@ from .result import (
     HandPlan as HandPlan,
     LimitName as LimitName,
     LoadFactorStatus as LoadFactorStatus,
+    Palm as Palm,
     Plan as Plan,
     Price as Price,
     Quantiles as Quantiles,

@@ -1,4 +1,4 @@
-"""How long an answer may still take: clock, budget of programs, work beside a solver."""
+"""The time that an answer may still take: clock, and budget of programs."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

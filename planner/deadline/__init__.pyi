@@ -10,4 +10,3 @@ from .clock import (
     seconds as seconds,
     within as within,
 )
-from .overlap import Overlap as Overlap, begin_overlap as begin_overlap

@@ -1,4 +1,4 @@
-"""How long an answer may still take, and how much it may still compute.
+"""The time that an answer may still take, and the programs that it may still solve.
 
 A clock reaches every solver that is started. It is that of the thread's context, so that nothing on
 the way has to hand it on. Solvers ask it at each of their iterations, searches before each of their
@@ -136,7 +136,7 @@ def left() -> float | None:
 
 
 def expired() -> bool:
-    """Whether the time is over."""
+    """Return whether the time is over."""
     clock = _clock.get()
     return clock is not None and time.perf_counter() >= clock.end
 
@@ -191,7 +191,7 @@ class Budget:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is left, here or of the whole, or the time is over."""
+        """True where nothing is left, here or of the whole, or the time is over."""
         if self._left <= 0 or expired():
             return True
         return self._whole is not None and self._whole.ended

@@ -11,11 +11,6 @@ from .certificate import (
     certify as certify,
     certify_idle as certify_idle,
 )
-from .floating_warnings import (
-    far_wrists as far_wrists,
-    idle_preloads as idle_preloads,
-    strained_preloads as strained_preloads,
-)
 from .path_safety import (
     UNKNOWN as UNKNOWN,
     tension_path as tension_path,
@@ -31,9 +26,10 @@ from .sentences import (
     shortfall_sentence as shortfall_sentence,
 )
 from .stance_warnings import (
-    joint_sentences as joint_sentences,
-    load_findings as load_findings,
-    off_sentences as off_sentences,
+    far_wrists as far_wrists,
+    idle_preloads as idle_preloads,
+    oddities as oddities,
     scene_findings as scene_findings,
+    strained_preloads as strained_preloads,
     warnings as warnings,
 )

@@ -1,4 +1,4 @@
-"""What binds a plan: its limits, how much of each is used, and what more of it would be worth."""
+"""Limits that bind a plan, how much of each is used, and what more of it would be worth."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def joint_name(limb: str, joint: str, slides: bool) -> LimitName:
 
 
 class LimitUse(NamedTuple):
-    """How much of a limit is used: load over capacity of one of its rows."""
+    """The use of a limit: load over capacity of one of its rows."""
 
     name: LimitName
     load: float
@@ -71,7 +71,7 @@ def close_to(utilisation: float) -> float:
 
 
 class ActiveLimits:
-    """What binds a plan, by the multipliers of its program; rows of one name are one limit.
+    """Limits that bind a plan, by the multipliers of its program; rows of one name are one limit.
 
     The dearest come first: of which one per cent more would take most off, so that newtons compare
     with amperes.

@@ -107,11 +107,9 @@ def certify(
         found: tuple[Array, Array] | None = _polished(system, missing)
     else:
         found = _contradiction(system, limbs)
-    proven = found is not None and system.proves(*found)
-    if not proven:
+    if found is None or not system.proves(*found):
         found = _multipliers(system, known, capped=cap is not None)
-        proven = found is not None and system.proves(*found)
-    if found is None or not proven:
+    if found is None or not system.proves(*found):
         return None
     direction, multipliers = found
     weights = system.weights(direction, multipliers)
@@ -142,7 +140,7 @@ def certify(
         irreducible=irreducible,
         irreducible_up_to=up_to,
         sufficient=sufficient_alone(system, irreducible),
-        spaces=dict(zip(limbs, spaces, strict=True)),
+        wrench_spaces=dict(zip(limbs, spaces, strict=True)),
     )
 
 
@@ -200,7 +198,7 @@ def certify_idle(used: LimitUse, cap: float, alone: bool | None) -> Certificate:
         irreducible=(used.name,),
         irreducible_up_to=None,
         sufficient=None if alone is None else (used.name,) * alone,
-        spaces={},
+        wrench_spaces={},
     )
 
 
@@ -222,7 +220,7 @@ def _in_order(
 
 
 def _is_own(name: LimitName, limits: Limits) -> bool:
-    """Whether the caller has set a limit."""
+    """Return whether the caller has set a limit."""
     if name.limit == TENDON_TENSION:
         return limits.tendon_tension is not None
     if name.limit in (JOINT_TORQUE, JOINT_FORCE, PASSIVE_JOINT):

@@ -1,4 +1,4 @@
-"""Which constraints together leave no loads: an irreducible set of them, by name.
+"""Find constraints that together leave no loads: an irreducible set of them, by name.
 
 A set of constraints is irreducible if they and the balance of the body have no loads, and have some
 as soon as any one of them is left out. It is found by a deletion filter over the constraints that a
@@ -17,8 +17,14 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices
-from planner.explanation.farkas_program import Multipliers
-from planner.explanation.infeasibility import BODY, WEIGHS, Chosen, HardRowSystem, ranked
+from planner.explanation.infeasibility import (
+    BODY,
+    WEIGHS,
+    Chosen,
+    HardRowSystem,
+    Multipliers,
+    ranked,
+)
 from planner.programs import UNLIMITED
 from planner.result import LimitName
 
@@ -38,7 +44,7 @@ RANK: Final = 1e-4
 
 
 def balance_alone(system: HardRowSystem) -> bool:
-    """Whether the balance alone has no loads, so that the irreducible set is empty."""
+    """Return whether the balance alone has no loads, so that the irreducible set is empty."""
     found = system.least_violation(())
     return found is not None and found.gain > BROKEN and _prove_alone(system, found, ())
 
@@ -149,7 +155,7 @@ def sufficient_alone(
 
 
 def _prove_alone(system: HardRowSystem, proof: Multipliers, kept: Collection[LimitName]) -> bool:
-    """Whether a proof stands on these constraints alone."""
+    """Return whether a proof stands on these constraints alone."""
     tied, rows = system.rows_of(kept)
     return system.proves(proof.direction * tied, proof.multipliers * rows)
 
@@ -193,7 +199,7 @@ class _Rows(NamedTuple):
         )
 
     def hold(self, loads: Array, but: int) -> bool:
-        """Whether loads are in the box, and keep to all rows but those of one constraint."""
+        """Return whether loads are in the box, and keep to all rows but those of one constraint."""
         over = self.M @ loads - self.right
         over[:BODY] = np.abs(over[:BODY])
         over[self.whose == but] = 0.0

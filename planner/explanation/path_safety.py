@@ -1,4 +1,4 @@
-"""Whether the straight way from the present tensions to the planned ones is safe.
+"""The safety of the straight way from the present tensions to the planned ones.
 
 Along it every tendon that has a present tension goes linearly from that to the planned one, while
 palms, lateral reactions and the tendons without a present tension take whatever balances the body.

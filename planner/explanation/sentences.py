@@ -1,4 +1,4 @@
-"""What a plan's numbers mean, in sentences that a climber understands."""
+"""Say what a plan's numbers mean, in sentences that a climber understands."""
 
 from __future__ import annotations
 
@@ -260,13 +260,13 @@ def overload_sentence(certificate: Certificate | None, *, floating: Collection[s
     return sentence
 
 
-def _blamed(certificate: Certificate) -> tuple[LimitName, ...]:
+def _blamed(certificate: Certificate) -> Sequence[LimitName]:
     """Return what a certificate puts the blame on."""
     return certificate.irreducible or certificate.blocking
 
 
 def _floats(certificate: Certificate, floating: Collection[str]) -> bool:
-    """Whether a floating hand is to blame: one that is named, or any where nothing is."""
+    """Return whether a floating hand is to blame: one that is named, or any where nothing is."""
     if certificate.irreducible == ():
         return not certificate.spaces.keys().isdisjoint(floating)
     return any(name.limb in floating for name in _blamed(certificate))

@@ -1,4 +1,4 @@
-"""Warnings about a stance, whatever its plan: idle fingers, joints, the centre of mass."""
+"""Warnings about a stance: idle fingers, joints, the centre of mass, floating wrists."""
 
 from __future__ import annotations
 
@@ -8,12 +8,20 @@ from typing import Final
 import numpy as np
 
 from hand_models.hand import FINGERS, SettledHand
+from hand_models.rock import Hold
 from planner.prepare import HandBatch, Posture, PreparedStance
 from planner.question import Question, Stance
-from planner.result import Finding
-from planner.scene import findings, link_findings, scene_of
+from planner.result import Finding, HandPlan
+from planner.scene import findings, link_findings, scene_of, unit_findings
 
-__all__ = ["joint_sentences", "load_findings", "off_sentences", "scene_findings", "warnings"]
+__all__ = [
+    "far_wrists",
+    "idle_preloads",
+    "oddities",
+    "scene_findings",
+    "strained_preloads",
+    "warnings",
+]
 
 SWINGS: Final = 1e-3
 """Torque from which on a joint without a motor is said to move [N·m]: a smaller one is nothing but
@@ -24,10 +32,43 @@ OFF_CENTRE: Final = 0.05
 vertical wall 0.12 m changed the load factor of four hands by a sixth."""
 
 
+FAR: Final = 5e-3
+"""How far a wrist may go from rest before a warning [m]."""
+
+TURNED: Final = 50e-3
+"""How far it may turn before a warning [rad]."""
+
+BACKWARDS: Final = 1e-3
+"""Shear away from the finger's base that counts [N]."""
+
+LIMIT: Final = 1.0 + 1e-6
+"""Utilisation beyond which a hand is overloaded at rest."""
+
+
+def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+    """Return what is odd about a stance and its question: findings, and all warnings in words.
+
+    Raises
+    ------
+    InvalidInputError
+        If the stance cannot be; the field is relative to the question.
+    """
+    question, where = prepared.question, prepared.where
+    odd = (*scene_findings(prepared), *unit_findings(question), *_load_findings(question, where))
+    words = (
+        *(each.message for each in odd),
+        *warnings(question.stance, prepared.batch),
+        *_off_sentences(where),
+        *_joint_sentences(question, where),
+    )
+    return odd, words
+
+
 def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
     """Return what is odd about the hands and rock of a stance that is planned all the same."""
     found: list[str] = []
     settled, holding, count = batch.hands, batch.touch.holding, len(FINGERS)
+    reach = settled[0].hand.finger.reach
     for h, (place, hand) in enumerate(zip(stance.hands, settled, strict=True)):
         most = hand.surface.strongest_tile
         if most is not None:
@@ -38,15 +79,18 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
         by_finger = holding[count * h : count * (h + 1)]
         if not all(by_finger) or (place.grasp.palm and not hand.palm.engaged):
             found.extend(f"{place.limb}: {words}" for words in _idle(hand, by_finger))
-        end, reach = min(hand.rock_ends), hand.hand.finger.reach
+        end = min(hand.rock_ends)
         if end < reach:
             found.append(
                 f"{place.limb}: its rock ends {end:.2g} m from the base of a finger, which reaches "
                 f"{reach:.2g} m; the plan may depend on rock that is not given"
             )
-    first = {place.hold: i for i, place in reversed([*enumerate(stance.hands)])}
-    for i in sorted(first.values()):
-        found.extend(f"hands[{i}].hold.{words}" for words in stance.hands[i].hold.oddities)
+    odd: set[Hold] = set()
+    for i, place in enumerate(stance.hands):
+        words = place.hold.oddities
+        if words and place.hold not in odd:
+            odd.add(place.hold)
+            found.extend(f"hands[{i}].hold.{each}" for each in words)
     return tuple(found)
 
 
@@ -63,7 +107,7 @@ def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:
     return odd if where is None else (*odd, *link_findings(scene, where.angles))
 
 
-def load_findings(question: Question, where: Posture | None) -> tuple[Finding, ...]:
+def _load_findings(question: Question, where: Posture | None) -> tuple[Finding, ...]:
     """Return what is odd about a load where joints are known: limbs weigh more, or it is elsewhere.
 
     The joints bear the limbs as the robot's file has them, whatever the load is.
@@ -94,7 +138,7 @@ def load_findings(question: Question, where: Posture | None) -> tuple[Finding, .
     return tuple(found)
 
 
-def off_sentences(where: Posture | None) -> tuple[str, ...]:
+def _off_sentences(where: Posture | None) -> tuple[str, ...]:
     """Return which hands no joint angles put exactly where they hold, and how near some come."""
     off = {} if where is None else where.off
     return tuple(
@@ -104,7 +148,7 @@ def off_sentences(where: Posture | None) -> tuple[str, ...]:
     )
 
 
-def joint_sentences(question: Question, where: Posture | None) -> tuple[str, ...]:
+def _joint_sentences(question: Question, where: Posture | None) -> tuple[str, ...]:
     """Return what is taken from the URDF for want of a rating, and which limbs would swing.
 
     Where joints are not known, how far the centre of mass may be from where it is taken.
@@ -168,3 +212,71 @@ def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:
         yield f"{tiles} of {len(FINGERS)} nails hook"
     if hand.grasp.palm and not hand.palm.engaged and tiles:
         yield "no palm tile is within its spines' travel of the rock"
+
+
+def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
+    """Return one sentence for each floating hand whose preload lets tiles slip backwards at rest.
+
+    A tile's shear at rest is affine in its tendon's tension; where the springs of the finger push
+    it away from the finger's base, a tension is needed to hold it.
+    """
+    found = []
+    hands, wrists = prepared.batch.hands, prepared.hands.wrists
+    for limb, hand, wrist in zip(prepared.limbs, hands, wrists, strict=True):
+        if wrist is None:
+            continue
+        needs = []
+        for t in np.flatnonzero(hand.touching):
+            finger = int(hand.finger_of[t])
+            drag = hand.loads[t, 0] + hand.surface.friction * hand.loads[t, 1]
+            at_zero, per_newton = (float(value) for value in drag)
+            at_zero += float(hand.drag_allowances[t])
+            shear = at_zero + per_newton * float(wrist.hand.preload[finger])
+            if shear < -BACKWARDS and per_newton > 0.0:
+                needs.append((-at_zero / per_newton, finger, hand.tiles[t].phalanx))
+        if needs:
+            need, finger, phalanx = max(needs)
+            found.append(
+                f"{limb}: tendon_preload of {wrist.hand.preload[finger]:g} N lets the {phalanx} "
+                f"tile of {FINGERS[finger]} be dragged backwards at rest; it needs about "
+                f"{need:.0f} N"
+            )
+    return tuple(found)
+
+
+def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
+    """Yield a sentence for each floating hand that its preload alone overloads."""
+    tension_limit = prepared.question.limits.tendon_tension
+    for limb, wrist in zip(prepared.limbs, prepared.hands.wrists, strict=True):
+        if wrist is None:
+            continue
+        most = float(wrist.hand.preload.max())
+        if tension_limit is not None and most > tension_limit:
+            yield (
+                f"{limb}: tendon_preload of {most:g} N is above the limit of {tension_limit:g} N "
+                "on tendons"
+            )
+            continue
+        verdict = wrist.evaluate(np.zeros((1, 6)))
+        used, row = float(verdict.utilisation[0]), wrist.limits[int(verdict.limiting[0])]
+        if used > LIMIT:
+            where = " of ".join(part for part in (row.phalanx, row.finger) if part is not None)
+            yield (
+                f"{limb}: tendon_preload alone takes the hand to utilisation {used:.3g} at rest "
+                f"({where or 'hand'}, {row.limit})"
+            )
+
+
+def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
+    """Yield a sentence for each wrist of a plan that goes too far for its loads to be sure."""
+    for hand in hands:
+        if hand.wrist is None:
+            continue
+        moved = float(np.linalg.norm(hand.wrist.twist[:3]))
+        turned = float(np.linalg.norm(hand.wrist.twist[3:]))
+        if moved > FAR or turned > TURNED:
+            yield (
+                f"{hand.limb}: the wrist moves {1e3 * moved:.0f} mm and turns "
+                f"{1e3 * turned:.0f} mrad: loads are of one step from rest, contacts may have "
+                "changed"
+            )

@@ -209,7 +209,6 @@ class Solver:
 
     def solve(self) -> Solution:
         """Solve the program taken last."""
-        deadline.begin_overlap()
         if deadline.left() is None:
             return _read(self._solver.solve())
         caught: list[BaseException] = []

@@ -1,4 +1,4 @@
-"""What is asked: a stance, its load, its limits."""
+"""Questions: a stance, its load, its limits."""
 
 import lazy_loader
 

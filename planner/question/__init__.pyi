@@ -3,9 +3,14 @@ from .draws import (
     drawn_hands as drawn_hands,
     drawn_quantities as drawn_quantities,
 )
-from .limits import BodyRange as BodyRange, ForceCap as ForceCap, Limits as Limits
+from .limits import (
+    BodyRange as BodyRange,
+    ForceCap as ForceCap,
+    Limits as Limits,
+    Objective as Objective,
+    Want as Want,
+)
 from .load import Load as Load, Weights as Weights
-from .names import Objective as Objective, Want as Want
 from .question import (
     MOST_DRAWS as MOST_DRAWS,
     OwnObjective as OwnObjective,

@@ -102,25 +102,18 @@ def drawn_quantities(
     """
     named = {name for name in surfaces if name is not None}
     on_presets = named | {"defaults"} if named else named
-    return {
-        f"{section}.{name}": values
-        for (section, name), values in _differing(hand, draws).items()
-        if section in on_presets or section not in surface_table().sections
-    }
-
-
-@stored("numbers that draws change", KEPT)
-def _differing(hand: HandModel, draws: tuple[Draw, ...] | None) -> dict[tuple[str, str], Array]:
-    """Return all numbers in which draws differ, by section and entry."""
-    drawn = drawn_hands(hand, draws)
+    drawn, presets = drawn_hands(hand, draws), surface_table().sections
     found = {}
     for tables in ([each.model.table for each in drawn], [each.surfaces for each in drawn]):
         entries = dict.fromkeys((section, name) for table in tables for section, name, _ in table)
         for section, name in entries:
+            if section in presets and section not in on_presets:
+                continue
             over = np.array([_value(table, section, name) for table in tables])
             for i, values in enumerate(over.reshape(len(tables), -1).T):
                 if np.ptp(values) > 0.0:
-                    found[section, name if over.ndim == 1 else f"{name}[{i}]"] = values
+                    entry = name if over.ndim == 1 else f"{name}[{i}]"
+                    found[f"{section}.{entry}"] = values
     return found
 
 

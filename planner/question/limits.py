@@ -1,4 +1,4 @@
-"""Limits that a caller puts on a plan and on an advice.
+"""Names and limits in a question: objectives, extras, and caps on a plan and on an advice.
 
 They travel, so that they are here without numbers of numpy's.
 """
@@ -14,7 +14,26 @@ from msgspec.structs import force_setattr
 
 from hand_models.base import Force, InvalidFieldError, Name, Strict, Tension, check_positive
 
-__all__ = ["BodyRange", "ForceCap", "Limits", "no_torque"]
+__all__ = [
+    "OBJECTIVES",
+    "WANTS",
+    "BodyRange",
+    "ForceCap",
+    "Limits",
+    "Objective",
+    "Want",
+    "no_torque",
+]
+
+Objective = Literal["max_margin", "min_effort"]
+
+OBJECTIVES: Final = get_args(Objective)
+"""What a plan may be the best in."""
+
+Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
+
+WANTS: Final = get_args(Want)
+"""What may be wanted beside a plan."""
 
 Frame = Literal["hand", "body", "world"]
 
@@ -175,7 +194,7 @@ def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
 
 
 class BodyRange(Strict, frozen=True):
-    """How far an advice may move the body from where it is.
+    """The range in which an advice may move the body from where it is.
 
     Attributes
     ----------

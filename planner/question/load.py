@@ -1,4 +1,4 @@
-"""What a robot weighs and carries, how it is to move, and the wrench that this takes.
+"""Loads: what a robot weighs and carries, how it is to move, and the wrench that this takes.
 
 A load travels, so that it is here without the libraries that it is weighed with.
 """
@@ -29,7 +29,7 @@ __all__ = ["Load", "Weights"]
 
 
 class Weights(NamedTuple):
-    """What a robot weighs where its joints are known.
+    """The weight of a robot whose joints are known.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Weights(NamedTuple):
 
 
 class Load(Strict, frozen=True):
-    """What the body weighs and how it is to move; by default the robot's own weight, at rest.
+    """The body's weight and motion; by default the robot's own weight, at rest.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Load(Strict, frozen=True):
 
     @property
     def own(self) -> bool:
-        """Whether the mass and its centre are the robot's own."""
+        """True where the mass and its centre are the robot's own."""
         return self.mass is None and self.com is None
 
     def body_wrench(self, stance: Stance, weights: Weights | None = None) -> Array:

@@ -1,4 +1,4 @@
-"""What is asked of a stance: what the body needs, what is best, and what must not be."""
+"""Questions about a stance: what the body needs, what is best, and what must not be."""
 
 from __future__ import annotations
 
@@ -10,9 +10,16 @@ from hand_models.base import Array, InvalidInputError, check_positive, finite_ve
 from hand_models.hand import FINGERS
 from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
-from planner.question.limits import BodyRange, Limits, no_torque
+from planner.question.limits import (
+    OBJECTIVES,
+    WANTS,
+    BodyRange,
+    Limits,
+    Objective,
+    Want,
+    no_torque,
+)
 from planner.question.load import Load, Weights
-from planner.question.names import OBJECTIVES, WANTS, Objective, Want
 from planner.question.stance import Stance, checked_body_wrench, known_choice, known_limbs
 
 __all__ = ["MOST_DRAWS", "OwnObjective", "Question"]

@@ -1,4 +1,4 @@
-"""Where the body, its hands and its joints are."""
+"""Stances: the places of the body, its hands and its joints."""
 
 from __future__ import annotations
 
@@ -76,7 +76,10 @@ def checked_body_wrench(wrench: Array, field: str | None) -> Array:
 
 def _possible(pose: Pose, field: str) -> None:
     """Refuse a pose that is not finite, absurdly far, or whose axes are not orthonormal."""
-    position = finite_vector(pose.position, 3, f"{field}.position").tolist()
+    place = pose.position
+    if not pose.proper:
+        place = finite_vector(place, 3, f"{field}.position")
+    position = place.tolist()
     if max(map(abs, position)) > FARTHEST:
         raise InvalidInputError(
             f"must be within {FARTHEST:g} m, got {position}", field=f"{field}.position"

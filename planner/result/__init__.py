@@ -1,4 +1,4 @@
-"""What comes out: a plan and its hands, as arrays and one by one, recovered from loads."""
+"""Results: a plan and its hands, as arrays and one by one, recovered from loads."""
 
 import lazy_loader
 

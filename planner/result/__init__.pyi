@@ -1,7 +1,10 @@
 from .advice import Advice as Advice, AdviceKind as AdviceKind
-from .floating_load_recovery import recover_floating_hand as recover_floating_hand
+from .certificate import CertificateOf as CertificateOf
 from .hand_plan import HandPlan as HandPlan, PlanArrays as PlanArrays, WristPlan as WristPlan
-from .load_recovery import LoadRecovery as LoadRecovery
+from .load_recovery import (
+    LoadRecovery as LoadRecovery,
+    recover_floating_hand as recover_floating_hand,
+)
 from .plain_parts import (
     Clearance as Clearance,
     Distance as Distance,
@@ -10,6 +13,7 @@ from .plain_parts import (
     LimitName as LimitName,
     LoadFactor as LoadFactor,
     LoadFactorStatus as LoadFactorStatus,
+    Palm as Palm,
     Price as Price,
     RobustLoadFactor as RobustLoadFactor,
     Solver as Solver,

@@ -1,4 +1,4 @@
-"""What would make a stance hold, or hold more: changes that were planned and verified."""
+"""Changes that would make a stance hold, or hold more, planned and verified."""
 
 from __future__ import annotations
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,25 +19,14 @@ from hand_models.hand import FINGERS, NAIL, Seating, Tile as NamedTile
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, concatenated
-from planner.result.plain_parts import Finger, Tile
+from planner.result.plain_parts import Finger, Palm, Tile
 
-__all__ = ["HandPlan", "PalmPlan", "PlanArrays", "WristPlan"]
-
-
-@dataclass(frozen=True, eq=False)
-class PalmPlan:
-    """The palm of a plan: where it acts and its force and moment on the rock, in H."""
-
-    position: Array
-    force: Array
-    moment: Array
-    engaged: tuple[int, ...]
-    utilisation: float
+__all__ = ["HandPlan", "PlanArrays", "WristPlan"]
 
 
 @dataclass(frozen=True, eq=False)
 class WristPlan:
-    """Where the wrist of a floating hand goes.
+    """The way that the wrist of a floating hand goes.
 
     Attributes
     ----------
@@ -85,7 +73,7 @@ class HandPlan:
         Their names and contacts.
     half_planes : tuple of HalfPlane
         Limits of each whole tile that is no nail.
-    palm : PalmPlan
+    palm : Palm
     utilisation : float
     seating : Seating
         Where the hold is in H.
@@ -115,7 +103,7 @@ class HandPlan:
     tile_utilisations: Array
     tiles: tuple[NamedTile, ...]
     half_planes: tuple[HalfPlane, ...]
-    palm: PalmPlan
+    palm: Palm[Array]
     utilisation: float
     seating: Seating
     closures: tuple[str, ...]
@@ -124,7 +112,7 @@ class HandPlan:
     nail_planes: Mapping[int, tuple[HalfPlane, ...]] = field(default_factory=dict)
     wrist: WristPlan | None = None
 
-    @cached_property
+    @property
     def fingers(self) -> list[Finger]:
         """The hand finger by finger, in the order of `FINGERS`, with the model of its tiles."""
         return self.finger_by_finger(model=True)
@@ -186,7 +174,7 @@ class PlanArrays(NamedTuple):
     tiles : tuple of tuple of Tile
     half_planes : tuple of tuple of HalfPlane
         Of each hand's whole tiles.
-    engaged : tuple of tuple of int
+    engaged : tuple of sequence of int
         Tiles of each palm.
     wrists : tuple of WristPlan or None
     """
@@ -205,7 +193,7 @@ class PlanArrays(NamedTuple):
     utilisations: Array
     tiles: tuple[tuple[NamedTile, ...], ...]
     half_planes: tuple[tuple[HalfPlane, ...], ...]
-    engaged: tuple[tuple[int, ...], ...]
+    engaged: tuple[Sequence[int], ...]
     wrists: tuple[WristPlan | None, ...]
 
     @classmethod
@@ -269,7 +257,7 @@ class PlanArrays(NamedTuple):
                     tile_utilisations=self.tile_utilisations[own],
                     tiles=self.tiles[h],
                     half_planes=self.half_planes[h],
-                    palm=PalmPlan(
+                    palm=Palm(
                         position=self.points[palm],
                         force=self.forces[palm],
                         moment=self.palm_moments[h],

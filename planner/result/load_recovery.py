@@ -1,25 +1,164 @@
-"""From loads y of hands with fixed wrists to what each tile, tendon, motor and palm carries."""
+"""Recover what each tile, tendon, motor and palm carries from a solution.
+
+Loads y of hands with fixed wrists are read all at once, by where everything is in them; of a
+floating hand the model itself says what it carries where its wrist goes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from functools import lru_cache
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
+from hand_models.compliance import CompliantHand
 from hand_models.finger import PHALANGES
+from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, layout_of
+from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
 from hand_models.tile import inner_half_planes
-from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import HandBatch, concatenated
-from planner.programs import LOAD_UNIT, ScaledRows, scaled_rows
-from planner.result.hand_plan import PlanArrays
-from planner.result.load_layout import WRENCH, ZERO, layout_of
+from hand_models.wrench_spaces import Row, WrenchSpace
+from planner.prepare import (
+    CONTACTS,
+    KEPT_NAMES,
+    TOUCHING,
+    HandBatch,
+    concatenated,
+    contact_pattern_of,
+    tile_index_of,
+)
+from planner.programs import LOAD_UNIT, ScaledRows, is_effort, scaled_rows
+from planner.result.hand_plan import HandPlan, PlanArrays, WristPlan
+from planner.result.plain_parts import Palm
 
-__all__ = ["LoadRecovery", "drawn_tendons"]
+__all__ = ["LoadRecovery", "recover_floating_hand"]
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Which way a palm shears and presses along x and z."""
+
+COUNT: Final = len(FINGERS)
+
+OWN: Final = (
+    *(f"{finger}/{kind}" for kind in ("tension", "lateral", NAIL) for finger in FINGERS),
+    PALM_SHEAR,
+    PALM_PRESSING,
+)
+"""Every column that a hand with a fixed wrist may have."""
+
+WRENCH: Final = 6
+"""Rows of a wrench."""
+
+SIGNED: Final = ("/lateral", f"/{NAIL}")
+"""Loads that may be negative."""
+
+ZERO: Final = np.zeros(1)
+"""A load that a hand does not have, before all others."""
+
+
+class _LoadLayout(NamedTuple):
+    """The places of everything in the loads and in the limit rows of all hands.
+
+    Attributes
+    ----------
+    columns : ndarray of int, shape (H, most m)
+        Each hand's loads among all; before all of them is one that is zero.
+    shape : tuple of int
+        (H, 6 + most limits): so many rows of so many hands.
+    limits : ndarray of int, shape (sum of nl,)
+        The limit rows among all hands' rows, of which the first six of each hand are its wrench.
+    least : ndarray, shape (1 + m,)
+        What each load may be at least [N].
+    tensions : ndarray of int, shape (F,)
+    palms : ndarray of int, shape (H, 2)
+    of_tile : ndarray of int, shape (T, 3)
+        Loads that shear, normal and lateral load of each tile follow.
+    first_row : ndarray of int, shape (H,)
+        Of the limit rows, by hand.
+    begins : ndarray of int
+        Where the limit rows of each tile on rock begin, and where those of a hand's last one end.
+    kept : ndarray of int, shape (T,)
+        Which of them each tile's are; the first for those that are not on rock.
+    hooked : ndarray of int
+        Nails that hook.
+    nail_limits : ndarray of int, shape (number of them, 2)
+        Their limit rows.
+    efforts : ndarray of int
+        Limit rows whose utilisation counts as effort.
+    """
+
+    columns: Indices
+    shape: tuple[int, int]
+    limits: Indices
+    least: Array
+    tensions: Indices
+    palms: Indices
+    of_tile: Indices
+    first_row: Indices
+    begins: Indices
+    kept: Indices
+    hooked: Indices
+    nail_limits: Indices
+    efforts: Indices
+
+
+@lru_cache(maxsize=KEPT_NAMES)
+def _layout_of(
+    tiles: tuple[tuple[Tile, ...], ...],
+    columns: tuple[tuple[str, ...], ...],
+    names: tuple[tuple[Row, ...], ...],
+    limits: tuple[int, ...],
+) -> _LoadLayout:
+    """Return the layout of all hands.
+
+    Parameters
+    ----------
+    tiles : tuple of tuple of Tile
+        By hand, and so are the others.
+    columns : tuple of tuple of str
+    names : tuple of tuple of Row
+        Of the rows of its set.
+    limits : tuple of int
+        Limit rows of each tile, of which a hand has the first, tile by tile.
+    """
+    places, touch = tile_index_of(tuple(map(len, tiles))), contact_pattern_of(tiles)
+    named = [(h, name) for h, own in enumerate(columns) for name in own]
+    place = {name: i for i, name in enumerate(named, start=1)}
+    found = np.array([[place.get((h, name), 0) for name in OWN] for h in range(len(limits))])
+    loads = np.zeros((len(limits), max(map(len, columns))), dtype=np.intp)
+    for h, own in enumerate(columns):
+        loads[h, : len(own)] = [place[h, name] for name in own]
+    tensions, laterals, axials = (
+        found[:, i : i + COUNT].ravel() for i in range(0, 3 * COUNT, COUNT)
+    )
+    of_tile = np.empty((len(places.hand), 3), dtype=np.intp)
+    of_tile[:, :2] = tensions[places.finger, None]
+    of_tile[:, 2] = laterals[places.finger]
+    hooked = np.flatnonzero(touch.contacts == CONTACTS[NAIL])
+    of_tile[hooked, 0] = axials[places.finger[hooked]]
+    rows = [(h, row) for h, own in enumerate(names) for row in own if row.kind == "limit"]
+    of_row = np.array([h for h, _ in rows], dtype=np.intp)
+    counts = np.bincount(of_row, minlength=len(limits))
+    first_row, most = np.cumsum(counts) - counts, WRENCH + int(counts.max())
+    touching = [sum(CONTACTS[tile.contact] == TOUCHING for tile in own) for own in tiles]
+    of_rock = zip(first_row, limits, touching, strict=True)
+    kept = np.zeros(len(places.hand), dtype=np.intp)
+    kept[touch.touching] = places.hand[touch.touching] + np.arange(len(touch.touching))
+    return _LoadLayout(
+        columns=loads,
+        shape=(len(limits), most),
+        limits=most * of_row + WRENCH + np.arange(len(rows)) - first_row[of_row],
+        least=np.array([0.0, *(-np.inf if name.endswith(SIGNED) else 0.0 for _, name in named)]),
+        tensions=tensions,
+        palms=found[:, 3 * COUNT :],
+        of_tile=of_tile,
+        first_row=first_row,
+        begins=np.concatenate([at + each * np.arange(n + 1) for at, each, n in of_rock]),
+        kept=kept,
+        hooked=hooked,
+        nail_limits=np.flatnonzero([row.phalanx == NAIL for _, row in rows]).reshape(-1, 2),
+        efforts=np.flatnonzero([is_effort(row) for _, row in rows]),
+    )
 
 
 class LoadRecovery:
@@ -53,7 +192,7 @@ class LoadRecovery:
         signs = [2 if hand.grasp.lateral else 1 for hand in settled]
         limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
         tiles = tuple([hand.tiles for hand in settled])
-        self._layout = layout = layout_of(
+        self._layout = layout = _layout_of(
             tiles,
             tuple([space.columns for space in spaces]),
             tuple([space.rows for space in spaces]),
@@ -74,7 +213,7 @@ class LoadRecovery:
             end, columns = WRENCH + len(own.L), own.L.shape[1]
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
             rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
-        self._drawn = drawn_tendons(known)
+        self._drawn = _drawn_tendons(known)
         self._fixed = (
             tiles,
             pieces,
@@ -140,7 +279,7 @@ class LoadRecovery:
         return arrays, used, float(efforts.dot(efforts))
 
 
-def drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
+def _drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
     """Return what winches draw in besides travel of the tiles, of each finger.
 
     Returns
@@ -158,3 +297,60 @@ def drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
     losses[places.base_fingers] = sums[-1]
     nails = hand.nail.pulley_radius * concatenated([each.nail_angles for each in known.hands])
     return known.bends @ np.array(hand.finger.pulley_radii), losses, nails
+
+
+def recover_floating_hand(
+    limb: str, settled: SettledHand, hand: CompliantHand, space: WrenchSpace, wrist: WristPlan
+) -> HandPlan:
+    """Turn the pose of a floating hand's wrist into tile loads and forces, by the model itself.
+
+    Parameters
+    ----------
+    limb : str
+    settled : SettledHand
+        At rest.
+    hand : CompliantHand
+    space : WrenchSpace
+        Its set, linearised at that pose.
+    wrist : WristPlan
+    """
+    found = hand.loads(wrist.twist[None])
+    loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]
+    tensions = found.tensions[0]
+    rows, of_tiles = space.utilisations(wrist.twist), layout_of(settled, sticking=False).plane_tiles
+    used = np.zeros(len(loads))
+    np.maximum.at(used, of_tiles, rows[: len(of_tiles)])
+    known, drive = HandBatch.of((settled,)), settled.hand.drive
+    # the winch stands still from the preload on
+    at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * hand.preload[settled.finger_of]
+    drawn = np.add.reduceat(at_rest, known.places.first_of_finger)
+    joints, losses, nails = _drawn_tendons(known)
+    shear, pressing = found.palm[0]
+    palm = Palm(
+        position=settled.palm.centre,
+        force=np.array([-shear, 0.0, pressing]),
+        moment=np.zeros(3),
+        engaged=settled.palm.engaged,
+        utilisation=float((found.palm[0] / known.palm_limits[0]).max()),
+    )
+    return HandPlan(
+        limb=limb,
+        wrench=hand.wrenches(found)[0],
+        tensions=tensions,
+        drives=drive.driven(tensions, (joints, hand.preload, drawn, losses, nails)),
+        loads=loads,
+        forces=np.einsum("tk,tkx->tx", loads, axes),
+        positions=positions,
+        axes=axes,
+        engagement=settled.engagement,
+        limit_shares=settled.limit_shares,
+        tile_utilisations=used,
+        tiles=settled.tiles,
+        half_planes=inner_half_planes(settled.surface),
+        palm=palm,
+        utilisation=max(0.0, float(rows.max())),
+        seating=settled.seating,
+        closures=settled.closures,
+        space=space,
+        wrist=wrist,
+    )

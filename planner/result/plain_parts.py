@@ -5,7 +5,8 @@ A name that does not exist is None, and null on its way; what was not asked for 
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from collections.abc import Sequence
+from typing import Generic, Literal, NamedTuple, TypeVar
 
 from msgspec import UNSET, Struct, UnsetType
 from msgspec.structs import astuple
@@ -18,6 +19,7 @@ __all__ = [
     "LimitName",
     "LoadFactor",
     "LoadFactorStatus",
+    "Palm",
     "Price",
     "RobustLoadFactor",
     "Solver",
@@ -27,6 +29,9 @@ __all__ = [
 ]
 
 Vector = list[float]
+
+V = TypeVar("V")
+"""Kind of a part's vectors: arrays in the planner, lists in a reply."""
 
 
 class LimitName(Struct, frozen=True):
@@ -85,7 +90,7 @@ wrench is too much, or none can be held; it was not asked for, or a deadline cam
 
 
 class LoadFactor(NamedTuple):
-    """What was found of a load factor.
+    """The outcome of a search for a load factor.
 
     Attributes
     ----------
@@ -105,7 +110,7 @@ class LoadFactor(NamedTuple):
 
     @property
     def status(self) -> LoadFactorStatus:
-        """What is known of it, where it was asked for."""
+        """Status of the search, where it was asked for."""
         if self.unbounded:
             return "unbounded"
         if self.factor is not None:
@@ -114,7 +119,7 @@ class LoadFactor(NamedTuple):
 
 
 class Solver(Struct, frozen=True):
-    """Which solver ended how.
+    """The solver, and how it ended.
 
     Attributes
     ----------
@@ -129,7 +134,7 @@ class Solver(Struct, frozen=True):
 
 
 class Time(Struct, frozen=True):
-    """Where the time went [s]."""
+    """The time that each part took [s]."""
 
     model: float
     solve: float
@@ -282,6 +287,25 @@ class RobustLoadFactor(Struct, frozen=True):
     hundredth_interval: list[float]
     places: int
     reasons: dict[str, str] = {}
+
+
+class Palm(Struct, Generic[V], frozen=True, kw_only=True, eq=False):
+    """The palm: where it acts, its force on the rock there, and its moment about that point, in H.
+
+    Attributes
+    ----------
+    position, force, moment : vector, length 3
+        [m], [N], [N·m]
+    engaged : sequence of int
+        Its tiles that are on the rock.
+    utilisation : float
+    """
+
+    position: V
+    force: V
+    moment: V
+    engaged: Sequence[int]
+    utilisation: float
 
 
 class Tile(Struct, frozen=True):

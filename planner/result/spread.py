@@ -1,4 +1,4 @@
-"""How sure an answer is: plan and load factor over draws of what nobody knows exactly."""
+"""The spread of an answer: plan and load factor over draws of what nobody knows exactly."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TOLD: Final = 3
 
 
 class DrawnPlan(Struct, frozen=True):
-    """What a draw's verified plan says; None where there is no such plan, or number.
+    """The verified plan of a draw; None where there is no such plan, or number.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Quantiles(Struct, frozen=True):
 
 
 class Influence(Struct, frozen=True):
-    """How much of the load factor's variation over the draws goes with one drawn quantity.
+    """The share of the load factor's variation over the draws that goes with one drawn quantity.
 
     Attributes
     ----------

@@ -13,7 +13,7 @@ import numpy as np
 from hand_models.base import Array, finite_vector
 from planner import deadline, programs
 from planner.advice import Trial, advise
-from planner.deadline import Budget, Overlap, late_sentence
+from planner.deadline import Budget, late_sentence
 from planner.explanation import LimitUse, certify
 from planner.floating import PROGRAMS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
@@ -74,7 +74,7 @@ def plan_on(
     start : float
         When it began, on the clock of `time.perf_counter`.
     known : Checks, optional
-        What recovers and checks its plans; by default it is made beside the solver.
+        What recovers and checks its plans; made here by default.
     near : Solution, optional
         Of the same hands at another wrench, where solving begins.
 
@@ -85,21 +85,21 @@ def plan_on(
     """
     question, modelled, budget = prepared.question, time.perf_counter(), Budget(PROGRAMS)
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
-    with Overlap(partial(prepare_checks, prepared), known) as checks:
-        answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
+    checks = prepare_checks(prepared) if known is None else known
+    answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
     if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
         answer = _second_look(prepared, checks, answer, budget)
     if isinstance(answer, Failed):
         deadline.check("a plan was found, or proven away")
-    ready, factor = checks.result(), LoadFactor()
+    factor = LoadFactor()
     if "load_factor" in question.want:
-        factor = load_factor_of(prepared, answer, budget, overloaded=ready.overloaded)
+        factor = load_factor_of(prepared, answer, budget, overloaded=checks.overloaded)
     solved = time.perf_counter()
 
     def times() -> Time:
         return Time(modelled - start, solved - modelled, time.perf_counter() - start)
 
-    found = explained_plan(prepared, ready, answer, factor, try_stance, times)
+    found = explained_plan(prepared, checks, answer, factor, try_stance, times)
     return found, answer.solution
 
 
@@ -123,16 +123,13 @@ def _best_in(
         yield least
 
 
-def _first_verified(
-    prepared: PreparedStance, checks: Overlap[Checks], found: Iterable[Solution]
-) -> Answer:
+def _first_verified(prepared: PreparedStance, checks: Checks, found: Iterable[Solution]) -> Answer:
     """Recover and verify one solution after the other, until one passes."""
     for solution in found:
         if not solution.loads:
             answer: Answer = Failed(solution, solution.no_answer(prepared))
             continue
-        ready = checks.result()
-        answer = verify(prepared, ready, recover(prepared, ready, solution))
+        answer = verify(prepared, checks, recover(prepared, checks, solution))
         if not isinstance(answer, Failed):
             break
     return answer
@@ -152,7 +149,7 @@ def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
 
 def _second_look(
     prepared: PreparedStance,
-    checks: Overlap[Checks],
+    checks: Checks,
     found: Answer,
     budget: Budget,
     *,
@@ -203,11 +200,11 @@ def try_stance(
         A plan of much the same stance, where solving begins.
     """
     budget = Budget(PROGRAMS)
-    with Overlap(partial(Checks.of, prepared, idle)) as checks:
-        answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
+    checks = Checks.of(prepared, idle)
+    answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
     if isinstance(answer, Failed):
         answer = _second_look(prepared, checks, answer, budget, prove=False)
-    overloaded = checks.result().overloaded
+    overloaded = checks.overloaded
     factor = partial(load_factor_of, prepared, answer, budget, overloaded=overloaded)
     solution, whole = answer.solution, answer.whole
     return Trial(prepared, solution.sets.data, solution.least, whole, factor)

@@ -9,15 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner import programs
-from planner.explanation import (
-    LimitUse,
-    joint_name,
-    joint_sentences,
-    load_findings,
-    off_sentences,
-    scene_findings,
-    warnings,
-)
+from planner.explanation import LimitUse, joint_name, oddities
 from planner.prepare import HandBatch, PreparedStance
 from planner.programs import SLACK
 from planner.result import (
@@ -27,7 +19,6 @@ from planner.result import (
     PlanArrays,
     recover_floating_hand,
 )
-from planner.scene import unit_findings
 from planner.solving.dual_bounds import is_least
 from planner.solving.objectives import CappedObjective
 from planner.solving.solution import ByHand, Failed, Solution, Verified
@@ -79,22 +70,13 @@ class Checks(NamedTuple):
 def prepare_checks(prepared: PreparedStance) -> Checks:
     """Return what recovering and checking plans of a stance needs, and what is odd about it.
 
-    It changes nothing that threads share, so it may run beside a solver.
-
     Raises
     ------
     InvalidInputError
         If the stance cannot be; the field is relative to the question.
     """
-    question, where = prepared.question, prepared.where
-    odd = (*scene_findings(prepared), *unit_findings(question), *load_findings(question, where))
-    oddities = (
-        *(each.message for each in odd),
-        *warnings(question.stance, prepared.batch),
-        *off_sentences(where),
-        *joint_sentences(question, where),
-    )
-    return Checks.of(prepared)._replace(findings=odd, oddities=oddities)
+    findings, words = oddities(prepared)
+    return Checks.of(prepared)._replace(findings=findings, oddities=words)
 
 
 def idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:

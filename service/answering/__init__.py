@@ -1,4 +1,4 @@
-"""From the bytes of a request to the bytes of its reply."""
+"""Answering: bytes of requests to bytes of replies."""
 
 import lazy_loader
 

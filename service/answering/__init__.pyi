@@ -20,5 +20,6 @@ from .own_models import (
     with_hand as with_hand,
     with_robot as with_robot,
 )
-from .questions import question as question, route as route, stance as stance
+from .questions import question as question, route as route
+from .stances import stance as stance
 from .streams import Streams as Streams, opened as opened, set_points_reply as set_points_reply

@@ -1,18 +1,20 @@
-"""From the planner's plan, with its arrays, to a reply of plain numbers, whole or brief."""
+"""Turn the planner's plan, with its arrays, into a reply of plain numbers, whole or brief."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeVar
 
+import msgspec
 import numpy as np
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET, Struct, UnsetType
+from msgspec.structs import replace
 
 from hand_models.base import Array, Pose
 from hand_models.hand import Seating
 from hand_models.wrench_spaces import WrenchSpace
-from planner import Certificate, HandPlan, Plan, Question, Stance, WristPlan
+from planner import Certificate, HandPlan, Palm, Plan, Question, Stance, WristPlan
 from service import replies
 from service.requests import Detail
 
@@ -27,6 +29,8 @@ __all__ = [
     "wrench_set_reply",
     "wrist_reply",
 ]
+
+T = TypeVar("T")
 
 LONGEST: Final = 120
 """Bytes of a reason beside set-points, which have to be small whatever the reason."""
@@ -112,20 +116,20 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
 def _certificate(proof: Certificate, model: bool) -> replies.Certificate:
     """Return why there is no plan, with the hands' wrench spaces if ``model``."""
     spaces = proof.spaces.items()
-    return replies.Certificate(
-        utilisation=finite(proof.utilisation),
-        direction=proof.direction.tolist(),
-        held={limb: share.tolist() for limb, share in proof.held.items()},
-        supremum=float(proof.supremum),
-        needed=float(proof.needed),
-        shortfall=_listed(proof.shortfall),
-        nearest=_listed(proof.nearest),
-        blocking=list(proof.blocking),
-        irreducible=None if proof.irreducible is None else list(proof.irreducible),
-        irreducible_up_to=finite(proof.irreducible_up_to),
-        sufficient=None if proof.sufficient is None else list(proof.sufficient),
-        wrench_spaces={limb: wrench_set_reply(each) for limb, each in spaces} if model else UNSET,
-    )
+    found = as_lists(replace(proof, wrench_spaces=UNSET), replies.Certificate)
+    if not model:
+        return found
+    return replace(found, wrench_spaces={limb: wrench_set_reply(each) for limb, each in spaces})
+
+
+def as_lists(part: Struct, kind: type[T]) -> T:
+    """Return a struct over arrays as the same struct over lists."""
+    return msgspec.convert(msgspec.to_builtins(part, enc_hook=_listed_number), kind)
+
+
+def _listed_number(value: Any) -> Any:
+    """Return an array as a list, and a number of NumPy's as a plain one."""
+    return value.tolist()
 
 
 def brief_plan_reply(
@@ -167,7 +171,9 @@ def brief_plan_reply(
 def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
     """Return what a hand is to do, and also what it carries if ``whole``."""
     torque, current, angle = hand.drives.tolist()
-    points = replies.HandSetPoints(hand.limb, hand.tensions.tolist(), angle)
+    points = replies.HandSetPoints(
+        limb=hand.limb, tensions=hand.tensions.tolist(), winch_angle=angle
+    )
     if whole:
         points.motor_torque, points.motor_current = torque, current
         points.wrench = hand.wrench.tolist()
@@ -198,18 +204,11 @@ def _listed_by_limb(arrays: Mapping[str, Array] | None) -> dict[str, replies.Vec
 
 def _hand_reply(part: HandPlan, model: bool) -> replies.Hand:
     """Return a hand of a plan as a reply has it, with its wrench space if ``model``."""
-    palm = part.palm
     return replies.Hand(
         limb=part.limb,
         wrench=part.wrench.tolist(),
         fingers=part.finger_by_finger(model=model),
-        palm=replies.Palm(
-            position=palm.position.tolist(),
-            force=palm.force.tolist(),
-            moment=palm.moment.tolist(),
-            engaged=list(palm.engaged),
-            utilisation=float(palm.utilisation),
-        ),
+        palm=as_lists(part.palm, Palm[replies.Vector]),
         utilisation=float(part.utilisation),
         seating=seating_reply(part.seating),
         wrist=wrist_reply(part.wrist),
@@ -237,7 +236,9 @@ def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
 
 
 def _frame(pose: Pose) -> replies.PlacedFrame:
-    return replies.PlacedFrame(pose.position.tolist(), pose.quaternion().tolist())
+    return replies.PlacedFrame(
+        position=pose.position.tolist(), orientation=pose.quaternion().tolist()
+    )
 
 
 def seating_reply(seating: Seating) -> replies.Seating:
@@ -257,7 +258,7 @@ def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
     return replies.WrenchSet(
         origin=space.origin.tolist(),
         generators=[
-            replies.Generator(name, column)
+            replies.Generator(name=name, wrench=column)
             for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
         ],
         rows=[

@@ -1,4 +1,4 @@
-"""What a stance can hold, on its way from a request to a reply."""
+"""Body spaces: what a stance can hold, from a request to a reply."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the bytes of a query to the bytes of its answer, whatever the bytes are."""
+"""Answer the bytes of a query by the bytes of its answer, whatever the bytes are."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from planner import DeadlineError, deadline
 from service.answering.answers import Planned, plan_reply
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_models import ROBOTS, Robots, over_default
-from service.answering.questions import question
+from service.answering.questions import climb, question
 from service.answering.reply_sizes import fitted
 from service.answering.streams import STREAMS, Streams
 from service.replies import BriefPlanReply, PlanReply, Reply, StreamReply
@@ -115,13 +115,11 @@ def _body_space(asked: BodySpaceRequest, robots: Robots, _: Streams) -> Reply:
 
 
 def _climb(asked: RouteRequest, robots: Robots, _: Streams) -> Reply:
-    from service.answering.climbs import climb
-
     return climb(asked, robots)
 
 
 class _Service(NamedTuple):
-    """What is asked at a key, and who answers, given the request, the robots and the streams."""
+    """A kind of request, and what answers it, given the request, the robots and the streams."""
 
     request: type[Request]
     answer: Callable[[Any, Robots, Streams], Reply | Planned]

@@ -1,4 +1,4 @@
-"""What one hand of a stance can carry, on its way from a request to a reply."""
+"""Wrench spaces: what one hand of a stance can carry, from a request to a reply."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from service.answering.answers import (
     wrist_reply,
 )
 from service.answering.own_models import ROBOTS, Robots
-from service.answering.questions import stance
+from service.answering.stances import stance
 from service.replies import AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest
 
@@ -126,7 +126,10 @@ def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
     return [
         replies.ClosingSequence(
             finger=closing.finger,
-            stages=[replies.ClosingStage(s.part, s.starts, s.ends) for s in closing.stages],
+            stages=[
+                replies.ClosingStage(part=each.part, starts=each.starts, ends=each.ends)
+                for each in closing.stages
+            ],
             in_order=bool(closing.in_order),
             closure=closing.closure,
             nearby=list(there.closures),

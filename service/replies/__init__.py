@@ -1,4 +1,4 @@
-"""What the service says: every reply, lenient."""
+"""Replies: everything that the service says, lenient."""
 
 import lazy_loader
 

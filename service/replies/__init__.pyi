@@ -1,44 +1,38 @@
-from .body_space import (
-    Acceleration as Acceleration,
-    BodyCapability as BodyCapability,
-    BodySection as BodySection,
-    BodySpaceReply as BodySpaceReply,
-)
-from .hand import (
-    Generator as Generator,
-    Hand as Hand,
-    Palm as Palm,
-    Row as Row,
-    Seating as Seating,
-    WrenchSet as WrenchSet,
-    Wrist as Wrist,
-)
 from .plan import (
     BriefPlanReply as BriefPlanReply,
     Certificate as Certificate,
+    Hand as Hand,
+    HandColumns as HandColumns,
+    HandSetPoints as HandSetPoints,
     PlanReply as PlanReply,
+    RouteReply as RouteReply,
+    RouteStage as RouteStage,
+    SetPointsReply as SetPointsReply,
+    StreamReply as StreamReply,
 )
 from .reply import (
     AXES as AXES,
     ErrorDetail as ErrorDetail,
     ErrorReply as ErrorReply,
+    Generator as Generator,
     HealthReply as HealthReply,
     LastFailure as LastFailure,
     PlacedFrame as PlacedFrame,
     ProcessHealth as ProcessHealth,
     Reply as Reply,
+    Row as Row,
+    Seating as Seating,
     StanceReply as StanceReply,
     Vector as Vector,
+    WrenchSet as WrenchSet,
+    Wrist as Wrist,
 )
-from .route import RouteReply as RouteReply, RouteStage as RouteStage
-from .stream import (
-    HandColumns as HandColumns,
-    HandSetPoints as HandSetPoints,
-    SetPointsReply as SetPointsReply,
-    StreamReply as StreamReply,
-)
-from .wrench_space import (
+from .spaces import (
+    Acceleration as Acceleration,
     AxisCapability as AxisCapability,
+    BodyCapability as BodyCapability,
+    BodySection as BodySection,
+    BodySpaceReply as BodySpaceReply,
     ClosingSequence as ClosingSequence,
     ClosingStage as ClosingStage,
     Contact as Contact,

@@ -1,4 +1,4 @@
-"""The reply to who carries what: loads, margins and prices, or the proof that there are none."""
+"""Replies to who carries what: plans, whole and brief, climbs, and set-points of a stream."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from msgspec import UNSET, Struct, UnsetType
 
 from planner import (
     Advice,
+    CertificateOf,
     Clearance,
     Finding,
+    Finger,
     LimitName,
     LoadFactorStatus,
+    Palm,
     Price,
     RobustLoadFactor,
     Solver,
@@ -17,14 +20,23 @@ from planner import (
     TensionPath,
     Time,
 )
-from service.replies.hand import Hand, WrenchSet
-from service.replies.reply import StanceReply, Vector
-from service.replies.stream import HandSetPoints
+from service.replies.reply import Reply, Seating, StanceReply, Vector, WrenchSet, Wrist
 
-__all__ = ["BriefPlanReply", "Certificate", "PlanReply"]
+__all__ = [
+    "BriefPlanReply",
+    "Certificate",
+    "Hand",
+    "HandColumns",
+    "HandSetPoints",
+    "PlanReply",
+    "RouteReply",
+    "RouteStage",
+    "SetPointsReply",
+    "StreamReply",
+]
 
 
-class Certificate(Struct, kw_only=True):
+class Certificate(CertificateOf[Vector, WrenchSet], frozen=True, kw_only=True, eq=False):
     """Why nothing balances the body: at any ``utilisation`` (null), or up to that cap on it.
 
     Every body wrench w that the hands can supply with loads up to 10⁶ N, and their wrenches v on
@@ -42,18 +54,18 @@ class Certificate(Struct, kw_only=True):
     ["model"]`` where there is no plan.
     """
 
-    utilisation: float | None = None
-    direction: Vector
-    held: dict[str, Vector] = {}
-    supremum: float
-    needed: float
-    shortfall: Vector | None
-    nearest: Vector | None
-    blocking: list[LimitName]
-    irreducible: list[LimitName] | None = None
-    irreducible_up_to: float | None = None
-    sufficient: list[LimitName] | None = None
-    wrench_spaces: dict[str, WrenchSet] | UnsetType = UNSET
+
+class Hand(Struct, kw_only=True):
+    """One hand of a plan. Its wrench space comes with ``"want": ["model"]``."""
+
+    limb: str
+    wrench: Vector
+    fingers: list[Finger]
+    palm: Palm[Vector]
+    utilisation: float
+    seating: Seating
+    wrist: Wrist
+    wrench_space: WrenchSet | UnsetType = UNSET
 
 
 class PlanReply(StanceReply, kw_only=True):
@@ -110,6 +122,22 @@ class PlanReply(StanceReply, kw_only=True):
     advice: list[Advice] | UnsetType = UNSET
 
 
+class HandSetPoints(Struct):
+    """Set-points of one hand: tensions [N], motors [N·m, A], its wrench on the rock in H.
+
+    ``winch_angle``: from the open finger [rad]. The hand's ``utilisation`` is only of a plan. With
+    ``"detail": "set_points"`` there are tensions and winches alone.
+    """
+
+    limb: str
+    tensions: Vector
+    winch_angle: Vector
+    motor_torque: Vector | UnsetType = UNSET
+    motor_current: Vector | UnsetType = UNSET
+    wrench: Vector | UnsetType = UNSET
+    utilisation: float | UnsetType = UNSET
+
+
 class BriefPlanReply(StanceReply, kw_only=True):
     """A plan with ``"detail"`` ``set_points`` or ``hands``: fields as of a plan's whole reply.
 
@@ -133,3 +161,89 @@ class BriefPlanReply(StanceReply, kw_only=True):
     warnings: list[str] | UnsetType = UNSET
     findings: list[Finding] | UnsetType = UNSET
     time: Time | UnsetType = UNSET
+
+
+class HandColumns(Struct, kw_only=True):
+    """One hand of a stream, and the names of its set's loads."""
+
+    limb: str
+    columns: list[str]
+
+
+class StreamReply(StanceReply, kw_only=True):
+    """A stream that is declared. It is there until many others are, or the service ends.
+
+    ``radius``: within which of ``body_wrench``, the first centre, set-points are interpolated, null
+    where they are solved one by one. ``status``, ``utilisation``, ``gap``: at that centre.
+    ``took``: the time of it [s].
+    """
+
+    stream: str
+    radius: float | None
+    status: str
+    reason: str | None
+    body_wrench: Vector
+    utilisation: float | None
+    gap: float | None
+    hands: list[HandColumns]
+    took: float
+
+
+class SetPointsReply(Reply, kw_only=True):
+    """Set-points of one body wrench.
+
+    ``status``, ``utilisation``, ``verified``: as of a plan. ``gap``: the least utilisation of any
+    plan is no more than this below, which is proven. ``source``: ``interpolated`` from plans known
+    before, ``solved`` for this wrench, or ``blended`` of both. ``reason``: why there is no plan;
+    then ``utilisation``, ``gap`` and ``hands`` are null. ``took``: the time of it [s].
+    """
+
+    stream: str
+    status: str
+    reason: str | None
+    body_wrench: Vector
+    utilisation: float | None
+    gap: float | None
+    hands: list[HandSetPoints] | None
+    verified: bool
+    source: str
+    took: float
+
+
+class RouteStage(Struct, kw_only=True):
+    """A stance of a climb. ``move``: from one, zero for the start; ``phase``: of the move.
+
+    ``limb``: the one that moves. ``reason``: what limits the plan, or why there is none.
+    """
+
+    move: int
+    phase: str
+    limb: str | None
+    status: str
+    utilisation: float | None
+    load_factor: float | None
+    load_factor_unbounded: bool
+    load_factor_status: LoadFactorStatus
+    joint_utilisation: float | None
+    limiting: LimitName | None
+    reason: str
+
+
+class RouteReply(Reply, kw_only=True):
+    """A climb, planned stage by stage.
+
+    ``status``: of the stage that is worst off. ``crux``: the index of the hardest stage, whose
+    ``utilisation`` and ``limiting`` these are. ``load_factor``: the least of all stages;
+    ``load_factor_status``, here and there: as of a plan.
+    """
+
+    name: str
+    status: str
+    crux: int
+    utilisation: float | None
+    load_factor: float | None
+    load_factor_unbounded: bool
+    load_factor_status: LoadFactorStatus
+    limiting: LimitName | None
+    stages: list[RouteStage]
+    warnings: list[str]

@@ -1,4 +1,4 @@
-"""What every reply has, the reply to a request that failed, and what an operator is told.
+"""Parts that replies share, the reply to a request that failed, and the state for an operator.
 
 Replies are lenient, so that they may gain fields. Poses and vectors as in the requests; forces and
 moments are on the rock and in H unless said otherwise. A value that does not exist is null; what
@@ -15,13 +15,18 @@ __all__ = [
     "AXES",
     "ErrorDetail",
     "ErrorReply",
+    "Generator",
     "HealthReply",
     "LastFailure",
     "PlacedFrame",
     "ProcessHealth",
     "Reply",
+    "Row",
+    "Seating",
     "StanceReply",
     "Vector",
+    "WrenchSet",
+    "Wrist",
 ]
 
 AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -31,7 +36,7 @@ Vector = list[float]
 
 
 class Reply(Struct, kw_only=True):
-    """What every reply has. ``id``: the request's, where there was one that could be read."""
+    """The fields of every reply. ``id``: the request's, where there was one that could be read."""
 
     v: int = 1
     id: str | None = None
@@ -50,8 +55,74 @@ class StanceReply(Reply, kw_only=True):
     poses: dict[str, PlacedFrame] | UnsetType = UNSET
 
 
+class Seating(Struct):
+    """The place of the hold in H, and the rule by which it was found.
+
+    ``backed_off``: how far the hand moved off the rock along -z of H, so that its open fingers
+    are clear [m].
+    """
+
+    rule: str
+    pose: PlacedFrame
+    backed_off: float = 0.0
+
+
+class Wrist(Struct, kw_only=True):
+    """The state of a hand's wrist; all but ``mode`` are null where it is fixed.
+
+    ``twist``: where it goes from the pose that was given, about that pose [m, rad]. ``palm``:
+    ``off``, ``drags``, ``presses`` or ``drags_and_presses``. ``rounds``: how often the hands' sets
+    were linearised. ``error``: how far the set of the last step was off at its end [N, moments over
+    0.1 m]; the plan is exact. Of a wrench space, how far it is off at most where it reaches
+    farthest along the axes.
+    """
+
+    mode: str
+    twist: Vector | None = None
+    palm: str | None = None
+    rounds: int | None = None
+    error: float | None = None
+
+
+class Generator(Struct):
+    """A column of a hand's wrench space: a load, and the wrench per newton of it.
+
+    Of a floating hand a component of its wrist's twist, and the wrench per metre or radian.
+    """
+
+    name: str
+    wrench: Vector
+
+
+class Row(Struct, kw_only=True):
+    """An inequality of a hand's wrench space.
+
+    ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
+    for ``motor_torque`` and ``joint_torque`` in newton-metres, for ``motor_current`` in amperes.
+    ``hard`` rows: coefficients · y at most capacity, whatever the utilisation.
+    """
+
+    name: str
+    kind: str
+    finger: str | None
+    phalanx: str | None
+    limit: str
+    joint: str | None = None
+    coefficients: Vector
+    constant: float
+    capacity: float
+
+
+class WrenchSet(Struct, kw_only=True):
+    """A hand's wrenches, origin + Σ y · generator, for the loads y that the rows allow."""
+
+    origin: Vector
+    generators: list[Generator]
+    rows: list[Row]
+
+
 class ErrorDetail(Struct):
-    """What is wrong, and with which field; ``retry_after``: when to ask again [s]."""
+    """The fault, and the field to blame; ``retry_after``: when to ask again [s]."""
 
     kind: str
     field: str | None
@@ -78,7 +149,7 @@ class ProcessHealth(Struct, kw_only=True):
 
 
 class LastFailure(Struct, kw_only=True):
-    """What failed last: the kind of error, of which key or process, and when (Unix time).
+    """The last failure: the kind of error, of which key or process, and when (Unix time).
 
     ``id``: the question's.
     """
@@ -90,7 +161,7 @@ class LastFailure(Struct, kw_only=True):
 
 
 class HealthReply(Reply, kw_only=True):
-    """How a service is.
+    """The state of a service.
 
     ``uptime``: [s]; ``replied``: questions so far; ``waiting``: questions, by the kind of queue.
     """

@@ -1,4 +1,4 @@
-"""What a caller may ask: every request, strict."""
+"""Requests: everything that a caller may ask, strict."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What every request is made of: strict structs, names, and numbers within bounds.
+"""Parts of all requests: strict structs, names, and numbers within bounds.
 
 Bounds are far beyond any climbing robot; they keep arithmetic finite.
 """
@@ -73,13 +73,13 @@ class Pose(Strict, frozen=True, kw_only=True):
 
 
 class Request(Strict, frozen=True, kw_only=True):
-    """What every request has."""
+    """The fields of every request."""
 
     v: Literal[1]
 
 
 class Query(Request, frozen=True, kw_only=True):
-    """What every request has that is asked over zenoh."""
+    """The fields of every request that is asked over zenoh."""
 
     id: Identifier | None = None
     deadline: Annotated[

@@ -121,7 +121,7 @@ class Hand(Strict, frozen=True, kw_only=True):
 
 
 class Stance(Strict, frozen=True, kw_only=True):
-    """Where the body and the hands are."""
+    """The places of the body and the hands."""
 
     robot: Annotated[
         Name | None,

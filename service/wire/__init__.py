@@ -1,4 +1,4 @@
-"""How messages travel: encodings, checks, errors, keys, schemas."""
+"""The wire: encodings, checks, errors, keys, schemas."""
 
 import lazy_loader
 

@@ -35,7 +35,7 @@ from .keys import (
     WRENCH_SPACE as WRENCH_SPACE,
     service_key as service_key,
 )
-from .places import (
+from .validation_errors import (
     Place as Place,
     Step as Step,
     entered as entered,

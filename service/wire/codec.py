@@ -1,4 +1,4 @@
-"""How messages travel: JSON or MessagePack, named by a zenoh encoding."""
+"""Encode and decode messages as JSON or MessagePack, named by a zenoh encoding."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def _schema_name(kind: type[msgspec.Struct]) -> str:
 
 
 class Answer(NamedTuple):
-    """What goes back to the caller.
+    """An answer to the caller: a reply, or an error.
 
     Attributes
     ----------

@@ -81,7 +81,7 @@ def schema() -> dict[str, Any]:
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
     )
-    names = {name: _plain_name(name) for name in parts}
+    names = {name: _plain_name(name, part["title"]) for name, part in parts.items()}
     assert len({*names.values()}) == len(parts)
     for part in parts.values():
         # what later versions will have is not offered
@@ -99,9 +99,9 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _plain_name(name: str) -> str:
-    """Return a part's name without its module; of two alike, the reply's is told apart."""
-    return name.rpartition(".")[2] + ("Reply" if name.startswith(REPLIES) else "")
+def _plain_name(name: str, title: str) -> str:
+    """Return a part's name without its module and parameters; of two alike, the reply's ends so."""
+    return title.partition("[")[0] + ("Reply" if name.startswith(REPLIES) else "")
 
 
 def _renamed(part: Any, names: Mapping[str, str]) -> Any:

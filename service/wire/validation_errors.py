@@ -1,4 +1,4 @@
-"""From msgspec's complaint to the field to blame and what would be valid."""
+"""Turn msgspec's complaint into the field to blame and what would be valid there, by its schema."""
 
 from __future__ import annotations
 
@@ -6,17 +6,25 @@ import math
 import re
 import sys
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
 from itertools import islice
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 from msgspec import inspect
 
 from hand_models.base import InvalidInputError
-from service.wire.places import Place, Step, entered, field_names, places_at
+from service.requests import Later
 
-__all__ = ["validation_error"]
+__all__ = ["Place", "Step", "entered", "field_names", "places_at", "validation_error"]
+
+SYMBOL: Final = r"(?:kg|rad|[Nms·/²])+"
+UNITS: Final = re.compile(rf"\[({SYMBOL}(?:, {SYMBOL})*)\]")
+"""Where a description says its units: one, or two of a wrench, forces first."""
+
+Step = str | int | None
+"""Of a path; None for a key that the caller chose."""
 
 WHERE: Final = re.compile(r" - at (?:`key` in )?`\$([^`]*)`$")
 STEP: Final = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[\.\.\.\]")
@@ -240,3 +248,80 @@ def _values(types: Iterable[inspect.Type]) -> list[str]:
         if isinstance(kind, inspect.LiteralType)
         for value in kind.values
     ]
+
+
+# Places ------------------------------------------------------------------------------------------
+
+
+class Place(NamedTuple):
+    """A type that may stand at a place, without its metadata, and the units of its numbers."""
+
+    kind: inspect.Type
+    units: tuple[str, ...]
+
+
+def places_at(kind: type, steps: Iterable[Step]) -> list[Place]:
+    """Return what may stand at the end of a path into a message of a kind."""
+    places = list(_bare(_known(kind)))
+    for step in steps:
+        places = entered(places, step)
+    return places
+
+
+def entered(places: Iterable[Place], step: Step) -> list[Place]:
+    """Return what may stand one step further."""
+    found: list[Place] = []
+    for place in places:
+        parent = place.kind
+        if isinstance(parent, inspect.StructType) and isinstance(step, str):
+            fields = [f.type for f in parent.fields if f.encode_name == step]
+            if not fields and parent.tag_field == step:
+                fields = [inspect.LiteralType((parent.tag,))]
+            found += [bare for field in fields for bare in _bare(field)]
+        elif isinstance(parent, inspect.ListType):
+            found += _bare(parent.item_type, place.units)
+        elif isinstance(parent, inspect.DictType) and step is None:
+            found += _bare(parent.value_type, place.units)
+        elif isinstance(parent, inspect.TupleType) and isinstance(step, int):
+            items = parent.item_types
+            for item in items[step : step + 1]:
+                found += _bare(item, _units_of(place.units, step, len(items)))
+    return found
+
+
+def field_names(types: Iterable[inspect.Type]) -> list[str]:
+    """Return the fields of the structs that may be meant, each once, but none not yet taken."""
+    names: list[str] = []
+    for kind in types:
+        if isinstance(kind, inspect.StructType):
+            names += [kind.tag_field] if kind.tag_field else []
+            names += [field.name for field in kind.fields if not _comes_later(field.type)]
+    return list(dict.fromkeys(names))
+
+
+def _comes_later(kind: inspect.Type) -> bool:
+    return kind == _known(Later)
+
+
+@cache
+def _known(kind: Any) -> inspect.Type:
+    """Return what is known of a message, which takes milliseconds to find out."""
+    return inspect.type_info(kind)
+
+
+def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[Place]:
+    """Yield a type without its metadata, and each member of a union."""
+    if isinstance(kind, inspect.Metadata):
+        found = UNITS.findall((kind.extra_json_schema or {}).get("description", ""))
+        yield from _bare(kind.type, tuple(found[-1].split(", ")) if found else units)
+    elif isinstance(kind, inspect.UnionType):
+        for member in kind.types:
+            yield from _bare(member, units)
+    else:
+        yield Place(kind, units)
+
+
+def _units_of(units: tuple[str, ...], entry: int, length: int) -> tuple[str, ...]:
+    """Return the units of one entry of a whole that has one unit, or two of equal halves."""
+    which = entry * len(units) // length
+    return units[which : which + 1]

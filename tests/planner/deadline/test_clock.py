@@ -22,7 +22,7 @@ from hand_models.rock import Plane
 from planner import deadline, programs
 from planner.deadline import Budget, DeadlineError
 from planner.explanation import certificate
-from planner.explanation.farkas_program import FarkasProgram
+from planner.explanation.infeasibility import FarkasProgram
 from planner.floating import continuation
 from planner.prepare import prepared_stance
 from planner.programs import WRENCH_UNIT

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import linprog
 
-from planner.explanation.farkas_program import FarkasProgram
+from planner.explanation.infeasibility import FarkasProgram
 from planner.programs import UNLIMITED
 
 ROWS, LOADS = 9, 4

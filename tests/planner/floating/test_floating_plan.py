@@ -238,7 +238,9 @@ def test_check_finds_what_is_wrong(spoilt):
         aside = hand.wrist.twist + np.array([0.0, 0.0, 1e-6, 0.0, 0.0, 0.0])
         hand = replace(hand, wrist=replace(hand.wrist, twist=aside))
     elif spoilt == "palm":
-        hand = replace(hand, palm=replace(palm, force=palm.force + np.array([0.0, 0.0, 0.1])))
+        hand = replace(
+            hand, palm=structs.replace(palm, force=palm.force + np.array([0.0, 0.0, 0.1]))
+        )
     elif spoilt == "wrist":
         hand = replace(hand, wrist=None)
     else:

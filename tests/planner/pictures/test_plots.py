@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path as MplPath
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Line3D
+from msgspec import structs
 
 import planner
 from hand_models import Grasp, Plane, Sphere
@@ -391,8 +392,8 @@ def test_a_palm_has_a_cell_as_high_as_its_hand():
     question, plan = answered("plain")
     first, *others = plan.hands
     used = 0.37
-    palms = [replace(first.palm, utilisation=used), *(hand.palm for hand in others)]
-    palms[1] = replace(palms[1], engaged=())
+    palms = [structs.replace(first.palm, utilisation=used), *(hand.palm for hand in others)]
+    palms[1] = structs.replace(palms[1], engaged=())
     hands = (replace(hand, palm=palm) for hand, palm in zip(plan.hands, palms, strict=True))
     table = draw_plan(replace(plan, hands=tuple(hands)), question).axes[3]
     assert [label.get_text() for label in table.get_xticklabels()][-2] == "palm"

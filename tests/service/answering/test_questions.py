@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from service.answering import questions
+from service.requests import Surface
 from tests.suite.helpers.requests import (
     JOINTS,
     full_request,
@@ -54,6 +55,26 @@ def test_a_request_with_joints_becomes_a_question() -> None:
     assert questions.question(
         plan_request(put(wall_request(), ("stance", "joints"), "solve"))
     ).stance.joints == ("solve")
+
+
+def test_every_number_of_a_surface_is_in_the_question() -> None:
+    own = {
+        "shear_limit": 80.0,
+        "pull_off_limit": 20.0,
+        "pull_off_angle": 1.1,
+        "lateral_limit": 40.0,
+        "compression_gain": 0.7,
+        "half_planes": 2,
+        "lateral_pull_off_ratio": 0.6,
+        "shear_scatter": 9.0,
+        "friction": 0.3,
+        "pull_off_exponent": 2.0,
+    }
+    assert set(own) == set(Surface.__struct_fields__)
+    request = wall_request()
+    request["stance"]["hands"][0]["surface"] = own
+    asked = questions.question(plan_request(request)).stance.hands[0].surface
+    assert {name: getattr(asked, name) for name in own} == own
 
 
 def test_seats_are_asked_for() -> None:

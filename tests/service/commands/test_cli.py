@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 import trimesh
+from msgspec.structs import replace
 from rich.console import Console
 
 from service import answering
@@ -286,7 +287,7 @@ def test_numbers_however_long_are_told_whole(capsys: pytest.CaptureFixture[str])
     hand = next(hand for hand in reply.hands if hand.limb == longest)
     hand.wrench = [-309073.0, -333.2, 126883.4, 10.26, -16361.4, 0.04]
     hand.utilisation = 901.51
-    hand.palm.force = [-97178.3, 0.0, 209575.1]
+    hand.palm = replace(hand.palm, force=[-97178.3, 0.0, 209575.1])
     print_plan(reply, Console(width=80))
     out = capsys.readouterr().out
     assert "…" not in out

@@ -12,15 +12,21 @@ api = pytest.importorskip("mypy.api", reason="mypy is not installed")
 
 ROOT = Path(__file__).parents[3]
 
-CHECKED = ("service/answering/answers.py", "service/answering/questions.py")
-"""The modules in which the planner's values and messages meet."""
+CHECKED = (
+    "planner/explanation/certificate.py",
+    "service/answering/answers.py",
+    "service/answering/questions.py",
+    "service/answering/stances.py",
+)
+"""The modules in which the planner's values and messages are made and meet."""
 
 RENAMED = {
     "planner/result/plan.py": "joint_torque_limit",
-    "service/replies/plan.py": "irreducible_up_to",
+    "planner/result/certificate.py": "irreducible_up_to",
+    "service/replies/reply.py": "backed_off",
     "service/requests/stance.py": "seat_direction",
 }
-"""Where a field is declared, and which: of the planner, of a reply, of a request."""
+"""Where a field is declared, and which: of the planner, of both, of a reply, of a request."""
 
 
 def errors(folder: Path) -> str:

@@ -1,14 +1,18 @@
-"""The reply to what one hand can carry."""
+"""Replies to what one hand can carry, and to what a stance can hold."""
 
 from __future__ import annotations
 
 from msgspec import UNSET, Struct, UnsetType
 
-from service.replies.hand import Generator, Row, Seating, Wrist
-from service.replies.reply import StanceReply, Vector
+from planner import Finding, LimitName, Time
+from service.replies.reply import Generator, Row, Seating, StanceReply, Vector, Wrist
 
 __all__ = [
+    "Acceleration",
     "AxisCapability",
+    "BodyCapability",
+    "BodySection",
+    "BodySpaceReply",
     "ClosingSequence",
     "ClosingStage",
     "Contact",
@@ -21,7 +25,7 @@ __all__ = [
 
 
 class Contact(Struct):
-    """Where a finger tile meets the rock, and the axes of its loads.
+    """The place where a finger tile meets the rock, and the axes of its loads.
 
     ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``
     where tendon and springs hold it without contact; null where contacts hold it.
@@ -46,7 +50,7 @@ class ClosingStage(Struct):
 
 
 class ClosingSequence(Struct):
-    """How a finger has closed: its nail, its joints from the base outward, its tiles.
+    """The way a finger has closed: its nail, its joints from the base outward, its tiles.
 
     ``in_order``: whether nail and joints move one after the other. ``closure``: how it has ended:
     ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped`` or ``straight``. ``nearby``: how else
@@ -86,7 +90,7 @@ class HalfSpaces(Struct):
 
 
 class AxisCapability(Struct):
-    """How far a set reaches along an axis.
+    """The reach of a set along an axis.
 
     ``pure``: the most of it with every other component zero, null where there is none. ``extent``:
     the most of it with whatever else. Below zero, so much of the opposite is always there.
@@ -97,7 +101,7 @@ class AxisCapability(Struct):
 
 
 class RobustCapability(Struct, kw_only=True):
-    """How far a set reaches along each axis where the hand is not quite where it was put.
+    """The reach of a set along each axis where the hand is not quite where it was put.
 
     Closed anew at so many ``draws`` of its place, to either side by at most ``position`` along each
     axis of H [m] and ``angle`` about each [rad]; ``without``: at so many of them it cannot be, or
@@ -116,7 +120,7 @@ class RobustCapability(Struct, kw_only=True):
 
 
 class WrenchSpaceReply(StanceReply, kw_only=True):
-    """What one hand can carry, at utilisation 1: if nothing, ``capability`` is null.
+    """The wrenches that one hand can carry, at utilisation 1: if none, ``capability`` is null.
 
     ``vertices`` and ``half_spaces`` are null where they were not asked for, or where they were left
     out, as ``warnings`` tell. ``dimension`` is null where nothing is left, or where even that would
@@ -139,3 +143,71 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
     capability: dict[str, AxisCapability] | None
     warnings: list[str] = []
     robust: RobustCapability | UnsetType = UNSET
+
+
+class BodyCapability(Struct, kw_only=True):
+    """The reach of body wrenches that are held along an axis of B; null where there are none.
+
+    ``more``: beyond the body wrench asked for, which has to be held. ``pure``: with every other
+    component zero. ``extent``: with whatever else. Below zero, so much of the opposite is always
+    there. ``limiting``: the limit that ends ``more``, or else ``extent``.
+    """
+
+    more: float | None
+    pure: float | None
+    extent: float | None
+    limiting: LimitName | None
+
+
+class BodySection(Struct, kw_only=True):
+    """The body wrenches that are held in the plane of two axes, between two polygons [N, N·m].
+
+    Every point of the inner polygon is held, and none outside the outer one. Corners go
+    counterclockwise: two of a segment, one of a point, none where the plane holds nothing. ``gap``:
+    how far the two are apart at most [N, moments over 0.1 m]. ``limiting``: what ends the way at
+    each corner of the inner one.
+    """
+
+    axes: list[str]
+    others: str
+    inner: list[Vector]
+    outer: list[Vector]
+    gap: float | None
+    limiting: list[LimitName | None]
+
+
+class Acceleration(Struct, kw_only=True):
+    """The largest acceleration from rest that is held along a direction in W [m/s², rad/s²]."""
+
+    direction: Vector
+    acceleration: float
+    limiting: LimitName | None
+
+
+class BodySpaceReply(StanceReply, kw_only=True):
+    """The body wrenches that a stance can hold within the utilisation asked for.
+
+    ``status``, ``reason``, ``utilisation``: of the plan for the body wrench asked for.
+    ``acceleration``: by axis of W; null where the body cannot be held at rest or its wrench was
+    given instead of a load. ``angular_acceleration``: about B's origin, for the robot's own load at
+    known joints. ``along``: in the directions asked for. ``exact``: false where a wrist floats; its
+    hand's set is then linearised, and at the extents it is off by up to ``linearisation_error``, in
+    newtons with moments over 0.1 m. ``error``: its old name, for one more version.
+    """
+
+    robot: str
+    status: str
+    reason: str
+    body_wrench: Vector
+    utilisation: float | None
+    exact: bool
+    linearisation_error: float
+    error: float
+    capability: dict[str, BodyCapability]
+    section: BodySection
+    acceleration: dict[str, Acceleration] | None
+    angular_acceleration: dict[str, Acceleration] | None
+    along: list[Acceleration] | None
+    time: Time
+    warnings: list[str] = []
+    findings: list[Finding] = []

@@ -1,0 +1,375 @@
+"""Stances of requests: hands on their holds, in the planner's own terms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import replace
+from hashlib import blake2b
+from typing import Final, Literal
+
+import msgspec
+import numpy as np
+
+from hand_models import rock
+from hand_models.base import Array, BoundedStore, InvalidInputError, LimitError, Pose, within
+from hand_models.fixed_wrist import UP, approach_frame
+from hand_models.hand import SpinyHand
+from hand_models.parameters import ParameterTable, own_hand
+from hand_models.rock import Mesh, Profile
+from hand_models.tile import Surface
+from planner import EARTH, HandOnHold, Stance, settle_each
+from service import requests
+from service.answering.own_models import ROBOTS, Robots, builder_of
+
+__all__ = ["Rocks", "array_of", "hands_on_rocks", "joints_of", "poses_of", "stance", "with_rocks"]
+
+VERTICAL: Final = (0.0, 0.0, 1.0)
+"""Up in W."""
+
+MOST_HALF_PLANES: Final = 256
+"""Of all hands of a stance: 64 each of four, some 7500 rows in a plan's program."""
+
+FLOATING: Final = 4
+"""How many times over a floating hand's half-planes count: its plan is found in several rounds."""
+
+MOST_POINTS: Final = 40_000
+"""Of the outlines of all hands of a stance, of some 0.1 ms each."""
+
+MOST_TURNED: Final = 4.0 * math.pi
+"""Largest angle of a wrist that is taken for one [rad]: beyond two turns, it is in degrees."""
+
+KEPT: Final = 8
+"""Meshes that are kept, those asked for last: on the same object hands are found settled."""
+
+MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests", KEPT)
+"""By all that they are built of."""
+
+Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
+"""A stance's rocks by name, and each one's frame in W if that is given."""
+
+
+def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
+    """Return the stance of a request.
+
+    Parameters
+    ----------
+    message : requests.Stance
+    robots : Robots, optional
+        Those that may be asked about.
+
+    Raises
+    ------
+    InvalidInputError
+        If a part of it is impossible; the field begins with ``stance``.
+    """
+    return with_rocks(message, robots)[0]
+
+
+def with_rocks(message: requests.Stance, robots: Robots = ROBOTS) -> tuple[Stance, Rocks]:
+    """Return the stance of a request, and its rocks by name; otherwise as `stance`."""
+    with within("stance"):
+        _check_costs(message)
+        build = builder_of(message.robot, robots)
+        if message.hand is None:
+            robot = build(None)
+        else:
+            with within("hand"):
+                robot = build(own_hand(ParameterTable.of(message.hand)))
+        rocks = _rocks(message, robot.hand.table)
+        found = Stance(
+            hands=tuple(hands_on_rocks(message.hands, robot.hand, rocks, "hands")),
+            body=poses_of({"body": message.body})["body"],
+            gravity=np.array(EARTH if message.gravity is None else message.gravity),
+            robot=robot,
+            joints=joints_of(message.joints),
+        )
+        return found, rocks
+
+
+def hands_on_rocks(
+    messages: Sequence[requests.Hand], kind: SpinyHand, rocks: Rocks, path: str
+) -> list[HandOnHold]:
+    """Return hands on their holds; those with a place on a rock have the poses they take there.
+
+    Parameters
+    ----------
+    messages : sequence of requests.Hand
+    kind : SpinyHand
+        The robot's.
+    rocks : Rocks
+    path : str
+        Where the hands are in the message.
+
+    Raises
+    ------
+    InvalidInputError
+        If one is impossible, or refers to no rock; the field begins with the path.
+    """
+    paths = [f"{path}[{i}]" for i in range(len(messages))]
+    given: dict[str, requests.Pose | None] = {}
+    for at, each in zip(paths, messages, strict=True):
+        given |= {f"{at}.hold.pose": each.hold.pose, f"{at}.pose": each.pose}
+        given[f"{at}.hold.pose_in_hand"] = each.hold.pose_in_hand
+    poses, hands = poses_of(given), list[HandOnHold]()
+    for at, message in zip(paths, messages, strict=True):
+        try:
+            hands.append(_hand(message, at, poses, kind.table, rocks))
+        except InvalidInputError as error:
+            raise error.within(at) from None
+    placed = [i for i, hand in enumerate(hands) if hand.at is not None]
+    for i, outcome in zip(placed, settle_each(kind, [hands[i] for i in placed]), strict=True):
+        if isinstance(outcome, InvalidInputError):
+            raise outcome.within(paths[i])
+        hands[i] = replace(hands[i], pose=hands[i].pose @ outcome.seating.pose.inverse())
+    return hands
+
+
+def _hand(
+    message: requests.Hand,
+    at: str,
+    poses: Mapping[str, Pose],
+    numbers: ParameterTable,
+    rocks: Rocks,
+) -> HandOnHold:
+    """Return a hand on its hold; one with a place stands at its rock's pose until it is placed.
+
+    Parameters
+    ----------
+    message : requests.Hand
+    at : str
+        Its path.
+    poses : mapping of str to Pose
+        Those that are given, by their paths.
+    numbers : ParameterTable
+        Of the robot's hands.
+    rocks : Rocks
+    """
+    surface = _surface(message.surface)
+    pose, in_hand = poses.get(f"{at}.pose"), poses.get(f"{at}.hold.pose_in_hand")
+    try:
+        hold, hold_pose = _placed_hold(message, poses.get(f"{at}.hold.pose"), numbers, rocks)
+    except InvalidInputError as error:
+        raise error.within("hold") from None
+    seat = None
+    if message.place is not None:
+        if pose is not None or in_hand is not None:
+            which = "pose" if pose is not None else "hold.pose_in_hand"
+            raise InvalidInputError("give a place or a pose, not both", field=which)
+        pose, hold_pose = hold_pose or Pose.identity(), None
+        seat = _frame(message.place, pose)
+        hold.check_place(seat)
+    if pose is None:
+        raise InvalidInputError("missing", field="pose")
+    return HandOnHold(
+        limb=message.limb,
+        pose=pose,
+        hold=hold,
+        surface=surface,
+        hold_pose=hold_pose,
+        hold_in_hand=in_hand,
+        at=seat,
+        grasp=message.grasp,
+        wrist=message.wrist,
+        tendon_preload=array_of(message.tendon_preload),
+        wrench=message.wrench,
+        seat=message.seat,
+        seat_direction=array_of(message.seat_direction),
+    )
+
+
+def _placed_hold(
+    message: requests.Hand, pose: Pose | None, numbers: ParameterTable, rocks: Rocks
+) -> tuple[rock.Hold, Pose | None]:
+    """Return what a hand holds, and its frame in W: the pose that is given, or its rock's own."""
+    hold, anywhere = message.hold, message.place is not None
+    if not isinstance(hold, requests.RockReference):
+        return _hold(hold, numbers, anywhere), pose
+    if hold.rock not in rocks:
+        known = f"known are {', '.join(rocks)}" if rocks else "stance.rocks names none"
+        raise InvalidInputError(f"unknown rock {hold.rock!r}; {known}", field="rock")
+    shared, own = rocks[hold.rock]
+    if pose is not None or hold.pose_in_hand is not None:
+        return shared, pose
+    if own is None and not anywhere:
+        try:
+            shared.check_place()
+        except InvalidInputError as error:
+            raise InvalidInputError(
+                f"without a pose the hand is seated at its origin: {error.message}", field="rock"
+            ) from None
+    return shared, own
+
+
+def poses_of(messages: Mapping[str, requests.Pose | None]) -> dict[str, Pose]:
+    """Return the poses that are given, by their paths; raises as `Pose.from_quaternions`."""
+    given = {path: pose for path, pose in messages.items() if pose is not None}
+    found = Pose.from_quaternions([(at, p.position, p.orientation) for at, p in given.items()])
+    return dict(zip(given, found, strict=True))
+
+
+def joints_of(
+    message: dict[str, list[float] | Literal["solve"]] | Literal["solve"] | None,
+) -> dict[str, Array | Literal["solve"]] | Literal["solve"] | None:
+    """Return the joints of a request, with arrays of angles."""
+    if not isinstance(message, dict):
+        return message
+    return {
+        limb: angles if isinstance(angles, str) else np.array(angles)
+        for limb, angles in message.items()
+    }
+
+
+def array_of(values: Sequence[float] | None) -> Array | None:
+    """Return numbers as an array, if there are any."""
+    return None if values is None else np.array(values)
+
+
+def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
+    """Return where on a rock a hand is seated, in the rock's frame."""
+    up = place.up
+    if abs(place.wrist_angle) > MOST_TURNED:
+        raise InvalidInputError(
+            f"must be within ±{MOST_TURNED:.4g} rad, two turns, got {place.wrist_angle:g}: is it "
+            "in rad?",
+            field="place.wrist_angle",
+        )
+    if place.frame == "world":
+        from_world = rock_pose.inverse()
+        axes, point, up = from_world.rotation, from_world.apply(place.point), up or VERTICAL
+    else:
+        axes, point, up = np.eye(3), np.array(place.point), up or UP
+    with within("place"):
+        return approach_frame(point, axes @ place.approach, place.wrist_angle, axes @ up)
+
+
+def _surface(message: str | requests.Surface) -> Surface:
+    """Return the surface that a preset's name or a caller's own numbers say."""
+    try:
+        if isinstance(message, str):
+            return Surface.named(message)
+        given = {
+            "shear_limit": message.shear_limit,
+            "pull_off_limit": message.pull_off_limit,
+            "pull_off_angle": message.pull_off_angle,
+            "lateral_limit": message.lateral_limit,
+            "compression_gain": message.compression_gain,
+            "half_planes": message.half_planes,
+            "lateral_pull_off_ratio": message.lateral_pull_off_ratio,
+            "shear_scatter": message.shear_scatter,
+            "friction": message.friction,
+            "pull_off_exponent": message.pull_off_exponent,
+        }
+        return Surface.from_values({name: v for name, v in given.items() if v is not None})
+    except InvalidInputError as error:
+        raise error.within("surface") from None
+
+
+# Holds --------------------------------------------------------------------------------------------
+
+
+def _rocks(message: requests.Stance, numbers: ParameterTable) -> Rocks:
+    """Return the rocks of a stance by name, each built once."""
+    found = {}
+    for name, each in message.rocks.items():
+        if not name:
+            raise InvalidInputError("a rock needs a name, got ''", field="rocks")
+        with within(f"rocks.{name}"):
+            if each.pose_in_hand is not None:
+                raise InvalidInputError(
+                    "hands share this rock; give its pose, or pose_in_hand where a hand refers to "
+                    "it",
+                    field="pose_in_hand",
+                )
+            hold = _hold(each, numbers, anywhere=True)
+            found[name] = hold, poses_of({"pose": each.pose}).get("pose")
+    return found
+
+
+def _hold(message: requests.Rock, numbers: ParameterTable, anywhere: bool) -> rock.Hold:
+    """Return the hold of a message; ``anywhere``: whether its frame may begin off the rock."""
+    match message:
+        case requests.Plane():
+            return rock.Plane()
+        case requests.Cylinder():
+            return rock.Cylinder(message.diameter)
+        case requests.Sphere():
+            return rock.Sphere(message.diameter)
+        case requests.Ellipsoid():
+            return rock.Ellipsoid(message.semi_axes)
+        case requests.Edge():
+            return rock.Edge(message.fillet_radius, message.angle)
+        case requests.Profile():
+            return _profile(message, numbers)
+        case requests.Mesh():
+            return _mesh(message, numbers, anywhere)
+
+
+def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
+    if message.points is not None and message.profiles is None:
+        return Profile(message.points, numbers)
+    if message.profiles is not None and message.points is None:
+        strips = message.profiles
+        outlines = {
+            "outer_left": strips.outer_left,
+            "inner_left": strips.inner_left,
+            "inner_right": strips.inner_right,
+            "outer_right": strips.outer_right,
+        }
+        return Profile(outlines, numbers)
+    raise InvalidInputError("give points or profiles, one of them", field="points")
+
+
+def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Mesh:
+    if message.file is not None:
+        raise InvalidInputError(
+            "only the command line reads files; send vertices and faces", field="file"
+        )
+    if message.vertices is None or message.faces is None:
+        missing = "vertices" if message.vertices is None else "faces"
+        raise InvalidInputError("missing", field=missing)
+    vertices, faces = message.vertices, message.faces
+    key = blake2b(msgspec.msgpack.encode((vertices, faces))).digest(), numbers, anywhere
+    return MESHES.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))
+
+
+# Costs --------------------------------------------------------------------------------------------
+
+
+def _check_costs(stance: requests.Stance) -> None:
+    """Refuse hands that would cost too much together.
+
+    Raises
+    ------
+    LimitError
+        The field is relative to the stance.
+    """
+    planes = sum(map(_half_planes, stance.hands))
+    if planes > MOST_HALF_PLANES:
+        raise LimitError(
+            f"half_planes of all hands are {planes} together, those of a floating hand counted "
+            f"{FLOATING} times; at most {MOST_HALF_PLANES} are worked with",
+            field="hands",
+        )
+    points = sum(_points(hand.hold, stance.rocks) for hand in stance.hands)
+    if points > MOST_POINTS:
+        raise LimitError(
+            f"profiles of all hands have {points} points together; at most {MOST_POINTS} are "
+            "worked with",
+            field="hands",
+        )
+
+
+def _half_planes(hand: requests.Hand) -> int:
+    given = hand.surface.half_planes if isinstance(hand.surface, requests.Surface) else None
+    return (FLOATING if hand.wrist == "floating" else 1) * (given or 1)
+
+
+def _points(hold: requests.Hold, rocks: dict[str, requests.Rock]) -> int:
+    """Return how many points the outlines of a hold have, those of a shared rock as its own."""
+    if isinstance(hold, requests.RockReference):
+        return _points(rocks[hold.rock], {}) if hold.rock in rocks else 0
+    if not isinstance(hold, requests.Profile):
+        return 0
+    strips = () if hold.profiles is None else msgspec.structs.astuple(hold.profiles)
+    return sum(map(len, strips)) + len(hold.points or ())
