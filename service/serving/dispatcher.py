@@ -94,8 +94,8 @@ class Dispatcher:
         self._crew, self._seconds, self._inquire = crew, seconds, inquire
         self.watch = Watch(robot, self._state)
         self._replies = Replies(self.watch)
-        self._costs = Costs()
         self._names, self._shares = Names(), Shares()
+        self._costs = Costs(self._shares)
         self._waiting = Waiting(self._shares)
         self._started = threading.Event()
         self._stops_at: float | None = None
@@ -318,7 +318,7 @@ class Dispatcher:
                 rest = "the streams are lost with it; declare them again"
             how, left = self._dismiss(lane.station)
             for question in left:
-                self._shares.ended_process(question.place, time.perf_counter() - question.begun)
+                self._charge_process(question)
                 lost = LostError(f"the process that worked on it {how}; {rest}")
                 self._replies.refuse(question, lost)
             return
@@ -329,10 +329,10 @@ class Dispatcher:
         asked = self._crew.work[lane]
         self._crew.work[lane] = None
         assert asked is not None
-        stance = asked.stance if asked.name == PLAN else None
         cost = done.cost or done.seconds
         self._shares.charge(asked.place, cost)
-        self._costs.took(asked.place, stance, lane.station, cost)
+        if asked.name == PLAN and asked.stance is not None:
+            self._costs.took(asked.stance, lane.station, cost)
         if asked.name == STREAM and not asked.rehearsed and done.good:
             asked.rehearsed = True
             self._put(Kind.DECLARED, asked)
@@ -344,7 +344,7 @@ class Dispatcher:
     def _end_overdue(self) -> None:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
-        for question in self._waiting.overdue(now):
+        for question in self._waiting.remove(lambda each: each.deadline <= now):
             self._replies.refuse(question, DeadlineError(question.seconds, "it was its turn"))
         for lane, asked in list(self._crew.work.items()):
             if asked is None or lane not in self._crew.work:
@@ -356,16 +356,19 @@ class Dispatcher:
                 missing = "there was an answer, and its work was broken off"
                 self._replies.refuse(asked, DeadlineError(asked.seconds, missing))
             if ends[1] <= now:
-                self._costs.took(asked.place, None, None, now - asked.begun)
-                self._shares.ended_process(asked.place, now - asked.begun)
+                self._charge_process(asked)
                 self._dismiss(lane.station, "did not stop at a deadline")
+
+    def _charge_process(self, question: Question) -> None:
+        """Charge the place of a question that has ended its process."""
+        self._shares.charge(question.place, time.perf_counter() - question.begun)
+        self._shares.ended_process(question.place)
 
     def _dismiss(
         self, station: Station[Job, Answer], why: str | None = None
     ) -> tuple[str, list[Question]]:
         """End a process, which another replaces; as `Crew.dismiss`."""
         how, left = self._crew.dismiss(station, dead=why is None)
-        self._costs.lost(station)
         self.watch.ended(station.process.pid, why or how)
         return how, left
 
