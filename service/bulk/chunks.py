@@ -17,7 +17,6 @@ import msgspec
 
 from hand_models.base import DISTRIBUTION, BoundedStore, CruxError, installed_version
 from hand_models.parameters import ParameterTable
-from service.bulk.columns import row_of
 from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format
 
@@ -54,8 +53,8 @@ class Setting(NamedTuple):
         Of questions and answers.
     explain : bool or None
         Whether what keeps a stance from a plan is explained; None: as each request says.
-    columns : tuple of str or None
-        Of the rows that answers are told as; with None they are whole replies.
+    brief : bool
+        Whether no more is asked for than a table tells.
     versions : dict of str to str or None, or None
         Of `PACKAGES`, where it is asked; None where it is answered by the same installation.
     kind : str
@@ -69,7 +68,7 @@ class Setting(NamedTuple):
     folder: Path | None = None
     form: Format = Format.JSON
     explain: bool | None = None
-    columns: tuple[str, ...] | None = None
+    brief: bool = False
     versions: dict[str, str | None] | None = None
     kind: str = PLAN
     make: Callable[[], Answerer] | None = None
@@ -132,8 +131,6 @@ def _answerer(pickled: bytes) -> Answerer:
             files=files,
             revised=revised,
         )
-        if setting.columns is not None:
-            found = row_of(found, setting.form, setting.columns)
         return found._replace(seconds=time.perf_counter() - start)
 
     return answer
@@ -151,9 +148,9 @@ def _check_versions(there: dict[str, str | None]) -> None:
 
 
 def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanRequest | RouteRequest:
-    """Return a request that asks for no more than is told."""
+    """Return a request as it is to be answered."""
     explain = request.explain if setting.explain is None else setting.explain
-    if setting.columns is None or isinstance(request, RouteRequest):
+    if not setting.brief or isinstance(request, RouteRequest):
         return msgspec.structs.replace(request, explain=explain)
     want = [each for each in request.want if each == "load_factor"]
     return msgspec.structs.replace(

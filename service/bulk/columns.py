@@ -15,7 +15,6 @@ from hand_models.base import InvalidInputError
 from hand_models.hand import FINGERS
 from planner import LimitName
 from service.replies import AXES, ErrorDetail
-from service.wire import Answer, Format
 
 __all__ = ["INDEX", "Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
 
@@ -218,12 +217,11 @@ def chosen_columns(
     )
 
 
-def row_of(answer: Answer, form: Format, columns: Sequence[str]) -> Answer:
-    """Return an answer as a row of these columns but ``index``, in MessagePack."""
-    told = form.decode(answer.payload, _Told)
+def row_of(payload: bytes, columns: Sequence[str]) -> Row:
+    """Return a reply in JSON, or an error, as a row of these columns but ``index``."""
+    told = msgspec.json.decode(payload, type=_Told)
     values = _values(told)
-    row = Row([values.get(name) for name in columns if name != INDEX], told.status, told.error)
-    return answer._replace(payload=msgspec.msgpack.encode(row), encoding=Format.MSGPACK.value)
+    return Row([values.get(name) for name in columns if name != INDEX], told.status, told.error)
 
 
 def _values(told: _Told) -> dict[str, Any]:

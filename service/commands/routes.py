@@ -202,7 +202,6 @@ def _many(
         workers=workers,
         robot=own.robot,
         explain=False if wanted.unexplained else None,
-        columns=sink.columns,
         kind=wire.ROUTE,
     )
     answer_rest(routes, answers, sink, file, "planning routes", "routes")
@@ -253,8 +252,4 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
         names = [column.name for column in bulk.route_columns()]
         with file.open("rb") as lines:
             for line in lines:
-                told = bulk.row_of(
-                    wire.Answer(line, wire.Format.JSON.value), wire.Format.JSON, names
-                ).payload
-                values = msgspec.msgpack.decode(told, type=bulk.Row).values
-                yield dict(zip(names[1:], values, strict=True))
+                yield dict(zip(names[1:], bulk.row_of(line, names).values, strict=True))
