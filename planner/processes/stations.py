@@ -1,6 +1,7 @@
 """Processes that answer questions, in order in each of their lanes.
 
-A process can be killed at any time, which costs the questions in its lanes and nothing else.
+A process can be killed at any time, which costs the questions in its lanes and nothing else. All
+end with the one that has started them, and leave signals to it.
 """
 
 from __future__ import annotations
@@ -8,21 +9,31 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import signal
 import sys
 import threading
+import time
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
 from queue import SimpleQueue
+from types import FrameType
 from typing import Any, Final, Generic, TypeVar
 
-from planner.processes.child_processes import begin_child, starting_children
-
-__all__ = ["Lane", "Make", "Station", "ending_in_words", "resident"]
+__all__ = ["Lane", "Make", "Station", "ending_in_words", "resident", "starting_children"]
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+
+ORPHANED: Final = 1.0
+"""How long a process may go on without the one that started it [s]."""
+
+THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""What keeps a library of linear algebra to one thread, before it is loaded."""
 
 SWITCH: Final = 5e-4
 """How long a lane keeps the interpreter from the others of its process [s]; Python's own is ten
@@ -205,7 +216,7 @@ def resident(pid: int | None) -> int | None:
 
 def _answer_each(pipes: list[Connection], memory: int | None, ahead: bool, stays: bool) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
-    begin_child(stays=stays)
+    _begin_child(stays=stays)
     sys.setswitchinterval(SWITCH)
     try:
         make = pipes[0].recv()
@@ -269,3 +280,78 @@ def _keep_to(memory: int | None) -> None:
 
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
+
+
+def _begin_child(*, stays: bool = False) -> None:
+    """Leave Ctrl-C to the process that started this one, and end soon after that one does.
+
+    Parameters
+    ----------
+    stays : bool, optional
+        Whether SIGTERM is left to that one, too.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN if stays else signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        time.sleep(ORPHANED)
+        os._exit(1)
+
+
+@contextmanager
+def starting_children(*signals: signal.Signals) -> Iterator[None]:
+    """Start processes that call `_begin_child`: no signal interrupts that on either side.
+
+    One that arrives here meanwhile is answered at the end; there it waits for `_begin_child`, for
+    good where that is not called. They do their linear algebra on one thread.
+
+    Parameters
+    ----------
+    *signals : Signals
+        By default SIGINT and SIGTERM.
+    """
+    signals = signals or SIGNALS
+    # or else it is started with the first process, and lets signals in again
+    resource_tracker.ensure_running()
+    arrived: list[int] = []
+
+    def later(number: int, _: FrameType | None) -> None:
+        arrived.append(number)
+
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for each in signals:
+            if signal.getsignal(each) not in (None, signal.SIG_IGN):
+                handlers[each] = signal.signal(each, later)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    try:
+        with _one_thread():
+            yield
+    finally:
+        # what has waited here arrives now
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in arrived:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes that are started here do their linear algebra on one thread."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -9,10 +9,12 @@ from __future__ import annotations
 import logging
 import math
 import os
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
+
+from cachetools import LRUCache
 
 from hand_models.base import CruxError
 from planner.processes.stations import Lane, Make, Station, ending_in_words
@@ -107,7 +109,7 @@ class Workers(Generic[T, R]):
         self.hands: dict[Lane[T, R], dict[int, _Task[T]]] = {}
         self.stillborn = 0
         self._queue: deque[_Task[T]] = deque()
-        self._knows: OrderedDict[Hashable, Lane[T, R]] = OrderedDict()
+        self._knows: LRUCache[Hashable, Lane[T, R]] = LRUCache(KNOWN)
         self._unborn = ""
         """Why."""
 
@@ -235,9 +237,6 @@ class Workers(Generic[T, R]):
         del self._queue[i]
         if task.about is not None:
             self._knows[task.about] = lane
-            self._knows.move_to_end(task.about)
-            if len(self._knows) > KNOWN:
-                self._knows.popitem(last=False)
         return task
 
     def _start(self) -> None:

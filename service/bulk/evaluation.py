@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting
-from service.bulk.grouping import about, grouped
+from service.bulk.chunks import Setting, about, grouped
 from service.bulk.pools import LARGEST, Here, Pool, pool_on
 from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hand_models.base import CruxError
-from planner.processes.child_processes import THREADS
+from planner.processes.stations import THREADS
 from planner.processes.workers import NO_GUARD, Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE
