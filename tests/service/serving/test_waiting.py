@@ -13,6 +13,7 @@ import pytest
 
 from planner.processes import Lane, Station
 from planner.processes.stations import PART, _send_parts
+from service.processes import Job
 from service.serving.costs import Costs
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
@@ -20,6 +21,7 @@ from service.serving.names import SHARED, Names, digest
 from service.serving.question import ATTACHED, LARGE, Question, take
 from service.serving.shares import ACTIVE, LAST, PAYS, Shares
 from service.serving.waiting import ALL, EACH, HELD, SHARE, Kind, Waiting
+from service.wire import Answer
 from tests.suite.helpers.checkout import ROOT
 
 
@@ -323,12 +325,14 @@ def test_a_deadline_that_is_over_already_is_not_slept_through():
     assert dispatcher._pause() == 0.0
     assert dispatcher._waiting.first_deadline() == late.deadline
     dispatcher._waiting.remove(lambda each: each is late)
-    station = Station.__new__(Station)
-    lane: Lane[object, object] = Lane(station, 0, Pipe()[0])
-    crew.work[lane] = question(seconds=-1.0)  # type: ignore[index]
+    station: Station[Job, Answer] = Station.__new__(Station)
+    lane: Lane[Job, Answer] = Lane(station, 0, Pipe()[0])
+    station.lanes, asked = (lane,), question(seconds=-1.0)
+    crew.put(station, "questions")
+    crew.work[lane] = asked
     assert dispatcher._pause() == 0.0
-    crew.work[lane].replied = True  # type: ignore[index, union-attr]
-    crew._streams = station  # type: ignore[assignment]
+    crew.put(station, "streams")
+    crew.work[lane], asked.replied = asked, True
     # it was told, and its process has a while to come back
     pause = dispatcher._pause()
     assert pause is not None
