@@ -1,7 +1,8 @@
 """Processes that do one kind of work, kept open; one that dies costs what it had in work at most.
 
 Work goes out ahead and comes back as it is done. What a process had in work when it died is tried
-once more: whatever kills its process then is lost, and nothing else is.
+once more: whatever kills its process then is lost, and nothing else is. (Pools of ``pebble`` do
+no more work once a process has died that had none.)
 """
 
 from __future__ import annotations

@@ -24,13 +24,12 @@ import zenoh
 from hand_models.base import CruxError
 from planner import DeadlineError, Lane, Station
 from service.processes import Job
-from service.serving.costs import Costs
 from service.serving.crew import Crew
 from service.serving.mail import Replies, Sender, reply_to
 from service.serving.names import Names
 from service.serving.question import Question, client_of, take
 from service.serving.shares import Shares
-from service.serving.waiting import Kind, Waiting
+from service.serving.waiting import Costs, Kind, Waiting
 from service.serving.watch import State, Watch
 from service.wire import (
     PLAN,

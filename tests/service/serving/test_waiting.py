@@ -14,13 +14,12 @@ import pytest
 from planner.processes import Lane, Station
 from planner.processes.stations import PART, _send_parts
 from service.processes import Job
-from service.serving.costs import Costs
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
 from service.serving.names import SHARED, Names, digest
 from service.serving.question import ATTACHED, LARGE, Question, take
 from service.serving.shares import ACTIVE, LAST, PAYS, Shares
-from service.serving.waiting import ALL, EACH, HELD, SHARE, Kind, Waiting
+from service.serving.waiting import ALL, EACH, HELD, SHARE, Costs, Kind, Waiting
 from service.wire import Answer
 from tests.suite.helpers.checkout import ROOT
 
