@@ -8,10 +8,9 @@ no more work once a process has died that had none.)
 from __future__ import annotations
 
 import logging
-import math
 import os
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Hashable
 from multiprocessing.connection import Connection, wait
 from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
 
@@ -27,16 +26,8 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 R = TypeVar("R")
 
-AHEAD: Final = 15
-"""Most items that a process has beside the one in work, where this process works, too: they are
-there before it is done."""
-
-NEXT: Final = 1
-"""The same where this process only gives out and takes in."""
-
-SHARE: Final = 4
-"""A process has no more ahead than what is left by this and by the processes: less and less, so
-that none waits long for the last one."""
+AHEAD: Final = 1
+"""Items that a process has beside the one in work: they are there before it is done."""
 
 PATIENCE: Final = 1.0
 """Longest time between the end of a process's pipe and its own [s]."""
@@ -123,45 +114,10 @@ class Workers(Generic[T, R]):
         for lane in list(self.hands):
             self._dismiss(lane)
 
-    @property
-    def _unfinished(self) -> bool:
-        return bool(self._queue) or any(self.hands.values())
-
     def wait(self) -> None:
         """Wait until all processes that have been started are ready, or have died."""
         for lane in [lane for lane in self.hands if not lane.ready]:
             self._take(lane)
-
-    def each(self, items: Sequence[T], here: Callable[[T], R]) -> Iterator[tuple[int, R | Lost]]:
-        """Yield each item's index and result, as they are done.
-
-        Parameters
-        ----------
-        items : sequence
-        here : callable
-            What this process turns items into results with meanwhile, so that nothing waits for
-            processes to start; it does not try what has cost a process.
-        """
-        for number, item in enumerate(items):
-            self.put(number, item)
-        try:
-            while self._unfinished:
-                self._start()
-                own = any(not task.tried for task in self._queue)
-                if self.hands:
-                    yield from self._exchange(AHEAD, 0.0 if own else None)
-                elif not own:
-                    for task in self._queue:
-                        yield task.number, Lost(self._unborn)
-                    return
-                if untried := next((task for task in self._queue if not task.tried), None):
-                    self._queue.remove(untried)
-                    yield untried.number, here(untried.item)
-        finally:
-            # what nobody waits for any more
-            self._queue.clear()
-            for lane in [lane for lane, hand in self.hands.items() if hand]:
-                self._dismiss(lane)
 
     def put(self, number: int, item: T, about: Hashable = None) -> None:
         """Let an item be worked on; `collect` returns its result.
@@ -186,26 +142,22 @@ class Workers(Generic[T, R]):
             If processes do not start.
         """
         found: list[tuple[int, R | Lost]] = []
-        while not found and self._unfinished:
+        while not found and (self._queue or any(self.hands.values())):
             self._start()
             if not self.hands:
                 raise CruxError(self._unborn)
-            found = self._exchange(NEXT, None)
+            found = self._exchange()
         return found
 
-    def _exchange(self, ahead: int, timeout: float | None) -> list[tuple[int, R | Lost]]:
-        """Give processes what they have room for, and return what comes within a time [s].
-
-        Each may have so many items ahead, beside the one in work.
-        """
+    def _exchange(self) -> list[tuple[int, R | Lost]]:
+        """Give processes what they have room for, and return what comes next."""
         for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
-            share = math.ceil(len(self._queue) / (SHARE * self.width))
-            while self._queue and lane.ready and len(self.hands[lane]) <= min(ahead, share):
+            while self._queue and lane.ready and len(self.hands[lane]) <= AHEAD:
                 task = self._chosen(lane)
                 self.hands[lane][task.number] = task
                 lane.give(task.item)
         lanes = {lane.pipe: lane for lane in self.hands}
-        ready = wait(list(lanes), timeout)
+        ready = wait(list(lanes))
         return [each for pipe in ready for each in self._take(lanes[cast(Connection, pipe)])]
 
     def _take(self, lane: Lane[T, R]) -> list[tuple[int, R | Lost]]:
