@@ -274,7 +274,7 @@ class TableLines(Run):
 
     def row(self, payload: bytes) -> Row:
         """Return what the table says of the answer to the next question."""
-        return row_of(payload, [column.name for column in self._described])
+        return row_of(payload, self._described)
 
     @contextmanager
     def open(self) -> Iterator[None]:

@@ -249,7 +249,8 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             for row in csv.DictReader(stream):
                 yield {name: value or None for name, value in row.items()}
     else:
-        names = [column.name for column in bulk.route_columns()]
+        columns = bulk.route_columns()
+        names = [column.name for column in columns[1:]]
         with file.open("rb") as lines:
             for line in lines:
-                yield dict(zip(names[1:], bulk.row_of(line, names).values, strict=True))
+                yield dict(zip(names, bulk.row_of(line, columns).values, strict=True))
