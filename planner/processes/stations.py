@@ -18,7 +18,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from queue import SimpleQueue
 from types import FrameType
 from typing import Any, Final, Generic, TypeVar
 
@@ -77,21 +76,25 @@ class Lane(Generic[T, R]):
         self._parts: list[bytes] = []
         self._sender: threading.Thread | None = None
 
-    def give(self, question: T, size: int = 0) -> None:
-        """Send a question of about so many bytes; of a process that has died, `take` tells.
+    def give(self, question: T) -> None:
+        """Send a question; of a process that has died, `take` tells.
 
-        One that the pipe may have no room for is sent in the background: its process may stand
-        still, and take nothing.
+        One that the pipe may have no room for is sent in the background: its process may be at work
+        on another, or stand still, and take nothing.
         """
-        if size < ROOM:
-            self._send(question)
+        data, before = pickle.dumps(question, protocol=pickle.HIGHEST_PROTOCOL), self._sender
+        if len(data) < ROOM and (before is None or not before.is_alive()):
+            self._send(data)
             return
-        self._sender = threading.Thread(target=self._send, args=(question,), daemon=True)
+        self._sender = threading.Thread(target=self._send, args=(data, before), daemon=True)
         self._sender.start()
 
-    def _send(self, question: T) -> None:
+    def _send(self, data: bytes, before: threading.Thread | None = None) -> None:
+        """Send a pickled question, after what a thread sends."""
+        if before is not None:
+            before.join()
         with suppress(OSError):
-            self.pipe.send(question)
+            self.pipe.send_bytes(data)
 
     def close(self) -> None:
         """Close the pipe; after its process has ended."""
@@ -136,9 +139,6 @@ class Station(Generic[T, R]):
         How many questions it has at a time, each in a thread of its own.
     memory : int, optional
         Bytes that it may have, where the system can keep it to them.
-    ahead : bool, optional
-        Whether its lanes are given questions before they have answered: it takes them in as they
-        come, so that who gives them does not wait.
     stays : bool, optional
         Whether SIGTERM is left to the process that started it.
 
@@ -154,14 +154,13 @@ class Station(Generic[T, R]):
         lanes: int = 1,
         memory: int | None = None,
         *,
-        ahead: bool = False,
         stays: bool = False,
     ) -> None:
         context = multiprocessing.get_context("spawn")
         ends = [context.Pipe() for _ in range(lanes)]
         others = [other for _, other in ends]
         self.process = context.Process(
-            target=_answer_each, args=(others, memory, ahead, stays), daemon=True
+            target=_answer_each, args=(others, memory, stays), daemon=True
         )
         with starting_children():
             self.process.start()
@@ -214,7 +213,7 @@ def resident(pid: int | None) -> int | None:
         return None
 
 
-def _answer_each(pipes: list[Connection], memory: int | None, ahead: bool, stays: bool) -> None:
+def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
     _begin_child(stays=stays)
     sys.setswitchinterval(SWITCH)
@@ -229,18 +228,17 @@ def _answer_each(pipes: list[Connection], memory: int | None, ahead: bool, stays
         sys.exit(UNREADY)
     _keep_to(memory)
     for pipe in pipes[1:]:
-        threading.Thread(target=_lane, args=(answer, pipe, ahead), daemon=True).start()
-    _lane(answer, pipes[0], ahead)
+        threading.Thread(target=_lane, args=(answer, pipe), daemon=True).start()
+    _lane(answer, pipes[0])
     os._exit(0)
 
 
-def _lane(answer: Callable[[Any], Any], pipe: Connection, ahead: bool) -> None:
+def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
     """Answer what comes through one pipe."""
-    following = _taken_ahead(pipe) if ahead else pipe.recv
     with suppress(EOFError, OSError):
         _send_parts(pipe, None)
         while True:
-            question = following()
+            question = pipe.recv()
             try:
                 result = answer(question)
                 _send_parts(pipe, result)
@@ -248,21 +246,6 @@ def _lane(answer: Callable[[Any], Any], pipe: Connection, ahead: bool) -> None:
                 # nothing here can be trusted to go on
                 os._exit(OUT_OF_MEMORY)
             del question, result
-
-
-def _taken_ahead(pipe: Connection) -> Callable[[], Any]:
-    """Take in what comes in a thread of its own; return what returns it, as a pipe's ``recv``."""
-    taken: SimpleQueue[bytes] = SimpleQueue()
-
-    def take() -> None:
-        try:
-            while True:
-                taken.put(pipe.recv_bytes())
-        except (EOFError, OSError):
-            taken.put(b"")  # which is read as an EOFError, too
-
-    threading.Thread(target=take, daemon=True).start()
-    return lambda: pickle.loads(taken.get())
 
 
 def _send_parts(pipe: Connection, result: object) -> None:

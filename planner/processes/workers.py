@@ -196,7 +196,7 @@ class Workers(Generic[T, R]):
         """Start processes in place of those that have died."""
         while len(self.hands) < self.width and self.stillborn < STARTS:
             try:
-                station = Station(self._make, ahead=True)
+                station = Station(self._make)
             except OSError as error:
                 self._miss(f"processes do not start: {error.strerror or error}")
             else:

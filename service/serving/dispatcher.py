@@ -294,7 +294,7 @@ class Dispatcher:
         question.begun = time.perf_counter()
         self._crew.work[lane] = question
         rehearsal = question.name == STREAM and not question.rehearsed
-        lane.give(question.job(question.begun, rehearsal), len(question.payload))
+        lane.give(question.job(question.begun, rehearsal))
 
     def _drop(self, client: str, token: bool) -> None:
         names = self._names
