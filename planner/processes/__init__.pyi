@@ -2,7 +2,6 @@ from .stations import (
     Lane as Lane,
     Make as Make,
     Station as Station,
-    ending_in_words as ending_in_words,
     resident as resident,
     starting_children as starting_children,
 )

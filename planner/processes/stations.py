@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection, wait
 from types import FrameType
 from typing import Any, Final, Generic, TypeVar
 
-__all__ = ["Lane", "Make", "Station", "ending_in_words", "resident", "starting_children"]
+__all__ = ["Lane", "Make", "Station", "resident", "starting_children"]
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -43,6 +43,9 @@ ROOM: Final = 2**14
 
 PART: Final = 2**13
 """Bytes of an answer that are sent at once: so few that no process can be stopped within them."""
+
+PATIENCE: Final = 1.0
+"""Longest time between the end of a process's pipes and its own [s]."""
 
 UNREADY: Final = 70
 """Exit status of a process that cannot be made ready to answer."""
@@ -177,31 +180,25 @@ class Station(Generic[T, R]):
         """Whether it has said that it can work."""
         return all(lane.ready for lane in self.lanes)
 
-    def kill(self, patience: float = 0.0) -> int | None:
-        """End it, whatever it does; return its exit status, or None if it was alive.
+    def kill(self, *, dead: bool = False) -> str:
+        """End it, whatever it does; return in words how it ended.
 
         Parameters
         ----------
-        patience : float, optional
-            How long to wait for one that has ended by itself: its pipes tell of that a moment
-            earlier than the system [s].
+        dead : bool, optional
+            Whether it has ended by itself, as its pipes tell a moment earlier than the system.
         """
-        self.process.join(patience)
-        died = self.process.exitcode
+        self.process.join(PATIENCE if dead else 0.0)
+        status = self.process.exitcode
         self.process.kill()
         self.process.join()
         for lane in self.lanes:
             lane.close()
-        return died
-
-
-def ending_in_words(status: int | None) -> str:
-    """Return in words how a process ended, by what `Station.kill` returned."""
-    if status is None:
-        return "was stopped"
-    if status == OUT_OF_MEMORY:
-        return "had not enough memory"
-    return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
+        if status is None:
+            return "was stopped"
+        if status == OUT_OF_MEMORY:
+            return "had not enough memory"
+        return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
 
 
 def resident(pid: int | None) -> int | None:

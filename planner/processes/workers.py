@@ -17,7 +17,7 @@ from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
 from cachetools import LRUCache
 
 from hand_models.base import CruxError
-from planner.processes.stations import Lane, Make, Station, ending_in_words
+from planner.processes.stations import Lane, Make, Station
 
 __all__ = ["Lost", "Workers", "cores"]
 
@@ -28,9 +28,6 @@ R = TypeVar("R")
 
 AHEAD: Final = 1
 """Items that a process has beside the one in work: they are there before it is done."""
-
-PATIENCE: Final = 1.0
-"""Longest time between the end of a process's pipe and its own [s]."""
 
 KNOWN: Final = 256
 """Things that items are about of which it is kept which process had them last."""
@@ -211,16 +208,15 @@ class Workers(Generic[T, R]):
 
     def _bury(self, lane: Lane[T, R]) -> str:
         """Dismiss a process that has died, and return how it did."""
-        status = self._dismiss(lane, PATIENCE)
-        how = f"a worker {ending_in_words(status)}"
+        how = f"a worker {self._dismiss(lane, dead=True)}"
         if not lane.ready:
             # nothing of this house is at work before a process is, but the program's own beginning
-            hint = NO_GUARD if status == UNCAUGHT else ""
+            hint = NO_GUARD if lane.station.process.exitcode == UNCAUGHT else ""
             self._miss(f"processes do not start: {how}{hint}")
         return how
 
-    def _dismiss(self, lane: Lane[T, R], patience: float = 0.0) -> int | None:
+    def _dismiss(self, lane: Lane[T, R], *, dead: bool = False) -> str:
         del self.hands[lane]
         for about in [about for about, one in self._knows.items() if one is lane]:
             del self._knows[about]
-        return lane.station.kill(patience)
+        return lane.station.kill(dead=dead)

@@ -7,7 +7,7 @@ import time
 from multiprocessing.connection import Connection
 from typing import Final, Literal
 
-from planner import Lane, Make, Station, ending_in_words, resident
+from planner import Lane, Make, Station, resident
 from service.processes import Job
 from service.replies import ProcessHealth
 from service.serving.question import Question
@@ -32,9 +32,6 @@ LONGEST_REST: Final = 30.0
 
 GROWN: Final = 700 * 2**20
 """Resident memory of a process that is replaced when it has nothing to do [bytes]."""
-
-LAST_MOMENT: Final = 0.2
-"""Longest time between the end of a process's pipes and its own [s]."""
 
 STREAMS_LANES: Final = 2
 """Of the process that has the streams: one for set-points, one for what else is short."""
@@ -199,7 +196,7 @@ class Crew:
         else:
             self._rest()
         left = [each for each in asked if each is not None and not each.replied]
-        return ending_in_words(station.kill(LAST_MOMENT if dead else 0.0)), left
+        return station.kill(dead=dead), left
 
     def left(self) -> list[Question]:
         """Return the questions in work that nobody has replied to."""
