@@ -31,14 +31,7 @@ from service.serving.question import Question, client_of, take
 from service.serving.shares import Shares
 from service.serving.waiting import Costs, Kind, Waiting
 from service.serving.watch import State, Watch
-from service.wire import (
-    PLAN,
-    STREAM,
-    Answer,
-    Format,
-    LostError,
-    encode_error,
-)
+from service.wire import PLAN, STREAM, Answer, Format, LostError, encode_error
 
 __all__ = ["Dispatcher"]
 
@@ -317,7 +310,7 @@ class Dispatcher:
                 rest = "the streams are lost with it; declare them again"
             how, left = self._dismiss(lane.station)
             for question in left:
-                self._charge_process(question)
+                self._shares.ended_process(question.place, time.perf_counter() - question.begun)
                 lost = LostError(f"the process that worked on it {how}; {rest}")
                 self._replies.refuse(question, lost)
             return
@@ -355,13 +348,8 @@ class Dispatcher:
                 missing = "there was an answer, and its work was broken off"
                 self._replies.refuse(asked, DeadlineError(asked.seconds, missing))
             if ends[1] <= now:
-                self._charge_process(asked)
+                self._shares.ended_process(asked.place, now - asked.begun)
                 self._dismiss(lane.station, "did not stop at a deadline")
-
-    def _charge_process(self, question: Question) -> None:
-        """Charge the place of a question that has ended its process."""
-        self._shares.charge(question.place, time.perf_counter() - question.begun)
-        self._shares.ended_process(question.place)
 
     def _dismiss(
         self, station: Station[Job, Answer], why: str | None = None

@@ -93,8 +93,16 @@ class Shares:
         known.spent += seconds
         known.costs.append(seconds)
 
-    def ended_process(self, place: str) -> None:
-        """Take off what it takes to start a process in place of one that a question has ended."""
+    def ended_process(self, place: str, seconds: float) -> None:
+        """Charge a question that has ended its process, and the start of another.
+
+        Parameters
+        ----------
+        place : str
+        seconds : float
+            How long its process has worked on it [s].
+        """
+        self.charge(place, seconds)
         known = self._of(place)
         known.spent += self.start
         known.held_until = time.perf_counter() + PAYS * self.start

@@ -151,12 +151,12 @@ def test_who_ends_a_process_pays_for_the_next_one(monkeypatch: pytest.MonkeyPatc
     shares.start = 2.0
     waiting = Waiting(shares)
     shares.asks("killer")
-    shares.ended_process("killer")
+    shares.ended_process("killer", 0.5)
     # alone, nobody is kept waiting for anybody
     assert waiting.put(Kind.OTHER, question("killer")) is None
     assert waiting.take(Kind.OTHER) is not None
     shares.asks("polite")
-    shares.ended_process("killer")
+    shares.ended_process("killer", 0.5)
     waiting.put(Kind.OTHER, question("killer"))
     waiting.put(Kind.SET_POINTS, question("killer"))
     assert waiting.take(Kind.OTHER) is None
@@ -179,11 +179,11 @@ def test_who_ends_processes_does_not_wait_for_who_asks_no_more(monkeypatch: pyte
     shares.start = 100.0
     shares.asks("killer")
     shares.asks("polite")
-    shares.ended_process("killer")
+    shares.ended_process("killer", 0.5)
     assert shares.waits("killer") == ACTIVE
     clock.now += ACTIVE
     assert shares.waits("killer") == 0.0
-    shares.ended_process("killer")
+    shares.ended_process("killer", 0.5)
     shares.asks("polite")
     assert shares.waits("killer") == ACTIVE
     shares.gone("polite")
