@@ -36,7 +36,6 @@ from .processes import (
     Station as Station,
     Workers as Workers,
     cores as cores,
-    ending_in_words as ending_in_words,
     resident as resident,
     starting_children as starting_children,
 )

@@ -1,9 +1,8 @@
-from .child_processes import starting_children as starting_children
 from .stations import (
     Lane as Lane,
     Make as Make,
     Station as Station,
-    ending_in_words as ending_in_words,
     resident as resident,
+    starting_children as starting_children,
 )
 from .workers import Lost as Lost, Workers as Workers, cores as cores

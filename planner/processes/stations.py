@@ -1,6 +1,7 @@
 """Processes that answer questions, in order in each of their lanes.
 
-A process can be killed at any time, which costs the questions in its lanes and nothing else.
+A process can be killed at any time, which costs the questions in its lanes and nothing else. All
+end with the one that has started them, and leave signals to it.
 """
 
 from __future__ import annotations
@@ -8,21 +9,30 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import signal
 import sys
 import threading
+import time
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
-from multiprocessing.connection import Connection
-from queue import SimpleQueue
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
+from types import FrameType
 from typing import Any, Final, Generic, TypeVar
 
-from planner.processes.child_processes import begin_child, starting_children
-
-__all__ = ["Lane", "Make", "Station", "ending_in_words", "resident"]
+__all__ = ["Lane", "Make", "Station", "resident", "starting_children"]
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+
+ORPHANED: Final = 1.0
+"""How long a process may go on without the one that started it [s]."""
+
+THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""What keeps a library of linear algebra to one thread, before it is loaded."""
 
 SWITCH: Final = 5e-4
 """How long a lane keeps the interpreter from the others of its process [s]; Python's own is ten
@@ -33,6 +43,9 @@ ROOM: Final = 2**14
 
 PART: Final = 2**13
 """Bytes of an answer that are sent at once: so few that no process can be stopped within them."""
+
+PATIENCE: Final = 1.0
+"""Longest time between the end of a process's pipes and its own [s]."""
 
 UNREADY: Final = 70
 """Exit status of a process that cannot be made ready to answer."""
@@ -66,21 +79,25 @@ class Lane(Generic[T, R]):
         self._parts: list[bytes] = []
         self._sender: threading.Thread | None = None
 
-    def give(self, question: T, size: int = 0) -> None:
-        """Send a question of about so many bytes; of a process that has died, `take` tells.
+    def give(self, question: T) -> None:
+        """Send a question; of a process that has died, `take` tells.
 
-        One that the pipe may have no room for is sent in the background: its process may stand
-        still, and take nothing.
+        One that the pipe may have no room for is sent in the background: its process may be at work
+        on another, or stand still, and take nothing.
         """
-        if size < ROOM:
-            self._send(question)
+        data, before = pickle.dumps(question, protocol=pickle.HIGHEST_PROTOCOL), self._sender
+        if len(data) < ROOM and (before is None or not before.is_alive()):
+            self._send(data)
             return
-        self._sender = threading.Thread(target=self._send, args=(question,), daemon=True)
+        self._sender = threading.Thread(target=self._send, args=(data, before), daemon=True)
         self._sender.start()
 
-    def _send(self, question: T) -> None:
+    def _send(self, data: bytes, before: threading.Thread | None = None) -> None:
+        """Send a pickled question, after what a thread sends."""
+        if before is not None:
+            before.join()
         with suppress(OSError):
-            self.pipe.send(question)
+            self.pipe.send_bytes(data)
 
     def close(self) -> None:
         """Close the pipe; after its process has ended."""
@@ -125,9 +142,6 @@ class Station(Generic[T, R]):
         How many questions it has at a time, each in a thread of its own.
     memory : int, optional
         Bytes that it may have, where the system can keep it to them.
-    ahead : bool, optional
-        Whether its lanes are given questions before they have answered: it takes them in as they
-        come, so that who gives them does not wait.
     stays : bool, optional
         Whether SIGTERM is left to the process that started it.
 
@@ -143,14 +157,13 @@ class Station(Generic[T, R]):
         lanes: int = 1,
         memory: int | None = None,
         *,
-        ahead: bool = False,
         stays: bool = False,
     ) -> None:
         context = multiprocessing.get_context("spawn")
         ends = [context.Pipe() for _ in range(lanes)]
         others = [other for _, other in ends]
         self.process = context.Process(
-            target=_answer_each, args=(others, memory, ahead, stays), daemon=True
+            target=_answer_each, args=(others, memory, stays), daemon=True
         )
         with starting_children():
             self.process.start()
@@ -167,31 +180,25 @@ class Station(Generic[T, R]):
         """Whether it has said that it can work."""
         return all(lane.ready for lane in self.lanes)
 
-    def kill(self, patience: float = 0.0) -> int | None:
-        """End it, whatever it does; return its exit status, or None if it was alive.
+    def kill(self, *, dead: bool = False) -> str:
+        """End it, whatever it does; return in words how it ended.
 
         Parameters
         ----------
-        patience : float, optional
-            How long to wait for one that has ended by itself: its pipes tell of that a moment
-            earlier than the system [s].
+        dead : bool, optional
+            Whether it has ended by itself, as its pipes tell a moment earlier than the system.
         """
-        self.process.join(patience)
-        died = self.process.exitcode
+        self.process.join(PATIENCE if dead else 0.0)
+        status = self.process.exitcode
         self.process.kill()
         self.process.join()
         for lane in self.lanes:
             lane.close()
-        return died
-
-
-def ending_in_words(status: int | None) -> str:
-    """Return in words how a process ended, by what `Station.kill` returned."""
-    if status is None:
-        return "was stopped"
-    if status == OUT_OF_MEMORY:
-        return "had not enough memory"
-    return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
+        if status is None:
+            return "was stopped"
+        if status == OUT_OF_MEMORY:
+            return "had not enough memory"
+        return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
 
 
 def resident(pid: int | None) -> int | None:
@@ -203,9 +210,9 @@ def resident(pid: int | None) -> int | None:
         return None
 
 
-def _answer_each(pipes: list[Connection], memory: int | None, ahead: bool, stays: bool) -> None:
+def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
-    begin_child(stays=stays)
+    _begin_child(stays=stays)
     sys.setswitchinterval(SWITCH)
     try:
         make = pipes[0].recv()
@@ -218,18 +225,17 @@ def _answer_each(pipes: list[Connection], memory: int | None, ahead: bool, stays
         sys.exit(UNREADY)
     _keep_to(memory)
     for pipe in pipes[1:]:
-        threading.Thread(target=_lane, args=(answer, pipe, ahead), daemon=True).start()
-    _lane(answer, pipes[0], ahead)
+        threading.Thread(target=_lane, args=(answer, pipe), daemon=True).start()
+    _lane(answer, pipes[0])
     os._exit(0)
 
 
-def _lane(answer: Callable[[Any], Any], pipe: Connection, ahead: bool) -> None:
+def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
     """Answer what comes through one pipe."""
-    following = _taken_ahead(pipe) if ahead else pipe.recv
     with suppress(EOFError, OSError):
         _send_parts(pipe, None)
         while True:
-            question = following()
+            question = pipe.recv()
             try:
                 result = answer(question)
                 _send_parts(pipe, result)
@@ -237,21 +243,6 @@ def _lane(answer: Callable[[Any], Any], pipe: Connection, ahead: bool) -> None:
                 # nothing here can be trusted to go on
                 os._exit(OUT_OF_MEMORY)
             del question, result
-
-
-def _taken_ahead(pipe: Connection) -> Callable[[], Any]:
-    """Take in what comes in a thread of its own; return what returns it, as a pipe's ``recv``."""
-    taken: SimpleQueue[bytes] = SimpleQueue()
-
-    def take() -> None:
-        try:
-            while True:
-                taken.put(pipe.recv_bytes())
-        except (EOFError, OSError):
-            taken.put(b"")  # which is read as an EOFError, too
-
-    threading.Thread(target=take, daemon=True).start()
-    return lambda: pickle.loads(taken.get())
 
 
 def _send_parts(pipe: Connection, result: object) -> None:
@@ -269,3 +260,78 @@ def _keep_to(memory: int | None) -> None:
 
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
     resource.setrlimit(resource.RLIMIT_DATA, (memory, hard))
+
+
+def _begin_child(*, stays: bool = False) -> None:
+    """Leave Ctrl-C to the process that started this one, and end soon after that one does.
+
+    Parameters
+    ----------
+    stays : bool, optional
+        Whether SIGTERM is left to that one, too.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN if stays else signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        time.sleep(ORPHANED)
+        os._exit(1)
+
+
+@contextmanager
+def starting_children(*signals: signal.Signals) -> Iterator[None]:
+    """Start processes that call `_begin_child`: no signal interrupts that on either side.
+
+    One that arrives here meanwhile is answered at the end; there it waits for `_begin_child`, for
+    good where that is not called. They do their linear algebra on one thread.
+
+    Parameters
+    ----------
+    *signals : Signals
+        By default SIGINT and SIGTERM.
+    """
+    signals = signals or SIGNALS
+    # or else it is started with the first process, and lets signals in again
+    resource_tracker.ensure_running()
+    arrived: list[int] = []
+
+    def later(number: int, _: FrameType | None) -> None:
+        arrived.append(number)
+
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for each in signals:
+            if signal.getsignal(each) not in (None, signal.SIG_IGN):
+                handlers[each] = signal.signal(each, later)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    try:
+        with _one_thread():
+            yield
+    finally:
+        # what has waited here arrives now
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in arrived:
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes that are started here do their linear algebra on one thread."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

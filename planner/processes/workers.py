@@ -1,21 +1,23 @@
 """Processes that do one kind of work, kept open; one that dies costs what it had in work at most.
 
 Work goes out ahead and comes back as it is done. What a process had in work when it died is tried
-once more: whatever kills its process then is lost, and nothing else is.
+once more: whatever kills its process then is lost, and nothing else is. (Pools of ``pebble`` do
+no more work once a process has died that had none.)
 """
 
 from __future__ import annotations
 
 import logging
-import math
 import os
-from collections import OrderedDict, deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections import deque
+from collections.abc import Hashable
 from multiprocessing.connection import Connection, wait
 from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
 
+from cachetools import LRUCache
+
 from hand_models.base import CruxError
-from planner.processes.stations import Lane, Make, Station, ending_in_words
+from planner.processes.stations import Lane, Make, Station
 
 __all__ = ["Lost", "Workers", "cores"]
 
@@ -24,19 +26,8 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 R = TypeVar("R")
 
-AHEAD: Final = 15
-"""Most items that a process has beside the one in work, where this process works, too: they are
-there before it is done."""
-
-NEXT: Final = 1
-"""The same where this process only gives out and takes in."""
-
-SHARE: Final = 4
-"""A process has no more ahead than what is left by this and by the processes: less and less, so
-that none waits long for the last one."""
-
-PATIENCE: Final = 1.0
-"""Longest time between the end of a process's pipe and its own [s]."""
+AHEAD: Final = 1
+"""Items that a process has beside the one in work: they are there before it is done."""
 
 KNOWN: Final = 256
 """Things that items are about of which it is kept which process had them last."""
@@ -107,7 +98,7 @@ class Workers(Generic[T, R]):
         self.hands: dict[Lane[T, R], dict[int, _Task[T]]] = {}
         self.stillborn = 0
         self._queue: deque[_Task[T]] = deque()
-        self._knows: OrderedDict[Hashable, Lane[T, R]] = OrderedDict()
+        self._knows: LRUCache[Hashable, Lane[T, R]] = LRUCache(KNOWN)
         self._unborn = ""
         """Why."""
 
@@ -120,45 +111,10 @@ class Workers(Generic[T, R]):
         for lane in list(self.hands):
             self._dismiss(lane)
 
-    @property
-    def _unfinished(self) -> bool:
-        return bool(self._queue) or any(self.hands.values())
-
     def wait(self) -> None:
         """Wait until all processes that have been started are ready, or have died."""
         for lane in [lane for lane in self.hands if not lane.ready]:
             self._take(lane)
-
-    def each(self, items: Sequence[T], here: Callable[[T], R]) -> Iterator[tuple[int, R | Lost]]:
-        """Yield each item's index and result, as they are done.
-
-        Parameters
-        ----------
-        items : sequence
-        here : callable
-            What this process turns items into results with meanwhile, so that nothing waits for
-            processes to start; it does not try what has cost a process.
-        """
-        for number, item in enumerate(items):
-            self.put(number, item)
-        try:
-            while self._unfinished:
-                self._start()
-                own = any(not task.tried for task in self._queue)
-                if self.hands:
-                    yield from self._exchange(AHEAD, 0.0 if own else None)
-                elif not own:
-                    for task in self._queue:
-                        yield task.number, Lost(self._unborn)
-                    return
-                if untried := next((task for task in self._queue if not task.tried), None):
-                    self._queue.remove(untried)
-                    yield untried.number, here(untried.item)
-        finally:
-            # what nobody waits for any more
-            self._queue.clear()
-            for lane in [lane for lane, hand in self.hands.items() if hand]:
-                self._dismiss(lane)
 
     def put(self, number: int, item: T, about: Hashable = None) -> None:
         """Let an item be worked on; `collect` returns its result.
@@ -183,26 +139,22 @@ class Workers(Generic[T, R]):
             If processes do not start.
         """
         found: list[tuple[int, R | Lost]] = []
-        while not found and self._unfinished:
+        while not found and (self._queue or any(self.hands.values())):
             self._start()
             if not self.hands:
                 raise CruxError(self._unborn)
-            found = self._exchange(NEXT, None)
+            found = self._exchange()
         return found
 
-    def _exchange(self, ahead: int, timeout: float | None) -> list[tuple[int, R | Lost]]:
-        """Give processes what they have room for, and return what comes within a time [s].
-
-        Each may have so many items ahead, beside the one in work.
-        """
+    def _exchange(self) -> list[tuple[int, R | Lost]]:
+        """Give processes what they have room for, and return what comes next."""
         for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
-            share = math.ceil(len(self._queue) / (SHARE * self.width))
-            while self._queue and lane.ready and len(self.hands[lane]) <= min(ahead, share):
+            while self._queue and lane.ready and len(self.hands[lane]) <= AHEAD:
                 task = self._chosen(lane)
                 self.hands[lane][task.number] = task
                 lane.give(task.item)
         lanes = {lane.pipe: lane for lane in self.hands}
-        ready = wait(list(lanes), timeout)
+        ready = wait(list(lanes))
         return [each for pipe in ready for each in self._take(lanes[cast(Connection, pipe)])]
 
     def _take(self, lane: Lane[T, R]) -> list[tuple[int, R | Lost]]:
@@ -235,16 +187,13 @@ class Workers(Generic[T, R]):
         del self._queue[i]
         if task.about is not None:
             self._knows[task.about] = lane
-            self._knows.move_to_end(task.about)
-            if len(self._knows) > KNOWN:
-                self._knows.popitem(last=False)
         return task
 
     def _start(self) -> None:
         """Start processes in place of those that have died."""
         while len(self.hands) < self.width and self.stillborn < STARTS:
             try:
-                station = Station(self._make, ahead=True)
+                station = Station(self._make)
             except OSError as error:
                 self._miss(f"processes do not start: {error.strerror or error}")
             else:
@@ -259,16 +208,15 @@ class Workers(Generic[T, R]):
 
     def _bury(self, lane: Lane[T, R]) -> str:
         """Dismiss a process that has died, and return how it did."""
-        status = self._dismiss(lane, PATIENCE)
-        how = f"a worker {ending_in_words(status)}"
+        how = f"a worker {self._dismiss(lane, dead=True)}"
         if not lane.ready:
             # nothing of this house is at work before a process is, but the program's own beginning
-            hint = NO_GUARD if status == UNCAUGHT else ""
+            hint = NO_GUARD if lane.station.process.exitcode == UNCAUGHT else ""
             self._miss(f"processes do not start: {how}{hint}")
         return how
 
-    def _dismiss(self, lane: Lane[T, R], patience: float = 0.0) -> int | None:
+    def _dismiss(self, lane: Lane[T, R], *, dead: bool = False) -> str:
         del self.hands[lane]
         for about in [about for about, one in self._knows.items() if one is lane]:
             del self._knows[about]
-        return lane.station.kill(patience)
+        return lane.station.kill(dead=dead)

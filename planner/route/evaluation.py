@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Final
 
-from hand_models.base import InvalidInputError, within
+from hand_models.base import CruxError, InvalidInputError, within
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
 from planner.result import Plan
@@ -16,7 +17,7 @@ from planner.solving import plan
 
 __all__ = ["evaluate"]
 
-WORTH_A_PROCESS: Final = 40
+WORTH_A_PROCESS: Final = 100
 """Stages below this many are planned faster here than in processes that must first start."""
 
 
@@ -31,8 +32,8 @@ def evaluate(
     ----------
     route : Route
     workers : int, optional
-        Processes, this one among them; as many as there are cores where the route is long enough
-        to be worth it.
+        Processes; as many as there are cores where the route is long enough to be worth it. With
+        one, this process plans itself.
     progress : callable, optional
         Called with (stages done, stages in all).
 
@@ -45,19 +46,33 @@ def evaluate(
     if workers is None:
         workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
     plans: dict[int, Plan | OutOfReach] = {}
-    with Workers(partial(_planning, todo), min(workers, len(todo)) - 1) as processes:
-        for i, found in processes.each(range(len(todo)), _planning(todo)):
-            # a stage that has cost a process is planned here
-            answer = _plan_stage(todo[i]) if isinstance(found, Lost) else found
-            if isinstance(answer, InvalidInputError):
-                raise answer
-            plans[i] = answer
-            if progress is not None:
-                progress(len(plans), len(todo))
+    for i, answer in _answers(todo, min(workers, len(todo))):
+        if isinstance(answer, InvalidInputError):
+            raise answer
+        plans[i] = answer
+        if progress is not None:
+            progress(len(plans), len(todo))
     return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
 
 
 Answer = Plan | OutOfReach | InvalidInputError
+
+
+def _answers(todo: Sequence[RouteStage], workers: int) -> Iterator[tuple[int, Answer]]:
+    """Yield the index and the answer of each stage, as they are planned."""
+    left = dict(enumerate(todo))
+    if workers > 1:
+        with Workers(partial(_planning, todo), workers) as processes, suppress(CruxError):
+            for i in left:
+                processes.put(i, i)
+            while found := processes.collect():
+                for i, answer in found:
+                    if not isinstance(answer, Lost):
+                        del left[i]
+                        yield i, answer
+    # also what has cost a process, and all where none starts
+    for i, stage in left.items():
+        yield i, _plan_stage(stage)
 
 
 def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:

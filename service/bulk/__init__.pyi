@@ -10,7 +10,6 @@ from .columns import (
     route_columns as route_columns,
     row_of as row_of,
 )
-from .dask_pools import LOCAL as LOCAL, check_address as check_address
 from .evaluation import Question as Question, answered as answered, evaluate as evaluate
 from .exports import (
     CSV as CSV,
@@ -20,6 +19,11 @@ from .exports import (
 )
 from .headers import Header as Header, digest_of as digest_of, new_header as new_header
 from .lines import Asked as Asked, Lines as Lines
-from .pools import pool_on as pool_on, whole_number as whole_number
+from .pools import (
+    LOCAL as LOCAL,
+    check_address as check_address,
+    pool_on as pool_on,
+    whole_number as whole_number,
+)
 from .runs import ReplyLines as ReplyLines, Run as Run, TableLines as TableLines
 from .tally import Tally as Tally

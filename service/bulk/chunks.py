@@ -1,15 +1,16 @@
-"""Chunks of questions, and the one function that answers them.
+"""Chunks of questions: which belong together, and the one function that answers them.
 
-The same wherever it runs, so that answers are equal to the last digit; their times aside, and what
-a deadline has left out.
+It is the same wherever it runs, so that answers are equal to the last digit; their times aside, and
+what a deadline has left out. Questions that have hands on the same holds are answered together.
 """
 
 from __future__ import annotations
 
 import pickle
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -17,24 +18,21 @@ import msgspec
 
 from hand_models.base import DISTRIBUTION, BoundedStore, CruxError, installed_version
 from hand_models.parameters import ParameterTable
-from service.bulk.columns import row_of
 from service.requests import PlanRequest, RouteRequest
-from service.wire import PLAN, Answer, Format
+from service.wire import PLAN, Answer, Format, MalformedError
 
 if TYPE_CHECKING:
     from planner import RobotFile
 
-__all__ = [
-    "Setting",
-    "answer_chunk",
-    "own_versions",
-]
+__all__ = ["About", "Setting", "about", "answer_chunk", "grouped", "own_versions"]
 
 SETTINGS: Final = 4
 """Settings whose models and files a process keeps."""
 
 PACKAGES: Final = (DISTRIBUTION, "numpy", "scipy", "clarabel")
 """On whose versions the last digits of answers hang."""
+
+NOTHING: Final = msgspec.Raw(b"null")
 
 Answerer = Callable[[bytes], Answer]
 
@@ -54,8 +52,8 @@ class Setting(NamedTuple):
         Of questions and answers.
     explain : bool or None
         Whether what keeps a stance from a plan is explained; None: as each request says.
-    columns : tuple of str or None
-        Of the rows that answers are told as; with None they are whole replies.
+    brief : bool
+        Whether no more is asked for than a table tells.
     versions : dict of str to str or None, or None
         Of `PACKAGES`, where it is asked; None where it is answered by the same installation.
     kind : str
@@ -69,7 +67,7 @@ class Setting(NamedTuple):
     folder: Path | None = None
     form: Format = Format.JSON
     explain: bool | None = None
-    columns: tuple[str, ...] | None = None
+    brief: bool = False
     versions: dict[str, str | None] | None = None
     kind: str = PLAN
     make: Callable[[], Answerer] | None = None
@@ -132,8 +130,6 @@ def _answerer(pickled: bytes) -> Answerer:
             files=files,
             revised=revised,
         )
-        if setting.columns is not None:
-            found = row_of(found, setting.form, setting.columns)
         return found._replace(seconds=time.perf_counter() - start)
 
     return answer
@@ -151,9 +147,9 @@ def _check_versions(there: dict[str, str | None]) -> None:
 
 
 def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanRequest | RouteRequest:
-    """Return a request that asks for no more than is told."""
+    """Return a request as it is to be answered."""
     explain = request.explain if setting.explain is None else setting.explain
-    if setting.columns is None or isinstance(request, RouteRequest):
+    if not setting.brief or isinstance(request, RouteRequest):
         return msgspec.structs.replace(request, explain=explain)
     want = [each for each in request.want if each == "load_factor"]
     return msgspec.structs.replace(
@@ -164,3 +160,63 @@ def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanReque
         detail="full" if explain else "hands",
         max_reply_bytes=None,
     )
+
+
+class About(NamedTuple):
+    """What must be prepared for a question, by digest.
+
+    Attributes
+    ----------
+    rock : bytes
+        Rocks and holds, wherever hands are on them.
+    hands : bytes
+        Hands and their poses on these.
+    """
+
+    rock: bytes = b""
+    hands: bytes = b""
+
+
+class _Hand(msgspec.Struct):
+    hold: msgspec.Raw = NOTHING
+
+
+class _Stance(msgspec.Struct):
+    hands: list[msgspec.Raw] = []
+    rocks: msgspec.Raw = NOTHING
+    hand: msgspec.Raw = NOTHING
+
+
+class _Request(msgspec.Struct):
+    stance: _Stance
+
+
+def about(payload: bytes, form: Format) -> About:
+    """Return what a request is about, as it is written; nothing where it cannot be read."""
+    try:
+        stance = form.decode(payload, _Request).stance
+        holds = [form.decode(bytes(hand), _Hand).hold for hand in stance.hands]
+    except (MalformedError, msgspec.ValidationError):
+        return About()
+    return About(_digest(stance.rocks, *holds), _digest(stance.hand, *stance.hands))
+
+
+def _digest(*parts: msgspec.Raw) -> bytes:
+    found = blake2b(digest_size=8)
+    for part in parts:
+        found.update(part)
+        found.update(b"\n")
+    return found.digest()
+
+
+def grouped(abouts: Sequence[About]) -> list[int]:
+    """Return the indices of questions so that what is about the same stands together.
+
+    Groups, and questions within them, stay in the order of their first ones.
+    """
+    rocks: dict[bytes, int] = {}
+    hands: dict[About, int] = {}
+    for i, each in enumerate(abouts):
+        rocks.setdefault(each.rock, i)
+        hands.setdefault(each, i)
+    return sorted(range(len(abouts)), key=lambda i: (rocks[abouts[i].rock], hands[abouts[i]], i))

@@ -15,7 +15,6 @@ from hand_models.base import InvalidInputError
 from hand_models.hand import FINGERS
 from planner import LimitName
 from service.replies import AXES, ErrorDetail
-from service.wire import Answer, Format
 
 __all__ = ["INDEX", "Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
 
@@ -29,17 +28,6 @@ EXPLAINED: Final = ("irreducible", "sufficient")
 
 FACTOR: Final = "found, at_least; or why there is none: unbounded, none, not_asked, not_finished"
 """Meaning of the column about what is known of a load factor."""
-
-TOLD: Final = (
-    "id",
-    "name",
-    "status",
-    "utilisation",
-    "load_factor",
-    "load_factor_status",
-    "verified",
-)
-"""Columns that are fields of a reply."""
 
 BETWEEN: Final = "; "
 """What stands between the parts of a text that has several."""
@@ -55,12 +43,16 @@ class Column(NamedTuple):
     unit : str
         ``1`` for a number that has none; empty where there is no number.
     meaning : str
+    path : str
+        To its value in a reply as `row_of` reads it: keys and indices with dots between them; by
+        default the name.
     """
 
     name: str
     kind: Kind
     unit: str
     meaning: str
+    path: str = ""
 
 
 class Row(msgspec.Struct):
@@ -68,50 +60,6 @@ class Row(msgspec.Struct):
 
     values: list[Any]
     status: str | None = None
-    error: ErrorDetail | None = None
-
-
-class _Finger(msgspec.Struct):
-    tendon_tension: float
-
-
-class _Hand(msgspec.Struct):
-    limb: str
-    wrench: list[float]
-    utilisation: float
-    tensions: list[float] = []
-    fingers: list[_Finger] = []
-
-
-class _Stage(msgspec.Struct):
-    move: int
-    phase: str
-    limb: str | None
-    reason: str
-
-
-class _Certificate(msgspec.Struct):
-    irreducible: list[LimitName] | None = None
-    sufficient: list[LimitName] | None = None
-
-
-class _Told(msgspec.Struct):
-    """What rows tell of a reply, brief or whole, or of an error."""
-
-    id: str | None = None
-    status: str | None = None
-    utilisation: float | None = None
-    load_factor: float | None = None
-    load_factor_unbounded: bool | None = None
-    load_factor_status: str | None = None
-    limiting: LimitName | None = None
-    hands: list[_Hand] | None = None
-    verified: bool | None = None
-    warnings: list[str] = []
-    certificate: _Certificate | None = None
-    name: str | None = None
-    crux: int | None = None
-    stages: list[_Stage] = []
     error: ErrorDetail | None = None
 
 
@@ -130,13 +78,16 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
     yield from _limiting()
     yield Column("verified", "bool", "", "whether the plan has passed its independent check")
     for limb in limbs:
-        yield Column(f"{limb}_utilisation", "float", "1", "the largest of the hand's limits")
-        for finger in FINGERS:
-            yield Column(f"{limb}_{finger}_tension_N", "float", "N", "tension of its tendon")
-        for axis in AXES:
-            unit = "N" if axis.startswith("f") else "Nm"
+        hand, meaning = f"hands.{limb}", "the largest of the hand's limits"
+        yield Column(f"{limb}_utilisation", "float", "1", meaning, f"{hand}.utilisation")
+        for i, finger in enumerate(FINGERS):
+            name, path = f"{limb}_{finger}_tension_N", f"{hand}.tensions.{i}"
+            yield Column(name, "float", "N", "tension of its tendon", path)
+        for i, axis in enumerate(AXES):
+            unit = "N" if axis.startswith("f") else "N·m"
+            name, path = f"{limb}_{axis}_{unit.replace('·', '')}", f"{hand}.wrench.{i}"
             meaning = f"{axis} of the hand's wrench on the rock, in its own frame"
-            yield Column(f"{limb}_{axis}_{unit}", "float", unit.replace("Nm", "N·m"), meaning)
+            yield Column(name, "float", unit, meaning, path)
     yield Column("warnings", "text", "", f"with {BETWEEN!r} between them")
     if explained:
         yield Column(EXPLAINED[0], "text", "", "limits that together leave no plan")
@@ -155,9 +106,11 @@ def _route_columns() -> Iterator[Column]:
     yield Column("status", "text", "", "of the stage that is worst off; empty for an error")
     yield Column("stages", "int", "1", "stances, those with a limb in the air among them")
     yield Column("crux", "int", "1", "the hardest stage, from zero")
-    yield Column("crux_move", "int", "1", "its move, from one; zero is the start")
+    meaning = "its move, from one; zero is the start"
+    yield Column("crux_move", "int", "1", meaning, "hardest.move")
     for part, what in (("phase", "of the move"), ("limb", "that moves"), ("reason", "in words")):
-        yield Column(f"crux_{part}", "text", "", f"the crux's {part}, {what}")
+        meaning = f"the crux's {part}, {what}"
+        yield Column(f"crux_{part}", "text", "", meaning, f"hardest.{part}")
     yield Column("utilisation", "float", "1", "of the crux: the largest of any limit")
     yield Column("load_factor", "float", "1", "the least of all stages, where it is bounded")
     yield Column("load_factor_unbounded", "bool", "", "whether there is no end to any of them")
@@ -174,12 +127,14 @@ def _asked() -> Iterator[Column]:
 
 def _limiting() -> Iterator[Column]:
     for part in LimitName.__struct_fields__:
-        yield Column(f"limiting_{part}", "text", "", f"{part} of the limit that is used most")
+        meaning = f"{part} of the limit that is used most"
+        yield Column(f"limiting_{part}", "text", "", meaning, f"limiting.{part}")
 
 
 def _failed() -> Iterator[Column]:
     for part in ("kind", "field", "message"):
-        yield Column(f"error_{part}", "text", "", f"{part} of the error; empty for a plan")
+        meaning = f"{part} of the error; empty for a plan"
+        yield Column(f"error_{part}", "text", "", meaning, f"error.{part}")
 
 
 def chosen_columns(
@@ -218,43 +173,47 @@ def chosen_columns(
     )
 
 
-def row_of(answer: Answer, form: Format, columns: Sequence[str]) -> Answer:
-    """Return an answer as a row of these columns but ``index``, in MessagePack."""
-    told = form.decode(answer.payload, _Told)
-    values = _values(told)
-    row = Row([values.get(name) for name in columns if name != INDEX], told.status, told.error)
-    return answer._replace(payload=msgspec.msgpack.encode(row), encoding=Format.MSGPACK.value)
+def row_of(payload: bytes, columns: Sequence[Column]) -> Row:
+    """Return a reply in JSON, brief or whole, or an error as a row of columns but ``index``."""
+    reply = msgspec.json.decode(payload)
+    error = reply.get("error")
+    told = _readable(reply)
+    return Row(
+        [_at(told, column.path or column.name) for column in columns if column.name != INDEX],
+        reply.get("status"),
+        None if error is None else msgspec.convert(error, ErrorDetail),
+    )
 
 
-def _values(told: _Told) -> dict[str, Any]:
-    found: dict[str, Any] = {name: getattr(told, name) for name in (*TOLD, "crux")}
-    if told.status is not None:
-        found["load_factor_unbounded"] = bool(told.load_factor_unbounded)
-        found["warnings"] = BETWEEN.join(told.warnings) or None
-    if told.limiting is not None:
-        for part in LimitName.__struct_fields__:
-            found[f"limiting_{part}"] = getattr(told.limiting, part)
-    if told.crux is not None:
-        found["stages"] = len(told.stages)
-        for part in _Stage.__struct_fields__:
-            found[f"crux_{part}"] = getattr(told.stages[told.crux], part)
-    for hand in told.hands or ():
-        found[f"{hand.limb}_utilisation"] = hand.utilisation
-        tensions = hand.tensions or [finger.tendon_tension for finger in hand.fingers]
-        for finger, tension in zip(FINGERS, tensions, strict=True):
-            found[f"{hand.limb}_{finger}_tension_N"] = tension
-        for axis, load in zip(AXES, hand.wrench, strict=True):
-            found[f"{hand.limb}_{axis}_{'N' if axis.startswith('f') else 'Nm'}"] = load
-    if told.certificate is not None:
-        for name in EXPLAINED:
-            limits = getattr(told.certificate, name)
-            found[name] = None if limits is None else BETWEEN.join(map(_spoken, limits))
-    if told.error is not None:
-        for part in ("kind", "field", "message"):
-            found[f"error_{part}"] = getattr(told.error, part)
+def _readable(reply: dict[str, Any]) -> dict[str, Any]:
+    """Return a reply with its hands by limb, its hardest stage, and lists of words as texts."""
+    found = reply | {"hands": {}, "stages": None}
+    found["warnings"] = BETWEEN.join(reply.get("warnings") or ()) or None
+    if reply.get("status") is not None:
+        found["load_factor_unbounded"] = bool(reply.get("load_factor_unbounded"))
+    for hand in reply.get("hands") or ():
+        fingers = hand.get("fingers") or ()
+        tensions = hand.get("tensions") or [finger["tendon_tension"] for finger in fingers]
+        found["hands"][hand["limb"]] = hand | {"tensions": tensions}
+    crux, stages = reply.get("crux"), reply.get("stages")
+    if crux is not None and stages:
+        found |= {"stages": len(stages), "hardest": stages[crux]}
+    for name in EXPLAINED:
+        limits = (reply.get("certificate") or {}).get(name)
+        found[name] = None if limits is None else BETWEEN.join(map(_spoken, limits))
     return found
 
 
-def _spoken(limit: LimitName) -> str:
-    parts = (getattr(limit, part) for part in LimitName.__struct_fields__)
+def _at(told: Any, path: str) -> Any:
+    """Return what is at the end of a path; None where a part of it is missing."""
+    for step in path.split("."):
+        try:
+            told = told[int(step) if isinstance(told, list) else step]
+        except (LookupError, TypeError):
+            return None
+    return told
+
+
+def _spoken(limit: dict[str, str | None]) -> str:
+    parts = (limit.get(part) for part in LimitName.__struct_fields__)
     return " ".join(part for part in parts if part is not None)

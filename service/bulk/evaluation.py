@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting
-from service.bulk.columns import row_of
-from service.bulk.grouping import about, grouped
+from service.bulk.chunks import Setting, about, grouped
 from service.bulk.pools import LARGEST, Here, Pool, pool_on
 from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
@@ -47,7 +45,7 @@ def evaluate(
     folder: Path | None = None,
     form: Format = Format.JSON,
     explain: bool | None = None,
-    columns: tuple[str, ...] | None = None,
+    brief: bool = False,
     kind: str = PLAN,
 ) -> Generator[Answer, None, None]:
     """Answer any number of plan requests or routes, in order, errors in their places.
@@ -77,9 +75,9 @@ def evaluate(
         Of questions and answers.
     explain : bool, optional
         Whether what keeps stances from plans is explained; by default as each request says.
-    columns : tuple of str, optional
-        Of the rows (`service.bulk.Row`, as MessagePack) that answers are told as; by default they
-        are whole replies.
+    brief : bool, optional
+        Whether plans are answered with no more than a table tells: of what requests want only the
+        load factor, and no hand in all detail unless it is explained.
     kind : str, optional
         Of the questions: ``plan`` or ``route``.
 
@@ -97,9 +95,9 @@ def evaluate(
         If no process can be started, or a cluster is gone: what is not yet answered can be asked
         again.
     """
-    setting = Setting(robot, hand, folder, form, explain, columns, kind=kind)
+    setting = Setting(robot, hand, folder, form, explain, brief, kind=kind)
     with pool_on(on, workers, setting) as pool:
-        yield from answered(questions, pool, form, columns)
+        yield from answered(questions, pool, form)
 
 
 class _Chunk(NamedTuple):
@@ -118,10 +116,9 @@ def answered(
     questions: Iterable[Question],
     pool: Pool,
     form: Format = Format.JSON,
-    columns: tuple[str, ...] | None = None,
 ) -> Generator[Answer, None, None]:
     """Yield the answers to questions in order, made by a pool that has been entered."""
-    work = _Work(enumerate(questions), pool, form, columns)
+    work = _Work(enumerate(questions), pool, form)
     following = 0
     while True:
         work.take_more(following)
@@ -153,9 +150,8 @@ class _Work:
         source: Iterator[tuple[int, Question]],
         pool: Pool,
         form: Format,
-        columns: tuple[str, ...] | None,
     ) -> None:
-        self._source, self._pool, self._form, self._columns = source, pool, form, columns
+        self._source, self._pool, self._form = source, pool, form
         self.ended = False
         self.early: dict[int, Answer] = {}
         self.chunks: dict[int, _Chunk] = {}
@@ -189,8 +185,7 @@ class _Work:
             else:
                 (place,), (payload,) = chunk
                 name = identifier(payload, self._form)
-                lost = encode_error(LostError(result.reason), self._form, name)
-                self.early[place] = self._reported(lost)
+                self.early[place] = encode_error(LostError(result.reason), self._form, name)
 
     def _window(self, count: int, most: int) -> list[tuple[int, bytes]]:
         """Take new questions, no more than so many or so many bytes."""
@@ -205,7 +200,7 @@ class _Work:
             self._asked, taken = i + 1, taken + 1
             payload = _encoded(question, self._form)
             if isinstance(payload, Answer):
-                self.early[i] = self._reported(payload)
+                self.early[i] = payload
             else:
                 found.append((i, payload))
                 size += len(payload)
@@ -238,9 +233,6 @@ class _Work:
         each = sum(answer.seconds for answer in answers) / len(answers)
         best = int(PACE / max(each, 1e-6))
         self._together = max(1, min(best, 2 * self._together, self._largest))
-
-    def _reported(self, answer: Answer) -> Answer:
-        return answer if self._columns is None else row_of(answer, self._form, self._columns)
 
 
 def _encoded(question: Question, form: Format) -> bytes | Answer:

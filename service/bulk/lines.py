@@ -16,15 +16,11 @@ __all__ = ["Asked", "Lines"]
 
 
 class Asked(Protocol):
-    """Questions whose answers are kept.
+    """Questions whose answers are kept."""
 
-    Attributes
-    ----------
-    count : int
-        How many there are.
-    """
-
-    count: int
+    @property
+    def count(self) -> int:
+        """How many there are."""
 
     def __iter__(self) -> Iterator[bytes]:
         """Yield what each is known by when its answer is found again."""

@@ -2,22 +2,48 @@
 
 from __future__ import annotations
 
+import logging
 import operator
 import pickle
+import signal
 from collections import deque
 from collections.abc import Callable, Hashable
+from contextlib import ExitStack, nullcontext, suppress
 from functools import partial
-from typing import Any, Final, Protocol, Self
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Final, Protocol, Self
+from urllib.parse import urlsplit
 
-from hand_models.base import InvalidInputError
-from planner import Lost, Workers, cores
+from hand_models.base import CruxError, InvalidInputError, to_install
+from planner import Lost, Workers, cores, starting_children
 from service.bulk.chunks import Setting, answer_chunk, own_versions
 from service.wire import Answer
 
-__all__ = ["LARGEST", "Here", "Pool", "pool_on", "whole_number"]
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+__all__ = ["LARGEST", "LOCAL", "Here", "Pool", "check_address", "pool_on", "whole_number"]
+
+log = logging.getLogger(__name__)
 
 LARGEST: Final = 64
 """Most questions in a chunk: what is tried again where its process has died."""
+
+LOCAL: Final = "dask:local"
+"""A cluster of this machine's own, for as long as the work lasts."""
+
+PATIENCE: Final = 15.0
+"""How long to wait for a scheduler, for its first worker, or for a result to come over [s]."""
+
+LOOK: Final = 1.0
+"""How often it is looked whether the scheduler is still there, while nothing comes [s]."""
+
+ALONE: Final = 5
+"""How often there is no worker, when it is looked, until that is told."""
+
+ALLOWED: Final = 3
+"""Deaths of workers after which Dask tries a chunk no more, as it is by default
+(``distributed.scheduler.allowed-failures``)."""
 
 
 class Pool(Protocol):
@@ -113,9 +139,193 @@ def pool_on(on: Any, workers: int | None, setting: Setting) -> Pool:
     count = None if workers is None else whole_number(workers)
     if on == "processes":
         return Workers(partial(_answering, pickle.dumps(setting)), count or cores())
-    from service.bulk.dask_pools import DaskPool
-
     # a worker may have other packages, and may have begun in another folder
     folder = None if setting.folder is None else setting.folder.absolute()
     there = setting._replace(versions=own_versions(), folder=folder)
     return DaskPool(on, count, pickle.dumps(there))
+
+
+def check_address(address: object) -> None:
+    """Refuse what is no address of a Dask scheduler.
+
+    Raises
+    ------
+    InvalidInputError
+    """
+    text = str(address)
+    try:
+        good = urlsplit(text).scheme in ("tcp", "tls", "ucx", "ws", "wss", "inproc")
+    except ValueError:
+        good = False
+    if not good:
+        raise InvalidInputError(
+            f"{text!r} is no place to work at; valid are processes, here, {LOCAL}, "
+            "tcp://HOST:PORT of a Dask scheduler, or its client",
+            field="on",
+        )
+
+
+class DaskPool:
+    """A cluster's workers, each of its threads a place to answer a chunk.
+
+    Parameters
+    ----------
+    on : str or Client
+        `LOCAL`, a scheduler's address, or a client.
+    workers : int or None
+        Of a cluster of this machine's own.
+    setting : bytes
+        As `answer_chunk` takes it.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``distributed`` is not installed, or ``on`` is no address.
+    """
+
+    def __init__(self, on: Any, workers: int | None, setting: bytes) -> None:
+        try:
+            import distributed
+        except ImportError:
+            raise InvalidInputError(
+                f"needs distributed, which is not installed: {to_install('dask')}", field="dask"
+            ) from None
+        self._own = not isinstance(on, distributed.Client)
+        if self._own and on != LOCAL:
+            check_address(on)
+            if workers is not None:
+                raise InvalidInputError(
+                    "a cluster has workers of its own; leave it out", field="workers"
+                )
+        self._on, self._workers, self._setting = on, workers, setting
+        self._stack = ExitStack()
+        self._open: dict[int, Future[list[Answer]]] = {}
+        self._alone = 0
+        self._done: SimpleQueue[tuple[int, Future[list[Answer]]]] = SimpleQueue()
+
+    def __enter__(self) -> Self:
+        try:
+            self._client: Client = self._stack.enter_context(self._connected())
+            self._client.wait_for_workers(1, timeout=PATIENCE)
+        except BaseException as error:
+            self._stack.close()
+            if isinstance(error, OSError | TimeoutError):
+                raise CruxError(
+                    f"no Dask scheduler with a worker answers at {self._on} within "
+                    f"{PATIENCE:g} s; start them with: dask scheduler, dask worker ADDRESS"
+                ) from None
+            raise
+        self._address = self._client.scheduler.address
+        return self
+
+    def _connected(self) -> Any:
+        from distributed import Client, LocalCluster
+
+        if not self._own:
+            return nullcontext(self._on)
+        # what it loses is told in the answers, or in one line
+        for name in logging.root.manager.loggerDict:
+            if name.split(".")[0] == "distributed":
+                logging.getLogger(name).setLevel(logging.CRITICAL)
+        where: Any = self._on
+        if where == LOCAL:
+            # a shell sends Ctrl-C to all of them, and each worker would print its traceback
+            with starting_children(signal.SIGINT):
+                where = LocalCluster(
+                    n_workers=cores() if self._workers is None else self._workers,
+                    threads_per_worker=1,
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+            self._stack.enter_context(where)
+        return Client(where, timeout=PATIENCE, set_as_default=False)
+
+    def __exit__(self, *error: object) -> None:
+        if self._client.status == "running":
+            self._client.cancel(list(self._open.values()), force=True)
+        self._open.clear()
+        self._stack.close()
+
+    @property
+    def width(self) -> int:
+        """Threads that the workers have now, which come and go."""
+        try:
+            threads: dict[str, int] = self._client.nthreads()
+        except OSError:
+            raise self._gone() from None
+        return max(1, sum(threads.values()))
+
+    def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
+        """Submit a chunk."""
+        future = self._client.submit(answer_chunk, self._setting, item, pure=False)
+        self._open[number] = future
+        self._await(number, future)
+
+    def _await(self, number: int, future: Future[list[Answer]]) -> None:
+        future.add_done_callback(lambda done: self._done.put((number, done)))
+
+    def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
+        """Wait until a chunk is answered or lost.
+
+        Raises
+        ------
+        CruxError
+            If the scheduler is gone, or a worker cannot answer at all.
+        """
+        while True:
+            if self._client.status != "running":
+                raise self._gone()
+            try:
+                number, future = self._done.get(timeout=LOOK)
+            except Empty:
+                self._warn_if_alone()
+                continue
+            if number not in self._open:
+                continue
+            try:
+                if future.status == "pending":
+                    raise TimeoutError
+                found = self._found(future)
+            except TimeoutError:
+                # its worker has left with the result: another works it out again
+                self._await(number, future)
+                continue
+            except OSError:
+                raise self._gone() from None
+            del self._open[number]
+            return [(number, found)]
+
+    def _warn_if_alone(self) -> None:
+        """Say once that there is no worker to wait for."""
+        with suppress(OSError):
+            self._alone = 0 if self._client.nthreads() else self._alone + 1
+        if self._alone == ALONE:
+            log.warning(
+                "the Dask scheduler at %s has no worker left: waiting for one; start it with: dask "
+                "worker %s, or break off with Ctrl-C, and go on later with --resume",
+                self._address,
+                self._address,
+            )
+
+    def _gone(self) -> CruxError:
+        return CruxError(f"the Dask scheduler at {self._address} is gone")
+
+    def _found(self, future: Future[list[Answer]]) -> list[Answer] | Lost:
+        from distributed import KilledWorker
+
+        if future.status == "finished":
+            answers: list[Answer] = future.result(timeout=PATIENCE)
+            return answers
+        if future.cancelled():
+            raise self._gone()
+        error = future.exception(timeout=PATIENCE)
+        if isinstance(error, KilledWorker):
+            return Lost(f"{ALLOWED + 1} Dask workers died of it")
+        if isinstance(error, MemoryError):
+            return Lost("a Dask worker had no memory for it")
+        if isinstance(error, CruxError):
+            raise error
+        raise CruxError(
+            f"a Dask worker cannot answer ({type(error).__name__}: {error}); it needs the same "
+            "crux, Python and packages as this process"
+        )

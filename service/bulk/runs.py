@@ -14,13 +14,13 @@ from hashlib import blake2b
 from io import FileIO
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import msgspec
 
 from hand_models.base import InvalidInputError
 from planner import Time
-from service.bulk.columns import INDEX, Column, Row
+from service.bulk.columns import INDEX, Column, Row, row_of
 from service.bulk.exports import exporter_at
 from service.bulk.headers import HEADER, RESUME, Header
 from service.bulk.lines import Asked
@@ -61,8 +61,6 @@ class Run(ABC):
 
     Attributes
     ----------
-    columns : tuple of str or None
-        As `service.bulk.evaluate` takes them.
     tally : Tally
         Of all answers, with those that were there before.
 
@@ -83,10 +81,6 @@ class Run(ABC):
         self._kept = 0
         if file is not None and resume and file.exists():
             self._kept = self._read(file, asked)
-
-    @property
-    def columns(self) -> tuple[str, ...] | None:
-        return None
 
     @contextmanager
     def open(self) -> Iterator[None]:
@@ -278,16 +272,9 @@ class TableLines(Run):
                 f"{table}: no table that a batch has written, or a sweep", field=RESUME
             )
 
-    @property
-    def columns(self) -> tuple[str, ...] | None:
-        return tuple(column.name for column in self._described)
-
     def row(self, payload: bytes) -> Row:
-        """Return what the table says of an answer."""
-        return msgspec.msgpack.decode(payload, type=Row)
-
-    def known(self, row: Row) -> None:
-        """Take note of a row that is there already."""
+        """Return what the table says of the answer to the next question."""
+        return row_of(payload, self._described)
 
     @contextmanager
     def open(self) -> Iterator[None]:
@@ -298,14 +285,17 @@ class TableLines(Run):
 
     def export(self) -> None:
         """Write the table of what is answered, whole or not at all; `OSError` as `open`."""
-        self._export(self._table, self._described, self._rows())
+        values = (row.values for row in self.rows())
+        if self._numbered:
+            values = ([i, *each] for i, each in enumerate(values))
+        self._export(self._table, self._described, values)
 
-    def _rows(self) -> Iterator[list[Any]]:
+    def rows(self) -> Iterator[Row]:
+        """Yield the rows of what is answered, in order."""
         assert self.file is not None
         with self.file.open("rb") as lines:
-            for i, line in enumerate(islice(lines, 1, 1 + self.tally.count)):
-                values = msgspec.json.decode(line, type=_RowLine).values
-                yield [i, *values] if self._numbered else values
+            for line in islice(lines, 1, 1 + self.tally.count):
+                yield msgspec.json.decode(line, type=_RowLine)
 
     def _line(self, question: bytes, payload: bytes, seconds: float) -> tuple[bytes, _Outcome]:
         row = self.row(payload)
@@ -326,7 +316,6 @@ class TableLines(Run):
                 "is it of another batch?",
                 field=RESUME,
             )
-        self.known(row)
         return _Outcome(row.status, row.error)
 
 

@@ -108,7 +108,7 @@ def batch(
             robot=own.robot,
             folder=Path() if requests == "-" else Path(requests).parent,
             explain=explain,
-            columns=sink.columns,
+            brief=is_table,
         )
         if export and isinstance(sink, bulk.TableLines):
             with writing_answers(file):

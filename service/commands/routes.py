@@ -202,7 +202,6 @@ def _many(
         workers=workers,
         robot=own.robot,
         explain=False if wanted.unexplained else None,
-        columns=sink.columns,
         kind=wire.ROUTE,
     )
     answer_rest(routes, answers, sink, file, "planning routes", "routes")
@@ -250,11 +249,8 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             for row in csv.DictReader(stream):
                 yield {name: value or None for name, value in row.items()}
     else:
-        names = [column.name for column in bulk.route_columns()]
+        columns = bulk.route_columns()
+        names = [column.name for column in columns[1:]]
         with file.open("rb") as lines:
             for line in lines:
-                told = bulk.row_of(
-                    wire.Answer(line, wire.Format.JSON.value), wire.Format.JSON, names
-                ).payload
-                values = msgspec.msgpack.decode(told, type=bulk.Row).values
-                yield dict(zip(names[1:], values, strict=True))
+                yield dict(zip(names, bulk.row_of(line, columns).values, strict=True))

@@ -104,8 +104,9 @@ def sweep(
     tables.write_alone(table, folder)
     with writing_answers(table):
         sink = sweeping.PointRows(request, design, seed or 0, table, resume, *own)
-    ask = sweeping.asking(sink.count - sink.tally.count, parallel.workers, own.robot, parallel.dask)
-    answer_rest(sink, ask, sink, table, f"sweeping {stance}", "points")
+    left = design.count - sink.tally.count
+    ask = sweeping.asking(left, parallel.workers, own.robot, parallel.dask)
+    answer_rest(design, ask, sink, table, f"sweeping {stance}", "points")
     try:
         result = sweeping.with_borders(design, sink.points, own.robot, tolerance)
     except processes.Interrupted:

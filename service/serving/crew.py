@@ -7,7 +7,7 @@ import time
 from multiprocessing.connection import Connection
 from typing import Final, Literal
 
-from planner import Lane, Make, Station, ending_in_words, resident
+from planner import Lane, Make, Station, resident
 from service.processes import Job
 from service.replies import ProcessHealth
 from service.serving.question import Question
@@ -33,13 +33,12 @@ LONGEST_REST: Final = 30.0
 GROWN: Final = 700 * 2**20
 """Resident memory of a process that is replaced when it has nothing to do [bytes]."""
 
-LAST_MOMENT: Final = 0.2
-"""Longest time between the end of a process's pipes and its own [s]."""
-
 STREAMS_LANES: Final = 2
 """Of the process that has the streams: one for set-points, one for what else is short."""
 
 SET_POINTS_LANE: Final = 0
+
+Purpose = Literal["questions", "streams", "spare"]
 
 
 class Crew:
@@ -73,54 +72,54 @@ class Crew:
         self.rests_until = 0.0
         self.stillborn = 0
         self.start = 0.0
-        self._streams: Station[Job, Answer] | None = None
-        self._spare: Station[Job, Answer] | None = None
+        self._purposes: dict[Station[Job, Answer], Purpose] = {}
         self._starting: dict[Station[Job, Answer], float] = {}
 
     @property
     def stations(self) -> list[Station[Job, Answer]]:
         """The processes."""
-        at_work = dict.fromkeys(lane.station for lane in self.work)
-        return [*at_work] if self._spare is None else [*at_work, self._spare]
+        return list(self._purposes)
 
     @property
     def pipes(self) -> dict[Connection, Lane[Job, Answer]]:
         """The lanes of all processes, by their pipes."""
-        return {lane.pipe: lane for station in self.stations for lane in station.lanes}
+        return {lane.pipe: lane for station in self._purposes for lane in station.lanes}
 
     @property
     def up(self) -> bool:
         """Whether questions of all kinds can be answered."""
-        return self._streams is not None and self._streams.ready and bool(self._answering())
+        return bool(self._ready("streams") and self._ready("questions"))
 
-    def _answering(self) -> list[Station[Job, Answer]]:
-        """Return the processes that answer questions and are ready."""
-        at_work = dict.fromkeys(lane.station for lane in self.work)
-        return [each for each in at_work if each.ready and each is not self._streams]
+    def _all(self, purpose: Purpose) -> list[Station[Job, Answer]]:
+        return [each for each, own in self._purposes.items() if own == purpose]
+
+    def _ready(self, purpose: Purpose) -> list[Station[Job, Answer]]:
+        return [each for each in self._all(purpose) if each.ready]
 
     def hire(self) -> None:
         """Fill places that are empty: with the one that is ready for that, or a new process.
 
         Where the system refuses one, none is started for a while.
         """
+        wanted: list[Purpose] = [] if self._all("streams") else ["streams"]
+        wanted += ["questions"] * (self.workers - len(self._all("questions")))
         try:
-            if self._streams is None and (station := self._next()):
-                self._streams = station
-                self.work |= dict.fromkeys(station.lanes)
-            has = len({lane.station for lane in self.work if not self.has_streams(lane)})
-            for _ in range(self.workers - has):
-                if station := self._next():
-                    self.work[station.lanes[0]] = None
-            if self._spare is None and self.up and len(self._answering()) == self.workers:
-                self._spare = self._started()
+            for purpose in wanted:
+                spare = self._all("spare")
+                if station := spare[0] if spare else self._started():
+                    self.put(station, purpose)
+            all_ready = self.up and len(self._ready("questions")) == self.workers
+            if all_ready and not self._all("spare") and (station := self._started()):
+                self.put(station, "spare")
         except OSError as error:
             rest = self._rest()
             log.warning("no process can be started, again in %g s: %s", rest, error)
 
-    def _next(self) -> Station[Job, Answer] | None:
-        """Return a process for an empty place; None while none is to be started."""
-        spare, self._spare = self._spare, None
-        return spare or self._started()
+    def put(self, station: Station[Job, Answer], purpose: Purpose) -> None:
+        """Let a process be for something from now on."""
+        self._purposes[station] = purpose
+        lanes: dict[Purpose, int] = {"streams": STREAMS_LANES, "questions": 1, "spare": 0}
+        self.work |= dict.fromkeys(station.lanes[: lanes[purpose]])
 
     def _started(self) -> Station[Job, Answer] | None:
         if time.perf_counter() < self.rests_until:
@@ -144,7 +143,7 @@ class Crew:
 
     def has_streams(self, lane: Lane[Job, Answer]) -> bool:
         """Whether a lane is of the process that has the streams."""
-        return lane.station is self._streams
+        return self._purposes.get(lane.station) == "streams"
 
     def is_for_set_points(self, lane: Lane[Job, Answer]) -> bool:
         """Whether a lane is kept for set-points."""
@@ -163,7 +162,7 @@ class Crew:
         """Whether a question that may take long leaves a process that is ready to the others."""
         asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
         dear = sum(each is not None and each.dear for each in asked)
-        return dear < (1 if self.workers == 1 else len(self._answering()) - 1)
+        return dear < (1 if self.workers == 1 else len(self._ready("questions")) - 1)
 
     def ends(self, lane: Lane[Job, Answer]) -> tuple[float, float]:
         """Return when the question that a lane works on, and then its process, are given up."""
@@ -191,16 +190,13 @@ class Crew:
         """
         asked = [self.work.pop(lane, None) for lane in station.lanes]
         self._starting.pop(station, None)
-        if station is self._streams:
-            self._streams = None
-        if station is self._spare:
-            self._spare = None
+        del self._purposes[station]
         if station.ready:
             self.stillborn = 0
         else:
             self._rest()
         left = [each for each in asked if each is not None and not each.replied]
-        return ending_in_words(station.kill(LAST_MOMENT if dead else 0.0)), left
+        return station.kill(dead=dead), left
 
     def left(self) -> list[Question]:
         """Return the questions in work that nobody has replied to."""
@@ -211,21 +207,16 @@ class Crew:
         for station in self.stations:
             station.kill()
         self.work.clear()
-        self._streams = self._spare = None
-
-    def _purpose(self, station: Station[Job, Answer]) -> Literal["questions", "streams", "spare"]:
-        if station is self._streams:
-            return "streams"
-        return "spare" if station is self._spare else "questions"
+        self._purposes.clear()
 
     def states(self) -> list[ProcessHealth]:
         """Return what each process does."""
         found = []
-        for station in self.stations:
+        for station, purpose in self._purposes.items():
             busy = any(self.work.get(lane) is not None for lane in station.lanes)
             state = ProcessHealth(
                 pid=station.process.pid,
-                purpose=self._purpose(station),
+                purpose=purpose,
                 state="starting" if not station.ready else "working" if busy else "idle",
                 resident=resident(station.process.pid),
             )

@@ -24,22 +24,14 @@ import zenoh
 from hand_models.base import CruxError
 from planner import DeadlineError, Lane, Station
 from service.processes import Job
-from service.serving.costs import Costs
 from service.serving.crew import Crew
 from service.serving.mail import Replies, Sender, reply_to
 from service.serving.names import Names
 from service.serving.question import Question, client_of, take
 from service.serving.shares import Shares
-from service.serving.waiting import Kind, Waiting
+from service.serving.waiting import Costs, Kind, Waiting
 from service.serving.watch import State, Watch
-from service.wire import (
-    PLAN,
-    STREAM,
-    Answer,
-    Format,
-    LostError,
-    encode_error,
-)
+from service.wire import PLAN, STREAM, Answer, Format, LostError, encode_error
 
 __all__ = ["Dispatcher"]
 
@@ -94,8 +86,8 @@ class Dispatcher:
         self._crew, self._seconds, self._inquire = crew, seconds, inquire
         self.watch = Watch(robot, self._state)
         self._replies = Replies(self.watch)
-        self._costs = Costs()
         self._names, self._shares = Names(), Shares()
+        self._costs = Costs(self._shares)
         self._waiting = Waiting(self._shares)
         self._started = threading.Event()
         self._stops_at: float | None = None
@@ -295,7 +287,7 @@ class Dispatcher:
         question.begun = time.perf_counter()
         self._crew.work[lane] = question
         rehearsal = question.name == STREAM and not question.rehearsed
-        lane.give(question.job(question.begun, rehearsal), len(question.payload))
+        lane.give(question.job(question.begun, rehearsal))
 
     def _drop(self, client: str, token: bool) -> None:
         names = self._names
@@ -329,10 +321,10 @@ class Dispatcher:
         asked = self._crew.work[lane]
         self._crew.work[lane] = None
         assert asked is not None
-        stance = asked.stance if asked.name == PLAN else None
         cost = done.cost or done.seconds
         self._shares.charge(asked.place, cost)
-        self._costs.took(asked.place, stance, lane.station, cost)
+        if asked.name == PLAN and asked.stance is not None:
+            self._costs.took(asked.stance, lane.station, cost)
         if asked.name == STREAM and not asked.rehearsed and done.good:
             asked.rehearsed = True
             self._put(Kind.DECLARED, asked)
@@ -344,7 +336,7 @@ class Dispatcher:
     def _end_overdue(self) -> None:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
-        for question in self._waiting.overdue(now):
+        for question in self._waiting.remove(lambda each: each.deadline <= now):
             self._replies.refuse(question, DeadlineError(question.seconds, "it was its turn"))
         for lane, asked in list(self._crew.work.items()):
             if asked is None or lane not in self._crew.work:
@@ -356,7 +348,6 @@ class Dispatcher:
                 missing = "there was an answer, and its work was broken off"
                 self._replies.refuse(asked, DeadlineError(asked.seconds, missing))
             if ends[1] <= now:
-                self._costs.took(asked.place, None, None, now - asked.begun)
                 self._shares.ended_process(asked.place, now - asked.begun)
                 self._dismiss(lane.station, "did not stop at a deadline")
 
@@ -365,7 +356,6 @@ class Dispatcher:
     ) -> tuple[str, list[Question]]:
         """End a process, which another replaces; as `Crew.dismiss`."""
         how, left = self._crew.dismiss(station, dead=why is None)
-        self._costs.lost(station)
         self.watch.ended(station.process.pid, why or how)
         return how, left
 

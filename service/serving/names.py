@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections import OrderedDict
-from typing import Any, Final
+from typing import Final
+
+from cachetools import LRUCache, TTLCache
 
 __all__ = ["SHARED", "Names", "digest"]
 
@@ -19,7 +20,7 @@ SHARED: Final = ""
 """The place of those whom nothing tells apart."""
 
 KEPT: Final = 4096
-"""Names whose digests are remembered, the last to be asked for."""
+"""Names whose digests are remembered, those that were asked about last."""
 
 PROOFS: Final = 16
 """Digests of one name: a session may have several clients."""
@@ -44,8 +45,9 @@ class Names:
 
     def __init__(self) -> None:
         self.linked: set[str] = set()
-        self._proofs: OrderedDict[str, set[bytes]] = OrderedDict()
-        self._asked: OrderedDict[str, float] = OrderedDict()
+        self._proofs: LRUCache[str, set[bytes]] = LRUCache(KEPT)
+        # made-up names are to push out no proven ones
+        self._asked: TTLCache[str, bool] = TTLCache(KEPT, PAUSE, timer=time.perf_counter)
 
     def place(self, name: str, secret: bytes) -> str:
         """Return the place of a query that carries a name, and perhaps a secret."""
@@ -58,21 +60,16 @@ class Names:
         """Whether the session of a name is to be asked for its digest now."""
         if not name or not secret or digest(secret) in self._proofs.get(name, ()):
             return False
-        now = time.perf_counter()
-        if now - self._asked.pop(name, -PAUSE) < PAUSE:
-            self._asked[name] = now
+        if name in self._asked:
             return False
-        self._asked[name] = now
-        _forget(self._asked)
+        self._asked[name] = True
         return True
 
     def proven(self, name: str, proof: bytes) -> None:
         """Take a digest that the session of a name has told."""
-        proofs = self._proofs.pop(name, set())
-        self._proofs[name] = proofs
+        proofs = self._proofs.setdefault(name, set())
         if len(proofs) < PROOFS:
             proofs.add(proof)
-        _forget(self._proofs)
 
     def has_proof(self, name: str) -> bool:
         """Whether the session of a name has told a digest."""
@@ -83,8 +80,3 @@ class Names:
         self.linked.discard(name)
         self._proofs.pop(name, None)
         self._asked.pop(name, None)
-
-
-def _forget(kept: OrderedDict[str, Any]) -> None:
-    if len(kept) > KEPT:
-        kept.popitem(last=False)

@@ -7,15 +7,24 @@ for is not saved up.
 
 from __future__ import annotations
 
+import math
+import statistics
 import time
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 __all__ = ["Shares"]
 
 KEPT: Final = 4096
 """Places that are remembered, those that asked last."""
+
+LAST: Final = 20
+"""Costs that are remembered of each."""
+
+DEAR: Final = 0.1
+"""A place whose questions cost more leaves the last process to others [s]."""
 
 START: Final = 3.0
 """How long a process takes to start, before any has been seen to [s]."""
@@ -26,6 +35,28 @@ starting takes no more than a fifth of a core from the others."""
 
 ACTIVE: Final = 10.0
 """How long after its last question a place counts as one that others are to leave time to [s]."""
+
+
+@dataclass
+class _Place:
+    """What is remembered of a place: times in s, on the clock of `time.perf_counter`.
+
+    Attributes
+    ----------
+    spent : float
+        The processes' time that it has had.
+    costs : deque of float
+        Processor times of its last answers.
+    asked : float
+        When it asked last.
+    held_until : float
+        When it need no longer wait for having ended a process.
+    """
+
+    spent: float
+    costs: deque[float] = field(default_factory=lambda: deque(maxlen=LAST))
+    asked: float = -math.inf
+    held_until: float = -math.inf
 
 
 class Shares:
@@ -39,50 +70,72 @@ class Shares:
 
     def __init__(self) -> None:
         self.start = START
-        self._spent: OrderedDict[str, float] = OrderedDict()
-        self._asked: dict[str, float] = {}
-        self._held: dict[str, float] = {}
+        self._places: OrderedDict[str, _Place] = OrderedDict()
         self._level = 0.0
+
+    def _of(self, place: str) -> _Place:
+        """Return what is remembered of a place, from now on if nothing is."""
+        found = self._places.setdefault(place, _Place(self._level))
+        if len(self._places) > KEPT:
+            self._places.popitem(last=False)
+        return found
 
     def asks(self, place: str) -> None:
         """Take note of a question."""
-        self._spent[place] = max(self._spent.pop(place, self._level), self._level)
-        self._asked[place] = time.perf_counter()
-        while len(self._spent) > KEPT:
-            oldest, _ = self._spent.popitem(last=False)
-            self._asked.pop(oldest, None)
+        known = self._of(place)
+        known.spent = max(known.spent, self._level)
+        known.asked = time.perf_counter()
+        self._places.move_to_end(place)
 
     def charge(self, place: str, seconds: float) -> None:
-        """Take off time that a place's question has cost [s]."""
-        self._spent[place] = self._spent.get(place, self._level) + seconds
+        """Take off time that an answer to a place has cost [s]."""
+        known = self._of(place)
+        known.spent += seconds
+        known.costs.append(seconds)
 
     def ended_process(self, place: str, seconds: float) -> None:
-        """Take off time of a question that has ended its process, and of the start of another."""
-        self.charge(place, seconds + self.start)
-        self._held[place] = time.perf_counter() + PAYS * self.start
+        """Charge a question that has ended its process, and the start of another.
+
+        Parameters
+        ----------
+        place : str
+        seconds : float
+            How long its process has worked on it [s].
+        """
+        self.charge(place, seconds)
+        known = self._of(place)
+        known.spent += self.start
+        known.held_until = time.perf_counter() + PAYS * self.start
 
     def gone(self, place: str) -> None:
         """Take note that a place will not ask again soon."""
-        self._asked.pop(place, None)
-        self._held.pop(place, None)
+        if known := self._places.get(place):
+            known.asked = known.held_until = -math.inf
 
     def next(self, places: Sequence[str]) -> str | None:
         """Return which of some places with a question is next, the first of equals."""
         if not places:
             return None
-        place = min(places, key=lambda each: self._spent.get(each, self._level))
-        self._level = max(self._level, self._spent.get(place, self._level))
+        place = min(places, key=self._spent)
+        self._level = max(self._level, self._spent(place))
         return place
+
+    def _spent(self, place: str) -> float:
+        known = self._places.get(place)
+        return self._level if known is None else known.spent
 
     def waits(self, place: str) -> float:
         """Return how long a place has to wait because it has ended a process [s]."""
-        until = self._held.get(place)
-        if until is None:
+        known, now = self._places.get(place), time.perf_counter()
+        if known is None or known.held_until <= now:
             return 0.0
-        now = time.perf_counter()
-        others = [at for each, at in self._asked.items() if each != place]
+        others = (each.asked for name, each in self._places.items() if name != place)
         # where nobody else asks, nobody is kept waiting
-        until = min(until, max(others, default=0.0) + ACTIVE)
-        if until <= now:
-            del self._held[place]
-        return max(until - now, 0.0)
+        return max(min(known.held_until, max(others, default=-math.inf) + ACTIVE) - now, 0.0)
+
+    def is_dear(self, place: str) -> bool:
+        """Whether a place's questions cost much."""
+        known = self._places.get(place)
+        if known is None or not known.costs:
+            return False
+        return statistics.median(known.costs) > DEAR

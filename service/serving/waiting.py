@@ -1,18 +1,29 @@
-"""Questions that wait: in queues by their kind, in which each client has its turn."""
+"""Questions that wait: in queues by their kind, in which each client has its turn.
+
+In which queue a question waits is decided by what questions about its stance, and of its client,
+have cost so far. That is only an expectation, and never decides whether one is answered. It goes by
+the median of the last costs, in processor time: neither one costly question nor a loaded machine
+decides it, and who asks for less has the shorter way again.
+"""
 
 from __future__ import annotations
 
 import math
+import statistics
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from enum import Enum
 from itertools import chain
 from typing import Final
+from weakref import WeakSet
+
+from cachetools import LRUCache
 
 from service.serving.question import LARGE, Question
-from service.serving.shares import Shares
+from service.serving.shares import DEAR, LAST, Shares
+from service.wire import PLAN, SET_POINTS
 
-__all__ = ["FairQueue", "Kind", "Waiting"]
+__all__ = ["Costs", "Kind", "Waiting"]
 
 EACH: Final = 32
 """Questions of one client that wait in a queue; further ones are told to come again."""
@@ -26,6 +37,15 @@ HELD: Final = 2**28
 
 SHARE: Final = 2**26
 """Bytes of those of one place, unless it is one question."""
+
+KEPT: Final = 4096
+"""Stances that are remembered, those that were asked about last."""
+
+SHORT: Final = 0.05
+"""A question about a known stance that costs no more may use the lane that nothing delays [s]."""
+
+SOON: Final = 0.3
+"""So may a stance cost when it was new [s]: the lane's process has to make it known there, too."""
 
 
 class Kind(Enum):
@@ -42,92 +62,68 @@ class Kind(Enum):
     """That may take long."""
 
 
-class FairQueue:
-    """Questions by place, and there by client: first in, first out among a client's.
+class _Stance:
+    """Which processes know a stance, and what it cost where it was new and since [s]."""
 
-    The place that has had least of the processes' time is next, and there clients have their turns.
+    def __init__(self) -> None:
+        self.known_to: WeakSet[object] = WeakSet()
+        self.new: deque[float] = deque(maxlen=LAST)
+        self.again: deque[float] = deque(maxlen=LAST)
+
+
+class Costs:
+    """What has been seen of stances, by their hashes.
 
     Parameters
     ----------
     shares : Shares
-    holds : bool
-        Whether places wait that have ended a process.
+        Has what questions of a place have cost.
     """
 
-    def __init__(self, shares: Shares, *, holds: bool) -> None:
-        self._shares, self._holds = shares, holds
-        self._at: dict[str, dict[str, deque[Question]]] = {}
+    def __init__(self, shares: Shares) -> None:
+        self._shares = shares
+        self._stances: LRUCache[int | None, _Stance] = LRUCache(KEPT)
 
-    def __iter__(self) -> Iterator[Question]:
-        return chain.from_iterable(self._all(place) for place in self._at)
+    def took(self, stance: int, process: object, seconds: float) -> None:
+        """Remember what an answer about a stance has cost in a process [s]."""
+        seen = self._stances.setdefault(stance, _Stance())
+        (seen.again if process in seen.known_to else seen.new).append(seconds)
+        seen.known_to.add(process)
 
-    def __len__(self) -> int:
-        return sum(self._size(place) for place in self._at)
+    def kind(self, question: Question) -> Kind:
+        """Return the queue in which a question is to wait."""
+        if question.name == SET_POINTS:
+            return Kind.SET_POINTS
+        if question.dear:
+            return Kind.DEAR
+        if question.name == PLAN and self.is_short(question.stance):
+            return Kind.SHORT
+        dear = self._shares.is_dear(question.place) and not self._is_cheap(question.stance)
+        return Kind.DEAR if dear else Kind.OTHER
 
-    def _all(self, place: str) -> Iterator[Question]:
-        return chain.from_iterable(self._at[place].values())
+    def is_short(self, stance: int | None) -> bool:
+        """Whether a question about a stance is sure to be answered soon."""
+        seen = self._stances.get(stance)
+        if seen is None or not seen.again:
+            return False
+        return statistics.median(seen.again) <= SHORT and statistics.median_low(seen.new) <= SOON
 
-    def _size(self, place: str) -> int:
-        return sum(map(len, self._at.get(place, {}).values()))
+    def _is_cheap(self, stance: int | None) -> bool:
+        """Whether questions about a stance have cost little so far."""
+        seen = self._stances.get(stance)
+        return seen is not None and statistics.median(seen.again or seen.new) <= DEAR
 
-    def put(self, question: Question) -> Question | None:
-        """Let a question wait; return the one that has no room then: this one, or another's."""
-        own = self._at.get(question.place, {}).get(question.client, ())
-        if len(own) >= EACH:
-            return question
-        gone = None
-        if len(self) >= ALL:
-            most = max(self._at, key=self._size)
-            if self._size(most) <= self._size(question.place) + 1:
-                return question
-            gone = max(self._at[most].values(), key=len)[-1]
-            self.remove(lambda each: each is gone)
-        clients = self._at.setdefault(question.place, {})
-        clients.setdefault(question.client, deque()).append(question)
-        return gone
-
-    def take(self) -> Question | None:
-        """Return the next question, if there is one that need not wait.
-
-        Its place and its client come last among equals from then on.
-        """
-        places = [place for place in self._at if not self._waits(place)]
-        place = self._shares.next(places)
-        if place is None:
-            return None
-        clients = self._at.pop(place)
-        client = next(iter(clients))
-        questions = clients.pop(client)
-        question = questions.popleft()
-        if questions:
-            clients[client] = questions
-        if clients:
-            self._at[place] = clients
-        return question
-
-    def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
-        """Take some questions out, wherever they wait; return them."""
-        gone = [question for question in self if unwanted(question)]
-        for question in gone:
-            clients = self._at[question.place]
-            clients[question.client].remove(question)
-            if not clients[question.client]:
-                del clients[question.client]
-            if not clients:
-                del self._at[question.place]
-        return gone
-
-    def held(self) -> float:
-        """Return how long it is until a place that has to wait is next [s]; infinity without."""
-        waits = map(self._waits, self._at)
-        return min((each for each in waits if each > 0.0), default=math.inf)
-
-    def _waits(self, place: str) -> float:
-        return self._shares.waits(place) if self._holds else 0.0
+    def knows(self, process: object, stance: int | None) -> bool:
+        """Whether a process knows a stance."""
+        seen = self._stances.get(stance)
+        return seen is not None and process in seen.known_to
 
 
 class Waiting:
-    """All questions that wait.
+    """All questions that wait, by kind.
+
+    The place that has had least of the processes' time is next, and there clients have their turns;
+    first in, first out among a client's.
 
     Parameters
     ----------
@@ -135,11 +131,8 @@ class Waiting:
     """
 
     def __init__(self, shares: Shares) -> None:
-        self._queues = {
-            # set-points end no process, and others are not to end with one
-            kind: FairQueue(shares, holds=kind is not Kind.SET_POINTS)
-            for kind in Kind
-        }
+        self._shares = shares
+        self._queues: dict[Kind, list[Question]] = {kind: [] for kind in Kind}
         self._turns = deque([Kind.SHORT, Kind.OTHER, Kind.DEAR])
 
     def __iter__(self) -> Iterator[Question]:
@@ -165,15 +158,44 @@ class Waiting:
         return not held or ((not own or own + size <= SHARE) and held.total() + size <= HELD)
 
     def put(self, kind: Kind, question: Question) -> Question | None:
-        """Let a question wait; return the one that has no room then, if any."""
-        return self._queues[kind].put(question) if self._fits(question) else question
+        """Let a question wait; return the one that has no room then: this one, or another's."""
+        queue = self._queues[kind]
+        clients = Counter((each.place, each.client) for each in queue)
+        if clients[question.place, question.client] >= EACH or not self._fits(question):
+            return question
+        removed = None
+        if len(queue) >= ALL:
+            places = Counter(each.place for each in queue)
+            most, count = places.most_common(1)[0]
+            if count <= places[question.place] + 1:
+                return question
+            _, client = max((each for each in clients if each[0] == most), key=clients.__getitem__)
+            own = [each for each in queue if (each.place, each.client) == (most, client)]
+            removed = own[-1]
+            queue.remove(removed)
+        queue.append(question)
+        return removed
 
     def take(self, *kinds: Kind) -> Question | None:
-        """Return the next question of the first of some kinds that has one."""
+        """Return the next question of the first of some kinds that has one that need not wait.
+
+        Its place and its client come last among equals of its queue from then on.
+        """
         for kind in kinds:
-            if (question := self._queues[kind].take()) is not None:
+            queue = self._queues[kind]
+            places = dict.fromkeys(each.place for each in queue)
+            place = self._shares.next([each for each in places if not self._waits(kind, each)])
+            if place is not None:
+                question = next(each for each in queue if each.place == place)
+                queue.remove(question)
+                queue.sort(key=lambda each: _turn_after(each, question))
                 return question
         return None
+
+    def _waits(self, kind: Kind, place: str) -> float:
+        """Return how long a place has to wait in a queue because it has ended a process [s]."""
+        # set-points end no process, and others are not to end with one
+        return 0.0 if kind is Kind.SET_POINTS else self._shares.waits(place)
 
     def next(self, *, dear: bool) -> Question | None:
         """Return the next question of those kinds that have their turns one after another.
@@ -194,26 +216,33 @@ class Waiting:
                 return question
         return None
 
+    def take_out(self, wanted: Callable[[Question], bool]) -> list[tuple[Kind, Question]]:
+        """Take some questions out, wherever they wait; return them with their queues."""
+        found = [(kind, each) for kind, own in self._queues.items() for each in own if wanted(each)]
+        for kind, question in found:
+            self._queues[kind].remove(question)
+        return found
+
     def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
         """Take some questions out, wherever they wait; return them."""
-        return [each for queue in self._queues.values() for each in queue.remove(unwanted)]
-
-    def take_out(self, wanted: Callable[[Question], bool]) -> list[tuple[Kind, Question]]:
-        """Take some questions out of their queues; return them with these."""
-        return [
-            (kind, each) for kind, queue in self._queues.items() for each in queue.remove(wanted)
-        ]
+        return [question for _, question in self.take_out(unwanted)]
 
     def held(self) -> float:
         """Return how long it is until a place that has to wait is next [s]; infinity without."""
-        return min(queue.held() for queue in self._queues.values())
+        waits = (
+            self._waits(kind, place)
+            for kind, queue in self._queues.items()
+            for place in {each.place for each in queue}
+        )
+        return min((each for each in waits if each > 0.0), default=math.inf)
 
     def first_deadline(self) -> float:
         """Return when the first question's time is over; infinity where none waits."""
         return min((each.deadline for each in self), default=math.inf)
 
-    def overdue(self, now: float) -> list[Question]:
-        """Take out the questions whose time is over; return them."""
-        if self.first_deadline() > now:
-            return []
-        return self.remove(lambda each: each.deadline <= now)
+
+def _turn_after(question: Question, taken: Question) -> int:
+    """Return when a question has its turn after one that is taken, the first of equals before."""
+    if question.place != taken.place:
+        return 0
+    return 1 if question.client != taken.client else 2

@@ -112,6 +112,17 @@ class Design:
         return design
 
     @property
+    def count(self) -> int:
+        """How many points there are."""
+        return len(self.points)
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Yield the encoded request at each point."""
+        return map(self.payload, self.points)
+
+    questions = __iter__
+
+    @property
     def labels(self) -> tuple[str, ...]:
         """Paths with their units, as ``load.mass [kg]``."""
         return tuple(

@@ -119,28 +119,22 @@ class Row(msgspec.Struct, frozen=True):
         return [*point, self.status, self.utilisation, factor, *limit, self.complaint]
 
     @classmethod
-    def read(cls, design: Design, point: Point, cells: Sequence[Any]) -> Row:
-        """Return the row that was written as cells; an error's field is in its message then.
-
-        Raises
-        ------
-        ValueError
-            If they are no row's.
-        """
-        names = [column.name for column in COLUMNS]
-        known = dict(zip(names, cells[len(point) :], strict=True))
-        given: dict[str, Any] = {
-            key: value for key, value in known.items() if value not in (None, "")
-        }
-        if given.get("load_factor") == "inf":
-            given = given | {"load_factor": None, "load_factor_unbounded": True}
-        if "limit" in given:
-            given["limiting"] = {part: known[part] or None for part in LIMIT}
-        if given.pop("error", None) and known["status"] == "error":
-            kind, _, message = known["error"].partition(": ")
-            given["error"] = {"kind": kind, "message": message, "field": None}
-        row = msgspec.convert(given, cls, strict=False)
-        return msgspec.structs.replace(row, point=point, cap=design.cap(point))
+    def read(cls, design: Design, point: Point, line: bulk.Row) -> Row:
+        """Return the row of a point that was written as a line."""
+        names = (column.name for column in COLUMNS)
+        known = dict(zip(names, line.values[len(point) :], strict=True))
+        factor, unbounded = known["load_factor"], known["load_factor"] == "inf"
+        limit = {part: known[part] for part in LIMIT}
+        return cls(
+            point,
+            known["status"],
+            known["utilisation"],
+            None if unbounded else factor,
+            unbounded,
+            msgspec.convert(limit, LimitName) if limit["limit"] else None,
+            line.error,
+            design.cap(point),
+        )
 
 
 def asking(
@@ -184,7 +178,7 @@ def columns_of(design: Design) -> tuple[Column, ...]:
 
 
 class PointRows(TableLines):
-    """Rows of points, beside a table that is written of them, and the questions that they answer.
+    """Rows of points, beside a table that is written of them.
 
     Parameters
     ----------
@@ -198,13 +192,6 @@ class PointRows(TableLines):
         Whether rows that are there are kept.
     hand : ParameterTable or None
     robot : RobotFile or None
-
-    Attributes
-    ----------
-    count : int
-        How many points there are.
-    points : list of Row
-        Those of the points that are answered.
 
     Raises
     ------
@@ -222,35 +209,22 @@ class PointRows(TableLines):
         hand: ParameterTable | None,
         robot: RobotFile | None,
     ) -> None:
-        columns, self._design, self.count = columns_of(design), design, len(design.points)
-        count = f"{self.count} of seed {seed}" if design.sampled else "none"
+        columns, self._design = columns_of(design), design
         about = {
             "stance": bulk.digest_of(msgspec.json.encode(request)),
-            "--samples": count,
+            "--samples": f"{design.count} of seed {seed}" if design.sampled else "none",
             "--vary": " ".join(each.text(sampled=design.sampled) for each in design.variations),
         }
         header = bulk.new_header(columns, False, hand, robot, about)
-        self.points: list[Row] = []
-        super().__init__(path, columns, header, resume, self)
-
-    def __iter__(self) -> Iterator[bytes]:
-        """Yield the encoded request at each point."""
-        return map(self._design.payload, self._design.points)
-
-    questions = __iter__
-
-    @property
-    def columns(self) -> None:
-        """None: whole replies are read."""
-        return None
+        super().__init__(path, columns, header, resume, design)
 
     def row(self, payload: bytes) -> bulk.Row:
         """Return the cells of the point that is next."""
-        row = row_of(self._design, self._design.points[len(self.points)], payload)
-        self.points.append(row)
+        row = row_of(self._design, self._design.points[self.tally.count], payload)
         return bulk.Row(row.cells, None if row.error else row.status, row.error)
 
-    def known(self, row: bulk.Row) -> None:
-        """Take note of a point that is answered already."""
-        point = self._design.points[len(self.points)]
-        self.points.append(Row.read(self._design, point, row.values))
+    @property
+    def points(self) -> list[Row]:
+        """Rows of the points that are answered."""
+        pairs = zip(self._design.points, self.rows(), strict=False)
+        return [Row.read(self._design, point, line) for point, line in pairs]

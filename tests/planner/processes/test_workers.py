@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hand_models.base import CruxError
-from planner.processes.child_processes import THREADS
+from planner.processes.stations import THREADS
 from planner.processes.workers import NO_GUARD, Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE
@@ -108,15 +108,6 @@ def test_all_processes_are_ready_once_they_are_waited_for():
         assert workers.hands == {}
 
 
-def test_who_stops_listening_leaves_no_work_behind(nappers):
-    for _ in nappers.each([0.0, *[2.0 * PATIENCE] * 5], lambda _: 0):
-        busy = [lane.station.process for lane, hand in nappers.hands.items() if hand]
-        break
-    assert busy
-    assert {process.exitcode for process in busy} == {-9}
-    assert len(done(nappers, [0.0, 0.0])) == 2
-
-
 def test_where_no_process_starts_that_is_told_and_nothing_hangs():
     with Workers(workshop.nothing, 2) as workers:
         assert not_started(workers) == KILLED
@@ -158,46 +149,6 @@ def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monk
     monkeypatch.setattr(multiprocessing.context.SpawnProcess, "start", killed)
     with Workers(partial(workshop.squares, "x" * 5_000_000), 2) as workers:
         assert not_started(workers) == KILLED
-
-
-def test_this_process_works_while_others_start_and_where_none_does():
-    with Workers(workshop.sleepers, 2) as workers:
-        # well before any is ready
-        found = dict(workers.each(list(range(5)), lambda item: -item))
-        assert not any(lane.ready for lane in workers.hands)
-        started = processes(workers)
-    assert found == {i: -i for i in range(5)}
-    # what is not ready is not waited for
-    assert [process.exitcode for process in started] == [-9, -9]
-    with Workers(workshop.nothing, 2) as workers:
-        found = {}
-        for i, result in workers.each([0.0] * 20, workshop.nap_here):
-            found[i] = result
-            for process in processes(workers):
-                process.join(PATIENCE)
-        assert workers.stillborn == 2
-        assert workers.hands == {}
-    assert set(found.values()) == {os.getpid()}
-    assert sorted(found) == list(range(20))
-
-
-def test_this_process_and_others_share_the_work(nappers):
-    # one of them at least is ready
-    done(nappers, [0.0])
-    found = dict(nappers.each([0.02] * 60, workshop.nap_here))
-    assert sorted(found) == list(range(60))
-    assert os.getpid() in found.values()
-    assert len(set(found.values())) >= 2
-
-
-def test_an_item_that_kills_processes_spares_this_one(tmp_path):
-    here = os.getpid()
-    with Workers(partial(workshop.squares, str(tmp_path / "log")), 1) as workers:
-        assert done(workers, [2]) == {0: 4}
-        found = dict(workers.each([13, 2, 3], lambda number: (here, number)))
-    assert isinstance(found[0], Lost)
-    assert found[1] in (4, (here, 2))
-    assert found[2] in (9, (here, 3))
 
 
 def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):

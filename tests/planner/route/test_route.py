@@ -25,6 +25,7 @@ from service.answering import questions
 from service.commands.cli import run
 from service.commands.stances import bundled, read_request, read_route
 from service.tables import console, print_route
+from tests.suite.helpers import workshop
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -229,6 +230,12 @@ def test_a_killed_process_costs_no_stage(route, result):
         [p.utilisation for p in result.plans],
         rtol=1e-6,
     )
+
+
+def test_where_no_process_starts_all_is_planned_here(route, result, monkeypatch):
+    monkeypatch.setattr("planner.route.evaluation._planning", workshop.nothing)
+    alone = evaluate(route, workers=2)
+    assert [p.utilisation for p in alone.plans] == [p.utilisation for p in result.plans]
 
 
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])

@@ -93,7 +93,7 @@ def test_a_worker_that_is_killed_is_replaced(client):
 
 
 def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
-    monkeypatch.setattr("service.bulk.dask_pools.LOOK", 0.05)
+    monkeypatch.setattr("service.bulk.pools.LOOK", 0.05)
     asked = encoded([wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(60)])
     told = []
     cluster = distributed.LocalCluster(
@@ -106,7 +106,7 @@ def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
                 told.append(record.getMessage())
                 cluster.scale(1)
 
-        log, hire = logging.getLogger("service.bulk.dask_pools"), Hire()
+        log, hire = logging.getLogger("service.bulk.pools"), Hire()
         log.addHandler(hire)
         try:
             answers = evaluate(asked, client)
@@ -124,7 +124,7 @@ def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
 
 
 def test_no_scheduler_is_told(monkeypatch):
-    monkeypatch.setattr("service.bulk.dask_pools.PATIENCE", 0.5)
+    monkeypatch.setattr("service.bulk.pools.PATIENCE", 0.5)
     with pytest.raises(CruxError, match=r"no Dask scheduler with a worker answers at tcp://"):
         list(evaluate([b"{}"], "tcp://127.0.0.1:9"))
 

@@ -17,9 +17,8 @@ from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
-from service.bulk.chunks import Setting, own_versions
+from service.bulk.chunks import About, Setting, about, grouped, own_versions
 from service.bulk.evaluation import AHEAD, WINDOW
-from service.bulk.grouping import About, about, grouped
 from service.bulk.pools import LARGEST, Here
 from service.requests import PlanRequest
 from service.wire import Format

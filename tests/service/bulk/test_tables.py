@@ -295,7 +295,7 @@ def test_answers_stay_where_no_others_take_their_place(
     name, address, status, told, lines, tmp_path, capfd, monkeypatch
 ):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("service.bulk.dask_pools.PATIENCE", 0.5)
+    monkeypatch.setattr("service.bulk.pools.PATIENCE", 0.5)
     path = tmp_path / name
     path.write_text("answers\n")
     assert run(["batch", str(lines), "-o", str(path), "--dask", address]) == status

@@ -89,11 +89,12 @@ def station(*, ready: bool) -> Any:
 def crew_of(workers: int, ready: int, dear: int) -> Crew:
     """A crew in which some processes are ready, and some of these have what may take long."""
     found = Crew(obedient, workers, MEMORY)
+    found.put(station(ready=True), "streams")
     for i in range(workers):
-        question = SimpleNamespace(dear=True) if i < dear else None
-        found.work[station(ready=i < ready).lanes[0]] = question  # type: ignore[assignment]
-    found._streams = station(ready=True)
-    found.work |= dict.fromkeys(found._streams.lanes)  # type: ignore[union-attr, arg-type]
+        process = station(ready=i < ready)
+        found.put(process, "questions")
+        if i < dear:
+            found.work[process.lanes[0]] = SimpleNamespace(dear=True)  # type: ignore[assignment]
     return found
 
 

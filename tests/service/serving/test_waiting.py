@@ -13,13 +13,14 @@ import pytest
 
 from planner.processes import Lane, Station
 from planner.processes.stations import PART, _send_parts
-from service.serving.costs import LAST, Costs
+from service.processes import Job
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
 from service.serving.names import SHARED, Names, digest
 from service.serving.question import ATTACHED, LARGE, Question, take
-from service.serving.shares import ACTIVE, PAYS, Shares
-from service.serving.waiting import ALL, EACH, HELD, SHARE, FairQueue, Kind, Waiting
+from service.serving.shares import ACTIVE, LAST, PAYS, Shares
+from service.serving.waiting import ALL, EACH, HELD, SHARE, Costs, Kind, Waiting
+from service.wire import Answer
 from tests.suite.helpers.checkout import ROOT
 
 
@@ -60,44 +61,44 @@ def test_one_question_fits_however_large_it_is():
 
 @pytest.mark.parametrize("names", [9, 20, 100])
 def test_however_many_names_one_place_takes_it_leaves_room_to_others(names: int):
-    queue = FairQueue(Shares(), holds=True)
-    refused = []
+    waiting = Waiting(Shares())
     for i in range(names):
-        refused += [queue.put(question("crowd", client=str(i))) for _ in range(EACH)]
-    assert len(queue) == ALL
+        for _ in range(EACH):
+            waiting.put(Kind.OTHER, question("crowd", client=str(i)))
+    assert len(waiting) == ALL
     # each has room, and the newest of those who have most go
     for client in "abcdefgh":
-        gone = [queue.put(question(client)) for _ in range(EACH)]
+        gone = [waiting.put(Kind.OTHER, question(client)) for _ in range(EACH)]
         most = [each for each in gone if each is not None and each.place == client]
-        assert len(queue) == ALL
+        assert len(waiting) == ALL
         assert len(gone) - len(most) >= ALL // 9 - 1
-    places = [each.place for each in queue]
+    places = [each.place for each in waiting]
     assert min(places.count(place) for place in set(places)) >= ALL // 9 - 1
 
 
 def test_a_client_has_so_many_questions_and_no_more():
-    queue = FairQueue(Shares(), holds=True)
-    assert all(queue.put(question("a")) is None for _ in range(EACH))
+    waiting = Waiting(Shares())
+    assert all(waiting.put(Kind.OTHER, question("a")) is None for _ in range(EACH))
     last = question("a")
-    assert queue.put(last) is last
-    assert queue.put(question("b")) is None
+    assert waiting.put(Kind.OTHER, last) is last
+    assert waiting.put(Kind.OTHER, question("b")) is None
 
 
 # Turns --------------------------------------------------------------------------------------------
 
 
-def served(queue: FairQueue, shares: Shares, costs: dict[str, float], count: int) -> list[str]:
+def served(waiting: Waiting, shares: Shares, costs: dict[str, float], count: int) -> list[str]:
     """Places in the order in which they are next, where each has always one more question."""
     found = []
     for place in costs:
         shares.asks(place)
-        queue.put(question(place))
+        waiting.put(Kind.OTHER, question(place))
     for _ in range(count):
-        asked = queue.take()
+        asked = waiting.take(Kind.OTHER)
         assert asked is not None
         shares.charge(asked.place, costs[asked.place])
         shares.asks(asked.place)
-        queue.put(question(asked.place))
+        waiting.put(Kind.OTHER, question(asked.place))
         found.append(asked.place)
     return found
 
@@ -105,27 +106,33 @@ def served(queue: FairQueue, shares: Shares, costs: dict[str, float], count: int
 @pytest.mark.parametrize("ratio", [1, 2, 3, 5, 10, 50])
 def test_places_have_equal_time_and_not_equal_turns(ratio: int):
     shares = Shares()
-    queue = FairQueue(shares, holds=True)
-    found = served(queue, shares, {"short": 0.01, "long": 0.01 * ratio}, 20 * (ratio + 1))
+    costs = {"short": 0.01, "long": 0.01 * ratio}
+    found = served(Waiting(shares), shares, costs, 20 * (ratio + 1))
     assert abs(found.count("long") - 20) <= 1
 
 
 def test_time_that_nobody_asked_for_is_not_saved_up():
     shares = Shares()
-    queue = FairQueue(shares, holds=True)
-    served(queue, shares, {"a": 0.1, "b": 0.1}, 100)
+    waiting = Waiting(shares)
+    served(waiting, shares, {"a": 0.1, "b": 0.1}, 100)
     for place in [place for place in "ab" for _ in range(30)]:
-        queue.put(question(place))
-    found = served(queue, shares, {"new": 0.1, "a": 0.1, "b": 0.1}, 30)
+        waiting.put(Kind.OTHER, question(place))
+    found = served(waiting, shares, {"new": 0.1, "a": 0.1, "b": 0.1}, 30)
     assert abs(found.count("new") - 10) <= 1
 
 
-def test_names_of_one_place_have_their_turns():
-    queue = FairQueue(Shares(), holds=True)
-    for _ in range(3):
+def test_places_and_names_of_one_place_have_their_turns():
+    waiting = Waiting(Shares())
+    for place in ("", "other"):
         for name in "xyz":
-            queue.put(question("", client=name))
-    assert [queue.take().client for _ in range(9)] == list("xyz" * 3)  # type: ignore[union-attr]
+            for i in range(3):
+                waiting.put(Kind.OTHER, question(place, client=name, size=i))
+    found = [waiting.take(Kind.OTHER) for _ in range(18)]
+    assert [each.place for each in found] == ["", "other"] * 9  # type: ignore[union-attr]
+    for place in ("", "other"):
+        own = [each for each in found if each.place == place]  # type: ignore[union-attr]
+        assert [each.client for each in own] == list("xyz" * 3)  # type: ignore[union-attr]
+        assert [len(each.payload) for each in own] == [0] * 3 + [1] * 3 + [2] * 3  # type: ignore[union-attr]
 
 
 class Clock(SimpleNamespace):
@@ -142,27 +149,27 @@ def test_who_ends_a_process_pays_for_the_next_one(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("service.serving.shares.time", clock)
     shares = Shares()
     shares.start = 2.0
-    queue, set_points = FairQueue(shares, holds=True), FairQueue(shares, holds=False)
+    waiting = Waiting(shares)
     shares.asks("killer")
     shares.ended_process("killer", 0.5)
     # alone, nobody is kept waiting for anybody
-    assert queue.put(question("killer")) is None
-    assert queue.take() is not None
+    assert waiting.put(Kind.OTHER, question("killer")) is None
+    assert waiting.take(Kind.OTHER) is not None
     shares.asks("polite")
     shares.ended_process("killer", 0.5)
-    queue.put(question("killer"))
-    set_points.put(question("killer"))
-    assert queue.take() is None
-    assert queue.held() == PAYS * 2.0
+    waiting.put(Kind.OTHER, question("killer"))
+    waiting.put(Kind.SET_POINTS, question("killer"))
+    assert waiting.take(Kind.OTHER) is None
+    assert waiting.held() == PAYS * 2.0
     # what ends no process is not held up by one that has ended
-    assert set_points.take() is not None
-    queue.put(question("polite"))
-    assert queue.take().place == "polite"  # type: ignore[union-attr]
+    assert waiting.take(Kind.SET_POINTS) is not None
+    waiting.put(Kind.OTHER, question("polite"))
+    assert waiting.take(Kind.OTHER).place == "polite"  # type: ignore[union-attr]
     clock.now += PAYS * 2.0
-    queue.put(question("polite"))
+    waiting.put(Kind.OTHER, question("polite"))
     # and has less time for what it has cost
-    assert queue.take().place == "polite"  # type: ignore[union-attr]
-    assert queue.take().place == "killer"  # type: ignore[union-attr]
+    assert waiting.take(Kind.OTHER).place == "polite"  # type: ignore[union-attr]
+    assert waiting.take(Kind.OTHER).place == "killer"  # type: ignore[union-attr]
 
 
 def test_who_ends_processes_does_not_wait_for_who_asks_no_more(monkeypatch: pytest.MonkeyPatch):
@@ -187,48 +194,52 @@ def test_who_ends_processes_does_not_wait_for_who_asks_no_more(monkeypatch: pyte
 
 
 def test_one_costly_question_changes_no_lane_and_cheap_ones_win_it_back():
-    costs = Costs()
+    shares = Shares()
     for _ in range(5):
-        costs.took("a", None, None, 0.01)
-    costs.took("a", None, None, 100.0)
-    assert not costs.is_dear("a")
+        shares.charge("a", 0.01)
+    shares.charge("a", 100.0)
+    assert not shares.is_dear("a")
     for _ in range(30):
-        costs.took("a", None, None, 1.0)
-    assert costs.is_dear("a")
+        shares.charge("a", 1.0)
+    assert shares.is_dear("a")
     for i in range(LAST):
-        assert costs.is_dear("a") == (i <= LAST // 2)
-        costs.took("a", None, None, 0.01)
+        assert shares.is_dear("a") == (i <= LAST // 2)
+        shares.charge("a", 0.01)
+
+
+class Process:
+    """Stands for one."""
 
 
 def test_a_known_stance_has_its_lane_back():
-    costs, process = Costs(), object()
-    costs.took("a", 1, process, 0.1)
-    for _ in range(9):
-        costs.took("a", 1, process, 0.01)
+    costs, process = Costs(Shares()), Process()
+
+    def took(count: int, seconds: float) -> None:
+        for _ in range(count):
+            costs.took(1, process, seconds)
+
+    took(1, 0.1)
+    took(9, 0.01)
     assert costs.is_short(1)
     # some answers of a moment in which all took long
     for _ in range(5):
-        costs.took("a", 1, process, 2.0)
+        took(1, 2.0)
         assert costs.is_short(1)
-    for _ in range(10):
-        costs.took("a", 1, process, 2.0)
+    took(10, 2.0)
     assert not costs.is_short(1)
-    for _ in range(LAST // 2 + 1):
-        costs.took("a", 1, process, 0.01)
+    took(LAST // 2 + 1, 0.01)
     assert costs.is_short(1)
 
 
 def test_a_stance_that_was_dear_where_it_was_new_has_the_lane_once_it_is_not():
-    costs, processes = Costs(), [object() for _ in range(3)]
-    costs.took("a", 1, processes[0], 5.0)
-    costs.took("a", 1, processes[0], 0.01)
+    costs, processes = Costs(Shares()), [Process() for _ in range(3)]
+    costs.took(1, processes[0], 5.0)
+    costs.took(1, processes[0], 0.01)
     assert not costs.is_short(1)
-    costs.took("a", 1, processes[1], 0.1)
+    costs.took(1, processes[1], 0.1)
     assert costs.is_short(1)
-    # what a process knew is gone with it
-    costs.lost(processes[0])
-    assert not costs.knows(processes[0], 1)
-    assert costs.knows(processes[1], 1)
+    assert [costs.knows(each, 1) for each in processes] == [True, True, False]
+    assert not costs.knows(processes[0], 2)
 
 
 # Names --------------------------------------------------------------------------------------------
@@ -266,7 +277,7 @@ def test_nothing_grows_with_names_that_are_made_up():
         names.proven(str(i), b"x")
         names.proven("one", str(i).encode())
         shares.asks(str(i))
-    sizes = [len(names._proofs), len(names._asked), len(shares._spent), len(shares._asked)]
+    sizes = [len(names._proofs), len(names._asked), len(shares._places)]
     assert max(sizes) < 5000
     assert len(names._proofs["one"]) < 100
 
@@ -274,31 +285,23 @@ def test_nothing_grows_with_names_that_are_made_up():
 # Lanes --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("size", [0, 10, PART - 200, PART, 5 * PART, 1_000_000])
-def test_an_answer_comes_in_parts_and_whole(size: int):
-    here, there = Pipe()
-    lane: Lane[object, object] = Lane(SimpleNamespace(), 0, here)  # type: ignore[arg-type]
-    parts: list[bytes] = []
-    _send_parts(SimpleNamespace(send_bytes=parts.append), b"x" * size)  # type: ignore[arg-type]
-    assert all(len(part) == PART for part in parts[:-1])
-    assert len(parts[-1]) < PART
-    for part in parts[:-1]:
-        there.send_bytes(part)
-        # a process that stops now keeps nobody waiting
-        assert lane.take() is None
-        assert not here.poll()
-    there.send_bytes(parts[-1])
-    assert lane.take() == b"x" * size
-    assert lane.ready
-
-
-def test_parts_are_cut_where_they_fit_to_the_byte():
-    """The last one is shorter than the others, be it empty."""
-    for size in range(PART - 60, PART):
+def test_an_answer_comes_in_parts_and_whole():
+    # around where the last part is cut to the byte, too: it is shorter than others, be it empty
+    for size in (0, 10, *range(PART - 60, PART), 5 * PART, 1_000_000):
+        here, there = Pipe()
+        lane: Lane[object, object] = Lane(SimpleNamespace(), 0, here)  # type: ignore[arg-type]
         parts: list[bytes] = []
         _send_parts(SimpleNamespace(send_bytes=parts.append), b"x" * size)  # type: ignore[arg-type]
-        assert b"".join(parts).count(b"x") == size
+        assert all(len(part) == PART for part in parts[:-1])
         assert len(parts[-1]) < PART
+        for part in parts[:-1]:
+            there.send_bytes(part)
+            # a process that stops now keeps nobody waiting
+            assert lane.take() is None
+            assert not here.poll()
+        there.send_bytes(parts[-1])
+        assert lane.take() == b"x" * size
+        assert lane.ready
 
 
 # Deadlines ----------------------------------------------------------------------------------------
@@ -311,13 +314,16 @@ def test_a_deadline_that_is_over_already_is_not_slept_through():
     late = question(seconds=-1.0)
     dispatcher._waiting.put(Kind.OTHER, late)
     assert dispatcher._pause() == 0.0
-    assert dispatcher._waiting.overdue(time.perf_counter()) == [late]
-    station = Station.__new__(Station)
-    lane: Lane[object, object] = Lane(station, 0, Pipe()[0])
-    crew.work[lane] = question(seconds=-1.0)  # type: ignore[index]
+    assert dispatcher._waiting.first_deadline() == late.deadline
+    dispatcher._waiting.remove(lambda each: each is late)
+    station: Station[Job, Answer] = Station.__new__(Station)
+    lane: Lane[Job, Answer] = Lane(station, 0, Pipe()[0])
+    station.lanes, asked = (lane,), question(seconds=-1.0)
+    crew.put(station, "questions")
+    crew.work[lane] = asked
     assert dispatcher._pause() == 0.0
-    crew.work[lane].replied = True  # type: ignore[index, union-attr]
-    crew._streams = station  # type: ignore[assignment]
+    crew.put(station, "streams")
+    crew.work[lane], asked.replied = asked, True
     # it was told, and its process has a while to come back
     pause = dispatcher._pause()
     assert pause is not None

@@ -24,7 +24,7 @@ def squares(log: str) -> Callable[[int], int]:
     return square
 
 
-def nothing() -> Callable[[int], int]:
+def nothing(*_: object) -> Callable[[int], int]:
     """Dies before it can do anything."""
     os.kill(os.getpid(), signal.SIGKILL)
     raise AssertionError
@@ -48,17 +48,6 @@ def naps() -> Callable[[float], int]:
         return os.getpid()
 
     return nap
-
-
-def nap_here(seconds: float) -> int:
-    """Does the work of `naps`."""
-    return naps()(seconds)
-
-
-def sleepers() -> Callable[[int], int]:
-    """Is not ready for as long as anyone waits."""
-    time.sleep(3600.0)
-    return abs
 
 
 def threads() -> Callable[[str], str | None]:
