@@ -348,10 +348,8 @@ def _print(
             "nothing holds: is the scan full of holes? `crux rock` says what helps against them"
             if open_rock
             else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
-            markup=False,
         )
-    for words in oddities:
-        out.print(f"warning: {words}", markup=False)
+    tables.print_warnings(oddities, out)
     for reason, count in refused.most_common(REASONS):
-        out.print(f"{count:,} refused: {reason}", markup=False)
-    out.print(f"{output} (in m, rad, N)", markup=False, soft_wrap=True)
+        out.print(f"{count:,} refused: {reason}")
+    out.print(f"{output} (in m, rad, N)", soft_wrap=True)

@@ -157,15 +157,15 @@ def study(
 
 def print_study(result: experiments.StudyResult, files: Sequence[Path], out: Console) -> None:
     """Print what was claimed, what came out, and where the files are."""
-    out.print(f"{result.name}: {result.title}", style="bold", markup=False)
+    out.print(f"{result.name}: {result.title}", style="bold")
     for line in result.data.get("summary", ()):
-        out.print(line, markup=False)
+        out.print(line)
     if result.claims:
         _print_claims(result, out)
     for what in result.data.get("not_tested", ()):
-        out.print(f"not tested: {what}", markup=False)
+        out.print(f"not tested: {what}")
     for path in files:
-        out.print(str(path), markup=False, soft_wrap=True)
+        out.print(str(path), soft_wrap=True)
 
 
 def _print_claims(result: experiments.StudyResult, out: Console) -> None:
@@ -180,9 +180,9 @@ def _print_claims(result: experiments.StudyResult, out: Console) -> None:
         result.claims, columns, out, style=lambda claim: "" if claim.holds else "bold"
     )
     held = sum(claim.holds for claim in result.claims)
-    out.print(f"{held} of {len(result.claims)} claims hold", markup=False)
+    out.print(f"{held} of {len(result.claims)} claims hold")
     if any(claim.role == "calibration" for claim in result.claims):
-        out.print("fitted: a parameter was calibrated to the claim", markup=False)
+        out.print("fitted: a parameter was calibrated to the claim")
 
 
 def _verdict(claim: experiments.Claim) -> str:

@@ -287,7 +287,7 @@ def test_numbers_however_long_are_told_whole(capsys: pytest.CaptureFixture[str])
     hand.wrench = [-309073.0, -333.2, 126883.4, 10.26, -16361.4, 0.04]
     hand.utilisation = 901.51
     hand.palm.force = [-97178.3, 0.0, 209575.1]
-    print_plan(reply, Console(width=80))
+    print_plan(reply, Console(width=80, markup=False))
     out = capsys.readouterr().out
     assert "…" not in out
     table = out.partition("wrench on the rock")[2].splitlines()
@@ -302,7 +302,7 @@ def test_names_however_long_leave_numbers_whole(capsys: pytest.CaptureFixture[st
         hand.limb = f"{side}_middle_foreleg"
     first = reply.hands[0]
     first.wrench = [-234.7, -564.0, 123.4, -12.34, 23.45, 0.04]
-    print_plan(reply, Console(width=80))
+    print_plan(reply, Console(width=80, markup=False))
     table = capsys.readouterr().out.partition("wrench on the rock")[2].splitlines()
     (row,) = (line.split() for line in table if line.split()[:1] == [first.limb] and "-564" in line)
     assert row[1:7] == ["-235", "-564", "123", "-12.3", "23.4", "0.0"]
@@ -353,7 +353,7 @@ def test_torques_of_many_joints_go_on_in_the_next_line(capsys: pytest.CaptureFix
     reply = dispatch.plan(decode_request(json.dumps(request).encode(), PlanRequest))
     reply.joint_torque = {"arm": [-1234.5, *range(1, 15), -7.0], "tail": [0.25]}
     reply.joint_torque_limit = {"arm": [2469.0, *[300.0] * 15], "tail": [1.0]}
-    print_plan(reply, Console(width=80))
+    print_plan(reply, Console(width=80, markup=False))
     table = capsys.readouterr().out.partition("joint torques")[2].splitlines()
     rows = [row.split() for row in table]
     assert ["arm", "-1234*", "1.0", "2.0", "3.0", "4.0", "5.0", "6.0", "2469", "0.50"] in rows
