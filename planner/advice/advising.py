@@ -96,7 +96,7 @@ def _try_all(trials: Trials) -> None:
     near = base.utilisation <= NEAR
     trials.of(lettings(prepared.question))
     if can_move(prepared):
-        body = BodySearch(trials, prepared, base)
+        body = BodySearch(trials)
         body.run()
         trials.of(body.changes())
         trials.of(body.tilts())

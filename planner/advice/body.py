@@ -96,35 +96,33 @@ class _Tilt(NamedTuple):
         return turns_about(self.angle * np.eye(3)[self.axis])
 
 
+LEVEL: Final = _Tilt()
+
+
 class BodySearch:
     """The search for the best shift of the body of one stance, whose body may be anywhere in reach.
 
     Parameters
     ----------
     trials : Trials
-        That pays for its plans.
-    prepared : PreparedStance
-        Its body moves.
-    base : Trial, optional
-        What is known of it as it is.
+        Of that stance; pays for its plans.
     """
 
-    def __init__(self, trials: Trials, prepared: PreparedStance, base: Trial | None = None) -> None:
-        self.trials, self.prepared = trials, prepared
-        self.range = prepared.question.body_range
+    def __init__(self, trials: Trials) -> None:
+        self.trials, self.prepared = trials, trials.base.prepared
+        self.stance, self.range = trials.question.stance, trials.question.body_range
         self._cuts: list[_Cut] = []
         self._known: list[tuple[Array, float]] = []
         self._rock: dict[_Tilt, list[tuple[Array, float]]] = {}
-        now = self._nearest(np.zeros(3), _Tilt())
+        now = self._nearest(np.zeros(3), LEVEL)
         # what is in rock today may stay so
         self._allowed = -math.inf if now is None else min(now.distance, 0.0)
-        if base is not None:
-            self._keep(np.zeros(3), base)
 
     def run(self) -> None:
         """Look for the best shift."""
+        self._keep(np.zeros(3), self.trials.base)
         for _ in range(ROUNDS):
-            shift, bound = self._next(_Tilt())
+            shift, bound = self._next(LEVEL)
             best = self._best
             if shift is None or self.trials.left <= 0:
                 return
@@ -142,7 +140,7 @@ class BodySearch:
         if best < cap and not self.trials.holds(self.trials.base.utilisation):
             wanted.insert(0, cap)
         shifts = [least for level in wanted if (least := self._least(level)) is not None]
-        found = [self._change(shift, _Tilt()) for shift in shifts]
+        found = [self.change(shift) for shift in shifts]
         if len(found) > 1 and found[0].size > (1.0 - CLOSE) * found[1].size:
             found.pop()
         return [each for each in found if each.size > LEAST / SHIFT_UNIT]
@@ -158,7 +156,7 @@ class BodySearch:
         ]
         if self.prepared.where is not None:
             shift = min(self._known, key=lambda known: known[1])[0]
-            return [self._change(shift, tilt) for tilt in tilts]
+            return [self.change(shift, tilt) for tilt in tilts]
         reached = [(self._next(tilt), tilt) for tilt in tilts]
         there = [
             (bound, abs(tilt.angle), shift, tilt)
@@ -168,22 +166,18 @@ class BodySearch:
         if not there:
             return []
         bound, _, shift, tilt = min(there, key=lambda each: each[:2])
-        return [self._change(shift, tilt)] if bound < (1.0 - 5.0 * CLOSE) * self._best else []
-
-    def shifted(self, shift: Array) -> Change:
-        """Return a shift of the body, in its axes."""
-        return self._change(shift, _Tilt())
+        return [self.change(shift, tilt)] if bound < (1.0 - 5.0 * CLOSE) * self._best else []
 
     def grid(self) -> Array:
         """Return shifts in reach, the body clear of the palms, shape (s, 3); none comes first."""
         steps = np.linspace(-self.range.shift, self.range.shift, STEPS)
         shifts = np.array([(x, y, z) for x in steps for y in steps for z in steps])
-        centres, radii = self._reaches(_Tilt())
+        centres, radii = self._reaches(LEVEL)
         far = np.linalg.norm(shifts[:, None] - centres, axis=2)
         clear = np.array(list(self._clearances(0)))
         fine = (far <= radii).all(axis=1) & (shifts @ clear[:, :3].T <= clear[:, 3]).all(axis=1)
         there = shifts[fine & shifts.any(axis=1)]
-        free = [each for each in there if self._rock_plane(each, _Tilt()) is None]
+        free = [each for each in there if self._rock_plane(each, LEVEL) is None]
         return np.vstack([np.zeros(3), *free])
 
     @property
@@ -194,7 +188,7 @@ class BodySearch:
         """Plan for a shift, and keep what it says."""
         wrench = self.prepared.wrench.copy()
         wrench[3:] += np.cross(shift, wrench[:3])
-        self._keep(shift, self.trials.turned(self.prepared, wrench))
+        self._keep(shift, self.trials.turned(wrench))
 
     def _keep(self, shift: Array, trial: Trial) -> None:
         outcome = trial.outcome
@@ -226,7 +220,7 @@ class BodySearch:
         ]
         for axis in np.eye(3):
             rows += [(*axis, *-axis, 0.0), (*-axis, *-axis, 0.0)]
-        found = self._solve(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]), rows, _Tilt())
+        found = self._solve(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]), rows, LEVEL)
         return None if found is None else found[:3]
 
     def _solve(self, cost: Array, rows: Sequence[Sequence[float]], tilt: _Tilt) -> Array | None:
@@ -260,7 +254,7 @@ class BodySearch:
 
     def _clearances(self, further: int) -> Iterator[tuple[float, ...]]:
         """Yield rows that keep the body off the planes of the palms, with columns of zeros."""
-        stance = self.prepared.question.stance
+        stance = self.stance
         for hand in stance.hands:
             into = hand.pose.rotation[:, 2]
             off = float(into @ (hand.pose.position - stance.body.position))
@@ -274,16 +268,16 @@ class BodySearch:
             return None
         one, other = np.array(nearest.points)
         # points lie the other way round where one is in the other
-        inward = self.prepared.question.stance.body.rotation.T @ (other - one) / nearest.distance
+        inward = self.stance.body.rotation.T @ (other - one) / nearest.distance
         return inward, float(inward @ shift) + nearest.distance - self._allowed
 
     def _nearest(self, shift: Array, tilt: _Tilt) -> Distance | None:
-        stance = replace(self.prepared.question.stance, body=self._body(shift, tilt))
+        stance = replace(self.stance, body=self._body(shift, tilt))
         return body_clearance(scene_of(stance, self.prepared.batch.hands))
 
     def _reaches(self, tilt: _Tilt) -> tuple[Array, Array]:
         """Return balls in which a shift keeps hands in reach: centres (n, 3), radii (n,)."""
-        stance = self.prepared.question.stance
+        stance = self.stance
         limbs, poses = [h.limb for h in stance.hands], [h.pose for h in stance.hands]
         away, reach = stance.robot.limb_spans(self._body(np.zeros(3), tilt), limbs, poses)
         now, _ = stance.robot.limb_spans(stance.body, limbs, poses)
@@ -292,7 +286,7 @@ class BodySearch:
 
     def _body(self, shift: Array, tilt: _Tilt) -> Pose:
         """Return B in W once it is tilted about its centre of mass, and shifted, in its axes."""
-        body, turn = self.prepared.question.stance.body, tilt.turn
+        body, turn = self.stance.body, tilt.turn
         centre = self._centre
         return body @ Pose(shift + centre - turn @ centre, turn)
 
@@ -303,8 +297,9 @@ class BodySearch:
             return np.array(question.load.com)
         return question.stance.robot.com if where is None else where.weights.com
 
-    def _change(self, shift: Array, tilt: _Tilt) -> Change:
-        stance = self.prepared.question.stance
+    def change(self, shift: Array, tilt: _Tilt = LEVEL) -> Change:
+        """Return a shift of the body, in its axes, with a tilt."""
+        stance = self.stance
         if np.linalg.norm(shift) < LEAST:
             shift = np.zeros(3)
         body = self._body(shift, tilt)
@@ -315,7 +310,7 @@ class BodySearch:
         return Change("body", (), ", and ".join(self._words(shift, tilt)), changes, size)
 
     def _words(self, shift: Array, tilt: _Tilt) -> Iterator[str]:
-        along = self.prepared.question.stance.body.rotation @ shift
+        along = self.stance.body.rotation @ shift
         told = ", ".join(f"{value:z.3f}" for value in along)
         if shift.any():
             yield f"shift the body by [{told}] m in W"

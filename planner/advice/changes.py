@@ -15,7 +15,7 @@ from hand_models.tile import Surface
 from planner.question import HandOnHold, Question
 from planner.result import AdviceKind
 
-__all__ = ["HAND_PATH", "Change", "changed", "combined", "hand_path", "joined", "pose_message"]
+__all__ = ["HAND_PATH", "Change", "changed", "combined", "hand_path", "pose_message"]
 
 HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
 """The path of a hand of a question, or of one of its fields."""
@@ -34,7 +34,7 @@ class Change(NamedTuple):
     size: float
 
 
-def joined(first: Change, second: Change) -> Change | None:
+def _joined(first: Change, second: Change) -> Change | None:
     """Return both changes as a pair; None where they say different things of one field."""
     whole = dict(first.changes)
     for path, value in second.changes.items():
@@ -55,10 +55,10 @@ def combined(changes: Sequence[Change]) -> Change | None:
         return None
     free = [each for each in changes if each.kind == "free_hand"]
     new = [_further(each, k) for k, each in enumerate(free)]
-    first, *others = [*(each for each in changes if each.kind != "free_hand"), *new]
-    whole: Change | None = first
+    whole: Change | None
+    whole, *others = [*(each for each in changes if each.kind != "free_hand"), *new]
     for each in others:
-        whole = None if whole is None else joined(whole, each)
+        whole = whole and _joined(whole, each)
     return whole if whole is None or len(changes) < 3 else whole._replace(kind="combination")
 
 

@@ -33,7 +33,7 @@ from planner.prepare import settle_each
 from planner.programs import Support
 from planner.question import HandOnHold
 
-__all__ = ["Choice", "CombinationSearch", "Known"]
+__all__ = ["Choice", "CombinationSearch"]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -108,8 +108,15 @@ class Choice(NamedTuple):
     shift: int
 
 
-class Known(NamedTuple):
-    """What is known of all choices, in k directions.
+class CombinationSearch:
+    """The search for changes of one stance that together make it hold.
+
+    Directions are k, variants of all limbs v, shifts of the body s.
+
+    Parameters
+    ----------
+    trials : Trials
+        That pays for its plans. Of floating wrists hands are chosen as if they were fixed.
 
     Attributes
     ----------
@@ -122,96 +129,24 @@ class Known(NamedTuple):
         Whether a variant is in its limb's reach with a shift.
     together : ndarray of bool, shape (v, v)
         Whether two variants go together.
-    slots : tuple of ndarray
+    slots : list of ndarray
         Variants of each limb.
-    smallest : bool
-        Whether the smallest choice that gives enough is wanted, not the one that gives most.
-    """
-
-    gives: Array
-    needs: Array
-    sizes: Array
-    shift_sizes: Array
-    reached: Mask
-    together: Mask
-    slots: tuple[Indices, ...]
-    smallest: bool
-
-    def part(self, choice: Choice) -> float:
-        """Return the part of what is needed that a choice gives at most."""
-        given = self.gives[:, list(choice.hands)].sum(axis=1)
-        return float((given - self.needs[:, choice.shift]).min())
-
-    def worth(self, given: Array, sizes: Array) -> Array:
-        """Return what choices are worth, by what they give in all directions (k, …), and size."""
-        part = given.min(axis=0)
-        if self.smallest:
-            return np.where(part >= 1.0, -SIZE * sizes, part - FAR).round(DIGITS)
-        return np.asarray(np.minimum(part, ENOUGH) - SIZE * sizes).round(DIGITS)
-
-    def _best(self, slot: Indices, given: Array) -> Indices:
-        """Return the variants of a limb that are worth most by themselves, `FEW` at most."""
-        if len(slot) <= FEW:
-            return slot
-        worth = self.worth(given[:, None] + self.gives[:, slot], self.sizes[slot])
-        return slot[np.argsort(-worth, kind="stable")[:FEW]]
-
-    def climbed(self, start: Choice) -> tuple[float, Choice]:
-        """Return the best that is reached by changing two limbs, or the shift, at a time."""
-        hands, shift, best = list(start.hands), start.shift, -np.inf
-        while True:
-            before = best
-            given = self.gives[:, hands].sum(axis=1)
-            size = float(self.sizes[hands].sum())
-            worth = self.worth(given[:, None] - self.needs, size + self.shift_sizes)
-            worth[~self.reached[hands].all(axis=0)] = -np.inf
-            if np.isfinite(worth.max()):
-                shift = int(worth.argmax())
-            for i, j in combinations(range(len(hands)), 2):
-                others = [each for k, each in enumerate(hands) if k not in (i, j)]
-                given = self.gives[:, others].sum(axis=1) - self.needs[:, shift]
-                size = float(self.sizes[others].sum() + self.shift_sizes[shift])
-                fits = self.reached[:, shift] & self.together[others].all(axis=0)
-                first, second = (
-                    self._best(each[fits[each]], given) for each in (self.slots[i], self.slots[j])
-                )
-                if not (len(first) and len(second)):
-                    continue
-                both = self.gives[:, first, None] + self.gives[:, None, second]
-                sizes = self.sizes[first, None] + self.sizes[second]
-                worth = self.worth(given[:, None, None] + both, size + sizes)
-                worth[~self.together[np.ix_(first, second)]] = -np.inf
-                a, b = np.unravel_index(int(worth.argmax()), worth.shape)
-                if worth[a, b] > best:
-                    hands[i], hands[j], best = int(first[a]), int(second[b]), float(worth[a, b])
-            if best <= before:
-                return best, Choice(tuple(hands), shift)
-
-
-class CombinationSearch:
-    """The search for changes of one stance that together make it hold.
-
-    Parameters
-    ----------
-    trials : Trials
-        That pays for its plans. Of floating wrists hands are chosen as if they were fixed.
     """
 
     def __init__(self, trials: Trials) -> None:
         prepared = trials.base.prepared
         self.trials, self._variants = trials, list(_variants(trials))
-        self._sizes = np.array([0.0 if v.change is None else v.change.size for v in self._variants])
+        self.sizes = np.array([0.0 if v.change is None else v.change.size for v in self._variants])
         limbs = np.array([each.limb for each in self._variants])
-        self._slots = [np.flatnonzero(limbs == limb) for limb in dict.fromkeys(limbs.tolist())]
-        self._body = BodySearch(trials, prepared) if can_move(prepared) else None
+        self.slots = [np.flatnonzero(limbs == limb) for limb in dict.fromkeys(limbs.tolist())]
+        self._body = BodySearch(trials) if can_move(prepared) else None
         self._shifts = np.zeros((1, 3)) if self._body is None else self._body.grid()
-        self._reached, self._together = (
-            _reached(trials, self._variants, self._shifts),
-            _together(self._variants),
-        )
+        self.shift_sizes = np.linalg.norm(self._shifts, axis=1) / SHIFT_UNIT
+        self.reached = _reached(trials, self._variants, self._shifts)
+        self.together = _together(self._variants)
         self._needed = prepared.wrench
         self._random = np.random.default_rng(SEED)
-        self._rows: list[tuple[Array, Array]] = []
+        self.gives, self.needs = np.zeros((0, len(limbs))), np.zeros((0, len(self._shifts)))
         self.learn(trials.base, 0)
 
     def run(self) -> None:
@@ -233,20 +168,18 @@ class CombinationSearch:
         Choice or None
             What holds.
         """
-        as_it_is = Choice(tuple(int(slot[self._sizes[slot].argmin()]) for slot in self._slots), 0)
+        as_it_is = Choice(tuple(int(slot[self.sizes[slot].argmin()]) for slot in self.slots), 0)
         seen, forbidden = [as_it_is], 0
-        while self._rows and self.trials.left > last:
-            known = self.known(smallest=smallest)
-            starts = {as_it_is, seen[-1], *self.anywhere(known)}
+        while len(self.gives) and self.trials.left > last:
             choices = set()
-            for start in starts:
+            for start in {as_it_is, seen[-1], *self.anywhere()}:
                 deadline.check(TRIED)
-                choices.add(known.climbed(start))
+                choices.add(self._climbed(start, smallest))
             new = [each for each in choices if each[1] not in seen]
             if not new:
                 return None
             _, choice = max(new)
-            if known.part(choice) < HOPELESS:
+            if self.part(choice) < HOPELESS:
                 return None
             seen.append(choice)
             change = self.change(choice)
@@ -262,24 +195,55 @@ class CombinationSearch:
                 self.learn(trial, choice.shift)
         return None
 
-    def anywhere(self, known: Known) -> Iterator[Choice]:
+    def anywhere(self) -> Iterator[Choice]:
         """Yield choices to begin at."""
         for _ in range(STARTS):
-            hands = tuple(int(self._random.choice(slot)) for slot in known.slots)
-            yield Choice(hands, int(self._random.integers(len(known.shift_sizes))))
+            hands = tuple(int(self._random.choice(slot)) for slot in self.slots)
+            yield Choice(hands, int(self._random.integers(len(self._shifts))))
 
-    def known(self, *, smallest: bool = False) -> Known:
-        """Return what is known of all choices."""
-        return Known(
-            gives=np.array([gives for gives, _ in self._rows]),
-            needs=np.array([needs for _, needs in self._rows]),
-            sizes=self._sizes,
-            shift_sizes=np.linalg.norm(self._shifts, axis=1) / SHIFT_UNIT,
-            reached=self._reached,
-            together=self._together,
-            slots=tuple(self._slots),
-            smallest=smallest,
-        )
+    def part(self, choice: Choice) -> float:
+        """Return the part of what is needed that a choice gives at most."""
+        given = self.gives[:, list(choice.hands)].sum(axis=1)
+        return float((given - self.needs[:, choice.shift]).min())
+
+    def _climbed(self, start: Choice, smallest: bool) -> tuple[float, Choice]:
+        """Return the best that is reached by changing two limbs, or the shift, at a time."""
+        hands, shift, best = list(start.hands), start.shift, -np.inf
+        while True:
+            before = best
+            given = self.gives[:, hands].sum(axis=1)
+            size = float(self.sizes[hands].sum())
+            worth = _worth(given[:, None] - self.needs, size + self.shift_sizes, smallest)
+            worth[~self.reached[hands].all(axis=0)] = -np.inf
+            if np.isfinite(worth.max()):
+                shift = int(worth.argmax())
+            for i, j in combinations(range(len(hands)), 2):
+                others = [each for k, each in enumerate(hands) if k not in (i, j)]
+                given = self.gives[:, others].sum(axis=1) - self.needs[:, shift]
+                size = float(self.sizes[others].sum() + self.shift_sizes[shift])
+                fits = self.reached[:, shift] & self.together[others].all(axis=0)
+                first, second = (
+                    self._best(each[fits[each]], given, smallest)
+                    for each in (self.slots[i], self.slots[j])
+                )
+                if not (len(first) and len(second)):
+                    continue
+                both = self.gives[:, first, None] + self.gives[:, None, second]
+                sizes = self.sizes[first, None] + self.sizes[second]
+                worth = _worth(given[:, None, None] + both, size + sizes, smallest)
+                worth[~self.together[np.ix_(first, second)]] = -np.inf
+                a, b = np.unravel_index(int(worth.argmax()), worth.shape)
+                if worth[a, b] > best:
+                    hands[i], hands[j], best = int(first[a]), int(second[b]), float(worth[a, b])
+            if best <= before:
+                return best, Choice(tuple(hands), shift)
+
+    def _best(self, slot: Indices, given: Array, smallest: bool) -> Indices:
+        """Return the variants of a limb that are worth most by themselves, `FEW` at most."""
+        if len(slot) <= FEW:
+            return slot
+        worth = _worth(given[:, None] + self.gives[:, slot], self.sizes[slot], smallest)
+        return slot[np.argsort(-worth, kind="stable")[:FEW]]
 
     def learn(self, trial: Trial, shift: int) -> None:
         """Keep the direction in which a plan tells that most is missing, if it does."""
@@ -290,15 +254,15 @@ class CombinationSearch:
         d = found / needs
         # about where B's origin was
         d[:3] -= np.cross(d[3:], self._shifts[shift])
-        gives = np.array([each.gives(d) for each in self._variants])
         moves = self._shifts @ np.cross(self._needed[:3], d[3:])
-        self._rows.append((gives, float(d @ self._needed) + moves - 1.0))
+        self.gives = np.vstack([self.gives, [each.gives(d) for each in self._variants]])
+        self.needs = np.vstack([self.needs, float(d @ self._needed) + moves - 1.0])
 
     def _forbid(self, choice: Choice) -> None:
         """Leave out variants that cannot be, or pairs that do not go together; else the largest."""
         moved = self._moved(choice.shift)
         if moved is not None and not self.trials.possible(moved):
-            self._reached[:, choice.shift] = False
+            self.reached[:, choice.shift] = False
             return
         alone = {i: each for i in choice.hands if (each := self._variants[i].change) is not None}
         gone = [i for i, each in alone.items() if not self.trials.possible(each)]
@@ -309,11 +273,11 @@ class CombinationSearch:
                 if both is None or not self.trials.possible(both):
                     apart.append((i, j))
         if not gone and not apart:
-            gone = [max(alone, key=lambda i: self._sizes[i])] if alone else []
+            gone = [max(alone, key=lambda i: self.sizes[i])] if alone else []
         for i in gone:
-            self._slots = [slot[slot != i] for slot in self._slots]
+            self.slots = [slot[slot != i] for slot in self.slots]
         for i, j in apart:
-            self._together[[i, j], [j, i]] = False
+            self.together[[i, j], [j, i]] = False
 
     def change(self, choice: Choice) -> Change | None:
         """Return all that is changed, as one."""
@@ -323,7 +287,18 @@ class CombinationSearch:
 
     def _moved(self, shift: int) -> Change | None:
         """Return a shift of the body, by its index, as a change."""
-        return self._body.shifted(self._shifts[shift]) if self._body is not None and shift else None
+        return self._body.change(self._shifts[shift]) if self._body is not None and shift else None
+
+
+def _worth(given: Array, sizes: Array, smallest: bool) -> Array:
+    """Return what choices are worth, by what they give in all directions (k, …), and size.
+
+    ``smallest``: whether the smallest that gives enough is wanted, not the one that gives most.
+    """
+    part = given.min(axis=0)
+    if smallest:
+        return np.where(part >= 1.0, -SIZE * sizes, part - FAR).round(DIGITS)
+    return np.asarray(np.minimum(part, ENOUGH) - SIZE * sizes).round(DIGITS)
 
 
 def _variants(trials: Trials) -> Iterator[_Variant]:

@@ -12,7 +12,7 @@ from msgspec import structs
 
 from hand_models.base import InvalidInputError, Pose, turns_about
 from hand_models.hand import Grasp
-from planner.advice.changes import Change, hand_path, joined, pose_message
+from planner.advice.changes import Change, combined, hand_path, pose_message
 from planner.prepare import PreparedStance, settle_each
 from planner.question import HandOnHold, Question
 
@@ -87,18 +87,21 @@ def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
     hands = prepared.question.stance.hands
     found: dict[float, list[Change]] = {turn: [] for turn in GRASPS}
     for i in order:
-        for turn in GRASPS:
-            if abs(hands[i].grasp.outer_rotation - turn) > ALIKE and not hands[i].grasp.fingernail:
-                found[turn] += _grasped(prepared, i, turn)
+        for turn in _other_grasps(hands[i]):
+            found[turn] += _grasped(prepared, i, turn)
     for turn, each in found.items():
         yield from each
-        if len(each) > 1:
-            whole: Change | None = each[0]
-            for further in each[1:]:
-                whole = whole and joined(whole, further)
-            if whole is not None:
-                words = f"take {', '.join(whole.limbs)} with {fingers(turn)}"
-                yield whole._replace(kind="grasp", words=words)
+        whole = combined(each) if len(each) > 1 else None
+        if whole is not None:
+            words = f"take {', '.join(whole.limbs)} with {fingers(turn)}"
+            yield whole._replace(kind="grasp", words=words)
+
+
+def _other_grasps(hand: HandOnHold) -> list[float]:
+    """Return turns of the outer fingers that are not the hand's; a fingernail has none [rad]."""
+    if hand.grasp.fingernail:
+        return []
+    return [turn for turn in GRASPS if abs(hand.grasp.outer_rotation - turn) > ALIKE]
 
 
 def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
@@ -108,15 +111,14 @@ def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
     yield from placed(prepared, index, WAYS)
     for turned in placed(prepared, index, AROUND):
         yield turned
-        for turn in GRASPS:
-            if abs(hand.grasp.outer_rotation - turn) > ALIKE and not hand.grasp.fingernail:
-                yield Change(
-                    "place",
-                    turned.limbs,
-                    f"{turned.words} and take it with {fingers(turn)}",
-                    {**turned.changes, hand_path(index, "grasp.outer_rotation"): turn},
-                    turned.size + abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT,
-                )
+        for turn in _other_grasps(hand):
+            yield Change(
+                "place",
+                turned.limbs,
+                f"{turned.words} and take it with {fingers(turn)}",
+                {**turned.changes, hand_path(index, "grasp.outer_rotation"): turn},
+                turned.size + abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT,
+            )
 
 
 def closings(prepared: PreparedStance) -> Iterator[Change]:

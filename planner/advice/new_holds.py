@@ -101,31 +101,31 @@ class NewHold:
 
     def refine(self) -> None:
         """Try the best so far turned, with other grasps, then elsewhere."""
-        quarters = QUARTERS[1:] if self.best and self.best[1].turn == 0.0 else ()
+        if self.best is None:
+            return
+        quarters = QUARTERS[1:] if self.best[1].turn == 0.0 else ()
         for steps in (quarters, (BETWEEN, -BETWEEN)):
-            if self.best is not None:
-                now = self.best[1]
-                self._try([now._replace(turn=now.turn + step) for step in steps])
-        if self.best is not None:
             now = self.best[1]
-            if self.prepared.question.stance.hands[now.like].placed_hold() is None:
-                self._try([now._replace(grasp=grasp) for grasp in GRASPS])
-        if self.best is not None:
-            now = self.best[1]
-            self._try([now._replace(place=place) for place in self.places])
+            self._try([now._replace(turn=now.turn + step) for step in steps])
+        now = self.best[1]
+        if self.prepared.question.stance.hands[now.like].placed_hold() is None:
+            self._try([now._replace(grasp=grasp) for grasp in GRASPS])
+        now = self.best[1]
+        self._try([now._replace(place=place) for place in self.places])
 
     def _try(self, wanted: Sequence[_Hold]) -> None:
-        changes: dict[str, tuple[Change, _Hold]] = {}
+        """Try holds that were not tried before."""
+        holds: dict[str, _Hold] = {}
+        changes: list[Change] = []
         for hold in wanted:
             change = self.change(hold)
-            if self.best is None or hold is not self.best[1]:
-                changes.setdefault(change.words, (change, hold))
-        for words in self._seen & set(changes):
-            del changes[words]
-        self._seen |= set(changes)
-        for tried in self.trials.of([change for change, _ in changes.values()]):
+            if change.words not in self._seen:
+                self._seen.add(change.words)
+                holds[change.words] = hold
+                changes.append(change)
+        for tried in self.trials.of(changes):
             if self.best is None or tried.utilisation < self.best[0].utilisation:
-                self.best = tried, changes[tried.change.words][1]
+                self.best = tried, holds[tried.change.words]
 
     def change(self, hold: _Hold) -> Change:
         """Return the limb holding at a place as another hand does, but for its turn and grasp."""

@@ -181,9 +181,9 @@ class Trials:
         )
         return None if worse else prepared
 
-    def turned(self, prepared: PreparedStance, wrench: Array) -> Trial:
-        """Try the hands of a stance for another body wrench, shape (6,) [N, N·m], in B."""
-        return self._try(prepared.turned(wrench))
+    def turned(self, wrench: Array) -> Trial:
+        """Try the hands as they are for another body wrench, shape (6,) [N, N·m], in B."""
+        return self._try(self.base.prepared.turned(wrench))
 
     def again(self, question: Question, objective: Objective | OwnObjective) -> Trial:
         """Plan what was tried for another objective."""

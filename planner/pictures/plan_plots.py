@@ -28,9 +28,8 @@ from planner.pictures.plan_scene import (
     scene_of,
     view_directions,
 )
-from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_tiles
+from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_spread, draw_tiles
 from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
-from planner.pictures.spread_plots import draw_spread
 from planner.question import Question
 from planner.result import Plan
 
@@ -172,8 +171,10 @@ def _draw_sides(facing: Any, side: Any, scene: Scene, seen: ViewDirections) -> N
 def _draw_side(
     axes: Any, scene: Scene, right: Array, up: Array, words: tuple[str, str], seen_from: str
 ) -> None:
+    plane = np.column_stack([right, up])
+
     def flat(points: Array) -> Array:
-        return (np.asarray(points) - scene.origin) @ np.column_stack([right, up])
+        return (np.asarray(points) - scene.origin) @ plane
 
     axes.set_title(f"seen from {seen_from}", fontsize=10)
     axes.set_aspect("equal", adjustable="datalim")

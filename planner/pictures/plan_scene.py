@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
-import scipy
 
 from hand_models.base import Array, Indices
 from hand_models.hand import SettledHand
@@ -283,7 +282,7 @@ def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[
 def _body(plan: Plan, stance: Stance) -> list[Surface]:
     """Return the capsules of what no joint moves, and of links where the joints are known.
 
-    Of a robot whose file has no capsules of its body, the hull of B and the first joints.
+    Of a robot whose file has no capsules of its body, all triangles of B and the first joints.
     """
     robot = stance.robot
     ends, radii = robot.body_capsules
@@ -297,11 +296,12 @@ def _body(plan: Plan, stance: Stance) -> list[Surface]:
         for kind, (start, end), radius in zip(kinds, placed, radii.tolist(), strict=True)
     ]
     if "body" not in kinds:
-        hull = [stance.body.position]
+        corners = [stance.body.position]
         if plan.joints is not None:
             chains = [robot.link_chain(plan.joints, limb) for limb in robot.limbs]
-            hull += [stance.body.apply(chain[0]) for chain in chains]
-        found.append(Surface("body", "", *_hull(np.array(hull))))
+            corners += [stance.body.apply(chain[0]) for chain in chains]
+        between = np.array([*combinations(range(len(corners)), 3)], dtype=np.intp).reshape(-1, 3)
+        found.append(Surface("body", "", np.array(corners), between))
     return found
 
 
@@ -316,24 +316,6 @@ def _capsule(start: Array, end: Array, radius: float) -> Triangles:
     half = np.sin(rise)[:, None, None] * around, np.cos(rise)[:, None, None] * along
     beyond, before = half[0] + half[1], (half[0] - half[1])[::-1]
     return grid(np.concatenate([end + radius * beyond, start + radius * before]))
-
-
-def _hull(points: Array) -> Triangles:
-    """Return the hull of points (n, 3), whether it is solid, flat or a line."""
-    off = points - points.mean(axis=0)
-    axes = np.linalg.svd(off)[2]
-    for dimensions in (3, 2):
-        try:
-            hull = scipy.spatial.ConvexHull(off @ axes[:dimensions].T)
-        except (scipy.spatial.QhullError, ValueError):
-            continue
-        if dimensions == 3:
-            return Triangles(points, hull.simplices.astype(np.intp))
-        first, *others = hull.vertices
-        return Triangles(points, np.array([(first, i, j) for i, j in pairwise(others)]))
-    along = off @ axes[0]
-    low, high = int(along.argmin()), int(along.argmax())
-    return Triangles(points, np.array([(low, high, high)]))
 
 
 def _load(plan: Plan, question: Question) -> Arrow:

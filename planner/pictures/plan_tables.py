@@ -1,4 +1,4 @@
-"""Tables in the picture of a plan: how near each limit is, or what no plan can supply."""
+"""Panels beside the views of a plan: how near each limit is, or what is missing, and the spread."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from hand_models.hand import NAIL
 from planner.explanation import constraint_words
 from planner.pictures.plan_views import COLOURS, UTILISATION
 from planner.question import Question
-from planner.result import Certificate, LimitName, Plan
+from planner.result import MANY, Certificate, LimitName, Plan, Spread
 
-__all__ = ["draw_joints", "draw_shortfall", "draw_tiles"]
+__all__ = ["draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
 
 PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
 
@@ -31,6 +31,9 @@ GAP: Final = 0.025
 
 WRENCHES: Final = 0.26
 """Height of the table of body wrenches, over the panel's."""
+
+BAND, BAR, NOMINAL, NEEDED = "0.88", "tab:blue", "black", "tab:red"
+"""Colours: from 5 to 95 %, the draws, the plan's own load factor, and 1."""
 
 SAID: Final[dict[str, Any]] = {"fontsize": 8, "ha": "left", "va": "top"}
 
@@ -183,3 +186,38 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
     if len(lines) > FIRST:
         lines[FIRST:] = ["…"]
     return lines
+
+
+def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
+    """Draw a histogram of the load factors over draws.
+
+    Parameters
+    ----------
+    axes : Axes
+    spread : Spread
+        With load factors.
+    nominal : float or None
+        The plan's own load factor.
+    """
+    factors = [factor for factor in spread.load_factors if factor is not None]
+    if spread.load_factor is None:
+        return
+    low, high = spread.load_factor.low, spread.load_factor.high
+    ends = np.array([*factors, 1.0, *([] if nominal is None else [nominal])])
+    axes.axvspan(low, high, color=BAND, label="5 to 95 %" if len(factors) >= MANY else "all")
+    axes.hist(factors, np.linspace(ends.min(), ends.max(), 15 + 1), color=BAR)
+    axes.axvline(1.0, color=NEEDED, linestyle="--", label="needed")
+    if nominal is not None:
+        axes.axvline(nominal, color=NOMINAL, label="nominal")
+    said = f"holds in {spread.holds} of {spread.draws} draws"
+    if spread.cap < 1.0:
+        said += f" within {spread.cap:g}"
+    if spread.hangs_on:
+        said += f"; hangs most on {spread.hangs_on[0].quantity}"
+    axes.set_title(said, fontsize=9)
+    axes.set(xlabel="load factor [1]", ylabel="draws")
+    axes.margins(x=0.04)
+    axes.set_ylim(top=1.6 * axes.get_ylim()[1])
+    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.tick_params(labelsize=8)
+    axes.legend(fontsize=7, loc="upper center", ncols=3, facecolor="white", framealpha=0.9)

@@ -160,24 +160,24 @@ def holds(
 
     outcomes: dict[int, Outcome] = {}
     scattered: dict[int, Outcome] = {}
-    best: list[Pair] = []
+    best: list[int] = []
     broken: processes.Interrupted | CruxError | None = None
     on, count = parallel.place(PLANS * (DEAR if seat == "best" else 1) * len(trials))
     try:
         with processes.HoldTrials(mesh, surface, numbers, seat=seat, on=on, workers=count) as tried:
             _keep(f"trying {len(trials):,} places", trials, tried.each(trials), outcomes)
-            best = _sorted(trials, outcomes)[:robust]
-            again = [trial for trial, _ in best]
+            best = [i for i, _ in _sorted(outcomes)[:robust]]
+            again = [trials[i] for i in best]
             title = f"scattering the best {len(best)}"
             _keep(title, again, tried.each(again, robust=True), scattered)
     except (processes.Interrupted, CruxError) as error:
         if not outcomes:
             raise
         broken = error
-    found = _sorted(trials, outcomes)
-    found[: len(best)] = _sorted(
-        [trial for trial, _ in best], dict(enumerate(each for _, each in best)) | scattered
-    )
+    for k, each in scattered.items():
+        # a process that was lost leaves a hold as it was found
+        outcomes[best[k]] = outcomes[best[k]] if isinstance(each, InvalidInputError) else each
+    found = [(trials[i], each) for i, each in _sorted(outcomes)]
     refused = Counter(
         _reason(each) for each in outcomes.values() if isinstance(each, InvalidInputError)
     )
@@ -228,10 +228,10 @@ def _keep(
             tell(len(outcomes), len(trials))
 
 
-def _sorted(trials: Sequence[fixed_wrist.Trial], outcomes: Mapping[int, Outcome]) -> list[Pair]:
-    """Return the trials whose hands hold something, the largest pull-off first."""
+def _sorted(outcomes: Mapping[int, Outcome]) -> list[tuple[int, fixed_wrist.FoundHold]]:
+    """Return the indices of trials whose hands hold something, the largest pull-off first."""
     pairs = [
-        (trials[i], each)
+        (i, each)
         for i, each in sorted(outcomes.items())
         if not isinstance(each, InvalidInputError) and each.support.max() >= LEAST
     ]
@@ -348,10 +348,8 @@ def _print(
             "nothing holds: is the scan full of holes? `crux rock` says what helps against them"
             if open_rock
             else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
-            markup=False,
         )
-    for words in oddities:
-        out.print(f"warning: {words}", markup=False)
+    tables.print_warnings(oddities, out)
     for reason, count in refused.most_common(REASONS):
-        out.print(f"{count:,} refused: {reason}", markup=False)
-    out.print(f"{output} (in m, rad, N)", markup=False, soft_wrap=True)
+        out.print(f"{count:,} refused: {reason}")
+    out.print(f"{output} (in m, rad, N)", soft_wrap=True)

@@ -232,7 +232,7 @@ def demo(picture: Path, own: options.Own, as_json: bool) -> int:
     tables.draw_plan(answering.planned(request, own.robots), picture)
     status = tables.show(reply, as_json)
     if not as_json:
-        tables.console().print(f"picture: {picture}", markup=False)
+        tables.console().print(f"picture: {picture}")
     return status
 
 

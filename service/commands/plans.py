@@ -121,8 +121,7 @@ def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
     assert isinstance(answer.reply, replies.PlanReply)
     if not brief:
         out = tables.console()
-        for warning in found.reply.warnings[len(answer.reply.warnings) :]:
-            out.print(f"warning: {warning}", markup=False)
+        tables.print_warnings(found.reply.warnings[len(answer.reply.warnings) :], out)
         tables.print_advice(found.reply, out)
     return found
 
@@ -133,7 +132,7 @@ def _print_files(files: list[Path], reply: replies.PlanReply) -> None:
     holding = reply.status == "optimal"
     for file, advice in zip(files, reply.advice or (), strict=False):
         told = tables.words_of(advice, holding=holding)
-        out.print(f"{file}: {told}", markup=False, soft_wrap=True)
+        out.print(f"{file}: {told}", soft_wrap=True)
 
 
 def _write_advice(

@@ -325,10 +325,9 @@ def _print_rock(
         del rows[2]
     if tables.verbosity() >= 0:
         tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
-    out.print(f"pose {_pose(made.pose)}", markup=False, soft_wrap=True)
-    for warning in warnings:
-        out.print(f"warning: {warning}", markup=False)
-    out.print(str(output), markup=False, soft_wrap=True)
+    out.print(f"pose {_pose(made.pose)}", soft_wrap=True)
+    tables.print_warnings(warnings, out)
+    out.print(str(output), soft_wrap=True)
 
 
 def _sizes(what: str, sizes: list[float], hole: float) -> tuple[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
 
-__all__ = ["NAMES", "chosen_study", "print_study", "study", "sweep_options"]
+__all__ = ["MEASURE", "NAMES", "SURFACES", "study"]
 
 SWEEP: Final = "sweep"
 """The one study that takes options."""
@@ -50,44 +50,7 @@ SURFACES: Final = ("sandpaper-36", "concrete-fine", "concrete-coarse", "rock")
 AXIS: Final = "SECTION.NAME[i]=LOW:HIGH:N"
 
 
-def sweep_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of the study `SWEEP` to a command."""
-    for option in (
-        click.option(
-            "--measure",
-            "measures",
-            multiple=True,
-            metavar="NAME",
-            help="Of a sweep: shear, normal, moment or volume, again for more than one map; by "
-            "default shear and normal.",
-        ),
-        click.option(
-            "--surface",
-            metavar="NAME",
-            help=f"Of a sweep: {', '.join(SURFACES)}; by default that of Fig. 16.",
-        ),
-        click.option(
-            "--tension", type=float, help="Of a sweep: of both tendons [N]; by default Fig. 16's."
-        ),
-        click.option(
-            "--diameter", type=float, help="Of a sweep: of the rock [m]; by default Fig. 16's A."
-        ),
-        click.option(
-            "--y", metavar=AXIS, help="Of a sweep: the other number, as --x; by default Fig. 16's."
-        ),
-        click.option(
-            "--x",
-            metavar=AXIS,
-            help="Of a sweep: a number of the gripper's, [i] if it is one of a list, and N values "
-            "from LOW to HIGH in SI units, such as finger.pulley_radii[1]=0.001:0.005:21; by "
-            "default Fig. 16's.",
-        ),
-    ):
-        command = option(command)
-    return command
-
-
-def chosen_study(name: str, **wanted: Any) -> str | studies.Study:
+def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
     """Return a study by its name, or a sweep of what the options ask for.
 
     Raises
@@ -128,7 +91,33 @@ def _measurements() -> studies.Study:
 @click.command(epilog=f"NAME is one of {', '.join(NAMES)}.")
 @click.argument("name", shell_complete=options.beginning_so(NAMES))
 @options.folder_option("Where result.json and the pictures go.")
-@sweep_options
+@click.option(
+    "--x",
+    metavar=AXIS,
+    help="Of a sweep: a number of the gripper's, [i] if it is one of a list, and N values "
+    "from LOW to HIGH in SI units, such as finger.pulley_radii[1]=0.001:0.005:21; by "
+    "default Fig. 16's.",
+)
+@click.option(
+    "--y", metavar=AXIS, help="Of a sweep: the other number, as --x; by default Fig. 16's."
+)
+@click.option("--diameter", type=float, help="Of a sweep: of the rock [m]; by default Fig. 16's A.")
+@click.option(
+    "--tension", type=float, help="Of a sweep: of both tendons [N]; by default Fig. 16's."
+)
+@click.option(
+    "--surface",
+    metavar="NAME",
+    help=f"Of a sweep: {', '.join(SURFACES)}; by default that of Fig. 16.",
+)
+@click.option(
+    "--measure",
+    "measures",
+    multiple=True,
+    metavar="NAME",
+    help="Of a sweep: shear, normal, moment or volume, again for more than one map; by "
+    "default shear and normal.",
+)
 @options.hand_option
 @options.json_option
 def study(
@@ -141,7 +130,7 @@ def study(
     """
     from hand_models import parameters, studies
 
-    chosen = chosen_study(name, **wanted)
+    chosen = _chosen_study(name, **wanted)
     numbers = None if hand is None else parameters.own_hand(hand)
     line = None if as_json else f"study {name}: started; it may take minutes"
     with tables.filling_folder():
@@ -152,20 +141,20 @@ def study(
     if as_json:
         tables.say(studies.as_json(result) | {"files": [str(path) for path in files]})
     else:
-        print_study(result, files, tables.console())
+        _print_study(result, files, tables.console())
 
 
-def print_study(result: experiments.StudyResult, files: Sequence[Path], out: Console) -> None:
+def _print_study(result: experiments.StudyResult, files: Sequence[Path], out: Console) -> None:
     """Print what was claimed, what came out, and where the files are."""
-    out.print(f"{result.name}: {result.title}", style="bold", markup=False)
+    out.print(f"{result.name}: {result.title}", style="bold")
     for line in result.data.get("summary", ()):
-        out.print(line, markup=False)
+        out.print(line)
     if result.claims:
         _print_claims(result, out)
     for what in result.data.get("not_tested", ()):
-        out.print(f"not tested: {what}", markup=False)
+        out.print(f"not tested: {what}")
     for path in files:
-        out.print(str(path), markup=False, soft_wrap=True)
+        out.print(str(path), soft_wrap=True)
 
 
 def _print_claims(result: experiments.StudyResult, out: Console) -> None:
@@ -180,9 +169,9 @@ def _print_claims(result: experiments.StudyResult, out: Console) -> None:
         result.claims, columns, out, style=lambda claim: "" if claim.holds else "bold"
     )
     held = sum(claim.holds for claim in result.claims)
-    out.print(f"{held} of {len(result.claims)} claims hold", markup=False)
+    out.print(f"{held} of {len(result.claims)} claims hold")
     if any(claim.role == "calibration" for claim in result.claims):
-        out.print("fitted: a parameter was calibrated to the claim", markup=False)
+        out.print("fitted: a parameter was calibrated to the claim")
 
 
 def _verdict(claim: experiments.Claim) -> str:

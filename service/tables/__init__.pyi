@@ -1,21 +1,22 @@
 from .body_spaces import print_body_space as print_body_space
 from .extras import print_advice as print_advice, words_of as words_of
+from .hands import (
+    print_robust as print_robust,
+    print_survey as print_survey,
+    print_wrench_space as print_wrench_space,
+    survey_json as survey_json,
+)
 from .layout import (
     console as console,
     in_order as in_order,
     name as name,
     number as number,
     print_rows as print_rows,
+    print_warnings as print_warnings,
     text as text,
 )
 from .output_lock import write_alone as write_alone
-from .plans import (
-    print_plan as print_plan,
-    print_robust as print_robust,
-    print_wrench_space as print_wrench_space,
-)
-from .routes import print_route as print_route
-from .surveys import print_survey as print_survey, survey_json as survey_json
+from .plans import print_plan as print_plan, print_route as print_route
 from .sweeps import print_sweep as print_sweep
 from .terminal import (
     BAD_INPUT as BAD_INPUT,

@@ -6,12 +6,12 @@ from typing import Final
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 from planner import COMPONENTS, OTHERS
 from service import replies
 from service.replies import BodySpaceReply
-from service.tables.layout import in_colour, name, number, print_rows, text, unit_of
+from service.tables.layout import in_colour, name, number, print_rows, print_warnings, text, unit_of
 
 __all__ = ["print_body_space"]
 
@@ -32,16 +32,14 @@ LETS_GO: Final = text(
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     """Print what a stance can hold."""
     used = "" if reply.utilisation is None else f"   utilisation {reply.utilisation:.3f}"
-    out.print(
-        f"{in_colour(reply.status, reply.status.upper())}{used}   {1e3 * reply.time.total:.0f} ms"
-    )
-    out.print(reply.reason, markup=False)
-    for warning in reply.warnings:
-        out.print(f"[bold]warning:[/bold] {escape(warning)}")
+    known = f"{used}   {1e3 * reply.time.total:.0f} ms"
+    out.print(Text.assemble(in_colour(reply.status, reply.status.upper()), known))
+    out.print(reply.reason)
+    print_warnings(reply.warnings, out)
     asked = ", ".join(
         f"{axis} {value:z.1f}" for axis, value in zip(COMPONENTS, reply.body_wrench, strict=True)
     )
-    out.print(f"body wrench asked for (in B): {asked} [N, N·m]", markup=False)
+    out.print(f"body wrench asked for (in B): {asked} [N, N·m]")
     axis = name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}")
     ends = [number(part, f"1.{part}", "z.1f") for part in ("more", "pure", "extent")]
     title = "how far body wrenches that are held go along the axes of B"
@@ -56,7 +54,7 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
     """Print how large the part of a plane is that is held."""
     plane = f"plane of {' and '.join(section.axes)}, {OTHERS[section.others]}"
     if not section.inner or section.gap is None:
-        out.print(f"{plane}: nothing is held", markup=False)
+        out.print(f"{plane}: nothing is held")
         return
     corners = np.array(section.inner)
     ranges = ", ".join(
@@ -67,9 +65,7 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
     )
     over = " (moments over 0.1 m)" if any(axis.startswith("m") for axis in section.axes) else ""
     shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
-    out.print(
-        f"{plane}: {shape}, {ranges}; known to {max(section.gap, FINEST):.2g} N{over}", markup=False
-    )
+    out.print(f"{plane}: {shape}, {ranges}; known to {max(section.gap, FINEST):.2g} N{over}")
 
 
 def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:

@@ -41,7 +41,7 @@ def print_advice(reply: PlanReply, out: Console) -> None:
     """Print what would make a plan's stance hold, or be better, where that was looked for."""
     holding = reply.status == "optimal"
     for advice in islice(reply.advice or (), MOST):
-        out.print(words_of(advice, holding=holding), markup=False)
+        out.print(words_of(advice, holding=holding))
     doubtful = any(each.kind == "unit" for each in reply.findings)
     if reply.advice == [] and "advice" not in reply.unfinished and not doubtful:
         out.print("of all changes that were tried none would help")

@@ -18,6 +18,7 @@ __all__ = [
     "name",
     "number",
     "print_rows",
+    "print_warnings",
     "short",
     "text",
     "unit_of",
@@ -51,9 +52,19 @@ def console(stderr: bool = False) -> Console:
     return screen
 
 
-def in_colour(status: str, word: str | None = None) -> str:
-    """Return a status, or a word in its place, as markup in bold and in its colour."""
-    return f"[bold {COLOURS.get(status, 'default')}]{word or status}[/]"
+def in_colour(status: str, word: str | None = None) -> Text:
+    """Return a status, or a word in its place, in bold and in its colour."""
+    from rich.text import Text
+
+    return Text(word or status, f"bold {COLOURS.get(status, 'default')}")
+
+
+def print_warnings(warnings: Iterable[str], out: Console) -> None:
+    """Print warnings, one below the other."""
+    from rich.text import Text
+
+    for warning in warnings:
+        out.print(Text.assemble(("warning:", "bold"), f" {warning}"))
 
 
 def short(value: float, digits: int) -> str:

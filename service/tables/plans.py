@@ -1,4 +1,4 @@
-"""Replies as tables for a person, in 80 columns."""
+"""Plans and climbs as tables for a person, in 80 columns."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
+from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 import planner
 from service import replies
@@ -20,18 +21,15 @@ from service.tables.layout import (
     name,
     number,
     print_rows,
+    print_warnings,
     short,
     text,
-    unit_of,
 )
 
-__all__ = ["print_plan", "print_robust", "print_wrench_space"]
+__all__ = ["print_plan", "print_route"]
 
 MOST_PRICES: Final = 8
 """Prices shown; the dearest first."""
-
-NEARLY: Final = 0.02
-"""Turns of joints that are told where the rock is a little elsewhere; less is not much [rad]."""
 
 JOINTS_A_LINE: Final = 7
 """Joint torques of a limb in one line of a table."""
@@ -60,11 +58,6 @@ FINGERS: Final = (
     text("tile", "2.phalanx"),
     number("util", "2.utilisation", ".2f"),
 )
-TENSION_LIMITS: Final = (
-    name("finger"),
-    name("phalanx"),
-    number("f_t(max) N", lambda limit: "none" if limit.tension is None else f"{limit.tension:.1f}"),
-)
 PRICES: Final = (
     name("hand", "limb"),
     name("finger, joint", lambda price: price.finger or price.joint),
@@ -78,14 +71,6 @@ CLEARANCES: Final = (
     text("between", "1.between.0"),
     text("and", "1.between.1"),
 )
-
-CARRIES: Final[Mapping[str, str]] = {
-    "off": "carries nothing",
-    "drags": "drags on the rock",
-    "presses": "presses on the rock",
-    "drags_and_presses": "drags and presses on the rock",
-}
-"""What a palm does in each of its modes."""
 
 
 def print_plan(
@@ -107,24 +92,24 @@ def print_plan(
         Whether its status and reason are all.
     """
     spread = reply.spread if isinstance(reply.spread, planner.Spread) else None
-    out.print("   ".join(_first_line(reply, spread)))
+    known = [f"   {part}" for part in _first_line(reply, spread)]
+    out.print(Text.assemble(in_colour(reply.status, reply.status.upper()), *known))
     if spread is not None:
-        out.print(spread_sentence(spread), markup=False)
-    out.print(reply.reason, markup=False)
+        out.print(spread_sentence(spread))
+    out.print(reply.reason)
     if brief:
         return
-    for warning in reply.warnings:
-        out.print(f"[bold]warning:[/bold] {escape(warning)}")
+    print_warnings(reply.warnings, out)
     for limb, pose in (reply.poses or {}).items():
         where = ", ".join(f"{value:.4f}" for value in pose.position)
         turned = ", ".join(f"{value:.4f}" for value in pose.orientation)
-        out.print(f"{limb} is at ({where}) m, ({turned}) [x, y, z, w]", markup=False)
+        out.print(f"{limb} is at ({where}) m, ({turned}) [x, y, z, w]")
     if reply.path is not None:
-        out.print(_path_sentence(reply.path), markup=False)
+        out.print(_path_sentence(reply.path))
     if without_palm is not None:
         out.print(f"load factor without the palms: {_load_factor(without_palm)}")
     if isinstance(reply.robust, planner.RobustLoadFactor):
-        out.print(robust_sentence(reply.robust), markup=False)
+        out.print(robust_sentence(reply.robust))
     if isinstance(reply.clearance, planner.Clearance):
         _print_clearance(reply.clearance, out)
     if reply.hands is not None:
@@ -143,7 +128,6 @@ def print_plan(
 
 def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iterator[str]:
     """Yield what is most to be known of a plan; intervals of it in place of lesser things."""
-    yield in_colour(reply.status, reply.status.upper())
     used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
     if reply.utilisation is not None:
         yield f"utilisation {within(reply.utilisation, used)}"
@@ -155,86 +139,6 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
         if reply.effort is not None:
             yield f"effort {reply.effort:.3g}"
         yield f"{1e3 * reply.time.total:.0f} ms"
-
-
-def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
-    """Print what one hand can carry."""
-    seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
-    out.print(f"[bold]{reply.limb}[/bold] of {reply.robot}")
-    off = 1e3 * reply.seating.backed_off
-    backed = f", backed off {off:.1f} mm" if off else ""
-    out.print(f"hold seated by rule {reply.seating.rule}{backed}, its origin in H ({seat}) mm")
-    if reply.wrist.error is not None:
-        _print_floating(reply.wrist.palm or "off", reply.wrist.error, out)
-    _print_closing(reply, out)
-    for closing in reply.closing:
-        if closing.nearby or closing.nearby_turn > NEARLY:
-            out.print(_nearby_sentence(closing))
-    title = "tendon tension at which the finger's first tile lets go"
-    print_rows(reply.tension_limits, TENSION_LIMITS, out, title)
-    if reply.capability is None:
-        out.print("nothing is left at utilisation 1: closing alone is more than its tiles hold")
-        return
-    faces = None if reply.half_spaces is None else reply.half_spaces.offsets
-    listed = ((reply.vertices, "vertices"), (faces, "half-spaces"))
-    counts = [f"{len(each)} {name}" for each, name in listed if each is not None]
-    counts += [] if reply.dimension is None else [f"dimension {reply.dimension}"]
-    if counts:
-        out.print(", ".join(counts))
-    for warning in reply.warnings:
-        out.print(warning, markup=False)
-    _print_capability(reply.capability, out)
-
-
-def print_robust(robust: replies.RobustCapability, out: Console) -> None:
-    """Print what is left of each component where the hand is a little elsewhere."""
-    title = (
-        f"what is left of that at {robust.draws} places "
-        f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad"
-    )
-    _print_ends({"99 in 100 ": robust.hundredth, "9 in 10 ": robust.tenth}, title, out)
-    if robust.without:
-        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing: 0 there")
-
-
-def _print_ends(
-    reaches: Mapping[str, Mapping[str, float | None]], title: str, out: Console
-) -> None:
-    """Print the least and the most of each component, from how far sets reach either way."""
-    heads = [f"{what}{end}" for what in reaches for end in ("least", "most")]
-    rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in replies.AXES]
-    for row, axis in zip(rows, replies.AXES, strict=True):
-        for ways in reaches.values():
-            back = ways[f"-{axis}"]
-            row += [None if back is None else -back, ways[f"+{axis}"]]
-    print_rows(rows, in_order(["axis"], heads, form="z.2f"), out, title)
-
-
-def _print_floating(palm: str, error: float, out: Console) -> None:
-    """Say what the set of a floating hand stands for, and what it does not."""
-    out.print(
-        f"floating wrist: this set is linearised at rest, for a palm that {CARRIES[palm]}. At its "
-        f"farthest wrenches the exact model differs by up to {error:.1f} N (moments over 0.1 m). "
-        "--search N finds what the hand really holds, palm and all.",
-        markup=False,
-    )
-
-
-def _print_capability(capability: Mapping[str, replies.AxisCapability], out: Console) -> None:
-    """Print the least and the most of each component, and those of it alone if there are any."""
-    with_pure = any(end.pure is not None for end in capability.values())
-    reaches: dict[str, Mapping[str, float | None]] = {
-        "": {way: end.extent for way, end in capability.items()}
-    }
-    if with_pure:
-        reaches["pure "] = {way: end.pure for way, end in capability.items()}
-    _print_ends(reaches, "wrenches on the rock along the axes of H", out)
-    out.print("least, most: with whatever else the hand can carry")
-    if with_pure:
-        out.print("pure: with every other component zero; -: none")
-    ends = [capability[f"{sign}{replies.AXES[0]}"].pure for sign in "+-"]
-    if any(end is None or round(end, 2) < 0.0 for end in ends):
-        out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
 
 
 def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out: Console) -> None:
@@ -256,10 +160,10 @@ def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out:
         print_rows(alike, in_order(("hand", "limit"), texts=["of"]), out, title)
         words = {each.limit: planner.constraint_words(each) for each in proof.irreducible}
         for limit, said in words.items():
-            out.print(f"{limit}: {said}", markup=False)
+            out.print(f"{limit}: {said}")
         if proof.sufficient is not None:
             out.print()
-            out.print(_sufficient_sentence(proof.sufficient), markup=False)
+            out.print(_sufficient_sentence(proof.sufficient))
 
 
 def _sufficient_sentence(names: Sequence[planner.LimitName]) -> str:
@@ -283,33 +187,6 @@ def _alike(names: Iterable[planner.LimitName]) -> dict[tuple[str, str], list[str
         owners = alike.setdefault((each.limb, each.limit), [])
         owners += [whose] if whose else []
     return alike
-
-
-def _print_closing(reply: replies.WrenchSpaceReply, out: Console) -> None:
-    """Print what of each finger touches, and when it stopped moving."""
-    kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
-
-    rows = []
-    for closing in reply.closing:
-        base = kinds.get((closing.finger, "base"), "")
-        cells = (
-            f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
-            for stage in closing.stages
-        )
-        rows.append((closing.finger, base, *cells, closing.closure))
-    parts = [stage.part for stage in reply.closing[0].stages]
-    columns = in_order(("finger", "base"), parts, ["ends"])
-    title = "contacts, and the tendon tension [N] at which each part was at rest"
-    print_rows(rows, columns, out, title)
-
-
-def _nearby_sentence(closing: replies.ClosingSequence) -> str:
-    """Say how else a finger would end."""
-    ends = f", or {', '.join(closing.nearby)}" if closing.nearby else ""
-    return (
-        f"{closing.finger} is {closing.closure} here; with the rock 0.1 mm elsewhere its joints "
-        f"end up to {math.degrees(closing.nearby_turn):.1f}° from here{ends}"
-    )
 
 
 def _path_sentence(path: planner.TensionPath) -> str:
@@ -383,4 +260,27 @@ def _print_clearance(clearance: planner.Clearance, out: Console) -> None:
     title = "least distances; below zero: how deep one is in the other"
     print_rows([row for row in near.items() if row[1] is not None], CLEARANCES, out, title)
     for missing in clearance.unchecked:
-        out.print(f"not measured: {missing}", markup=False)
+        out.print(f"not measured: {missing}")
+
+
+def print_route(result: planner.RouteResult, files: Mapping[str, Path], out: Console) -> None:
+    """Print a climb, stage by stage, its crux, and where its files are."""
+    out.print(Text.assemble((result.route.name, "bold"), f": {len(result.route.moves)} moves"))
+    numbers = {"util": "utilisation", "load factor": "load_factor", "joints": "joint_utilisation"}
+    if all(plan.joint_utilisation is None for plan in result.plans):
+        del numbers["joints"]
+    columns = (
+        name("", lambda row: "crux" if row[0].index == result.crux else ""),
+        *(name(part, f"0.{part}") for part in ("move", "phase", "limb")),
+        name("status", lambda row: in_colour(row[1].status)),
+        *(number(head, f"1.{part}", ".2f") for head, part in numbers.items()),
+    )
+    stages = zip(result.stages, result.plans, strict=True)
+    print_rows(
+        stages, columns, out, style=lambda row: "bold" if row[0].index == result.crux else ""
+    )
+    told = planner.summary(result)
+    print_warnings(told["warnings"], out)
+    out.print(told["crux"]["sentence"])
+    for what, path in files.items():
+        out.print(f"{what}: {path}", soft_wrap=True)

@@ -41,7 +41,7 @@ def print_sweep(sweep: Sweep, out: Console) -> None:
     if complaint := next((row.complaint for row in sweep.rows if row.complaint), None):
         lines.append(f"no answer at some points; the first: {complaint}")
     for line in lines:
-        out.print(line, markup=False, soft_wrap=line is not lines[0])
+        out.print(line, soft_wrap=line is not lines[0])
 
 
 def _everywhere(sweep: Sweep, x: int) -> str:

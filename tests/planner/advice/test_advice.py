@@ -158,7 +158,7 @@ def test_the_least_utilisation_is_convex_in_the_shift_and_above_every_slope():
 def test_no_place_of_a_grid_is_better_than_the_best_shift():
     asked = random_question(SEED)
     trials = Trials(asked.bare(), try_stance)
-    search = BodySearch(trials, trials.base.prepared, trials.base)
+    search = BodySearch(trials)
     search.run()
     best = min(each.utilisation for each in trials.of(search.changes()))
     stance = asked.stance

@@ -227,7 +227,7 @@ def test_what_no_single_limit_is_to_blame_for_is_told_so_in_words():
 
 def printed(answer) -> str:
     out = io.StringIO()
-    print_plan(plan_reply(answer, None, model=False), Console(file=out, width=80))
+    print_plan(plan_reply(answer, None, model=False), Console(file=out, width=80, markup=False))
     return " ".join(out.getvalue().split())
 
 
@@ -288,7 +288,7 @@ def palmless_request() -> dict:
 def test_a_person_reads_what_is_missing_and_what_is_in_the_way_in_80_columns(request_of):
     reply, proof = reply_of(request_of())
     out = io.StringIO()
-    print_plan(reply, Console(file=out, width=80))
+    print_plan(reply, Console(file=out, width=80, markup=False))
     lines = out.getvalue().splitlines()
     assert max(len(line) for line in lines) <= 80
     for name, wrench in (("nearest held", proof.nearest), ("missing", proof.shortfall)):

@@ -302,7 +302,7 @@ def test_the_way_is_told_in_the_reply_and_to_a_person():
     assert reply.path.safe_part == answer.path.safe_part
     assert reply.path.largest_change == answer.path.largest_change
     said = io.StringIO()
-    print_plan(reply, Console(file=said, width=80, highlight=False))
+    print_plan(reply, Console(file=said, width=80, highlight=False, markup=False))
     words = " ".join(said.getvalue().split())
     share = math.floor(100.0 * answer.path.safe_part)
     assert f"only the last {share} % of the straight way from the present tensions is safe" in words

@@ -32,8 +32,8 @@ from tests.suite.helpers.rocks import cylinder_mesh
     ],
 )
 def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
-    stance: str, what: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+    stance, what, tmp_path, capfd
+):
     run(["plan", stance, "--advice", str(tmp_path / "advised")])
     lines = capfd.readouterr().out.splitlines()
     files = sorted((tmp_path / "advised").iterdir(), key=lambda file: (len(file.name), file.name))
@@ -45,7 +45,7 @@ def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
         assert line.startswith(f"{file}: {what}, utilisation {used}: ")
 
 
-def test_advice_leaves_a_scan_in_its_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+def test_advice_leaves_a_scan_in_its_file(tmp_path, capfd):
     folder = tmp_path / "stances"
     folder.mkdir()
     vertices, faces = cylinder_mesh(0.3)
@@ -66,9 +66,7 @@ def test_advice_leaves_a_scan_in_its_file(tmp_path: Path, capfd: pytest.CaptureF
     assert run(["plan", str(files[0]), "--json"]) in (DONE, OVERLOADED)
 
 
-def test_a_stance_may_be_gone_while_advice_is_sought(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stance_may_be_gone_while_advice_is_sought(stance_file, tmp_path, capfd, monkeypatch):
     path = stance_file(wall_request(HEAVY))
     planned = answering.planned
 
@@ -82,9 +80,7 @@ def test_a_stance_may_be_gone_while_advice_is_sought(
     assert capfd.readouterr().err == ""
 
 
-def test_the_plan_is_printed_before_advice_is_looked_for(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_plan_is_printed_before_advice_is_looked_for(stance_file, tmp_path, capfd, monkeypatch):
     looked, told = answering.with_advice, []
 
     def looks(answer: answering.Planned) -> answering.Planned:
@@ -106,9 +102,7 @@ def test_the_plan_is_printed_before_advice_is_looked_for(
         assert "would h" in capfd.readouterr().out
 
 
-def test_json_is_one_line_with_the_advice_in_it(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_json_is_one_line_with_the_advice_in_it(stance_file, tmp_path, capfd):
     path = stance_file(wall_request(HEAVY))
     assert run(["plan", path, "--json", "--advice", str(tmp_path)]) == OVERLOADED
     assert result(capfd)["advice"]
@@ -116,9 +110,7 @@ def test_json_is_one_line_with_the_advice_in_it(
     assert "advice" not in result(capfd)
 
 
-def test_a_file_of_advice_is_the_stance_but_for_its_changes(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_of_advice_is_the_stance_but_for_its_changes(stance_file, tmp_path, capfd):
     given = wall_request(HEAVY)
     given = dict(reversed(given.items())) | {"limits": {"utilisation": 1}}
     given["stance"] = dict(reversed(given["stance"].items()))
@@ -135,9 +127,7 @@ def test_a_file_of_advice_is_the_stance_but_for_its_changes(
         assert {part for part in written if written[part] != given.get(part)} <= changed
 
 
-def test_who_asks_for_less_waits_for_no_advice(
-    stance_file, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_asks_for_less_waits_for_no_advice(stance_file, capfd, monkeypatch):
     asked: list[object] = []
     monkeypatch.setattr(answering, "with_advice", lambda answer: asked.append(answer) or answer)
     path = stance_file(wall_request(HEAVY))
@@ -148,16 +138,14 @@ def test_who_asks_for_less_waits_for_no_advice(
     capfd.readouterr()
 
 
-def test_nothing_is_said_of_changes_that_nobody_asked_for(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_nothing_is_said_of_changes_that_nobody_asked_for(capfd):
     assert run(["plan", "wall-300"]) == DONE
     assert "changes" not in capfd.readouterr().out
 
 
 def test_a_folder_has_the_advice_about_this_stance_and_none_of_another(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+    stance_file, tmp_path, capfd
+):
     folder, path = tmp_path / "advice", stance_file(wall_request(HEAVY))
     folder.mkdir()
     for name in ("advice-1.json", "advice-99.json", "advice-mine.json"):
@@ -171,9 +159,7 @@ def test_a_folder_has_the_advice_about_this_stance_and_none_of_another(
     assert result(capfd)["utilisation"] == pytest.approx(told[0]["utilisation"], abs=1e-6)
 
 
-def test_advice_that_a_brief_reply_does_not_tell_cannot_be_written(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_advice_that_a_brief_reply_does_not_tell_cannot_be_written(stance_file, tmp_path, capfd):
     path, folder = stance_file(wall_request(HEAVY) | {"detail": "set_points"}), tmp_path / "advice"
     assert run(["plan", path, "--advice", str(folder), "--json"]) == BAD_INPUT
     assert "detail: --advice needs the full reply" in complaint(capfd)

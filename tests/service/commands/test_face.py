@@ -38,13 +38,13 @@ def completed(*words: str) -> list[str]:
     return [item.value for item in items if item.type == "plain"]
 
 
-def test_the_version_is_that_of_the_distribution(capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_version_is_that_of_the_distribution(capfd):
     assert run(["--version"]) == DONE
     assert capfd.readouterr().out == f"crux {version('crux-climb')}\n"
 
 
 @pytest.mark.parametrize("command", ["plan", "query", "wrench-space", "body-space", "stream"])
-def test_names_of_stances_are_completed(command: str) -> None:
+def test_names_of_stances_are_completed(command):
     assert completed(command, "") == list(bundled())
     assert completed(command, "wall-300-") == ["wall-300-floating", "wall-300-joints"]
 
@@ -59,7 +59,7 @@ def test_names_of_stances_are_completed(command: str) -> None:
         (["study", "fig06"], ["fig06"]),
     ],
 )
-def test_bash_offers_the_names(words: list[str], names: list[str], tmp_path: Path) -> None:
+def test_bash_offers_the_names(words, names, tmp_path):
     command = Path(sys.executable).with_name("crux")
     script = f"""
         PATH={shlex.quote(str(command.parent))}:$PATH
@@ -74,19 +74,19 @@ def test_bash_offers_the_names(words: list[str], names: list[str], tmp_path: Pat
     assert sorted(told.stdout.split()) == sorted(names)
 
 
-def test_names_of_commands_routes_and_studies_are_completed() -> None:
+def test_names_of_commands_routes_and_studies_are_completed():
     assert completed("") == sorted(COMMANDS)
     assert completed("s") == ["schema", "serve", "stream", "study", "sweep"]
     assert completed("route", "") == list(bundled(RouteRequest))
     assert completed("study", "fig1") == [name for name in NAMES if name.startswith("fig1")]
 
 
-def test_names_that_completion_knows_are_all_there_are() -> None:
+def test_names_that_completion_knows_are_all_there_are():
     assert (*STUDIES, MEASURE) == NAMES
     assert surface_names() == SURFACES
 
 
-def test_limbs_are_those_of_the_stance(stance_file) -> None:
+def test_limbs_are_those_of_the_stance(stance_file):
     assert completed("wrench-space", "wall-300", "--hand", "") == [*limbs_of("wall-300")]
     assert set(limbs_of("wall-300")) == set(LIMBS)
     limbs = ("nose", "tail")
@@ -102,7 +102,7 @@ def test_limbs_are_those_of_the_stance(stance_file) -> None:
 
 
 @pytest.mark.slow
-def test_less_is_said_where_asked(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
+def test_less_is_said_where_asked(stance_file, capfd):
     words = ["plan", stance_file(wall_request(HEAVY))]
     assert run(words) == OVERLOADED
     whole = capfd.readouterr().out.splitlines()
@@ -118,9 +118,7 @@ def test_less_is_said_where_asked(stance_file, capfd: pytest.CaptureFixture[str]
 
 
 @pytest.mark.parametrize("place", [0, 1])
-def test_more_is_said_where_asked(
-    place: int, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_more_is_said_where_asked(place, stance_file, capfd):
     words = ["plan", stance_file(wall_request())]
     assert run(words) == DONE
     assert capfd.readouterr().err == ""
@@ -138,7 +136,7 @@ RED, GREEN = "\x1b[1;31m", "\x1b[1;32m"
     ("status", "colour"),
     [("optimal", GREEN), ("overloaded", RED), ("infeasible", RED), ("failed", RED)],
 )
-def test_a_status_has_its_colour(status: str, colour: str) -> None:
+def test_a_status_has_its_colour(status, colour):
     reply = planned(read_request("wall-300")).reply
     reply = msgspec.structs.replace(reply, status=status)
     out = Console(file=io.StringIO(), force_terminal=True, color_system="standard", no_color=False)
@@ -173,7 +171,7 @@ def on_a_terminal(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
-def test_colours_are_for_terminals_and_for_who_wants_them() -> None:
+def test_colours_are_for_terminals_and_for_who_wants_them():
     words = ["-q", "plan", "wall-300"]
     assert f"{GREEN}OPTIMAL" in on_a_terminal(words)
     assert "\x1b[1;32m" not in on_a_terminal(words, NO_COLOR="1")
@@ -190,7 +188,7 @@ def test_colours_are_for_terminals_and_for_who_wants_them() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
-def test_a_terminal_shows_that_advice_is_looked_for(stance_file) -> None:
+def test_a_terminal_shows_that_advice_is_looked_for(stance_file):
     words = ["plan", stance_file(wall_request(HEAVY))]
     assert "looking for what would hold" in on_a_terminal(words, "stderr", OVERLOADED)
     assert on_a_terminal(["-q", *words], "stderr", OVERLOADED) == ""
@@ -198,7 +196,7 @@ def test_a_terminal_shows_that_advice_is_looked_for(stance_file) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
-def test_a_study_shows_how_far_it_is(tmp_path: Path) -> None:
+def test_a_study_shows_how_far_it_is(tmp_path):
     words = ["study", "fig06", "-o", str(tmp_path)]
     told = on_a_terminal(words, stream="stderr")
     assert "fig06" in told

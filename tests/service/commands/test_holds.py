@@ -35,9 +35,7 @@ def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_holds_are_written_sorted_told_and_drawn(
-    rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_holds_are_written_sorted_told_and_drawn(rock, tmp_path, capfd):
     output, picture = tmp_path / "holds.json", tmp_path / "holds.png"
     twice = ["--outer-rotation", "0"]  # which is no other hand
     options = ["-o", str(output), *COARSE, *twice, "--robust", "1", "--workers", "1"]
@@ -72,7 +70,7 @@ def check_refusals(told: dict) -> None:
     assert len({*points}) == len(points)
 
 
-def test_the_file_says_why_hands_cannot_be_at_places(rock: Path, tmp_path: Path) -> None:
+def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
     """At the rim of a wall fingers reach over its border; each trial is tried again."""
     output = tmp_path / "holds.json"
     options = [*COARSE, "--robust", "0", "--workers", "1"]
@@ -99,9 +97,7 @@ def test_the_file_says_why_hands_cannot_be_at_places(rock: Path, tmp_path: Path)
             assert any(outcome.message.startswith(why.split("…")[0]) for why in there["reasons"])
 
 
-def test_a_plan_is_made_with_a_hold_that_was_proposed(
-    rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_plan_is_made_with_a_hold_that_was_proposed(rock, tmp_path, capfd):
     output = tmp_path / "holds.json"
     options = ["-o", str(output), *COARSE, "--robust", "0", "--workers", "1", "--json"]
     assert run(["holds", str(rock), *options]) == DONE
@@ -126,9 +122,7 @@ def test_a_plan_is_made_with_a_hold_that_was_proposed(
     assert list(reply["poses"]) == [hand["limb"]]
 
 
-def test_what_was_tried_is_kept_when_the_rest_is_broken_off(
-    rock: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_tried_is_kept_when_the_rest_is_broken_off(rock, tmp_path, monkeypatch):
     output = tmp_path / "holds.json"
     real = processes.HoldTrials.each
 
@@ -157,9 +151,7 @@ def test_what_was_tried_is_kept_when_the_rest_is_broken_off(
     ],
     ids=["processes", "cluster"],
 )
-def test_holds_are_the_same_wherever_hands_are_tried(
-    more: list[str], rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_holds_are_the_same_wherever_hands_are_tried(more, rock, tmp_path, capfd):
     if "--dask" in more:
         pytest.importorskip("distributed")
     found = []
@@ -172,9 +164,7 @@ def test_holds_are_the_same_wherever_hands_are_tried(
     assert found[0] == found[1]
 
 
-def test_what_was_tried_is_kept_when_the_cluster_is_gone(
-    rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_tried_is_kept_when_the_cluster_is_gone(rock, tmp_path, capfd, monkeypatch):
     output = tmp_path / "holds.json"
     real = processes.HoldTrials.each
 
@@ -190,7 +180,7 @@ def test_what_was_tried_is_kept_when_the_cluster_is_gone(
 
 
 @watched
-def test_an_interruption_ends_the_search(rock: Path, tmp_path: Path) -> None:
+def test_an_interruption_ends_the_search(rock, tmp_path):
     output = tmp_path / "holds.json"
     process = begun("holds", str(rock), "-o", str(output), "--workers", "2")
     until(lambda: workers(process), process)
@@ -202,9 +192,7 @@ def test_an_interruption_ends_the_search(rock: Path, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} <= {output.name}
 
 
-def test_what_cannot_be_is_told_in_a_line(
-    rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_is_told_in_a_line(rock, tmp_path, capfd):
     output = str(tmp_path / "holds.json")
     for arguments, words in (
         ([str(tmp_path / "none.ply"), "-o", output], "no such file"),

@@ -9,7 +9,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -51,7 +50,7 @@ def flags_to(endpoint: str) -> list[str]:
     return [*flags, "--timeout", str(PATIENCE)]
 
 
-def test_query_and_serve(served: Served, stance_file) -> None:
+def test_query_and_serve(served, stance_file):
     flags = flags_to(served.endpoint)
     asked = process("query", stance_file(wall_request()), *flags, "--json")
     assert (asked.returncode, asked.stderr) == (DONE, b"")
@@ -60,9 +59,7 @@ def test_query_and_serve(served: Served, stance_file) -> None:
     assert reply["prices"]
 
 
-def test_a_query_from_standard_input(
-    served: Served, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_query_from_standard_input(served, capfd, monkeypatch):
     heavy = io.BytesIO(json.dumps(wall_request(HEAVY)).encode())
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=heavy))
     assert run(["query", "-", *flags_to(served.endpoint)]) == OVERLOADED
@@ -71,9 +68,7 @@ def test_a_query_from_standard_input(
     assert out.startswith("OVERLOADED")
 
 
-def test_what_the_service_refuses_is_bad_input(
-    served: Served, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_the_service_refuses_is_bad_input(served, stance_file, capfd):
     twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
     flags = flags_to(served.endpoint)
     assert run(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
@@ -86,14 +81,12 @@ def no_session(capfd: pytest.CaptureFixture[str]) -> bool:
     return out == "" and err.splitlines()[-1].startswith("crux: no zenoh session: ")
 
 
-def test_an_endpoint_that_is_taken_is_not_served(
-    served: Served, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_an_endpoint_that_is_taken_is_not_served(served, capfd):
     assert run(["serve", "-l", served.endpoint, "--no-multicast-scouting", "--json"]) == FAILED
     assert no_session(capfd)
 
 
-def test_a_query_where_nobody_listens(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_query_where_nobody_listens(stance_file, capfd):
     flags = flags_to(free_endpoint())
     assert run(["query", stance_file(wall_request()), *flags, "--json"]) == FAILED
     out, err = capfd.readouterr()
@@ -103,7 +96,7 @@ def test_a_query_where_nobody_listens(stance_file, capfd: pytest.CaptureFixture[
     assert "--wait" in err
 
 
-def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
+def test_zenoh_may_talk_but_not_on_standard_output(stance_file):
     arguments = [
         "query",
         stance_file(wall_request()),
@@ -128,7 +121,7 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
 
 
 @pytest.mark.parametrize("mode", ["client", "peer"])
-def test_a_query_waits_for_a_service_that_is_not_there_yet(mode: str, stance_file) -> None:
+def test_a_query_waits_for_a_service_that_is_not_there_yet(mode, stance_file):
     endpoint = free_endpoint()
     flags = ["-m", mode, "-e", endpoint, "--no-multicast-scouting", "--wait", str(PATIENCE)]
     asked = begun("query", stance_file(wall_request()), *flags, "--json")
@@ -143,9 +136,7 @@ def test_a_query_waits_for_a_service_that_is_not_there_yet(mode: str, stance_fil
 
 
 @pytest.mark.parametrize("mode", ["client", "peer"])
-def test_a_service_that_does_not_come_is_waited_for_no_longer(
-    mode: str, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_service_that_does_not_come_is_waited_for_no_longer(mode, stance_file, capfd):
     flags = ["-m", mode, "-e", free_endpoint(), "--no-multicast-scouting", "--wait", "0.3"]
     assert run(["query", stance_file(wall_request()), *flags]) == FAILED
     told = complaint(capfd)
@@ -154,21 +145,19 @@ def test_a_service_that_does_not_come_is_waited_for_no_longer(
 
 
 @pytest.mark.parametrize("wait", ["-1", "nan", "soon", "1e7"])
-def test_how_long_is_waited_is_a_number_of_seconds(
-    wait: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_how_long_is_waited_is_a_number_of_seconds(wait, capfd):
     assert run(["query", "wall-300", "--wait", wait]) == BAD_INPUT
     assert "--wait" in complaint(capfd)
 
 
 @pytest.mark.parametrize("wait", [-1.0, -1e-9, math.nan, math.inf, -math.inf, 1e308])
-def test_how_long_a_client_waits_is_checked_before_it_does(wait: float) -> None:
+def test_how_long_a_client_waits_is_checked_before_it_does(wait):
     with pytest.raises(InvalidInputError, match="must be from 0 to") as caught:
         CruxClient(zenoh.Config(), wait=wait)
     assert caught.value.field == "wait"
 
 
-def test_a_client_of_another_robot_s_service_waits_in_vain(served: Served) -> None:
+def test_a_client_of_another_robot_s_service_waits_in_vain(served):
     with zenoh.open(client_config(served.endpoint)) as session:
         with pytest.raises(NoServiceError, match=r"no service of loris within 0\.2 s; start one"):
             CruxClient(session, "loris", wait=0.2)
@@ -177,7 +166,7 @@ def test_a_client_of_another_robot_s_service_waits_in_vain(served: Served) -> No
             assert client.plan(read_request("wall-300")).status == "optimal"
 
 
-def test_a_configuration_stays_as_it_was() -> None:
+def test_a_configuration_stays_as_it_was():
     config = client_config(free_endpoint())
     before = str(config)
     with pytest.raises(NoServiceError, match=r"within 0\.1 s"):
@@ -208,14 +197,12 @@ VALID = "valid is such as tcp/127.0.0.1:7447"
         ),
     ],
 )
-def test_bad_flags(
-    flags: list[str], line: str, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_flags(flags, line, stance_file, capfd):
     assert run(["query", stance_file(wall_request()), *flags]) == BAD_INPUT
     assert complaint(capfd).startswith(line)
 
 
-def test_demo(tmp_path: Path) -> None:
+def test_demo(tmp_path):
     picture = tmp_path / "demo.png"
     shown = process("demo", "-o", str(picture), "--json")
     assert shown.stderr == b""

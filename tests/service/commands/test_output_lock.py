@@ -76,9 +76,7 @@ def hold_lock() -> Iterator[Callable[[Path], subprocess.Popen[bytes]]]:
 
 @watched
 @pytest.mark.parametrize("name", ["replies.jsonl", "table.csv"])
-def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(
-    name: str, lines: Path, tmp_path: Path
-) -> None:
+def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(name, lines, tmp_path):
     output, lock = tmp_path / name, tmp_path / f".{name}.lock"
     first = begun("batch", str(lines), "-o", str(output), "--workers", "2", stderr=None)
     until(lambda: lock.exists() and lock.read_text().strip() and lines_there(output), first)
@@ -134,13 +132,8 @@ LONG = ("route", "routes", "study")
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_command_that_fills_an_output_has_it_alone(
-    name: str,
-    few: Path,
-    rock: Path,
-    tmp_path: Path,
-    hold_lock: Callable[[Path], subprocess.Popen[bytes]],
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+    name, few, rock, tmp_path, hold_lock, capfd
+):
     words, lock = commands(few, rock, tmp_path)[name]
     lock.parent.mkdir(exist_ok=True)
     there = {*lock.parent.iterdir()}
@@ -156,12 +149,7 @@ def test_every_command_that_fills_an_output_has_it_alone(
     assert not lock.exists()
 
 
-def test_another_name_of_the_file_is_the_same_output(
-    few: Path,
-    tmp_path: Path,
-    hold_lock: Callable[[Path], subprocess.Popen[bytes]],
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_another_name_of_the_file_is_the_same_output(few, tmp_path, hold_lock, capfd):
     (tmp_path / "real.jsonl").touch()
     (tmp_path / "link.jsonl").symlink_to("real.jsonl")
     hold_lock(tmp_path / ".real.jsonl.lock")
@@ -169,23 +157,17 @@ def test_another_name_of_the_file_is_the_same_output(
     assert "another run" in complaint(capfd)
 
 
-def test_other_outputs_in_the_same_folder_are_free(
-    few: Path, tmp_path: Path, hold_lock: Callable[[Path], subprocess.Popen[bytes]]
-) -> None:
+def test_other_outputs_in_the_folder_are_free_and_what_a_killed_run_left_is_no_lock(
+    few, tmp_path, hold_lock
+):
     hold_lock(tmp_path / ".a.jsonl.lock")
-    assert run(["batch", str(few), "-o", str(tmp_path / "b.jsonl")]) == DONE
-
-
-def test_what_a_killed_run_left_is_no_lock(few: Path, tmp_path: Path) -> None:
-    lock = tmp_path / ".a.jsonl.lock"
+    lock = tmp_path / ".b.jsonl.lock"
     lock.write_text("1\n")
-    assert run(["batch", str(few), "-o", str(tmp_path / "a.jsonl")]) == DONE
+    assert run(["batch", str(few), "-o", str(tmp_path / "b.jsonl")]) == DONE
     assert not lock.exists()
 
 
-def test_a_run_that_fails_leaves_no_lock(
-    few: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_fails_leaves_no_lock(few, tmp_path, monkeypatch):
     def broken(*_: object, **__: object) -> None:
         raise OSError(5, "no more", "here")
 
@@ -195,15 +177,13 @@ def test_a_run_that_fails_leaves_no_lock(
 
 
 @pytest.mark.skipif(not Path("/dev/null").exists(), reason="no /dev/null")
-def test_a_device_is_not_locked(few: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_device_is_not_locked(few, capfd):
     assert run(["batch", str(few), "-o", "/dev/null"]) == DONE
     assert not Path("/dev/.null.lock").exists()
     capfd.readouterr()
 
 
-def test_a_system_without_locks_says_so(
-    few: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_system_without_locks_says_so(few, tmp_path, monkeypatch, capfd):
     monkeypatch.setitem(sys.modules, "fcntl", None)
     output = tmp_path / "a.jsonl"
     assert run(["batch", str(few), "-o", str(output)]) == DONE

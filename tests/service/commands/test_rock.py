@@ -26,9 +26,7 @@ def scanned(folder: Path) -> str:
     return str(write_cloud(folder / "wall.xyz", 1e3 * points))
 
 
-def test_it_is_said_which_axis_was_taken_for_up(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_it_is_said_which_axis_was_taken_for_up(tmp_path, capfd):
     """A wall seen along z is ground unless it is told what is up."""
     x, y, z = wall(0.01, 0.2, 0.0).T
     cloud = str(write_cloud(tmp_path / "cloud.xyz", np.column_stack([x, z, y])))
@@ -47,9 +45,7 @@ def test_it_is_said_which_axis_was_taken_for_up(
         assert (told["up"], told["up_assumed"]) == (up, assumed)
 
 
-def test_the_table_tells_what_was_read_and_what_is_open(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_the_table_tells_what_was_read_and_what_is_open(tmp_path, capfd):
     output, picture = tmp_path / "rock.ply", tmp_path / "rock.png"
     arguments = [scanned(tmp_path), "-o", str(output), "--unit", "mm", "--plot", str(picture)]
     assert run(["rock", *arguments]) == DONE
@@ -68,7 +64,7 @@ def test_the_table_tells_what_was_read_and_what_is_open(
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_same_as_json(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_same_as_json(tmp_path, capfd):
     output = tmp_path / "rock.ply"
     options = ["--unit", "mm", "--view", "0,1,0", "--hole", "0.1", "--spacing", "0.01", "--json"]
     assert run(["rock", scanned(tmp_path), "-o", str(output), *options]) == DONE
@@ -80,9 +76,7 @@ def test_the_same_as_json(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
     assert told["file"] == str(output)
 
 
-def test_a_plan_is_made_on_scanned_terrain(
-    tmp_path: Path, stance_file, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_plan_is_made_on_scanned_terrain(tmp_path, stance_file, capfd):
     options = ["--cell", "90", "--width", "1", "--up", "y", "--spacing", "0.005", "--json"]
     assert run(["rock", str(TERRAIN), "-o", str(tmp_path / "rock.ply"), *options]) == DONE
     told = result(capfd)
@@ -105,18 +99,14 @@ def test_a_plan_is_made_on_scanned_terrain(
         ("0 0 0\n1e200 0 0\n0 1e200 1\n", [], "file: numbers up to 1e+200 are no lengths"),
     ],
 )
-def test_points_have_no_cells_and_are_near(
-    text: str, more: list[str], words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_points_have_no_cells_and_are_near(text, more, words, tmp_path, capfd):
     file = tmp_path / "wall.xyz"
     file.write_text(text)
     assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), *more]) == BAD_INPUT
     assert words in complaint(capfd)
 
 
-def test_rock_is_not_written_over_its_scan(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_rock_is_not_written_over_its_scan(tmp_path, capfd):
     scan, link = tmp_path / "scan.ply", tmp_path / "link.ply"
     trimesh.creation.box().export(scan)
     before = scan.read_bytes()
@@ -147,13 +137,7 @@ def test_rock_is_not_written_over_its_scan(
         ([str(TERRAIN), "-o", "rock.ply", "--cell", "-1"], "cell: must be finite and above zero"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_wrong_is_told_in_one_line(arguments, words, tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there.ply").write_text("")
     assert run(["rock", *arguments]) == BAD_INPUT
@@ -161,9 +145,7 @@ def test_what_is_wrong_is_told_in_one_line(
     assert not (tmp_path / "rock.ply").exists()
 
 
-def test_a_file_in_the_wrong_unit_is_warned_of(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_in_the_wrong_unit_is_warned_of(tmp_path, capfd):
     file = write_cloud(tmp_path / "wall.xyz", 100.0 * wall(0.01))
     assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--hole", "3"]) == DONE
     assert "m across, and a hold may be 10 m" in capfd.readouterr().out
@@ -174,9 +156,7 @@ def test_a_file_in_the_wrong_unit_is_warned_of(
 
 
 @pytest.mark.parametrize("up", ["z", pytest.param("y", marks=pytest.mark.slow)])
-def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(
-    up: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(up, tmp_path, capfd):
     line = 2e-3 * np.arange(120)
     heights = 0.5 + relief(*np.meshgrid(line, line))
     options = [str(tmp_path / "heights.npy"), "-o", str(tmp_path / "rock.ply"), "--cell", "2e-3"]
@@ -192,9 +172,7 @@ def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(
 
 
 @pytest.mark.slow
-def test_a_scan_that_is_a_sieve_is_told_to_be_one(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scan_that_is_a_sieve_is_told_to_be_one(tmp_path, capfd):
     x, z = np.random.default_rng(0).uniform(0.0, 0.7, (2, 4400))
     cloud, rock = tmp_path / "cloud.xyz", tmp_path / "rock.ply"
     np.savetxt(cloud, np.c_[x, 0.02 * np.sin(x / 0.07) * np.cos(z / 0.09), z])
@@ -217,9 +195,7 @@ def printed(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> str:
     return " ".join(capfd.readouterr().out.split())
 
 
-def test_a_printed_pose_has_the_digits_that_a_millimetre_needs(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_printed_pose_has_the_digits_that_a_millimetre_needs(tmp_path, capfd):
     points = wall(0.01) + np.array([402117.25, 5310842.75, 812.5])
     cloud, output = str(tmp_path / "wall.xyz"), ["-o", str(tmp_path / "rock.ply")]
     np.savetxt(cloud, points, fmt="%.4f")
@@ -248,9 +224,7 @@ def test_a_printed_pose_has_the_digits_that_a_millimetre_needs(
     )
 
 
-def test_stray_points_are_told_and_dropped(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_stray_points_are_told_and_dropped(tmp_path, capfd):
     rng = np.random.default_rng(0)
     strays = rng.uniform([-0.17, 0.3, -0.17], [0.17, 0.9, 0.17], (90, 3))
     cloud = str(write_cloud(tmp_path / "wall.xyz", np.vstack([wall(0.004, 0.2), strays])))
@@ -276,9 +250,7 @@ def test_stray_points_are_told_and_dropped(
 
 
 @pytest.mark.parametrize("ending", ["ply", "stl", "obj", "off"])
-def test_the_triangles_of_a_file_are_kept(
-    ending: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_the_triangles_of_a_file_are_kept(ending, tmp_path, capfd):
     mesh = trimesh.creation.icosphere(3, radius=0.2)
     path, output = tmp_path / f"ball.{ending}", tmp_path / "rock.ply"
     mesh.export(path)
@@ -297,9 +269,7 @@ def test_the_triangles_of_a_file_are_kept(
     assert "showed their backs to that view" in out
 
 
-def test_a_large_rock_is_said_to_be_so_for_its_own_reason(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_large_rock_is_said_to_be_so_for_its_own_reason(tmp_path, capfd):
     output = ["-o", str(tmp_path / "rock.ply"), "--view", "0,1,0"]
     far = np.vstack([wall(0.004), [0.1, 400.0, 0.1], [40.0, 1.0, 30.0]])
     stray = str(write_cloud(tmp_path / "stray.xyz", far))

@@ -10,7 +10,7 @@ from hand_models.fixed_wrist import named_row
 from hand_models.wrench_spaces import Row
 from service.commands.cli import crux, run
 from service.tables import console
-from service.tables.surveys import print_failures
+from service.tables.hands import print_failures
 
 STANCE = "wall-300-floating"
 

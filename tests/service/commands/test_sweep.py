@@ -17,11 +17,10 @@ from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, res
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
 
 MASS = "load.mass=60:120:4"
+WEAK = '[tendon]\nmaximum_tension = { value = 60.0, unit = "N", source = "assumed" }\n'
 
 
-def test_a_sweep_writes_a_table_and_a_picture(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_writes_a_table_and_a_picture(tmp_path, capfd):
     folder = tmp_path / "new" / "there"
     for _ in range(2):
         # a folder that is there is written again
@@ -62,13 +61,7 @@ def test_a_sweep_writes_a_table_and_a_picture(
         ),
     ],
 )
-def test_what_is_printed_fits_a_terminal(
-    arguments: list[str],
-    words: list[str],
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_printed_fits_a_terminal(arguments, words, tmp_path, capfd, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     assert run(["sweep", "wall-300", *arguments, "-o", str(tmp_path)]) == DONE
     out, err = capfd.readouterr()
@@ -98,9 +91,7 @@ def test_what_is_printed_fits_a_terminal(
         (["--vary", "hands.*.grasp.closing_tension=1,2"], "no point can be answered: invalid: "),
     ],
 )
-def test_bad_input_is_a_line(
-    arguments: list[str], words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_input_is_a_line(arguments, words, tmp_path, capfd):
     given = ["sweep", "wall-300", *arguments, "-o", str(tmp_path / "out"), "--json"]
     assert run(given) == BAD_INPUT
     err = capfd.readouterr().err
@@ -108,7 +99,7 @@ def test_bad_input_is_a_line(
     assert words in err
 
 
-def test_a_file_is_no_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_file_is_no_folder(tmp_path, capfd):
     file = tmp_path / "file"
     file.write_text("mine", encoding="utf-8")
     assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(file)]) == BAD_INPUT
@@ -116,14 +107,9 @@ def test_a_file_is_no_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
     assert file.read_text(encoding="utf-8") == "mine"
 
 
-def test_numbers_of_a_hand_of_ones_own_count(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_numbers_of_a_hand_of_ones_own_count(tmp_path, capfd):
     weak = tmp_path / "weak.toml"
-    weak.write_text(
-        '[tendon]\nmaximum_tension = { value = 60.0, unit = "N", source = "assumed" }\n',
-        encoding="utf-8",
-    )
+    weak.write_text(WEAK, encoding="utf-8")
     used = []
     for more in ([], ["--hand", str(weak)]):
         given = ["sweep", "wall-300", "--vary", "load.mass=100,110", "-o", str(tmp_path / "out")]
@@ -132,9 +118,7 @@ def test_numbers_of_a_hand_of_ones_own_count(
     assert used[1] > used[0]
 
 
-def test_a_point_that_is_lost_is_a_failure(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_point_that_is_lost_is_a_failure(tmp_path, capfd, monkeypatch):
 
     def losing(questions, **options):
         for i, answer in enumerate(evaluate(questions, **options)):
@@ -149,9 +133,7 @@ def test_a_point_that_is_lost_is_a_failure(
     assert (told["points"], told["answered"]) == (3, 2)
 
 
-def test_what_is_answered_is_kept(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_answered_is_kept(tmp_path, capfd, monkeypatch):
 
     def interrupted(questions, **options):
         yield next(evaluate(questions, **options))
@@ -167,7 +149,7 @@ def test_what_is_answered_is_kept(
 
 
 @watched
-def test_a_sweep_ends_with_its_processes(tmp_path: Path) -> None:
+def test_a_sweep_ends_with_its_processes(tmp_path):
     varied = ["--vary", "load.mass=60:120:100", "--vary", "body.position.0=-1:0:100"]
     process = begun("sweep", "wall-300", *varied, "-o", str(tmp_path), "--workers", "2")
     until(lambda: workers(process), process)
@@ -204,9 +186,7 @@ def whole_rows(folder: Path) -> int:
 
 @pytest.mark.slow
 @watched
-def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(tmp_path, capfd, monkeypatch):
     whole, folder = tmp_path / "whole", tmp_path / "broken"
     assert run(["sweep", "wall-300", *WIDE, "-o", str(whole), "--json"]) == DONE
     summary = result(capfd)
@@ -249,9 +229,7 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(
     "values",
     [MASS, "hands.front_left.grasp.closing_tension=1,40", "limits.utilisation=0.1:1:3"],
 )
-def test_what_is_read_again_is_told_as_before(
-    values: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_read_again_is_told_as_before(values, tmp_path, capfd):
     given = ["sweep", "wall-300", "--vary", values, "-o", str(tmp_path)]
     assert run(given) == DONE
     printed = capfd.readouterr().out
@@ -262,51 +240,31 @@ def test_what_is_read_again_is_told_as_before(
 
 
 @pytest.mark.parametrize(
-    ("begun_with", "goes_on_with", "words"),
+    ("began", "now", "words"),
     [
+        ([MASS], ["load.mass=60:120:5"], "another --vary ('load.mass=60:120:4'"),
+        ([MASS], ["gravity.2=-9:-8:4"], "now 'gravity.2=-9:-8:4')"),
+        ([MASS, "--samples", "4"], [MASS], "another --samples ('4 of seed 0'"),
         (
-            ["--vary", MASS],
-            ["--vary", "load.mass=60:120:5"],
-            "another --vary ('load.mass=60:120:4'",
-        ),
-        (["--vary", MASS], ["--vary", "gravity.2=-9:-8:4"], "now 'gravity.2=-9:-8:4')"),
-        (["--vary", MASS, "--samples", "4"], ["--vary", MASS], "another --samples ('4 of seed 0'"),
-        (
-            ["--vary", MASS, "--samples", "4"],
-            ["--vary", MASS, "--samples", "4", "--seed", "2"],
+            [MASS, "--samples", "4"],
+            [MASS, "--samples", "4", "--seed", "2"],
             "another --samples ('4 of seed 0', now '4 of seed 2')",
         ),
-        (["--vary", MASS], ["--vary", MASS, "--hand"], "another hand"),
+        ([MASS], [MASS, "--hand", "weak.toml"], "another hand"),
     ],
 )
-def test_a_sweep_does_not_go_on_as_another(
-    begun_with: list[str],
-    goes_on_with: list[str],
-    words: str,
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    weak = tmp_path / "weak.toml"
-    weak.write_text(
-        '[tendon]\nmaximum_tension = { value = 60.0, unit = "N", source = "assumed" }\n',
-        encoding="utf-8",
-    )
-    folder = tmp_path / "out"
-    more = [str(weak)] if goes_on_with[-1] == "--hand" else []
-    assert run(["sweep", "wall-300", *begun_with, "-o", str(folder), "--json"]) == DONE
-    before = (folder / "sweep.csv").read_bytes()
+def test_a_sweep_does_not_go_on_as_another(began, now, words, tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("weak.toml").write_text(WEAK, encoding="utf-8")
+    assert run(["sweep", "wall-300", "--vary", *began, "-o", "out", "--json"]) == DONE
+    before = Path("out/sweep.csv").read_bytes()
     capfd.readouterr()
-    given = ["sweep", "wall-300", *goes_on_with, *more, "-o", str(folder), "--resume"]
-    assert run(given) == BAD_INPUT
-    err = capfd.readouterr().err
-    assert words in err
-    assert err.count("\n") == 1
-    assert (folder / "sweep.csv").read_bytes() == before
+    assert run(["sweep", "wall-300", "--vary", *now, "-o", "out", "--resume"]) == BAD_INPUT
+    assert words in complaint(capfd)
+    assert Path("out/sweep.csv").read_bytes() == before
 
 
-def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(tmp_path, capfd):
     given = ["--vary", MASS, "-o", str(tmp_path)]
     assert run(["sweep", "wall-300", *given, "--json"]) == DONE
     capfd.readouterr()
@@ -323,9 +281,7 @@ def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(
     assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path / "new"), "--resume"]) == 0
 
 
-def test_a_sweep_goes_on_after_a_full_disk(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_goes_on_after_a_full_disk(tmp_path, capfd):
     folder = tmp_path / "out"
     varied = ["--vary", "load.mass=60:120:40", "-o", str(folder)]
     status, error = limited("sweep", "wall-300", *varied, size=2000)

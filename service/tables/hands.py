@@ -1,0 +1,239 @@
+"""What one hand carries: on its hold, where it is not quite put, and a floating one's search."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from rich.console import Console
+from rich.text import Text
+
+from hand_models.finger import PHALANGES
+from hand_models.hand import FINGERS, NAIL
+from hand_models.wrench_spaces import Row
+from planner import Survey
+from service import replies
+from service.replies import AXES
+from service.tables.layout import in_order, name, number, print_rows, text, unit_of
+
+__all__ = ["print_failures", "print_robust", "print_survey", "print_wrench_space", "survey_json"]
+
+NEARLY: Final = 0.02
+"""Turns of joints that are told where the rock is a little elsewhere; less is not much [rad]."""
+
+TENSION_LIMITS: Final = (
+    name("finger"),
+    name("phalanx"),
+    number("f_t(max) N", lambda limit: "none" if limit.tension is None else f"{limit.tension:.1f}"),
+)
+
+CARRIES: Final[Mapping[str, str]] = {
+    "off": "carries nothing",
+    "drags": "drags on the rock",
+    "presses": "presses on the rock",
+    "drags_and_presses": "drags and presses on the rock",
+}
+"""What a palm does in each of its modes."""
+
+DRAGGED: Final = "a tile dragged backwards"
+"""What ends the way where no limit does: a part that can only push or only pull is about to do the
+other, which is a tile nearly always."""
+
+WHOLE: Final = "finger"
+"""Column of a finger's limits that are no tile's."""
+
+ORDER: Final = (WHOLE, "base", *PHALANGES, NAIL)
+"""Of the columns of a finger's parts."""
+
+
+def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
+    """Print what one hand can carry."""
+    seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
+    out.print(Text.assemble((reply.limb, "bold"), f" of {reply.robot}"))
+    off = 1e3 * reply.seating.backed_off
+    backed = f", backed off {off:.1f} mm" if off else ""
+    out.print(f"hold seated by rule {reply.seating.rule}{backed}, its origin in H ({seat}) mm")
+    if reply.wrist.error is not None:
+        _print_floating(reply.wrist.palm or "off", reply.wrist.error, out)
+    _print_closing(reply, out)
+    for closing in reply.closing:
+        if closing.nearby or closing.nearby_turn > NEARLY:
+            out.print(_nearby_sentence(closing))
+    title = "tendon tension at which the finger's first tile lets go"
+    print_rows(reply.tension_limits, TENSION_LIMITS, out, title)
+    if reply.capability is None:
+        out.print("nothing is left at utilisation 1: closing alone is more than its tiles hold")
+        return
+    faces = None if reply.half_spaces is None else reply.half_spaces.offsets
+    listed = ((reply.vertices, "vertices"), (faces, "half-spaces"))
+    counts = [f"{len(each)} {name}" for each, name in listed if each is not None]
+    counts += [] if reply.dimension is None else [f"dimension {reply.dimension}"]
+    if counts:
+        out.print(", ".join(counts))
+    for warning in reply.warnings:
+        out.print(warning)
+    _print_capability(reply.capability, out)
+
+
+def print_robust(robust: replies.RobustCapability, out: Console) -> None:
+    """Print what is left of each component where the hand is a little elsewhere."""
+    title = (
+        f"what is left of that at {robust.draws} places "
+        f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad"
+    )
+    _print_ends({"99 in 100 ": robust.hundredth, "9 in 10 ": robust.tenth}, title, out)
+    if robust.without:
+        out.print(f"at {robust.without} of them the hand cannot be, or holds nothing: 0 there")
+
+
+def _print_ends(
+    reaches: Mapping[str, Mapping[str, float | None]], title: str, out: Console
+) -> None:
+    """Print the least and the most of each component, from how far sets reach either way."""
+    heads = [f"{what}{end}" for what in reaches for end in ("least", "most")]
+    rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in AXES]
+    for row, axis in zip(rows, AXES, strict=True):
+        for ways in reaches.values():
+            back = ways[f"-{axis}"]
+            row += [None if back is None else -back, ways[f"+{axis}"]]
+    print_rows(rows, in_order(["axis"], heads, form="z.2f"), out, title)
+
+
+def _print_floating(palm: str, error: float, out: Console) -> None:
+    """Say what the set of a floating hand stands for, and what it does not."""
+    out.print(
+        f"floating wrist: this set is linearised at rest, for a palm that {CARRIES[palm]}. At its "
+        f"farthest wrenches the exact model differs by up to {error:.1f} N (moments over 0.1 m). "
+        "--search N finds what the hand really holds, palm and all.",
+    )
+
+
+def _print_capability(capability: Mapping[str, replies.AxisCapability], out: Console) -> None:
+    """Print the least and the most of each component, and those of it alone if there are any."""
+    with_pure = any(end.pure is not None for end in capability.values())
+    reaches: dict[str, Mapping[str, float | None]] = {
+        "": {way: end.extent for way, end in capability.items()}
+    }
+    if with_pure:
+        reaches["pure "] = {way: end.pure for way, end in capability.items()}
+    _print_ends(reaches, "wrenches on the rock along the axes of H", out)
+    out.print("least, most: with whatever else the hand can carry")
+    if with_pure:
+        out.print("pure: with every other component zero; -: none")
+    ends = [capability[f"{sign}{AXES[0]}"].pure for sign in "+-"]
+    if any(end is None or round(end, 2) < 0.0 for end in ends):
+        out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
+
+
+def _print_closing(reply: replies.WrenchSpaceReply, out: Console) -> None:
+    """Print what of each finger touches, and when it stopped moving."""
+    kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
+
+    rows = []
+    for closing in reply.closing:
+        base = kinds.get((closing.finger, "base"), "")
+        cells = (
+            f"{kinds.get((closing.finger, stage.part), '')} {stage.ends:.1f}"
+            for stage in closing.stages
+        )
+        rows.append((closing.finger, base, *cells, closing.closure))
+    parts = [stage.part for stage in reply.closing[0].stages]
+    columns = in_order(("finger", "base"), parts, ["ends"])
+    title = "contacts, and the tendon tension [N] at which each part was at rest"
+    print_rows(rows, columns, out, title)
+
+
+def _nearby_sentence(closing: replies.ClosingSequence) -> str:
+    """Say how else a finger would end."""
+    ends = f", or {', '.join(closing.nearby)}" if closing.nearby else ""
+    return (
+        f"{closing.finger} is {closing.closure} here; with the rock 0.1 mm elsewhere its joints "
+        f"end up to {math.degrees(closing.nearby_turn):.1f}° from here{ends}"
+    )
+
+
+def survey_json(survey: Survey) -> dict[str, Any]:
+    """Return the search as JSON has it: extreme wrenches, poses, and what lets go at each."""
+    found = survey.found
+    return {
+        "tried": found.tried,
+        "held": found.held,
+        "wrenches": found.wrenches.tolist(),
+        "twists": found.poses.tolist(),
+        "limiting": [_limit(row) for row in found.limiting],
+        "ends": {
+            name: None
+            if end is None
+            else {
+                "reach": end.reach,
+                "wrench": end.wrench.tolist(),
+                "twist": end.twist.tolist(),
+                "limiting": _limit(end.limiting),
+            }
+            for name, end in zip(_names(), survey.ends, strict=True)
+        },
+    }
+
+
+def _names() -> list[str]:
+    return [f"{sign}{axis}" for axis in AXES for sign in "+-"]
+
+
+def _limit(row: Row | None) -> dict[str, str | None] | None:
+    if row is None:
+        return None
+    return {"finger": row.finger, "phalanx": row.phalanx, "limit": row.limit}
+
+
+def print_survey(survey: Survey, out: Console) -> None:
+    """Print how far the hand goes along each axis, and which tiles let go first."""
+    found = survey.found
+    out.print(
+        f"search: at {found.held} of {found.tried} poses of the wrist nothing lets go; "
+        f"{len(found.poses)} extreme wrenches",
+    )
+    _print_survey_ends(survey, out)
+    if found.limiting:
+        print_failures(found.limiting, out)
+
+
+def _print_survey_ends(survey: Survey, out: Console) -> None:
+    """Print where the hand lets go along each axis."""
+    columns = (
+        name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}"),
+        number("reach", "1.reach", ".2f"),
+        *(text(part, f"1.limiting.{part}") for part in ("finger", "phalanx", "limit")),
+    )
+    print_rows(zip(_names(), survey.ends, strict=True), columns, out)
+    if any(end is None for end in survey.ends):
+        out.print("reach -: no way along the axis was found that holds")
+    if any(end is not None and end.limiting is None for end in survey.ends):
+        out.print(
+            f"limit -: no limit binds there; the way ends at {DRAGGED}, or where the search "
+            "stopped",
+        )
+
+
+def print_failures(limiting: Sequence[Row | None], out: Console) -> None:
+    """Print how often each tile of each finger lets go first, and what is no finger's."""
+    counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
+    parts = [part for part in ORDER if any(finger and what == part for finger, what in counts)]
+    rows = []
+    for finger in FINGERS:
+        own = [counts[finger, part] for part in parts]
+        rows.append((finger, *(count or "-" for count in own), sum(own)))
+    for (other, what), count in counts.items():
+        if other is None:
+            rows.append((what, *[""] * len(parts), count))
+    columns = in_order([""], [*parts, "all"])
+    title = f"what lets go first, at how many of {len(limiting)}"
+    print_rows(rows, columns, out, title)
+
+
+def _place(row: Row) -> tuple[str | None, str]:
+    """Return finger and part of a limit; for what is no finger's, the limit in words."""
+    if row.finger is None:
+        return None, row.limit.replace("_", " ")
+    return row.finger, row.phalanx or WHOLE
