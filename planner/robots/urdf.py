@@ -12,8 +12,9 @@ from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from hand_models.base import Array, InvalidInputError, Pose, stored
+from hand_models.base import Array, InvalidInputError, Pose
 
 __all__ = ["JointElement", "Link", "Mimic", "Urdf", "parse_urdf"]
 
@@ -194,7 +195,6 @@ class Urdf:
             raise InvalidInputError(f"unknown link {link!r}; known are {known}")
 
 
-@stored("links and joints of robots", 32)
 def parse_urdf(text: str) -> Urdf:
     """Read the tree of a URDF, and check its numbers.
 
@@ -289,19 +289,8 @@ def _origin(owner: str, element: ElementTree.Element) -> Pose:
         _numbers(owner, origin, name, 3, most) if name in origin.attrib else [0.0, 0.0, 0.0]
         for name, most in (("xyz", LONGEST), ("rpy", WIDEST))
     )
-    return Pose(np.array(position), _turned(*angles))
-
-
-def _turned(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation of URDF's angles about the fixed axes x, y, z, one after the other."""
-    (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
-    return np.array(
-        [
-            [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
-            [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
-            [-sy, sx * cy, cx * cy],
-        ]
-    )
+    # turned about the fixed axes x, y, z, one after the other
+    return Pose(np.array(position), Rotation.from_euler("xyz", angles).as_matrix())
 
 
 def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
