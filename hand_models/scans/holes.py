@@ -8,7 +8,6 @@ the outline have circles that reach beyond it, however short their edges: those 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -39,30 +38,26 @@ class Gaps:
     triangles: Array
     beside: NDArray[np.int32]
 
-    @cached_property
+    @property
     def _edges(self) -> Array:
         return self.triangles[:, [1, 2, 0]] - self.triangles
 
-    @cached_property
-    def _width(self) -> tuple[Array, NDArray[np.bool_]]:
-        """What each triangle bridges [m], and which ones are slivers of the outline."""
+    def open_(self, hole: float) -> NDArray[np.bool_]:
+        """Return which triangles bridge more than a length [m], or nothing, shape (m,).
+
+        Those that bridge nothing are slivers of the outline.
+        """
         edges = self._edges
-        across = np.hypot(edges[..., 0], edges[..., 1])
-        twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+        across, twice = np.hypot(edges[..., 0], edges[..., 1]), _twice_areas(edges)
         sliver = twice <= SLIVER * across.max(axis=1) ** 2
         circle = np.where(sliver, 0.0, across.prod(axis=1) / np.where(sliver, 1.0, twice))
         step = np.linalg.norm(edges, axis=2).max(axis=1)
-        return np.maximum(circle, step), sliver & (self.beside < 0).any(axis=1)
-
-    def open_(self, hole: float) -> NDArray[np.bool_]:
-        """Return which triangles bridge more than a length [m], or nothing, shape (m,)."""
-        width, sliver = self._width
-        return np.asarray(sliver | (width > hole))
+        on_outline = sliver & (self.beside < 0).any(axis=1)
+        return np.asarray(on_outline | (np.maximum(circle, step) > hole))
 
     def covered(self, hole: float) -> float:
         """Return the part of the area across z that is left if wider gaps stay open."""
-        edges = self._edges
-        area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+        area = _twice_areas(self._edges)
         return float(area[~self.open_(hole)].sum() / area.sum())
 
     def left(self, hole: float) -> tuple[tuple[Hole, ...], tuple[Step, ...]]:
@@ -107,7 +102,7 @@ def empty_circles(triangles: Array) -> Array:
     """
     edges = triangles[:, [1, 2, 0], :2] - triangles[:, :, :2]
     a, b, c = np.sort(np.linalg.norm(edges, axis=2), axis=1).T
-    twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    twice = _twice_areas(edges)
     obtuse = a**2 + b**2 <= c**2
     tiny = np.finfo(float).tiny
     near = [
@@ -116,3 +111,8 @@ def empty_circles(triangles: Array) -> Array:
     ]
     circle = a * b * c / np.where(obtuse, 1.0, np.maximum(twice, tiny))
     return np.asarray(np.where(obtuse, np.maximum(*near), circle))
+
+
+def _twice_areas(edges: Array) -> Array:
+    """Return twice the areas across z of triangles, by their edges (m, 3, 2 or 3), shape (m,)."""
+    return np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
