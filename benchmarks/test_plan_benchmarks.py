@@ -9,9 +9,7 @@ import pytest
 
 from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, assemble
-from planner.programs import program, solvers
-from planner.programs.conic import Solver
-from planner.programs.stance_program import SETTINGS
+from planner.programs import solvers
 from planner.result import LoadRecovery
 from planner.solving import plan
 from planner.solving.dual_bounds import unique_bound
@@ -57,23 +55,6 @@ def test_margin_with_new_data(benchmark, hold):
     question = question_of(hold=hold)
     outcome = benchmark(solvers.margin, program_data(question))
     assert outcome.value == pytest.approx(peer.least_utilisation(question).fun, rel=1e-6)
-
-
-@pytest.mark.benchmark(group="least utilisation of four hands")
-@pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
-def test_margin_by_highs(benchmark, hold):
-    question = question_of(hold=hold)
-    result = benchmark(peer.solve, *peer.margin_program(question))
-    assert result.fun == pytest.approx(plan(question).utilisation, rel=1e-5)
-
-
-@pytest.mark.benchmark(group="least utilisation of four hands")
-@pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
-def test_margin_by_a_solver_set_up_for_each_query(benchmark, hold):
-    question = question_of(hold=hold)
-    data = program_data(question)
-    found = benchmark(lambda: Solver(program.Best(data).conic(), SETTINGS).solve())
-    assert found.value == pytest.approx(plan(question).utilisation, rel=1e-5)
 
 
 @pytest.mark.benchmark(group="other programs of four hands")
