@@ -3,8 +3,6 @@
 ``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
-from dataclasses import replace
-
 import pytest
 
 from hand_models.rock import Cylinder
@@ -34,13 +32,6 @@ def test_plan(benchmark, hands):
     answer = benchmark(plan, question_of(hands))
     assert len(answer.hands) == hands
     assert answer.verified
-
-
-@pytest.mark.benchmark(group="plan, from holds to a verified plan")
-def test_plan_with_load_factor_and_prices(benchmark):
-    answer = benchmark(plan, question_of(4, "load_factor", "prices"))
-    assert answer.load_factor > 1.0
-    assert answer.prices
 
 
 @pytest.mark.benchmark(group="plan, from holds to a verified plan")
@@ -74,30 +65,6 @@ def test_certificate(benchmark):
     """A whole plan that ends as infeasible, the certificate included."""
     answer = benchmark(plan, ask(on_wall(palm=False)))
     assert answer.status == "infeasible"
-
-
-BEYOND = {
-    "optimal": {},
-    "overloaded": {"body_wrench": 1.4},
-    "overloaded, not explained": {"body_wrench": 1.4, "explain": False},
-}
-"""How a question for a plan with its extras is changed; wrenches in load factors."""
-
-
-@pytest.mark.benchmark(group="an overloaded plan, proven and explained, and an optimal one")
-@pytest.mark.parametrize("name", BEYOND)
-@pytest.mark.parametrize("hold", HOLDS.values(), ids=["300 mm", "700 mm"])
-def test_an_overloaded_plan_beside_an_optimal_one(benchmark, hold, name):
-    """The same hands and extras; the ratio stands in brackets beside the median."""
-    question = question_of(4, "load_factor", "prices", hold=hold)
-    first, change = plan(question), dict(BEYOND[name])
-    most = first.load_factor * change.pop("body_wrench", 0.7)
-    answer = benchmark(
-        plan, replace(question, body_wrench=most * question.needed_wrench(), **change)
-    )
-    assert answer.status == name.split(",")[0]
-    assert answer.prices
-    assert (answer.certificate is not None) == (name == "overloaded")
 
 
 # After the solver ---------------------------------------------------------------------------------
