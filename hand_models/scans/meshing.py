@@ -154,7 +154,9 @@ def triangulated(
         ) from None
     tell(2, STEPS)
     corners = flat.simplices.astype(np.intp)
-    return Triangulated(points, corners, Gaps(points[corners], flat.neighbors), middle, axes)
+    return Triangulated(
+        points, corners, Gaps.between(points[corners], flat.neighbors), middle, axes
+    )
 
 
 def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputError:
