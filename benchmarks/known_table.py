@@ -8,10 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.measured_stances import question_of
-from benchmarks.plain_programs import Clarabel, scaled, unique
+from benchmarks.plain_programs import Clarabel, scaled, unique, whole_blocks
 from benchmarks.race import TURN, WARM, race
 from benchmarks.results import Table, lines
-from benchmarks.whole_blocks import WholeBlocks
 from planner.prepare import assemble
 from planner.programs import WRENCH_UNIT, program
 from planner.result import SetPoints
@@ -39,7 +38,7 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
     sets = hands.sets(hands.at_rest(hands.idle))
     data, goals = scaled(sets), [wrench / WRENCH_UNIT for wrench in wrenches]
     raw = Clarabel([unique(data._replace(wrench=goal)) for goal in goals], program.SHARP)
-    whole = WholeBlocks([sets.data.turned(goal) for goal in goals])
+    whole = whole_blocks([sets.data.turned(goal) for goal in goals])
     known = KnownStance(question)
     given: list[SetPoints] = []
     with WrenchStream(question) as stream:

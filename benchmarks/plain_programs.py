@@ -19,11 +19,32 @@ import numpy as np
 import scipy.sparse as sp
 
 from planner.prepare import Sets
-from planner.programs import SLACK, tie_weight
+from planner.programs import (
+    SLACK,
+    HandData,
+    StanceData,
+    program,
+    tie_weight,
+    unique as unique_program,
+)
+from planner.programs.conic import Columns, ConicProgram
 from planner.question import Question
 from tests.suite.helpers import peer
+from tests.suite.helpers.named_programs import program_of
 
-__all__ = ["Clarabel", "Conic", "Data", "Qoco", "highs", "least", "scaled", "si", "tie", "unique"]
+__all__ = [
+    "Clarabel",
+    "Conic",
+    "Data",
+    "Qoco",
+    "highs",
+    "least",
+    "scaled",
+    "si",
+    "tie",
+    "unique",
+    "whole_blocks",
+]
 
 
 class Data(NamedTuple):
@@ -130,14 +151,25 @@ def _diagonal(p: np.ndarray) -> sp.csc_matrix:
 
 
 class Clarabel:
-    """Clarabel, set up once for the pattern of some programs and updated with each of them."""
+    """Clarabel, set up once for the pattern of some programs and updated with each of them.
 
-    def __init__(self, programs: Sequence[Conic], settings: Mapping[str, Any]) -> None:
+    Parameters
+    ----------
+    programs : sequence of Conic
+    settings : mapping of str to object
+        Of the solver.
+    full : Conic, optional
+        A program whose entries are the pattern; by default those that the programs have.
+    """
+
+    def __init__(
+        self, programs: Sequence[Conic], settings: Mapping[str, Any], full: Conic | None = None
+    ) -> None:
         self._settings = clarabel.DefaultSettings()
         self._settings.verbose = False
         for name, value in settings.items():
             setattr(self._settings, name, value)
-        starts, rows, columns = _pattern(programs)
+        starts, rows, columns = _pattern(programs if full is None else [full])
         first = programs[0]
         self._cones = [
             clarabel.ZeroConeT(first.equations),
@@ -177,6 +209,24 @@ class Clarabel:
     def fresh(self, number: int) -> Any:
         """Set a solver up for that program, and solve."""
         return self._set_up(number % len(self.programs)).solve()
+
+
+def whole_blocks(stances: Sequence[StanceData]) -> Clarabel:
+    """Return Clarabel for the planner's own programs, with the zeros in their blocks, as CVXPY's.
+
+    The utilisation is the first of their unknowns.
+    """
+    hands = tuple(HandData(*map(np.ones_like, hand)) for hand in stances[0].hands)
+    full, *programs = (
+        _dense(program_of(unique_program, each).conic())
+        for each in (StanceData(hands, stances[0].wrench), *stances)
+    )
+    return Clarabel(programs, program.SHARP, full)
+
+
+def _dense(asked: ConicProgram) -> Conic:
+    A = sp.csc_matrix(Columns.beside(asked.A), (len(asked.b), len(asked.q))).toarray()
+    return Conic(np.array(asked.P), np.array(asked.q), A, np.array(asked.b), asked.zero)
 
 
 class Qoco:

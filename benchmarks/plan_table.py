@@ -12,10 +12,19 @@ from msgspec import structs
 
 from benchmarks.cvxpy_users import Parametrised, Query, rebuilt
 from benchmarks.measured_stances import payload, question_of, request
-from benchmarks.plain_programs import Clarabel, Qoco, highs, least, scaled, si, tie, unique
+from benchmarks.plain_programs import (
+    Clarabel,
+    Qoco,
+    highs,
+    least,
+    scaled,
+    si,
+    tie,
+    unique,
+    whole_blocks,
+)
 from benchmarks.race import TURN, WARM, Way, race
 from benchmarks.results import Line, Table, lines, span
-from benchmarks.whole_blocks import WholeBlocks
 from hand_models.parameters import bundled_draws
 from planner.deadline import DeadlineError
 from planner.prepare import HandSets, Sets, assemble
@@ -71,7 +80,7 @@ class Rivals:
         used = [each.utilisation for each in stances]
         settings = program.SHARP
         self.unique = Clarabel([unique(data) for data in own], settings)
-        self.whole = WholeBlocks([each.sets.data for each in stances])
+        self.whole = whole_blocks([each.sets.data for each in stances])
         self.least = Clarabel([least(data) for data in own], stance_program.SETTINGS)
         self.tie = Clarabel(
             [tie(data, u) for data, u in zip(own, used, strict=True)], stance_program.SETTINGS
@@ -96,7 +105,7 @@ class Rivals:
         query = self.queries[number]
         for name, got in (
             ("Clarabel", self.unique.updated(number).x[-1]),
-            ("Clarabel, zeros kept", self.whole.used(number)),
+            ("Clarabel, zeros kept", self.whole.updated(number).x[0]),
             ("Clarabel, SI", self.si.fresh(number).x[-1]),
             ("QOCO", self.qoco.updated(number).x[-1]),
             ("least utilisation", self.least.updated(number).x[-1]),

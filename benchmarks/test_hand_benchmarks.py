@@ -16,10 +16,9 @@ from hand_models.finger import ClosedFinger, OpenFinger, close_all
 from hand_models.fixed_wrist import wrench_space, wrench_spaces
 from hand_models.hand import Placement
 from hand_models.tendon import share_load
-from planner.prepare import assemble
 from tests.suite.helpers.hands import HAND, ROCK, pinch
 from tests.suite.helpers.rocks import random_axes
-from tests.suite.helpers.stances import SANDPAPER, ask, on_wall
+from tests.suite.helpers.stances import SANDPAPER
 
 pytestmark = pytest.mark.slow
 
@@ -104,34 +103,6 @@ def test_four_wrench_spaces(benchmark, way):
     work = each if way == "one by one" else wrench_spaces
     spaces = benchmark.pedantic(work, setup=settled, rounds=300)
     assert [space.columns[-1] for space in spaces] == ["palm_pressing"] * 4
-
-
-@pytest.mark.benchmark(group="four hands, from a parsed question to the programs' data")
-@pytest.mark.parametrize("known", [False, True], ids=["new holds", "known holds"])
-def test_data_of_four_hands(benchmark, known):
-    stance = on_wall()
-    question = ask(
-        dataclasses.replace(
-            stance,
-            hands=tuple(
-                dataclasses.replace(hand, hold=hold, surface=rock, grasp=Grasp(rotation))
-                for hand, (hold, rock, rotation) in zip(stance.hands, FOUR, strict=True)
-            ),
-        )
-    )
-    wrench = question.needed_wrench()
-
-    def forget():
-        if not known:
-            stance.robot.hand.settled.clear()
-
-    def data():
-        _, hands = assemble(question, None, wrench)
-        return hands.sets(hands.at_rest(hands.idle)).data
-
-    found = benchmark.pedantic(data, setup=forget, rounds=100)
-    assert found.wrench.shape == (6,)
-    assert len(found.hands) == 4
 
 
 @functools.cache

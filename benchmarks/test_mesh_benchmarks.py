@@ -1,4 +1,4 @@
-"""How long scanned rock takes: to be taken up, cut, and closed on.
+"""How long scanned rock takes: to be taken up, cut, and closed on by one hand.
 
 ``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
@@ -8,18 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from hand_models import Grasp, SettledHand
-from hand_models.fixed_wrist import (
-    PULL_OFF,
-    Trial,
-    approach_frame,
-    grid_of_trials,
-    wrench_spaces,
-)
+from hand_models import Grasp
 from hand_models.hand import Placement, settle_hands
 from hand_models.rock import Mesh
 from tests.suite.helpers.hands import HAND, ROCK, seating_on
-from tests.suite.helpers.rocks import fractal_wall
 
 pytestmark = pytest.mark.slow
 
@@ -68,58 +60,3 @@ def test_close_a_placed_hand(benchmark, hold, rotation):
 @pytest.mark.benchmark(group="scan of 200,000 triangles")
 def test_seat_a_hand(benchmark, hold):
     assert benchmark(seating_on, hold, Grasp(math.pi)).rule == "pinch"
-
-
-# Hands all over a wall of 400,000 triangles -------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def wall() -> Mesh:
-    return Mesh(*fractal_wall(0, size=1.0, count=448, height=0.01), anywhere=True)
-
-
-@pytest.fixture(scope="module")
-def trials(wall: Mesh) -> list[Trial]:
-    """Eight of them, away from the border."""
-    found = grid_of_trials(wall, 0.1, 4, (0.0, math.pi), radius=0.055)
-    return [each for each in found if max(map(abs, each.point[:2])) < 0.3][::11][:8]
-
-
-def placements(wall: Mesh, trials: list[Trial]) -> list[Placement]:
-    frames = [approach_frame(each.point, each.approach, each.wrist_angle) for each in trials]
-    return [
-        Placement(wall, ROCK, Grasp(each.outer_rotation), None, frame)
-        for each, frame in zip(trials, frames, strict=True)
-    ]
-
-
-@pytest.mark.benchmark(group="eight hands on a wall of 400,000 triangles")
-def test_cut_for_a_hand(benchmark, wall, trials):
-    x, y, z = trials[0].point
-    planes = [([x, y + off, z], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]) for off in (-0.02, 0.0, 0.02)]
-    assert all(benchmark(lambda: [wall.section(*plane) for plane in planes]))
-
-
-@pytest.mark.benchmark(group="eight hands on a wall of 400,000 triangles")
-def test_seat(benchmark, wall, trials):
-    placed = placements(wall, trials)
-    seats = benchmark(lambda: [seating_on(each.hold, each.grasp, each.at) for each in placed])
-    assert len(seats) == 8
-
-
-@pytest.mark.benchmark(group="eight hands on a wall of 400,000 triangles")
-def test_seat_and_close(benchmark, wall, trials):
-    placed = placements(wall, trials)
-    assert len(benchmark(settle_hands, HAND, placed)) == 8
-
-
-@pytest.mark.benchmark(group="eight hands on a wall of 400,000 triangles")
-def test_wrench_spaces_and_capability(benchmark, wall, trials):
-    def closed() -> tuple[tuple[list[SettledHand]], dict]:
-        found = settle_hands(HAND, placements(wall, trials))
-        return ([each for each in found if isinstance(each, SettledHand)],), {}
-
-    def capability(hands: list[SettledHand]) -> list[float]:
-        return [space.support(PULL_OFF) for space in wrench_spaces(hands)]
-
-    assert benchmark.pedantic(capability, setup=closed, rounds=5)

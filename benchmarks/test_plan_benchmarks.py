@@ -3,15 +3,11 @@
 ``pytest benchmarks --benchmark-enable -m slow`` measures; else each runs once, as a test.
 """
 
-from dataclasses import replace
-
 import pytest
 
 from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, assemble
-from planner.programs import program, solvers
-from planner.programs.conic import Solver
-from planner.programs.stance_program import SETTINGS
+from planner.programs import solvers
 from planner.result import LoadRecovery
 from planner.solving import plan
 from planner.solving.dual_bounds import unique_bound
@@ -39,13 +35,6 @@ def test_plan(benchmark, hands):
 
 
 @pytest.mark.benchmark(group="plan, from holds to a verified plan")
-def test_plan_with_load_factor_and_prices(benchmark):
-    answer = benchmark(plan, question_of(4, "load_factor", "prices"))
-    assert answer.load_factor > 1.0
-    assert answer.prices
-
-
-@pytest.mark.benchmark(group="plan, from holds to a verified plan")
 def test_plan_with_its_spread(benchmark):
     answer = benchmark(plan, question_of(4, "spread"))
     assert answer.spread.without == 0
@@ -57,23 +46,6 @@ def test_margin_with_new_data(benchmark, hold):
     question = question_of(hold=hold)
     outcome = benchmark(solvers.margin, program_data(question))
     assert outcome.value == pytest.approx(peer.least_utilisation(question).fun, rel=1e-6)
-
-
-@pytest.mark.benchmark(group="least utilisation of four hands")
-@pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
-def test_margin_by_highs(benchmark, hold):
-    question = question_of(hold=hold)
-    result = benchmark(peer.solve, *peer.margin_program(question))
-    assert result.fun == pytest.approx(plan(question).utilisation, rel=1e-5)
-
-
-@pytest.mark.benchmark(group="least utilisation of four hands")
-@pytest.mark.parametrize("hold", HOLDS.values(), ids=HOLDS.keys())
-def test_margin_by_a_solver_set_up_for_each_query(benchmark, hold):
-    question = question_of(hold=hold)
-    data = program_data(question)
-    found = benchmark(lambda: Solver(program.Best(data).conic(), SETTINGS).solve())
-    assert found.value == pytest.approx(plan(question).utilisation, rel=1e-5)
 
 
 @pytest.mark.benchmark(group="other programs of four hands")
@@ -93,30 +65,6 @@ def test_certificate(benchmark):
     """A whole plan that ends as infeasible, the certificate included."""
     answer = benchmark(plan, ask(on_wall(palm=False)))
     assert answer.status == "infeasible"
-
-
-BEYOND = {
-    "optimal": {},
-    "overloaded": {"body_wrench": 1.4},
-    "overloaded, not explained": {"body_wrench": 1.4, "explain": False},
-}
-"""How a question for a plan with its extras is changed; wrenches in load factors."""
-
-
-@pytest.mark.benchmark(group="an overloaded plan, proven and explained, and an optimal one")
-@pytest.mark.parametrize("name", BEYOND)
-@pytest.mark.parametrize("hold", HOLDS.values(), ids=["300 mm", "700 mm"])
-def test_an_overloaded_plan_beside_an_optimal_one(benchmark, hold, name):
-    """The same hands and extras; the ratio stands in brackets beside the median."""
-    question = question_of(4, "load_factor", "prices", hold=hold)
-    first, change = plan(question), dict(BEYOND[name])
-    most = first.load_factor * change.pop("body_wrench", 0.7)
-    answer = benchmark(
-        plan, replace(question, body_wrench=most * question.needed_wrench(), **change)
-    )
-    assert answer.status == name.split(",")[0]
-    assert answer.prices
-    assert (answer.certificate is not None) == (name == "overloaded")
 
 
 # After the solver ---------------------------------------------------------------------------------

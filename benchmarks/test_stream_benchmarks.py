@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from planner.question import Load
-from planner.solving import KnownStance
 from planner.streaming import WrenchStream
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.stream_stance import StreamStance
@@ -31,14 +30,6 @@ CENTRE = QUESTION.needed_wrench()
 STEP = np.array([0.6, -0.3, 0.2, 0.02, 0.01, -0.03])
 WRENCHES = [CENTRE + k * STEP for k in (-8, -5, -2, 1, 4, 7)]
 """Within the radius about the centre, so that none drifts."""
-
-
-@pytest.mark.benchmark(group="another wrench on a known stance of four hands")
-def test_set_points(benchmark):
-    wrenches = cycle(WRENCHES)
-    with WrenchStream(QUESTION) as stream:
-        points = benchmark(lambda: stream.set_points(next(wrenches)))
-    assert (points.source, points.verified) == ("interpolated", True)
 
 
 @pytest.mark.benchmark(group="another wrench on a known stance of four hands")
@@ -64,12 +55,6 @@ def test_set_points_as_messages(benchmark):
 def test_solved_set_points(benchmark):
     wrenches, stance = cycle(WRENCHES), StreamStance(QUESTION)
     assert benchmark(lambda: stance.solve(next(wrenches))).outcome.solved
-
-
-@pytest.mark.benchmark(group="another wrench on a known stance of four hands")
-def test_whole_plan(benchmark):
-    wrenches, known = cycle(WRENCHES), KnownStance(QUESTION)
-    assert benchmark(lambda: known.plan(next(wrenches))).verified
 
 
 @pytest.mark.benchmark(group="parts of a set-point")

@@ -12,7 +12,6 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from pathlib import Path
 
 import click
 import zenoh
@@ -24,15 +23,17 @@ from benchmarks.load.asking import (
     Asked,
     Client,
     Tally,
+    at_once,
     dear_questions,
     health,
     mixed,
     new_stances,
     new_wrenches,
+    percentile,
     random_plans,
     spoilt,
 )
-from benchmarks.load.bulk import bulk
+from benchmarks.load.bulk import bulk, memory_of
 from benchmarks.load.others import greedy, process, starve, starved, unread
 from hand_models.base import stores
 from planner import processes as proc
@@ -133,11 +134,6 @@ def in_process(payloads: Iterator[bytes], count: int) -> list[float]:
     return found
 
 
-def percentile(values: list[float], part: float) -> float:
-    """A percentile, in ms."""
-    return 1e3 * sorted(values)[min(len(values) - 1, int(part * len(values)))]
-
-
 @main.command()
 @click.option("--count", default=400, show_default=True, help="Questions a round.")
 def latency(count: int) -> None:
@@ -194,11 +190,7 @@ def rate(endpoint: str, seconds: float, clients: int, deep: int) -> float:
         counts.append(count)
         client.close()
 
-    threads = [threading.Thread(target=ask, args=(i,)) for i in range(clients * deep)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    at_once(clients * deep, ask)
     return sum(counts) / seconds
 
 
@@ -244,8 +236,7 @@ def overload(seconds: float, factor: float) -> None:
     console.print(f"while as many go to a bare replier {floor:.1f}/s: {good / floor:.2f} of that")
     console.print(f"{dict(tally.statuses)} of {asked}")
     console.print(
-        f"good ones p50 {percentile(tally.times, 0.5):.0f} ms, "
-        f"p99 {percentile(tally.times, 0.99):.0f} ms"
+        f"good ones p50 {tally.percentile(0.5):.0f} ms, p99 {tally.percentile(0.99):.0f} ms"
     )
     console.print(f"the generator was late by p99 {percentile(tally.late, 0.99):.1f} ms")
 
@@ -267,20 +258,6 @@ def flood(endpoint: str, key: str, gap: float, seconds: float, tally: Tally) -> 
     for client in clients:
         client.close()
     return asked
-
-
-def resident(server: Served) -> int:
-    """Memory of a service's processes, all together [bytes]."""
-    pids = [server.process.pid]
-    for task in Path(f"/proc/{server.process.pid}/task").iterdir():
-        pids += [int(pid) for pid in (task / "children").read_text().split()]
-    pages = 0
-    for pid in set(pids):
-        try:
-            pages += int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-        except OSError:
-            continue
-    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 @main.command()
@@ -311,7 +288,7 @@ def soak(minutes: float, every: float, seed: int) -> None:
         start, killed, told = time.perf_counter(), 0, 0.0
         while (now := time.perf_counter() - start) < 60.0 * minutes:
             time.sleep(min(every, 60.0 * minutes - now))
-            sizes.append((now, resident(server)))
+            sizes.append((now, memory_of(server.process.pid)))
             processes = [p for p in health(operator)["processes"] if p["state"] != "starting"]
             if processes:
                 os.kill(rng.choice(processes)["pid"], signal.SIGKILL)
@@ -352,11 +329,7 @@ def fuzz(count: int, seed: int) -> None:
                 reply = clients[i].ask(*next(questions[i]))
                 tally.note(reply, time.perf_counter() - start)
 
-        threads = [threading.Thread(target=ask, args=(i,)) for i in range(2)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        at_once(2, ask)
         state = health(clients[0])
         for client in clients:
             client.close()

@@ -7,7 +7,8 @@ import itertools
 import random
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import msgspec
@@ -108,13 +109,15 @@ def mixed(seed: int = 0) -> Iterator[Asked]:
 
 @dataclass
 class Tally:
-    """What came of questions: how many of each status, and how long the good ones took [s]."""
+    """Outcomes of questions: how many of each status, and how long the good ones took [s]."""
 
     statuses: Counter[str] = field(default_factory=Counter)
     times: list[float] = field(default_factory=list)
     late: list[float] = field(default_factory=list)
     slowest: float = 0.0
     in_time: int = 0
+    seconds: float = 0.0
+    """How long it was asked [s]."""
 
     def note(self, reply: zenoh.Reply | None, seconds: float) -> None:
         """Count what a question got."""
@@ -126,6 +129,34 @@ class Tally:
             self.times.append(seconds)
         else:
             self.statuses[error_kind(reply)] += 1
+
+    @property
+    def rate(self) -> float:
+        """Good answers a second."""
+        return self.statuses["good"] / self.seconds
+
+    def percentile(self, part: float) -> float:
+        """A percentile of how long good answers took [ms]."""
+        return percentile(self.times, part)
+
+    def in_words(self) -> str:
+        """Return rate, times and statuses, in words."""
+        middle, late, most = map(self.percentile, (0.5, 0.99, 1.0))
+        return (
+            f"{self.rate:.1f}/s, p50 {middle:.0f} ms, p99 {late:.0f} ms, longest {most:.0f} ms, "
+            f"{dict(self.statuses)}"
+        )
+
+
+def percentile(seconds: list[float], part: float) -> float:
+    """A percentile of durations [s], in ms."""
+    return 1e3 * sorted(seconds)[min(len(seconds) - 1, int(part * len(seconds)))]
+
+
+def at_once(count: int, work: Callable[[int], object]) -> None:
+    """Do some work in so many threads, each with its number, until all have ended."""
+    with ThreadPoolExecutor(count) as pool:
+        list(pool.map(work, range(count)))
 
 
 def error_kind(reply: zenoh.Reply) -> str:

@@ -65,6 +65,11 @@ def children(pid: int) -> list[int]:
     return found
 
 
+def memory_of(pid: int) -> int:
+    """Resident memory of a process and of all that it has started [bytes]."""
+    return sum(resident(each) or 0 for each in (pid, *children(pid)))
+
+
 def workers(pid: int) -> list[int]:
     """Those of them that plan."""
     found = []
@@ -98,8 +103,7 @@ class Run:
         """Look at the memory until so many seconds have passed, or it ends; return how many."""
         pid = self._process.pid
         while self._process.poll() is None and time.perf_counter() - self.started < until:
-            both = [resident(each) for each in (pid, *children(pid))]
-            self.sizes.append(sum(size or 0 for size in both))
+            self.sizes.append(memory_of(pid))
             time.sleep(EVERY)
         return time.perf_counter() - self.started
 

@@ -9,18 +9,16 @@ import signal
 import statistics
 import subprocess
 import sys
-import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
 
 import click
 import msgspec
 from rich.console import Console
 
-from benchmarks.load.asking import PLAN, WRENCH_SPACE, Client, Tally, new_stances
+from benchmarks.load.asking import PLAN, WRENCH_SPACE, Client, Tally, at_once, new_stances
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.requests import wall_request
 from tests.suite.helpers.served import Served, free_endpoint
@@ -59,24 +57,16 @@ def starve(endpoint: str, half_planes: int) -> None:
 @click.argument("count", type=int)
 def greedy(endpoint: str, count: int) -> None:
     """Ask for large replies by some clients, each all the time, until killed."""
-    payload = next(large_questions())
+    # its reply has a megabyte, which a process has at once when it knows the question
+    payload = msgspec.json.encode(msgspec.json.decode(next(starving(3))) | {"deadline": 60.0})
 
-    def ask() -> None:
+    def ask(_: int) -> None:
         client = Client(endpoint, timeout=60.0)
         while True:
             client.ask(WRENCH_SPACE, payload)
 
-    threads = [threading.Thread(target=ask, daemon=True) for _ in range(count)]
-    for thread in threads:
-        thread.start()
     print("on", flush=True)
-    threading.Event().wait()
-
-
-def large_questions() -> Iterator[bytes]:
-    """Questions with replies of a megabyte, which a process has at once when it knows them."""
-    asked = msgspec.json.decode(next(starving(3)))
-    yield msgspec.json.encode(asked | {"deadline": 60.0})
+    at_once(count, ask)
 
 
 @contextmanager
@@ -106,35 +96,9 @@ def spinning(count: int) -> Iterator[None]:
         yield
 
 
-@dataclass
-class Polite:
-    """What clients have had that ask one question after another."""
-
-    seconds: float
-    times: list[float] = field(default_factory=list)
-    statuses: Counter[str] = field(default_factory=Counter)
-
-    @property
-    def rate(self) -> float:
-        """Good answers a second."""
-        return self.statuses["good"] / self.seconds
-
-    def late(self, part: float) -> float:
-        """A percentile of the good ones' times [s]."""
-        return sorted(self.times)[min(len(self.times) - 1, int(part * len(self.times)))]
-
-    def told(self) -> str:
-        """In words."""
-        middle, late, most = (1e3 * self.late(part) for part in (0.5, 0.99, 1.0))
-        return (
-            f"{self.rate:.1f}/s, p50 {middle:.0f} ms, p99 {late:.0f} ms, longest {most:.0f} ms, "
-            f"{dict(self.statuses)}"
-        )
-
-
-def polite(endpoint: str, seconds: float, seed: int, clients: int = 2) -> Polite:
+def polite(endpoint: str, seconds: float, seed: int, clients: int = 2) -> Tally:
     """Ask new stances, and known ones, by clients that wait for each answer."""
-    found, tally = Polite(seconds), Tally()
+    tally = Tally(seconds=seconds)
     until = time.perf_counter() + seconds
 
     def ask(number: int) -> None:
@@ -147,20 +111,15 @@ def polite(endpoint: str, seconds: float, seed: int, clients: int = 2) -> Polite
             tally.note(client.ask(PLAN, payload), time.perf_counter() - start)
         client.close()
 
-    threads = [threading.Thread(target=ask, args=(i,)) for i in range(clients)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    found.times, found.statuses = tally.times, tally.statuses
-    return found
+    at_once(clients, ask)
+    return tally
 
 
-def ratios(without: list[Polite], with_: list[Polite]) -> tuple[float, float]:
+def ratios(without: list[Tally], with_: list[Tally]) -> tuple[float, float]:
     """Median ratios of the rates, and of the 99th percentiles."""
     pairs = list(zip(without, with_, strict=True))
     rate = statistics.median(b.rate / a.rate for a, b in pairs)
-    return rate, statistics.median(b.late(0.99) / a.late(0.99) for a, b in pairs)
+    return rate, statistics.median(b.percentile(0.99) / a.percentile(0.99) for a, b in pairs)
 
 
 @click.command()
@@ -177,11 +136,11 @@ def starved(seconds: float, pairs: int, busy: int, half_planes: int) -> None:
             polite(server.endpoint, 5.0, 10_000)
             for i in range(pairs):
                 without.append(polite(server.endpoint, seconds, 100 * i))
-                console.print(f"without: {without[-1].told()}")
+                console.print(f"without: {without[-1].in_words()}")
                 more = ("-m", "benchmarks.load", "starve", server.endpoint)
                 with process(*more, "--half-planes", str(half_planes)):
                     with_.append(polite(server.endpoint, seconds, 100 * i + 50))
-                console.print(f"beside it: {with_[-1].told()}")
+                console.print(f"beside it: {with_[-1].in_words()}")
     finally:
         _, err = server.stop(signal.SIGTERM)
     rate, late = ratios(without, with_)
@@ -211,7 +170,9 @@ def unread(seconds: float, pairs: int, clients: int) -> None:
                 found.append(polite(server.endpoint, seconds, 100 * i, clients=1))
                 last = at_the_end(server)
             name = "that do not read" if stopped else "that read"
-            console.print(f"beside {clients} {name}: {found[-1].told()}; at SIGTERM {dict(last)}")
+            console.print(
+                f"beside {clients} {name}: {found[-1].in_words()}; at SIGTERM {dict(last)}"
+            )
     rate, late = ratios(reading, not_reading)
     console.print(f"goodput beside those that do not read / that do: {rate:.2f}; p99: {late:.2f}")
 

@@ -8,7 +8,6 @@ the outline have circles that reach beyond it, however short their edges: those 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -34,36 +33,35 @@ class Gaps:
         Corners [m].
     beside : ndarray of int, shape (m, 3)
         Neighbours, −1 for none.
+    bridged : ndarray, shape (m,)
+        Width of what each triangle bridges [m]; infinite for slivers of the outline.
+    area : ndarray, shape (m,)
+        Across z [m²].
     """
 
     triangles: Array
     beside: NDArray[np.int32]
+    bridged: Array
+    area: Array
 
-    @cached_property
-    def _edges(self) -> Array:
-        return self.triangles[:, [1, 2, 0]] - self.triangles
-
-    @cached_property
-    def _width(self) -> tuple[Array, NDArray[np.bool_]]:
-        """What each triangle bridges [m], and which ones are slivers of the outline."""
-        edges = self._edges
-        across = np.hypot(edges[..., 0], edges[..., 1])
-        twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-        sliver = twice <= SLIVER * across.max(axis=1) ** 2
-        circle = np.where(sliver, 0.0, across.prod(axis=1) / np.where(sliver, 1.0, twice))
-        step = np.linalg.norm(edges, axis=2).max(axis=1)
-        return np.maximum(circle, step), sliver & (self.beside < 0).any(axis=1)
+    @classmethod
+    def between(cls, triangles: Array, beside: NDArray[np.int32]) -> Gaps:
+        """Return the gaps that triangles (m, 3, 3) with these neighbours (m, 3) bridge."""
+        edges = _edges(triangles)
+        across, area = np.hypot(edges[..., 0], edges[..., 1]), _areas(edges)
+        sliver = 2.0 * area <= SLIVER * across.max(axis=1) ** 2
+        circle = np.where(sliver, 0.0, across.prod(axis=1) / np.where(sliver, 1.0, 2.0 * area))
+        width = np.maximum(circle, np.linalg.norm(edges, axis=2).max(axis=1))
+        width[sliver & (beside < 0).any(axis=1)] = np.inf
+        return cls(triangles, beside, width, area)
 
     def open_(self, hole: float) -> NDArray[np.bool_]:
-        """Return which triangles bridge more than a length [m], or nothing, shape (m,)."""
-        width, sliver = self._width
-        return np.asarray(sliver | (width > hole))
+        """Return which triangles bridge more than a length [m], shape (m,)."""
+        return np.asarray(self.bridged > hole)
 
     def covered(self, hole: float) -> float:
         """Return the part of the area across z that is left if wider gaps stay open."""
-        edges = self._edges
-        area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-        return float(area[~self.open_(hole)].sum() / area.sum())
+        return float(self.area[~self.open_(hole)].sum() / self.area.sum())
 
     def left(self, hole: float) -> tuple[tuple[Hole, ...], tuple[Step, ...]]:
         """Return holes and steps that the outline does not reach, the widest and highest first.
@@ -79,7 +77,10 @@ class Gaps:
         outside = np.zeros(count, dtype=bool)
         outside[part[(beside < 0).any(axis=1)]] = True
         groups = grouped(np.flatnonzero(open_ & ~outside[part]), part)
-        circle, rise = empty_circles(self.triangles), np.abs(self._edges[..., 2]).max(axis=1)
+        circle, rise = (
+            empty_circles(self.triangles),
+            np.abs(_edges(self.triangles)[..., 2]).max(axis=1),
+        )
         holes: list[Hole] = []
         steps: list[Step] = []
         for group in groups:
@@ -105,9 +106,9 @@ def empty_circles(triangles: Array) -> Array:
     triangles : ndarray, shape (m, 3, 3)
         Of a Delaunay triangulation across z.
     """
-    edges = triangles[:, [1, 2, 0], :2] - triangles[:, :, :2]
+    edges = _edges(triangles[:, :, :2])
     a, b, c = np.sort(np.linalg.norm(edges, axis=2), axis=1).T
-    twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    twice = 2.0 * _areas(edges)
     obtuse = a**2 + b**2 <= c**2
     tiny = np.finfo(float).tiny
     near = [
@@ -116,3 +117,13 @@ def empty_circles(triangles: Array) -> Array:
     ]
     circle = a * b * c / np.where(obtuse, 1.0, np.maximum(twice, tiny))
     return np.asarray(np.where(obtuse, np.maximum(*near), circle))
+
+
+def _edges(triangles: Array) -> Array:
+    return triangles[:, [1, 2, 0]] - triangles
+
+
+def _areas(edges: Array) -> Array:
+    """Return areas across z of triangles, by their edges (m, 3, 2 or 3), shape (m,)."""
+    cross = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    return np.asarray(0.5 * np.abs(cross))

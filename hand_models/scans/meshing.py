@@ -17,11 +17,10 @@ import scipy
 from hand_models.base import Array, Indices, InvalidInputError, Pose, Progress
 from hand_models.parameters import scan_table
 from hand_models.rock import Triangles, filled_cells
-from hand_models.scans.frame import axes_along, in_scan, start_on
 from hand_models.scans.holes import Gaps
 from hand_models.scans.kept import keep_triangles
 from hand_models.scans.rock import ScannedRock
-from hand_models.scans.scan import UNITS, Scan, Unit
+from hand_models.scans.scan import UNITS, Scan, Unit, axes_along, in_scan, start_on
 
 __all__ = ["Triangulated", "mesh_scan", "too_large", "too_small", "triangulated", "wider_holes"]
 
@@ -155,7 +154,9 @@ def triangulated(
         ) from None
     tell(2, STEPS)
     corners = flat.simplices.astype(np.intp)
-    return Triangulated(points, corners, Gaps(points[corners], flat.neighbors), middle, axes)
+    return Triangulated(
+        points, corners, Gaps.between(points[corners], flat.neighbors), middle, axes
+    )
 
 
 def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputError:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, Pose, finite_vector, reading_file
+from hand_models.parameters import scan_table
 from hand_models.rock import MESH_ENDINGS, read_vertices
 from hand_models.scans.columns import read_columns
-from hand_models.scans.digits import check_digits
 from hand_models.scans.grids import is_esri, read_esri, read_geotiff, read_numpy
 from hand_models.scans.pcd import read_pcd
 from hand_models.scans.scan import UNITS, UPS, RawScan, Scan, Unit, Up
@@ -49,6 +49,14 @@ LARGEST: Final = 1e12
 
 UNTURNED: Final = 1e-3
 """Turn of a scanner that is taken for none [rad]."""
+
+
+FEW_DIGITS: Final = (6, 7)
+"""Digits that programs write unless they are told otherwise: C++ streams and ``%g``, and floats of
+32 bits."""
+
+SAME: Final = 0.9
+"""Part of the points that are at places of their own, below which digits are taken to be lost."""
 
 
 def read_scan(
@@ -108,7 +116,7 @@ def read_scan(
     raw = _finite(raw)
     _check_numbers(raw.points, read, path)
     scale, turn = _scale(raw.points, unit, width), UPS[up]
-    check_digits(raw.points, scale, path)
+    _check_digits(raw.points, scale, path)
     if not np.ptp(raw.points, axis=0).any():
         place = ", ".join(f"{x:g}" for x in raw.points[0])
         raise InvalidInputError(
@@ -174,6 +182,53 @@ def _check_numbers(points: Array, read: int, path: Path) -> None:
             "not measured, write nan",
             field="file",
         )
+
+
+def _check_digits(points: Array, scale: float, path: Path) -> None:
+    """Refuse coordinates that come in steps too large for a hand, and name their cause.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        In the file's unit.
+    scale : float
+        Metres of that unit.
+    path : Path
+
+    Raises
+    ------
+    InvalidInputError
+        If they are floats of 32 bits, or were written with few digits; the field is ``file``.
+    """
+    largest = float(np.abs(points).max())
+    coarsest = scan_table().scalar("scan", "coarsest")
+    step = float(np.spacing(np.float32(largest)))
+    if scale * step > coarsest and np.array_equal(points, points.astype(np.float32)):
+        raise InvalidInputError(
+            f"coordinates up to {largest:,.0f} are in steps of {step:g} {_of_unit(scale)}, as "
+            "floats of 32 bits are at that size: subtract an offset (shift to a local origin) "
+            f"before the export, or export 64-bit floats (double): {path}",
+            field="file",
+        )
+    for digits in FEW_DIGITS:
+        step = 10.0 ** (math.floor(math.log10(max(largest, 1e-300))) + 1 - digits)
+        if scale * step <= coarsest:
+            return
+        cut = points[:, np.abs(points).max(axis=0).argmax()]
+        if np.allclose(cut, step * np.round(cut / step), rtol=1e-12, atol=0.0):
+            distinct = len(np.unique(points, axis=0))
+            if distinct <= SAME * len(points):
+                raise InvalidInputError(
+                    f"coordinates up to {largest:,.0f} have {digits} digits, steps of {step:g} "
+                    f"{_of_unit(scale)}, and {len(points):,} points are at {distinct:,} places: "
+                    f"write more digits, or subtract an offset before the export: {path}",
+                    field="file",
+                )
+
+
+def _of_unit(scale: float) -> str:
+    """Return the unit of numbers by its metres, if it has a name."""
+    return next((name for name, metres in UNITS.items() if metres == scale), f"times {scale:.3g} m")
 
 
 def _raw(path: Path, cell: float | None) -> RawScan:

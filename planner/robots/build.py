@@ -13,10 +13,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, within
-from planner.robots.joint_coupling import JointCoupling, coupling_of
-from planner.robots.limb_joints import limb_joints, locked_joints
+from planner.robots.limb_joints import JointCoupling, coupling_of, limb_joints, locked_joints
 from planner.robots.robot_file import STRONGEST, Mount, RobotDescription
-from planner.robots.urdf import JointElement, parse_urdf
+from planner.robots.urdf import JointElement, Urdf
 
 __all__ = ["Chain", "build_model", "pose_of"]
 
@@ -117,11 +116,21 @@ def pose_of(placement: Any) -> Pose:
 
 
 def build_model(
-    urdf: str, described: RobotDescription, hand_mass: float
+    tree: Urdf, urdf: str, described: RobotDescription, hand_mass: float
 ) -> tuple[Any, Pose, dict[str, Chain], dict[str, float]]:
     """Return Pinocchio's model of a robot that floats, with its hands.
 
     Joints that no limb has are where they are locked, or at zero.
+
+    Parameters
+    ----------
+    tree : Urdf
+        What the text of the URDF says.
+    urdf : str
+        The text, which Pinocchio reads by itself.
+    described : RobotDescription
+    hand_mass : float
+        [kg]
 
     Returns
     -------
@@ -136,10 +145,9 @@ def build_model(
     Raises
     ------
     InvalidInputError
-        If the URDF is none, a link is not in it, or a limb is no chain of joints of its own.
+        If Pinocchio cannot read it, a link is not in it, or a limb is no chain of joints of its
+        own.
     """
-    with within("urdf"):
-        tree = parse_urdf(urdf)
     with within("body"):
         tree.require(described.body)
     if not any(link.mass > 0.0 for link in tree.links.values()):

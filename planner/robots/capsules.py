@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
-from functools import cache
 from importlib import resources
 from typing import Any, Final, NamedTuple
 
@@ -27,6 +26,11 @@ __all__ = ["Capsules", "capsules_of", "scene_number"]
 
 BODY: Final = 0
 """Step of what no joint moves."""
+
+SCENE: Final = ParameterTable.read(
+    resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8"), "scene.toml"
+)
+"""Numbers of what is in the way, and of what is usual."""
 
 
 class Capsules(NamedTuple):
@@ -117,8 +121,6 @@ def _given(
                     yield _Capsule(frame.name, limb, step, frame.parentJoint, ends, row[6])
 
 
-@cache
 def scene_number(section: str, name: str) -> float:
     """Return a number of ``parameters/scene.toml``, in SI units."""
-    text = resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8")
-    return ParameterTable.read(text, "scene.toml").positive(section, name)
+    return SCENE.positive(section, name)

@@ -1,8 +1,13 @@
-"""Joint angles for poses of the hands: first any that put them there, then such that bear less."""
+"""Joint angles for poses of the hands: first any that put them there, then such that bear less.
+
+The second is Gauss–Newton on ``Σ (τ / τ_max)²`` over the directions in which a redundant limb can
+move without moving its hand, with each step's error of the pose taken back in the next.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +16,37 @@ from hand_models.base import Array, InvalidInputError, Pose
 from planner import deadline
 from planner.robots.limb_batch import LimbBatch
 from planner.robots.nearest_pose import PLACED, angles_near, lacking, starts_beside
-from planner.robots.pose_search import TOLERANCE, find_angles
+from planner.robots.pose_search import TOLERANCE, damped_step, find_angles
 from planner.robots.robot import Robot
-from planner.robots.torque_lowering import lower_torques
 
-__all__ = ["UnreachableError", "solve_limbs"]
+__all__ = ["UnreachableError", "lower_torques", "solve_limbs"]
+
+STEPS: Final = 6
+"""Steps of lowering, taken back or not."""
+
+LONGEST_STEP: Final = 0.35
+"""Most that a joint turns in one of them [rad]."""
+
+LOWERED: Final = 1e-3
+"""Step after which the torques count as lowered [rad]."""
+
+ASTRAY: Final = 0.1
+"""Largest error of the pose that a step may leave, in the terms of `LimbBatch.errors`."""
+
+CORRECTIONS: Final = 6
+"""Steps back onto the pose at the end."""
+
+DAMPING: Final = 1e-3
+"""First damping, over the sum of the curvatures; it falls with steps kept and grows with others."""
+
+FLAT: Final = 1e-12
+"""Curvature that is always added: joints that bear nothing have none."""
+
+SINGULAR: Final = 1e-8
+"""Added to J Jᵀ, which is singular where a limb is stretched."""
+
+POSE: Final = 6
+"""Joints that a pose takes up."""
 
 
 class UnreachableError(InvalidInputError):
@@ -121,3 +152,95 @@ def _lowered(batch: LimbBatch, angles: Mapping[str, Array]) -> dict[str, Array]:
     found, solved = _solved(again)
     parts = zip(angles.items(), found, solved, again.joints, strict=True)
     return {limb: mine[:n] if met else given for (limb, given), mine, met, n in parts}
+
+
+def lower_torques(batch: LimbBatch, angles: Array) -> Array:
+    """Return angles for the same poses, within the limits, with joint torques no higher.
+
+    Parameters
+    ----------
+    batch : LimbBatch
+    angles : ndarray, shape (L, m)
+        Limbs whose poses they do not solve are left as they are.
+
+    Returns
+    -------
+    ndarray, shape (L, m)
+        Σ (τ / τ_max)² of each limb is at most that at ``angles``, and near a local minimum.
+
+    Raises
+    ------
+    DeadlineError
+        If the time is over before.
+    """
+    now = _measured(batch, angles.copy())
+    movable = np.abs(now.errors).max(axis=1) <= TOLERANCE
+    movable &= np.array(batch.joints) > POSE
+    if not movable.any():
+        return angles
+    first, damping, going = now.cost.copy(), np.full(len(angles), DAMPING), movable
+    for _ in range(STEPS):
+        deadline.check("the joint angles were found")
+        back = damped_step(batch, now.angles, now.errors, now.jacobians) - now.angles
+        along = _along(_idle(now.jacobians), now.efforts, now.slopes, damping)
+        along *= (LONGEST_STEP / np.maximum(np.abs(along).max(axis=1), LONGEST_STEP))[:, None]
+        along *= _room(batch, now.angles, along)[:, None]
+        tried = np.minimum(np.maximum(now.angles + along + back, batch.lower), batch.upper)
+        new = _measured(batch, np.where(going[:, None], tried, now.angles))
+        kept = going & (new.cost < now.cost) & (np.abs(new.errors).max(axis=1) <= ASTRAY)
+        for before, after in zip(now, new, strict=True):
+            before[kept] = after[kept]
+        damping = np.where(kept, damping / 10.0, damping * 10.0)
+        going = going & (np.abs(along).max(axis=1) > LOWERED)
+        if not going.any():
+            break
+    for _ in range(CORRECTIONS):
+        if np.abs(now.errors[movable]).max() <= TOLERANCE:
+            break
+        moved = damped_step(batch, now.angles, now.errors, now.jacobians)
+        now = _measured(batch, np.where(movable[:, None], moved, now.angles))
+    good = movable & (np.abs(now.errors).max(axis=1) <= TOLERANCE) & (now.cost <= first)
+    return np.where(good[:, None], now.angles, angles)
+
+
+class _Posture(NamedTuple):
+    """Angles of the limbs, with what `LimbBatch` says of them."""
+
+    angles: Array
+    errors: Array
+    jacobians: Array
+    efforts: Array
+    slopes: Array
+    cost: Array
+
+
+def _measured(batch: LimbBatch, angles: Array) -> _Posture:
+    (errors,), (jacobians,) = batch.errors(angles[None])
+    (efforts,), (slopes,) = batch.efforts(angles[None])
+    return _Posture(angles, errors, jacobians, efforts, slopes, (efforts * efforts).sum(axis=1))
+
+
+def _idle(jacobians: Array) -> Array:
+    """Return projectors (L, m, m) onto the motions that leave the hands alone."""
+    transposed = jacobians.transpose(0, 2, 1)
+    inner = jacobians @ transposed + SINGULAR * np.eye(POSE)
+    return np.eye(jacobians.shape[2]) - transposed @ np.linalg.solve(inner, jacobians)
+
+
+def _along(idle: Array, effort: Array, slopes: Array, damping: Array) -> Array:
+    """Return the Gauss–Newton step, shape (L, m), among the motions that a projector leaves."""
+    S = slopes @ idle
+    transposed = S.transpose(0, 2, 1)
+    curvature = transposed @ S
+    added = damping * np.einsum("lkk->l", curvature) + FLAT
+    uphill = transposed @ effort[:, :, None]
+    x = np.linalg.solve(curvature + added[:, None, None] * np.eye(idle.shape[1]), -uphill)
+    return np.asarray((idle @ x)[:, :, 0])
+
+
+def _room(batch: LimbBatch, angles: Array, step: Array) -> Array:
+    """Return how much of a step stays within the limits, from 0 to 1, shape (L,)."""
+    gap = np.where(step > 0.0, batch.upper - angles, angles - batch.lower)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = np.where(np.abs(step) > 0.0, gap / np.abs(step), 1.0)
+    return np.asarray(np.clip(parts.min(axis=1), 0.0, 1.0))

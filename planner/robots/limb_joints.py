@@ -1,18 +1,25 @@
-"""Which joints of a URDF move a robot's limbs, and which are locked, and where."""
+"""Which joints of a URDF move a robot's limbs, which follow others, and where some are locked.
+
+A limb's joints are ``q = matrix · a + offset`` where a are those that motors move; the others
+follow these (mimic). By virtual work the force of a motor is then ``matrixᵀ · τ``: its own joint's,
+and that of every joint that follows it, times how far that one moves for each radian or metre of
+its own.
+"""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterable, Mapping
-from typing import Final
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
 
-from hand_models.base import InvalidInputError, within
-from planner.robots.joint_coupling import uncoupled
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, within
 from planner.robots.robot_file import RobotDescription, section_table
 from planner.robots.urdf import JointElement, Urdf
 
-__all__ = ["limb_joints", "locked_joints"]
+__all__ = ["JointCoupling", "coupling_of", "limb_joints", "locked_joints"]
 
 MOVING: Final = ("revolute", "continuous", "prismatic")
 """Types of joint that a limb may have."""
@@ -118,7 +125,8 @@ def _require_own(chains: Mapping[str, tuple[JointElement, ...]], already: Collec
 def _require_moved(chain: tuple[JointElement, ...], between: str, already: Collection[str]) -> None:
     """Refuse joints of a limb that no motor of it moves; say how to lock them."""
     free = [joint for joint in chain if joint.type not in MOVING]
-    wrong = free or uncoupled(chain)
+    known = _drivers(chain)
+    wrong = free or [joint for joint in chain if joint.name not in known]
     if not wrong:
         return
     last, advice = wrong[-1], _advice(wrong, already)
@@ -152,3 +160,65 @@ def _advice(joints: Iterable[JointElement], already: Collection[str]) -> str:
     if already:
         return f"; to lock {them}, add to locked: {line}"
     return f"; to lock {them}, write: locked = {{ {line} }}, above the first section"
+
+
+class JointCoupling(NamedTuple):
+    """Where k joints of a limb are, by the n of them that move by themselves.
+
+    Attributes
+    ----------
+    driving : tuple of JointElement, length n
+        From the body outward.
+    matrix : ndarray, shape (k, n)
+        [1, or m/rad or rad/m where one of them slides]
+    offset : ndarray, shape (k,)
+        [rad, or m]
+    lower, upper : ndarray, shape (n,)
+        Limits of those that drive, such that those that follow keep to theirs, too [rad, or m].
+    """
+
+    driving: tuple[JointElement, ...]
+    matrix: Array
+    offset: Array
+    lower: Array
+    upper: Array
+
+
+def coupling_of(chain: Sequence[JointElement]) -> JointCoupling:
+    """Return how the joints of a limb hang together, all of which follow its own motors.
+
+    Raises
+    ------
+    InvalidInputError
+        If the limits of coupled joints leave no room to a joint that drives them.
+    """
+    known = _drivers(chain)
+    driving = tuple(joint for joint in chain if joint.mimic is None)
+    names = [joint.name for joint in driving]
+    matrix, offset = np.zeros((len(chain), len(driving))), np.zeros(len(chain))
+    lower = np.array([joint.lower for joint in driving])
+    upper = np.array([joint.upper for joint in driving])
+    for i, joint in enumerate(chain):
+        driver, ratio, shift = known[joint.name]
+        j = names.index(driver)
+        matrix[i, j], offset[i] = ratio, shift
+        if ratio:
+            ends = sorted(((joint.lower - shift) / ratio, (joint.upper - shift) / ratio))
+            lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
+            if lower[j] > upper[j]:
+                raise InvalidInputError(
+                    f"joint {joint.name!r} follows {driver!r}, and their limits leave no room"
+                )
+    return JointCoupling(driving, matrix, offset, lower, upper)
+
+
+def _drivers(chain: Sequence[JointElement]) -> dict[str, tuple[str, float, float]]:
+    """Return of each joint that a motor of the limb moves that one's name, ratio and offset."""
+    found = {joint.name: (joint.name, 1.0, 0.0) for joint in chain if joint.mimic is None}
+    for _ in chain:
+        for joint in chain:
+            if joint.mimic is not None and joint.mimic.joint in found:
+                driver, ratio, shift = found[joint.mimic.joint]
+                by = joint.mimic.multiplier
+                found[joint.name] = driver, by * ratio, by * shift + joint.mimic.offset
+    return found

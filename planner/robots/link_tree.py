@@ -16,7 +16,6 @@ import numpy as np
 from hand_models.base import Array, Pose, turns_about
 from planner.robots.payload import Payload
 from planner.robots.robot import Robot
-from planner.robots.urdf import parse_urdf
 
 __all__ = ["LimbTorques", "LinkTree"]
 
@@ -55,7 +54,7 @@ class LinkTree:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        tree = parse_urdf(robot.urdf)
+        tree = robot.tree
         trails = sorted(map(tree.trail, tree.links), key=len)
         self.links = [tree.links[trail[0]] for trail in trails]
         # all but the root hang on a joint

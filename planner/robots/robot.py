@@ -21,6 +21,7 @@ from hand_models.base import (
     finite_vector,
     in_file,
     stored,
+    within,
     wrench_transport,
 )
 from hand_models.hand import SpinyHand, spiny_hand
@@ -28,6 +29,7 @@ from hand_models.parameters import ParameterTable
 from planner.robots.build import build_model, pose_of
 from planner.robots.capsules import capsules_of
 from planner.robots.robot_file import RobotDescription, RobotFile
+from planner.robots.urdf import parse_urdf
 
 __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
 
@@ -89,6 +91,8 @@ class Robot:
         Direction out of its back in B, where that is known.
     reach : float
         The longest limb's [m].
+    tree : Urdf
+        Links and joints, as the URDF has them.
     model
         Pinocchio's; the body floats, with its root link at the origin.
     root : Pose
@@ -108,7 +112,11 @@ class Robot:
 
     def __init__(self, description: RobotDescription, urdf: str, hand: SpinyHand) -> None:
         self.description, self.urdf, self.hand = description, urdf, hand
-        self.model, self.root, self.chains, self.locked = build_model(urdf, description, hand.mass)
+        with within("urdf"):
+            self.tree = parse_urdf(urdf)
+        self.model, self.root, self.chains, self.locked = build_model(
+            self.tree, urdf, description, hand.mass
+        )
         self._local = threading.local()
         self._from_root = self.root.inverse()
         self._to_body = wrench_transport(self._from_root)

@@ -12,8 +12,9 @@ from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from hand_models.base import Array, InvalidInputError, Pose, stored
+from hand_models.base import Array, InvalidInputError, Pose
 
 __all__ = ["JointElement", "Link", "Mimic", "Urdf", "parse_urdf"]
 
@@ -194,7 +195,6 @@ class Urdf:
             raise InvalidInputError(f"unknown link {link!r}; known are {known}")
 
 
-@stored("links and joints of robots", 32)
 def parse_urdf(text: str) -> Urdf:
     """Read the tree of a URDF, and check its numbers.
 
@@ -262,13 +262,23 @@ def _distinct(kind: str, names: list[str]) -> None:
 
 
 def _numbers(
-    owner: str, element: ElementTree.Element, attribute: str, count: int, largest: float
+    owner: str,
+    element: ElementTree.Element,
+    attribute: str,
+    count: int,
+    largest: float,
+    default: float | None = None,
 ) -> list[float]:
-    """Return the numbers of an attribute; refuse any other count, and any absurd one."""
+    """Return the numbers of an attribute; refuse any other count, and any absurd one.
+
+    Where the attribute is missing they are the default; without one, it is refused.
+    """
     place = f"{owner}: {attribute} of <{element.tag}>"
     raw = element.get(attribute)
     if raw is None:
-        raise InvalidInputError(f"{place} is missing")
+        if default is None:
+            raise InvalidInputError(f"{place} is missing")
+        return [default] * count
     words = raw.split()
     numbers = [float(word) for word in words] if all(map(NUMBER.fullmatch, words)) else []
     # written so that what is not a number fails
@@ -285,23 +295,10 @@ def _origin(owner: str, element: ElementTree.Element) -> Pose:
     origin = element.find("origin")
     if origin is None:
         return Pose.identity()
-    position, angles = (
-        _numbers(owner, origin, name, 3, most) if name in origin.attrib else [0.0, 0.0, 0.0]
-        for name, most in (("xyz", LONGEST), ("rpy", WIDEST))
-    )
-    return Pose(np.array(position), _turned(*angles))
-
-
-def _turned(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation of URDF's angles about the fixed axes x, y, z, one after the other."""
-    (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
-    return np.array(
-        [
-            [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
-            [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
-            [-sy, sx * cy, cx * cy],
-        ]
-    )
+    position = _numbers(owner, origin, "xyz", 3, LONGEST, default=0.0)
+    angles = _numbers(owner, origin, "rpy", 3, WIDEST, default=0.0)
+    # turned about the fixed axes x, y, z, one after the other
+    return Pose(np.array(position), Rotation.from_euler("xyz", angles).as_matrix())
 
 
 def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
@@ -338,10 +335,8 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         for rating in ("effort", "velocity"):
             _numbers(owner, limit, rating, 1, sys.float_info.max)
         # URDF takes a limit that is left out for zero
-        lower, upper = (
-            _numbers(owner, limit, end, 1, WIDEST)[0] if end in limit.attrib else 0.0
-            for end in ("lower", "upper")
-        )
+        (lower,) = _numbers(owner, limit, "lower", 1, WIDEST, default=0.0)
+        (upper,) = _numbers(owner, limit, "upper", 1, WIDEST, default=0.0)
         if lower > upper:
             unit = "m" if kind == "prismatic" else "rad"
             raise InvalidInputError(
@@ -366,10 +361,8 @@ def _mimic(owner: str, element: ElementTree.Element) -> Mimic | None:
     mimic = element.find("mimic")
     if mimic is None:
         return None
-    multiplier, offset = (
-        _numbers(owner, mimic, name, 1, most)[0] if name in mimic.attrib else default
-        for name, most, default in (("multiplier", STEEPEST, 1.0), ("offset", WIDEST, 0.0))
-    )
+    (multiplier,) = _numbers(owner, mimic, "multiplier", 1, STEEPEST, default=1.0)
+    (offset,) = _numbers(owner, mimic, "offset", 1, WIDEST, default=0.0)
     return Mimic(mimic.get("joint", ""), multiplier, offset)
 
 

@@ -7,9 +7,17 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from hand_models.base import InvalidInputError, Pose
-from planner.robots import LinkTree, RobotFile, robot_of
-from tests.suite.helpers.robots import TWO_LINK, joint, limbs_toml, link, urdf
+from hand_models.base import Pose
+from planner.robots import RobotFile, robot_of
+from tests.suite.helpers.robots import (
+    TWO_LINK,
+    check_link_tree,
+    joint,
+    limbs_toml,
+    link,
+    refusal,
+    urdf,
+)
 
 EARTH = np.array([0.5, -0.3, -9.81])
 TURNED = np.array([0.2, 0.1, -0.3, 0.4, -0.2, 0.3])
@@ -50,14 +58,6 @@ def robot(toml, text):
     return robot_of(RobotFile("walker", toml, text, "walker.toml"))
 
 
-def refusal(toml, text):
-    with pytest.raises(InvalidInputError) as caught:
-        robot(toml, text)
-    message = str(caught.value)
-    assert "\n" not in message
-    return message.removeprefix("walker.toml: ")
-
-
 def agree(one, other, angles):
     """Two robots must stand and bear alike."""
     for a, b in zip(held_up(one, angles), held_up(other, angles), strict=True):
@@ -74,19 +74,6 @@ def held_up(robot, angles):
     yield robot.com_at(angles)
 
 
-def check_tree(robot, angles):
-    """Pinocchio's kinematics and statics must be those of the links, moment by moment."""
-    wrenches = {limb: np.arange(1.0, 7.0) * (i + 1) for i, limb in enumerate(robot.limbs)}
-    tree = LinkTree(robot).hold_up(angles, wrenches, EARTH, TURNED)
-    statics, found = robot.statics(angles, EARTH, TURNED), robot.kinematics(angles)
-    np.testing.assert_allclose(tree.body_wrench, statics.body_wrench, atol=1e-9)
-    for limb, (pose, jacobian) in found.items():
-        np.testing.assert_allclose(tree.hands[limb].position, pose.position, atol=1e-12)
-        np.testing.assert_allclose(tree.hands[limb].rotation, pose.rotation, atol=1e-12)
-        torque = statics.joint_torque[limb] + jacobian.T @ wrenches[limb]
-        np.testing.assert_allclose(tree.torques[limb], torque, atol=1e-9)
-
-
 # names --------------------------------------------------------------------------------------------
 
 
@@ -99,7 +86,7 @@ def test_a_joint_may_have_the_name_of_a_link(name, old):
     named = robot(toml, TWO_LINK.replace(f'joint name="{old}"', f'joint name="{name}"'))
     assert named.chains["leg"].joints == (name if old == "hip" else "hip", "knee")
     agree(named, plain, {"leg": np.array([0.3, -0.7])})
-    check_tree(named, {"leg": np.array([0.3, -0.7])})
+    check_link_tree(named, {"leg": np.array([0.3, -0.7])}, EARTH, TURNED)
 
 
 @pytest.mark.parametrize("name", ["free body", "universe", "joint hip"])
@@ -128,7 +115,7 @@ def test_a_joint_with_equal_limits_is_fixed_there():
     one, other = (robot(toml, TWO_LINK.replace(free, knee)) for knee in (bent, drawn))
     assert one.chains["leg"].joints == ("hip",)
     agree(one, other, {"leg": np.array([0.3])})
-    check_tree(one, {"leg": np.array([0.3])})
+    check_link_tree(one, {"leg": np.array([0.3])}, EARTH, TURNED)
 
 
 def test_a_limb_of_joints_whose_limits_are_equal_is_told_why_it_is_none():
@@ -161,7 +148,7 @@ def test_a_waist_is_locked_where_the_file_says():
         )
         assert count == 1
     agree(walker, robot(ARMS, text), ANGLES)
-    check_tree(walker, ANGLES)
+    check_link_tree(walker, ANGLES, EARTH, TURNED)
 
 
 def test_a_lock_moves_what_is_beyond_it_and_nothing_else():
@@ -209,7 +196,7 @@ def test_a_joint_that_no_limb_can_have_is_told_with_what_locks_it(old, new, word
     assert told.endswith("; to lock it, add to locked: left_elbow = 0.0")
     walker = robot(ARMS + LOCKED + told.partition("locked: ")[2], text)
     assert walker.chains["left"].joints == ("left_shoulder",)
-    check_tree(walker, {"left": ANGLES["left"][:1], "right": ANGLES["right"]})
+    check_link_tree(walker, {"left": ANGLES["left"][:1], "right": ANGLES["right"]}, EARTH, TURNED)
 
 
 @pytest.mark.parametrize(

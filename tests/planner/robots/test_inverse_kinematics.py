@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose
 from planner.robots import RobotFile, UnreachableError, robosimian, robot_of, solve_limbs
+from planner.robots.inverse_kinematics import lower_torques
 from planner.robots.limb_batch import LimbBatch
 from planner.robots.pose_search import TOLERANCE, damped_step
-from planner.robots.torque_lowering import lower_torques
 from tests.suite.helpers.robots import arm
 
 EARTH = np.array([0.0, 0.0, -9.81])

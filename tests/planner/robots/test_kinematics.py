@@ -123,6 +123,37 @@ def test_limits_and_names_are_those_of_the_published_model():
         np.testing.assert_array_equal(model.chains[limb].upper, np.full(7, 3.1415))
 
 
+def test_shoulders_and_reach_are_those_of_the_published_model():
+    """Two segments along a line to link 6, and the last one on."""
+    robot = robosimian()
+    for i, limb in enumerate(LIMBS):
+        shoulder = ZERO_POSE[f"limb{i + 1}_link2"]
+        np.testing.assert_allclose(robot.chains[limb].shoulder, shoulder, atol=1e-5)
+    # joints 3 and 5, and 7, in their parents
+    segment, last = np.array([0.2865, -0.117, 0.0]), np.array([0.1925, -0.117, 0.0])
+    stretched = 2 * np.linalg.norm(segment) + np.linalg.norm(last)
+    assert robot.reach == pytest.approx(stretched, abs=1e-3)
+
+
+def test_hand_is_mounted_where_the_meshes_say():
+    # hand frame 87.2 mm along link 7, less 19.85 mm from it to H; palm 112.5 mm above the axis
+    for mount in robosimian().description.mounts.values():
+        np.testing.assert_allclose(mount.pose.position, [0.0872 - 0.01985, 0.0, 0.1125])
+        np.testing.assert_array_equal(mount.pose.rotation, np.eye(3))
+
+
+@pytest.mark.parametrize("part", [0.0, 0.5, 1.0, 1.2])
+def test_stretch_is_the_distance_of_the_last_link_over_the_reach(part):
+    robot = robosimian()
+    way = np.random.default_rng(3).normal(size=3)
+    turn = Pose.from_quaternion([0.0, 0.0, 0.0], [0.5, -0.5, 0.5, 0.5]).rotation
+    for limb, chain in robot.chains.items():
+        link = chain.shoulder + part * robot.reach * way / np.linalg.norm(way)
+        hand = Pose(link, turn) @ robot.description.mounts[limb].pose
+        (stretch,) = robot.stretches(Pose.identity(), [limb], [hand])
+        assert stretch == pytest.approx(part, abs=1e-9)
+
+
 # --- a planar limb by hand
 
 
@@ -238,6 +269,7 @@ def test_the_body_may_be_another_link_than_the_root():
     rooted, framed = (bare_robot(t, "trunk", hands, 3.0) for t in (TWO_LINK, text))
     angles = {"leg": np.array([0.3, -1.2])}
     acceleration = np.array([0.1, 0.2, -0.3, 0.5, -0.4, 0.6])
+    one, other = (each.statics(angles, EARTH, acceleration) for each in (rooted, framed))
     for a, b in [
         (rooted.hand_poses(angles)["leg"].position, framed.hand_poses(angles)["leg"].position),
         (rooted.hand_poses(angles)["leg"].rotation, framed.hand_poses(angles)["leg"].rotation),
@@ -245,15 +277,8 @@ def test_the_body_may_be_another_link_than_the_root():
         (rooted.com_at(angles), framed.com_at(angles)),
         (rooted.link_chain(angles, "leg"), framed.link_chain(angles, "leg")),
         (rooted.chains["leg"].shoulder, framed.chains["leg"].shoulder),
-        *zip(
-            (lambda s: (s.body_wrench, s.joint_torque["leg"]))(
-                rooted.statics(angles, EARTH, acceleration)
-            ),
-            (lambda s: (s.body_wrench, s.joint_torque["leg"]))(
-                framed.statics(angles, EARTH, acceleration)
-            ),
-            strict=True,
-        ),
+        (one.body_wrench, other.body_wrench),
+        (one.joint_torque["leg"], other.joint_torque["leg"]),
     ]:
         np.testing.assert_allclose(a, b, atol=1e-12)
 

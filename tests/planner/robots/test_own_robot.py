@@ -36,13 +36,16 @@ BODY = Pose(np.zeros(3), np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0,
 """The trunk hangs on a wall: x up, z into the rock."""
 
 
+TOML, URDF = arm(6, ("left", "right"))
+"""A robot with two arms of six joints."""
+
+
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of a robot with two arms of six joints, beside its URDF."""
+    """The robot's file, beside its URDF."""
     folder = tmp_path_factory.mktemp("arms")
-    toml, urdf = arm(6, ("left", "right"))
-    (folder / "arms.urdf").write_text(urdf)
-    (folder / "arms.toml").write_text(toml)
+    (folder / "arms.urdf").write_text(URDF)
+    (folder / "arms.toml").write_text(TOML)
     return folder / "arms.toml"
 
 
@@ -201,28 +204,22 @@ def test_a_stance_with_limbs_of_another_robot_names_those_that_are_there(
 BAD = {
     "no file": (None, None, "No such file or directory"),
     "no TOML": ("[limbs\n", None, "Expected"),
-    "no name": ('urdf = "arms.urdf"', None, "name: must be text, got nothing"),
-    "a name that is no part of a key": (('name = "arms"', 'name = "a/b"'), (), "name: a name must"),
-    "no URDF": ("", None, "urdf: "),
-    "a URDF that is none": ("", "<robot", "urdf: "),
-    "degrees": ("", ("2.5", "143"), "urdf: "),
-    "a link that is not there": (("left6", "left9"), (), "limbs.left.link: "),
-    "too few torques": (("80.0", "[80.0, 80.0]"), (), "limbs.left.torque_limit: one number is"),
+    "no URDF": (TOML, None, "urdf: "),
+    "degrees": (TOML, URDF.replace("2.5", "143"), "urdf: "),
+    "too few torques": (TOML.replace("80.0", "[80.0, 80.0]"), URDF, "limbs.left.torque_limit: one"),
 }
+"""Texts of a robot's file and its URDF, and the words that each is refused with."""
 
 
 @pytest.mark.parametrize("what", BAD)
 def test_a_bad_file_is_refused_in_one_line(
     what: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    toml, urdf = arm(6, ("left", "right"))
-    change, spoilt, words = BAD[what]
+    *texts, words = BAD[what]
     path = tmp_path / "mine.toml"
-    if change is not None:
-        path.write_text(toml.replace(*change) if isinstance(change, tuple) else change or toml)
-    if spoilt is not None:
-        text = spoilt if isinstance(spoilt, str) else urdf.replace(*spoilt) if spoilt else urdf
-        (tmp_path / "arms.urdf").write_text(text)
+    for file, text in zip((path, tmp_path / "arms.urdf"), texts, strict=True):
+        if text is not None:
+            file.write_text(text)
     assert run(["plan", "wall-300", "--robot", str(path)]) == 2
     line = complaint(capfd)
     assert line.startswith(f"crux: {path}: {words}")

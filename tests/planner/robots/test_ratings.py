@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hand_models.base import InvalidInputError
 from planner.question import Limits, Question
 from planner.robots import RobotFile, robot_of
 from planner.solving import plan
-from tests.suite.helpers.robots import TWO_LINK, limbs_toml
+from tests.suite.helpers.robots import TWO_LINK, limbs_toml, refusal
 from tests.suite.helpers.stances_with_joints import at_joints
 
 TOML = re.sub(r"torque_limit = .*\n", "", limbs_toml("walker", {"leg": "foot"}))
@@ -53,10 +52,8 @@ def test_efforts_are_taken_joint_by_joint(hip, knee):
     ],
 )
 def test_efforts_that_are_no_rating_are_refused(hip, knee, words):
-    with pytest.raises(InvalidInputError) as caught:
-        robot(rated(hip, knee))
-    told = str(caught.value)
-    assert told.startswith("walker.toml: limbs.leg.torque_limit: missing, and the URDF has ")
+    told = refusal(TOML, rated(hip, knee))
+    assert told.startswith("limbs.leg.torque_limit: missing, and the URDF has ")
     assert words in told
     assert "give torque_limit" in told
 
@@ -108,12 +105,8 @@ XACRO = [
 def test_a_xacro_is_named_with_what_expands_it(old, new, more):
     text = TWO_LINK.replace(old, new).replace("</robot>", f"{more}</robot>")
     assert text != TWO_LINK
-    with pytest.raises(InvalidInputError) as caught:
-        robot(text, limbs_toml("walker", {"leg": "foot"}))
-    told = str(caught.value)
-    assert told.startswith(
-        "walker.toml: urdf: must be a URDF; this is a xacro, which is not expanded"
-    )
+    told = refusal(limbs_toml("walker", {"leg": "foot"}), text)
+    assert told.startswith("urdf: must be a URDF; this is a xacro, which is not expanded")
     assert "xacro ROBOT.urdf.xacro > ROBOT.urdf" in told
 
 

@@ -4,9 +4,10 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
-from hand_models.base import Pose
-from planner.robots import Robot
+from hand_models.base import InvalidInputError, Pose
+from planner.robots import LinkTree, Robot, RobotFile, robot_of
 from planner.robots.robot_file import Mount, RobotDescription
 
 ROBOT_TOML = """
@@ -65,6 +66,29 @@ def bare_robot(text, body, hands, hand_mass, com=(0.0, 0.0, 0.0)):
 def with_hand(robot, hand):
     """The robot with another hand on every limb."""
     return Robot(robot.description, robot.urdf, hand)
+
+
+def refusal(toml, text):
+    """The line in which a robot is refused, after its file's name."""
+    with pytest.raises(InvalidInputError) as caught:
+        robot_of(RobotFile("walker", toml, text, "walker.toml"))
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("walker.toml: ")
+    return message.removeprefix("walker.toml: ")
+
+
+def check_link_tree(robot, angles, gravity, acceleration):
+    """Pinocchio's kinematics and statics must be those of the links, moment by moment."""
+    wrenches = {limb: 10.0 * np.arange(1.0, 7.0) * (i + 1) for i, limb in enumerate(robot.limbs)}
+    tree = LinkTree(robot).hold_up(angles, wrenches, gravity, acceleration)
+    statics, found = robot.statics(angles, gravity, acceleration), robot.kinematics(angles)
+    np.testing.assert_allclose(tree.body_wrench, statics.body_wrench, rtol=1e-9, atol=1e-9)
+    for limb, (pose, jacobian) in found.items():
+        np.testing.assert_allclose(tree.hands[limb].position, pose.position, atol=1e-12)
+        np.testing.assert_allclose(tree.hands[limb].rotation, pose.rotation, atol=1e-12)
+        torque = statics.joint_torque[limb] + jacobian.T @ wrenches[limb]
+        np.testing.assert_allclose(tree.torques[limb], torque, rtol=1e-9, atol=1e-9)
 
 
 TWO_LINK = urdf(
