@@ -113,14 +113,12 @@ class CompliantGrasp(ABC):
     ----------
     columns : tuple of str, length d
         Names of the components of a pose of its wrist.
+    load_rows : LoadRows
+        What its loads and wrenches must keep to.
     """
 
     columns: tuple[str, ...]
-
-    @property
-    @abstractmethod
-    def load_rows(self) -> LoadRows:
-        """What its loads and wrenches must keep to."""
+    load_rows: LoadRows
 
     @abstractmethod
     def loads_at(self, twists: Numbers) -> GraspLoads:

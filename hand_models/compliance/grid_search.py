@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -73,7 +72,7 @@ class WristSearch:
     wrenches: Array
     limiting: tuple[Row | None, ...]
 
-    @cached_property
+    @property
     def hull(self) -> scipy.spatial.ConvexHull:
         """The hull of the wrenches, in newtons (moments over a length, `SCALE`).
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -133,10 +132,10 @@ class Gripper(CompliantGrasp):
             tendon.closed(tension, shears),
             "tension",
         )
+        self.load_rows = self._load_rows()
 
-    @cached_property
-    def load_rows(self) -> LoadRows:
-        """What loads must keep to: each side's tiles, proximal first, and their half-planes."""
+    def _load_rows(self) -> LoadRows:
+        """Return the rows of each side's tiles, proximal first, and their half-planes."""
         tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
         each, pieces = np.eye(len(tiles)), inner_half_planes(self.surface)
         limits = [named_row(*tile, piece.limit, "limit") for tile in tiles for piece in pieces]

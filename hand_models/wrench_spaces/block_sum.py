@@ -94,7 +94,7 @@ class BlockSum:
             summands.append(extreme_points(image, len(columns)))
         return tuple(summands)
 
-    @cached_property
+    @property
     def base(self) -> Array:
         """A scaled wrench of the set."""
         start = self.origin * SCALE
