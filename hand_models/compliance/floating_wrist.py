@@ -20,7 +20,14 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, BoundedStore, Indices
 from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
-from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, complex_steps, slopes
+from hand_models.compliance.grasp import (
+    CompliantGrasp,
+    GraspLoads,
+    LoadRows,
+    complex_steps,
+    rows_of_range,
+    slopes,
+)
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import layout_of
@@ -69,7 +76,7 @@ class FloatingWrist(CompliantGrasp):
     tension_limit: float | None = None
     palm: PalmMode = "off"
 
-    columns = WRIST
+    columns, range_rows = WRIST, rows_of_range(WRIST)
 
     def __post_init__(self) -> None:
         self.layout = layout_of(self.hand.settled, sticking=False)

@@ -15,7 +15,7 @@ import numpy as np
 
 from hand_models.base import InvalidInputError, check_positive
 from hand_models.compliance.compliant_finger import CompliantFinger, FingerLoads
-from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows
+from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, rows_of_range
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES, FingerModel, settle_finger
 from hand_models.fixed_wrist import named_row
@@ -86,7 +86,7 @@ class Gripper(CompliantGrasp):
         If a number is out of range, or the fingers do not all lie on the surface.
     """
 
-    columns = PLANE
+    columns, range_rows = PLANE, rows_of_range(PLANE)
 
     def __init__(
         self,
