@@ -48,14 +48,12 @@ NEAR_SHIFT: Final = 0.25
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Pull the gripper straight off, and in other directions of (F_x, F_z)."""
-    steps = 3
-    progress(0, steps)
+    progress(0, 1)
     table = experiment_table()
     conditions = Conditions.of_figure("fig12")
     gripper = conditions.gripper(gripper_table(hand))
     rest = unloaded(gripper)
     slip = pull(gripper, np.array([[0.0, -1.0, 0.0]]))
-    progress(1, steps)
     pulls = np.linspace(0.0, table.scalar("fig12", "pull"), POINTS)
     poses = pulled_off_poses(gripper, pulls)
     further = np.linspace(0.0, -slip.wrenches[0, 1], POINTS)
@@ -63,11 +61,10 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         gripper.finger_loads(at)[0]
         for at in (pulled_off_poses(gripper, further), slip.poses, poses)
     )
-    progress(2, steps)
     turns = np.linspace(-np.pi / 2, np.pi / 2, SIDEWAYS + 1)
     around = np.column_stack([np.sin(turns), -np.cos(turns), np.zeros(len(turns))])
     elsewhere = pull(gripper, around)
-    progress(3, steps)
+    progress(1, 1)
     # of each phalanx, the largest of its limits
     pieces = inner_half_planes(gripper.surface)
     used = [
