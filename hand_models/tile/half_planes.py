@@ -27,15 +27,13 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hand_models.base import Array
 from hand_models.tile.direction_boxes import DirectionBoxes, bounded
-
-if TYPE_CHECKING:
-    from hand_models.tile.surface import Surface
 
 __all__ = [
     "BoundsGap",
@@ -72,6 +70,39 @@ SAMPLES: Final = 2049
 
 LEAST_LATERAL: Final = 1e-3
 """Share of a load out of the finger plane from which on the search looks."""
+
+
+class TileLaw(Protocol):
+    """What half-planes need of a law: numbers of `Surface`, and F and its parts, f_s and λ.
+
+    Neither part may rise with φ. Laws that are equal have equal hashes.
+    """
+
+    @property
+    def shear_limit(self) -> float: ...
+    @property
+    def pull_off_limit(self) -> float: ...
+    @property
+    def pull_off_angle(self) -> float: ...
+    @property
+    def lateral_limit(self) -> float: ...
+    @property
+    def compression_gain(self) -> float: ...
+    @property
+    def half_planes(self) -> int: ...
+    def __hash__(self) -> int: ...
+
+    def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
+        """Return F(φ, θ) [N]."""
+        ...
+
+    def straight_strength(self, angle: ArrayLike) -> Array:
+        """Return f_s(φ) [N]."""
+        ...
+
+    def sideways_share(self, angle: ArrayLike) -> Array:
+        """Return λ(φ)."""
+        ...
 
 
 class HalfPlane(NamedTuple):
@@ -112,7 +143,7 @@ class BoundsGap(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def inner_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
+def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     """Return half-planes whose intersection lies inside the limit surface, for shear T ≥ 0.
 
     Returns
@@ -141,7 +172,7 @@ def inner_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
     return tuple(pieces)
 
 
-def outer_half_planes(surface: Surface) -> tuple[HalfPlane, ...]:
+def outer_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     """Return half-planes of the inner ones' normals that hold the whole limit surface, for T ≥ 0.
 
     Where pressing raises the strength faster than a normal allows, it is tilted as far as needed.
@@ -180,7 +211,7 @@ def directional_strength(pieces: Sequence[HalfPlane], directions: Array) -> Arra
     return found
 
 
-def bounds_gap(surface: Surface, directions: Array) -> BoundsGap:
+def bounds_gap(surface: TileLaw, directions: Array) -> BoundsGap:
     """Return the gap between inner half-planes, limit surface and outer half-planes.
 
     Parameters
@@ -204,7 +235,7 @@ def bounds_gap(surface: Surface, directions: Array) -> BoundsGap:
     )
 
 
-def _nodes(surface: Surface) -> list[tuple[float, float]]:
+def _nodes(surface: TileLaw) -> list[tuple[float, float]]:
     """Return the ends of the chords, (shear T, pull P) on the curve of Eq. 21 [N]."""
     angles = np.linspace(0.0, surface.pull_off_angle, int(surface.half_planes) + 1)
     radii = surface.strength(angles)
@@ -227,7 +258,7 @@ def _chord(start: tuple[float, float], end: tuple[float, float]) -> tuple[float,
 
 
 def _inside(
-    surface: Surface, chord: tuple[float, float, float], sector: tuple[float, float]
+    surface: TileLaw, chord: tuple[float, float, float], sector: tuple[float, float]
 ) -> tuple[float, float, float]:
     """Return a chord as it is if it is inside the curve over its sector, or moved inward."""
     a, b, c = chord
@@ -247,7 +278,7 @@ def _inside(
 
 
 def _lateral_coefficient(
-    surface: Surface, chord: tuple[float, float, float], sector: tuple[float, float]
+    surface: TileLaw, chord: tuple[float, float, float], sector: tuple[float, float]
 ) -> float:
     """Return the least a_Y that keeps a chord inside the surface over its sector.
 
@@ -286,7 +317,7 @@ def _lateral_coefficient(
     return bounded(needed, DirectionBoxes(*np.concatenate(edges, axis=1)), found * (1.0 + MARGIN))
 
 
-def _support(surface: Surface, normal: tuple[float, float, float]) -> float:
+def _support(surface: TileLaw, normal: tuple[float, float, float]) -> float:
     """Return the largest load along (a, b, a_Y) on the surface [N]."""
 
     def along(angle: Array, azimuth: Array) -> Array:
