@@ -154,12 +154,7 @@ class Axis:
 
     def set(self, table: ParameterTable, value: float) -> ParameterTable:
         """Return a table in which the entry has a value."""
-        old = table.quantity(self.section, self.name)
-        new: float | list[float] = value
-        if isinstance(old.value, list):
-            new = list(old.value)
-            new[self.index or 0] = value
-        quantity = Quantity(new, old.unit, old.source, old.note)
+        quantity = table.quantity(self.section, self.name).changed(value, self.index)
         return table.replaced(ParameterTable({self.section: {self.name: quantity}}))
 
     def current(self, table: ParameterTable) -> float:

@@ -73,6 +73,14 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     source: Source
     note: str = ""
 
+    def changed(self, value: float, place: int | None = None) -> Quantity:
+        """Return it with another number, of a list that at a place, the first by default."""
+        if not isinstance(self.value, list):
+            return msgspec.structs.replace(self, value=value)
+        numbers = list(self.value)
+        numbers[place or 0] = value
+        return msgspec.structs.replace(self, value=numbers)
+
 
 class ParameterTable:
     """Quantities by section and name. Tables of the same content are equal.
