@@ -27,7 +27,6 @@ from .pictures import (
 from .pulling import (
     DRAGGED as DRAGGED,
     UNBALANCED as UNBALANCED,
-    Explored as Explored,
     Pulled as Pulled,
     even_pulls as even_pulls,
     explored as explored,

@@ -9,7 +9,7 @@ signs.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -27,7 +27,6 @@ from hand_models.finger import PHALANGES
 __all__ = [
     "DRAGGED",
     "UNBALANCED",
-    "Explored",
     "Pulled",
     "even_pulls",
     "explored",
@@ -88,27 +87,10 @@ class Pulled:
     way: tuple[str, ...]
 
 
-class Explored(NamedTuple):
-    """What a gripper holds, by a search of its wrist's poses and by pulls.
-
-    Attributes
-    ----------
-    search : WristSearch
-    pulled : Pulled
-    wrenches : ndarray, shape (n, 3)
-        Outermost of the search, and those of the pulls [N, N, N·m].
-    size : ndarray, shape (3,)
-        How far those of the search with F_z ≤ 0 go.
-    """
-
-    search: WristSearch
-    pulled: Pulled
-    wrenches: Array
-    size: Array
-
-
-def explored(gripper: Gripper, count: int, progress: Progress) -> Explored:
+def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSearch, Pulled, Array]:
     """Search a gripper's poses, then pull it along about ``count`` directions.
+
+    Also returned are the outermost wrenches of the search and those of the pulls, shape (n, 3).
 
     Raises
     ------
@@ -121,7 +103,7 @@ def explored(gripper: Gripper, count: int, progress: Progress) -> Explored:
     size = np.abs(clipped_vertices(wrenches)).max(axis=0)
     pulled = pull(gripper, even_pulls(count, size), part(progress, 1, 10, 10))
     # a pull that a search of poses has missed is held all the same
-    return Explored(found, pulled, np.vstack([wrenches, pulled.wrenches]), size)
+    return found, pulled, np.vstack([wrenches, pulled.wrenches])
 
 
 def held_wrenches(gripper: Gripper) -> Array:

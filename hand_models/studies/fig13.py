@@ -76,7 +76,8 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     table = experiment_table()
     conditions, numbers = Conditions.of_figure("fig13"), gripper_table(hand)
     gripper = conditions.gripper(numbers)
-    found, pulled, whole, size = explored(gripper, DIRECTIONS, part(progress, 0, PULLED, STEPS))
+    found, pulled, whole = explored(gripper, DIRECTIONS, part(progress, 0, PULLED, STEPS))
+    size = np.abs(clipped_vertices(in_paper_signs(found.wrenches))).max(axis=0)
     full, shown = vertices(whole), clipped_vertices(whole)
     # those that press no more than the paper's surface
     pressing_less = conditions.gripper(numbers, table.scalar("fig13", "top"))

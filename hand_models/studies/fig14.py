@@ -80,7 +80,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 
 def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -> dict[str, Any]:
     """Return hull, failures and planes of the gripper on one surface."""
-    _, pulled, wrenches, _ = explored(conditions.gripper(gripper_table(hand)), DIRECTIONS, progress)
+    _, pulled, wrenches = explored(conditions.gripper(gripper_table(hand)), DIRECTIONS, progress)
     shown = clipped_vertices(wrenches)
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
