@@ -22,6 +22,7 @@ from .errors import (
     in_file as in_file,
     within as within,
 )
+from .files import reading_file as reading_file, whole_file as whole_file
 from .frames import (
     SKEW as SKEW,
     Array as Array,
@@ -33,7 +34,6 @@ from .frames import (
     wrench_transport as wrench_transport,
     wrench_transports as wrench_transports,
 )
-from .input_files import reading_file as reading_file
 from .long_work import Progress as Progress, broken_off_by as broken_off_by, go_on as go_on
 from .message_fields import (
     Acceleration as Acceleration,
@@ -46,4 +46,3 @@ from .message_fields import (
     Strict as Strict,
     Tension as Tension,
 )
-from .whole_files import whole_file as whole_file

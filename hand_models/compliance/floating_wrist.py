@@ -13,7 +13,6 @@ each of its ways of carrying is a set of its own. A tendon's stick and slip stay
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
@@ -21,10 +20,17 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, BoundedStore, Indices
 from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
-from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, complex_steps, slopes
+from hand_models.compliance.grasp import (
+    CompliantGrasp,
+    GraspLoads,
+    LoadRows,
+    complex_steps,
+    rows_of_range,
+    slopes,
+)
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
-from hand_models.fixed_wrist import RowLayout, layout_of
+from hand_models.fixed_wrist import layout_of
 from hand_models.hand import FINGERS, HELD
 from hand_models.wrench_spaces import WrenchSpace
 
@@ -51,7 +57,7 @@ PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
 """By whether the palm drags, and whether it presses."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class FloatingWrist(CompliantGrasp):
     """The limits of a compliant hand.
 
@@ -70,21 +76,16 @@ class FloatingWrist(CompliantGrasp):
     tension_limit: float | None = None
     palm: PalmMode = "off"
 
-    columns = WRIST
+    columns, range_rows = WRIST, rows_of_range(WRIST)
 
-    @cached_property
-    def _kept(self) -> BoundedStore[bytes, HandLoads]:
-        """Loads at the complex steps from poses, by the poses."""
-        return BoundedStore("linearised wrists", KEPT)
+    def __post_init__(self) -> None:
+        self.layout = layout_of(self.hand.settled, sticking=False)
+        self.load_rows = self._load_rows()
+        # loads at the complex steps from poses, by the poses
+        self._kept: BoundedStore[bytes, HandLoads] = BoundedStore("linearised wrists", KEPT)
 
-    @cached_property
-    def layout(self) -> RowLayout:
-        """Names and coefficients of the rows."""
-        return layout_of(self.hand.settled, sticking=False)
-
-    @cached_property
-    def load_rows(self) -> LoadRows:
-        """What loads and wrenches must keep to, but for the way of the palm."""
+    def _load_rows(self) -> LoadRows:
+        """Return what loads and wrenches must keep to, but for the way of the palm."""
         settled, layout = self.hand.settled, self.layout
         n, structure = len(settled.tiles), settled.hand.structure
         tension, palm = 3 * n, 3 * n + len(FINGERS)

@@ -11,7 +11,6 @@ so that with e and w linearised about a pose they are a `WrenchSpace`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.base import Array, Indices
 from hand_models.compliance.compliant_finger import STEP
 from hand_models.compliance.rolling import Numbers
-from hand_models.fixed_wrist import KEPT
 from hand_models.wrench_spaces import Row, WrenchSpace
 
 __all__ = [
@@ -29,6 +27,7 @@ __all__ = [
     "GraspLoads",
     "LoadRows",
     "complex_steps",
+    "rows_of_range",
     "slopes",
 ]
 
@@ -113,14 +112,15 @@ class CompliantGrasp(ABC):
     ----------
     columns : tuple of str, length d
         Names of the components of a pose of its wrist.
+    range_rows : tuple of Row, length 2 d
+        Their `rows_of_range`.
+    load_rows : LoadRows
+        What its loads and wrenches must keep to.
     """
 
     columns: tuple[str, ...]
-
-    @property
-    @abstractmethod
-    def load_rows(self) -> LoadRows:
-        """What its loads and wrenches must keep to."""
+    range_rows: tuple[Row, ...]
+    load_rows: LoadRows
 
     @abstractmethod
     def loads_at(self, twists: Numbers) -> GraspLoads:
@@ -183,7 +183,7 @@ class CompliantGrasp(ABC):
             inverse = np.diag(1.0 / np.asarray(within, dtype=float))
             sides = np.vstack([inverse, -inverse])
             H, h = np.vstack([H, sides]), np.concatenate([h, 1.0 + sides @ at])
-            names = _with_range(names, self.columns)
+            names += self.range_rows
         return WrenchSpace(
             origin=origin,
             generators=generators,
@@ -215,10 +215,9 @@ def _affine(values: Numbers, at: Array) -> tuple[Array, Array]:
     return values[0].real - slope @ at, slope
 
 
-@lru_cache(maxsize=KEPT)
-def _with_range(rows: tuple[Row, ...], columns: tuple[str, ...]) -> tuple[Row, ...]:
-    """Return rows and those that keep a wrist within a range, the same tuple for the same rows."""
-    return rows + tuple(
+def rows_of_range(columns: tuple[str, ...]) -> tuple[Row, ...]:
+    """Return the hard rows that keep the components of a wrist's pose within a range."""
+    return tuple(
         Row(None, None, "wrist_range", "hard", f"wrist_range/{name.split('/')[1]}{sign}")
         for sign in "+-"
         for name in columns

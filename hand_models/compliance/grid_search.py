@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -73,7 +72,7 @@ class WristSearch:
     wrenches: Array
     limiting: tuple[Row | None, ...]
 
-    @cached_property
+    @property
     def hull(self) -> scipy.spatial.ConvexHull:
         """The hull of the wrenches, in newtons (moments over a length, `SCALE`).
 
@@ -178,25 +177,21 @@ def boundary(
     found = _pushed(grasp, box, ways * box.range, 0, 0)
     if toward is None:
         return found
-    about, poses, limiting, wrenches = (
-        _sphere(CLOSER, d),
-        [found.poses],
-        [*found.limiting],
-        [found.wrenches],
-    )
+    about = _sphere(CLOSER, d)
     for round_ in range(CLOSER_ROUNDS):
-        reaches = np.vstack(wrenches) @ toward.T
+        reaches = found.wrenches @ toward.T
         best = np.unique(np.argpartition(-reaches, CLOSEST, axis=0)[:CLOSEST])
         more = (ways[best][:, None, :] + NEARER ** (round_ + 1) * about).reshape(-1, d)
         more /= np.linalg.norm(more, axis=1, keepdims=True)
         near = _pushed(grasp, box, more * box.range, 0, 0)
         ways = np.vstack([ways, more])
-        poses.append(near.poses)
-        wrenches.append(near.wrenches)
-        limiting += near.limiting
-    return replace(
-        found, poses=np.vstack(poses), wrenches=np.vstack(wrenches), limiting=tuple(limiting)
-    )
+        found = replace(
+            found,
+            poses=np.vstack([found.poses, near.poses]),
+            wrenches=np.vstack([found.wrenches, near.wrenches]),
+            limiting=found.limiting + near.limiting,
+        )
+    return found
 
 
 def _pushed(grasp: CompliantGrasp, box: SearchBox, t: Array, tried: int, held: int) -> WristSearch:

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from hand_models.base import InvalidInputError, check_positive
 from hand_models.compliance.compliant_finger import CompliantFinger, FingerLoads
-from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows
+from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, rows_of_range
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES, FingerModel, settle_finger
 from hand_models.fixed_wrist import named_row
@@ -87,7 +86,7 @@ class Gripper(CompliantGrasp):
         If a number is out of range, or the fingers do not all lie on the surface.
     """
 
-    columns = PLANE
+    columns, range_rows = PLANE, rows_of_range(PLANE)
 
     def __init__(
         self,
@@ -133,10 +132,10 @@ class Gripper(CompliantGrasp):
             tendon.closed(tension, shears),
             "tension",
         )
+        self.load_rows = self._load_rows()
 
-    @cached_property
-    def load_rows(self) -> LoadRows:
-        """What loads must keep to: each side's tiles, proximal first, and their half-planes."""
+    def _load_rows(self) -> LoadRows:
+        """Return the rows of each side's tiles, proximal first, and their half-planes."""
         tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
         each, pieces = np.eye(len(tiles)), inner_half_planes(self.surface)
         limits = [named_row(*tile, piece.limit, "limit") for tile in tiles for piece in pieces]

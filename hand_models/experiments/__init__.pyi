@@ -7,7 +7,14 @@ from .force_limits import (
     rest_state as rest_state,
     sharpened as sharpened,
 )
-from .gripper_fit import Datum as Datum, GripperFit as GripperFit
+from .gripper_fit import (
+    NEAR_EDGE as NEAR_EDGE,
+    NEAR_EDGE_ON_AVERAGE as NEAR_EDGE_ON_AVERAGE,
+    NEAR_FORCE as NEAR_FORCE,
+    NEAR_SHARE as NEAR_SHARE,
+    Datum as Datum,
+    GripperFit as GripperFit,
+)
 from .hard_stop import PalmExperiment as PalmExperiment
 from .pictures import (
     COLOURS as COLOURS,
@@ -22,6 +29,8 @@ from .pulling import (
     UNBALANCED as UNBALANCED,
     Pulled as Pulled,
     even_pulls as even_pulls,
+    explored as explored,
+    held_wrenches as held_wrenches,
     pull as pull,
     pulled_off_poses as pulled_off_poses,
     unloaded as unloaded,

@@ -16,14 +16,21 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, CruxError, SolverError
-from hand_models.compliance import PLANAR, Gripper, boundary, gripper_table, linear_box, search
-from hand_models.experiments.pulling import pulled_off_poses
-from hand_models.experiments.sweep_axis import Axis
+from hand_models.compliance import PLANAR, Gripper, boundary, gripper_table, linear_box
+from hand_models.experiments.pulling import held_wrenches, pulled_off_poses
+from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import edge, extents, in_paper_signs, with_mirrored
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = ["Datum", "GripperFit"]
+__all__ = [
+    "NEAR_EDGE",
+    "NEAR_EDGE_ON_AVERAGE",
+    "NEAR_FORCE",
+    "NEAR_SHARE",
+    "Datum",
+    "GripperFit",
+]
 
 NEAR_SHARE: Final = 0.1
 NEAR_FORCE: Final = 0.3
@@ -42,9 +49,6 @@ RAYS: Final = 350
 
 SHORT: Final = 1.008
 """By what factor the fine hull's wrenches are larger than those of the rays, about."""
-
-PER_AXIS: Final = 60
-"""Poses of the wrist along each axis of the fine search, as of the studies."""
 
 TOWARD: Final = np.array(
     [
@@ -170,10 +174,7 @@ class GripperFit:
         table, settings = self.table, self._settings
         for number, value in zip(self.numbers, self.values(x).tolist(), strict=True):
             table = number.set(table, value)
-        diameter, tension = (settings.scalar("fig13", name) for name in ("diameter", "tension"))
-        return Gripper(
-            diameter, tension, table=table, most_pressing=settings.scalar("fig13", "top")
-        )
+        return Conditions.of_figure("fig13").gripper(table, settings.scalar("fig13", "top"))
 
     def wrenches(self, gripper: Gripper, *, fine: bool = False) -> Array:
         """Return the outermost wrenches held, (F_x, F_z, M_y) in the paper's signs, shape (n, 3).
@@ -185,13 +186,12 @@ class GripperFit:
             Whether by the grid of the studies; else by rays, sooner and some per cent off.
         """
         if fine:
-            found = search(gripper, PER_AXIS)
-        else:
-            toward = np.zeros((len(TOWARD), 6))
-            size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
-            toward[:, PLANAR] = TOWARD / np.abs(size) * (1.0, 1.0, -1.0)
-            found = boundary(gripper, linear_box(gripper), RAYS, toward)
-        return with_mirrored(in_paper_signs(found.wrenches) * (1.0 if fine else SHORT))
+            return held_wrenches(gripper)
+        toward = np.zeros((len(TOWARD), 6))
+        size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
+        toward[:, PLANAR] = TOWARD / np.abs(size) * (1.0, 1.0, -1.0)
+        found = boundary(gripper, linear_box(gripper), RAYS, toward)
+        return with_mirrored(in_paper_signs(found.wrenches) * SHORT)
 
     def model(self, x: Array, *, fine: bool = False) -> Array:
         """Return what the model has for the data.

@@ -14,8 +14,14 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, EmptySetError, Progress
-from hand_models.compliance import SIDES, STEP, Gripper, Numbers
-from hand_models.experiments.wrench_hull import UNITS, in_paper_signs
+from hand_models.compliance import SIDES, STEP, Gripper, Numbers, WristSearch, search
+from hand_models.experiments.study_result import part
+from hand_models.experiments.wrench_hull import (
+    UNITS,
+    clipped_vertices,
+    in_paper_signs,
+    with_mirrored,
+)
 from hand_models.finger import PHALANGES
 
 __all__ = [
@@ -23,6 +29,8 @@ __all__ = [
     "UNBALANCED",
     "Pulled",
     "even_pulls",
+    "explored",
+    "held_wrenches",
     "pull",
     "pulled_off_poses",
     "unloaded",
@@ -33,6 +41,9 @@ DRAGGED: Final = "dragged_backwards"
 UNBALANCED: Final = "no_pose"
 """How a load ends, where not at a tile's limit: a tile has less drag than it needs (`Surface`), or
 nothing balances."""
+
+PER_AXIS: Final = 60
+"""Poses of the wrist along each axis of the studies' searches."""
 
 NEWTON_STEPS: Final = 12
 """For each increment of the load, at most."""
@@ -74,6 +85,30 @@ class Pulled:
     side: tuple[str | None, ...]
     phalanx: tuple[str | None, ...]
     way: tuple[str, ...]
+
+
+def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSearch, Pulled, Array]:
+    """Search a gripper's poses, then pull it along about ``count`` directions.
+
+    Also returned are the outermost wrenches of the search and those of the pulls, shape (n, 3).
+
+    Raises
+    ------
+    EmptySetError
+        If it does not hold without load.
+    """
+    unloaded(gripper)
+    found = search(gripper, PER_AXIS, part(progress, 0, 1, 10))
+    wrenches = in_paper_signs(found.wrenches)
+    size = np.abs(clipped_vertices(wrenches)).max(axis=0)
+    pulled = pull(gripper, even_pulls(count, size), part(progress, 1, 10, 10))
+    # a pull that a search of poses has missed is held all the same
+    return found, pulled, np.vstack([wrenches, pulled.wrenches])
+
+
+def held_wrenches(gripper: Gripper) -> Array:
+    """Return the outermost wrenches held by a gripper and its mirror image, shape (n, 3)."""
+    return with_mirrored(in_paper_signs(search(gripper, PER_AXIS).wrenches))
 
 
 def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array, Array]:
@@ -159,9 +194,8 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     unit = directions / np.linalg.norm(directions * UNITS, axis=1)[:, None]
     poses = np.repeat(unloaded(gripper)[None], m, axis=0)
     loads, increments = np.zeros(m), np.full(m, INCREMENT)
-    # the right side's first, as limit rows are
     tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
-    names = [row.limit for row in gripper.limits]
+    limits = gripper.limits
     fails: list[tuple[str | None, str | None, str]] = [(None, None, UNBALANCED)] * m
     going = np.ones(m, dtype=bool)
     while going.any():
@@ -176,11 +210,11 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
         friction, fingers = gripper.surface.friction, gripper.finger_loads(tried)
         drags = np.concatenate([side.shears + friction * side.normals for side in fingers], axis=1)
         for k in np.flatnonzero(~holds):
-            row = found.limiting[k]
+            row = limits[found.limiting[k]]
             if not balanced[k]:
                 fails[i[k]] = (None, None, UNBALANCED)
             elif found.utilisation[k] > 1.0:
-                fails[i[k]] = (*tiles[row // (len(names) // len(tiles))], names[row])
+                fails[i[k]] = (row.finger, row.phalanx, row.limit)
             else:
                 fails[i[k]] = (*tiles[drags[k].argmin()], DRAGGED)
         over = i[~holds]

@@ -46,14 +46,22 @@ class Conditions:
     surface: str = CONCRETE
 
     @classmethod
+    def of_figure(cls, figure: str) -> Conditions:
+        """Return those of a figure of the experiments on sandpaper, such as ``fig12``."""
+        settings = experiment_table()
+        return cls(
+            settings.scalar(figure, "diameter"), settings.scalar(figure, "tension"), SANDPAPER
+        )
+
+    @classmethod
     def of_fig16(cls) -> tuple[Conditions, ...]:
         """Return those of Fig. 16, surface A first."""
         settings = experiment_table()
         tension = settings.scalar("fig16", "tension")
         return tuple(cls(d, tension) for d in settings.vector(PARAMETER_STUDIES, "diameters"))
 
-    def gripper(self, table: ParameterTable) -> Gripper:
-        """Return a gripper of these numbers.
+    def gripper(self, table: ParameterTable, most_pressing: float = math.inf) -> Gripper:
+        """Return a gripper of these numbers, which presses no more than ``most_pressing`` [N].
 
         Raises
         ------
@@ -64,7 +72,7 @@ class Conditions:
         if self.surface != SANDPAPER:
             with within("surface"):
                 surface = pulled_off(Surface.named(self.surface), table)
-        return Gripper(self.diameter, self.tension, surface, table)
+        return Gripper(self.diameter, self.tension, surface, table, most_pressing)
 
 
 @dataclass(frozen=True)
@@ -146,12 +154,7 @@ class Axis:
 
     def set(self, table: ParameterTable, value: float) -> ParameterTable:
         """Return a table in which the entry has a value."""
-        old = table.quantity(self.section, self.name)
-        new: float | list[float] = value
-        if isinstance(old.value, list):
-            new = list(old.value)
-            new[self.index or 0] = value
-        quantity = Quantity(new, old.unit, old.source, old.note)
+        quantity = table.quantity(self.section, self.name).changed(value, self.index)
         return table.replaced(ParameterTable({self.section: {self.name: quantity}}))
 
     def current(self, table: ParameterTable) -> float:

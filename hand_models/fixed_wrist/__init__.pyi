@@ -15,7 +15,6 @@ from .placing import (
 )
 from .row_layout import (
     HAND_LOAD as HAND_LOAD,
-    KEPT as KEPT,
     PALM_PRESSING as PALM_PRESSING,
     PALM_SHEAR as PALM_SHEAR,
     TENDON_TENSION as TENDON_TENSION,

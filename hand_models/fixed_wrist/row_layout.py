@@ -46,17 +46,6 @@ _Name = tuple[str | None, str | None, str, str]
 """Finger, phalanx and limit of a row, and what tells it from others of the same names."""
 
 
-@lru_cache(maxsize=256)
-def _surface_planes(surface: Surface) -> Array:
-    """Return the half-planes of whole tiles on a surface, shape (p, 4).
-
-    Coefficients of shear, normal and lateral load, and capacity [N].
-    """
-    return np.array(
-        [(p.a_shear, p.a_normal, p.a_lateral, p.capacity) for p in inner_half_planes(surface)]
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class RowLayout:
     """Names, and which tile and column each row is about. Arrays are read-only.
@@ -118,7 +107,9 @@ class RowLayout:
         """
         signs = np.ones((len(self.plane_signs), 4))
         signs[:, 2] = self.plane_signs
-        planes = np.array([_surface_planes(surface) for surface in surfaces])
+        planes = np.array(
+            [[piece[1:] for piece in inner_half_planes(surface)] for surface in surfaces]
+        )
         return np.asarray(planes[:, self.plane_pieces] * signs)
 
 

@@ -27,7 +27,7 @@ from hand_models.hand.structure import Structure
 from hand_models.parameters import ParameterTable, hand_table
 from hand_models.rock import Hold
 from hand_models.sections import Section
-from hand_models.tendon import PalmTendon, TendonDrive, shear_capacity
+from hand_models.tendon import TendonDrive, check_palm, shear_capacity
 
 __all__ = ["HandModel"]
 
@@ -126,7 +126,7 @@ class HandModel:
                 field="palm.contact_stiffness",
             )
         try:
-            PalmTendon(
+            check_palm(
                 self.palm_contact, self.palm_spring, self.palm_friction, self.palm_own_friction
             )
         except InvalidInputError as error:

@@ -20,6 +20,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import scipy
+from msgspec import structs
 
 from hand_models.base import Array, InvalidInputError, stored, within
 from hand_models.parameters.own import own_hand, own_surfaces
@@ -225,12 +226,8 @@ def _hand_of(
         if name in known.sections.get(section, {}):
             return
         entries = found.setdefault(section, {})
-        now = entries.get(name, hand.quantity(section, name)).value
-        if isinstance(now, list):
-            changed: float | list[float] = [*now[:place], value, *now[place + 1 :]]
-        else:
-            changed = value
-        entries[name] = Quantity(changed, quantity.unit, quantity.source, quantity.note)
+        now = entries.get(name, hand.quantity(section, name))
+        entries[name] = structs.replace(quantity, value=now.changed(value, place).value)
 
     for section, name, quantity in _fitted(sets):
         if section in hand_table().sections:
@@ -260,9 +257,7 @@ def _strengths(sets: ParameterTable, k: int, quantiles: Array) -> ParameterTable
     for section, name, quantity in _fitted(sets):
         if section in table.sections:
             value = sets.vector(section, name)[k]
-            found.setdefault(section, {})[name] = Quantity(
-                value, quantity.unit, quantity.source, quantity.note
-            )
+            found.setdefault(section, {})[name] = structs.replace(quantity, value=value)
     tile = sets.vector(FITTED, "shear_limit")[k]
     least, most = sets.vector("ranges", "rock_ratio")
     floor = sets.scalar("ranges", "least_strength")
@@ -277,7 +272,7 @@ def _strengths(sets: ParameterTable, k: int, quantiles: Array) -> ParameterTable
                 1.0 + scatter * float(scipy.special.ndtri(cut + (1.0 - cut) * u))
             )
             source = "scatter_ratio"
-        found.setdefault(name, {})["shear_limit"] = Quantity(
-            float(strength), usual.unit, usual.source, f"drawn by {source}"
+        found.setdefault(name, {})["shear_limit"] = structs.replace(
+            usual, value=float(strength), note=f"drawn by {source}"
         )
     return ParameterTable(found)

@@ -14,6 +14,7 @@ from textwrap import shorten
 from typing import Final
 
 import numpy as np
+from msgspec import structs
 
 from hand_models.base import InvalidInputError, in_file
 from hand_models.parameters.tables import (
@@ -133,7 +134,7 @@ def _of_all(own: Quantity, bundled: Quantity, field: str) -> Quantity:
     if field not in ONE_FOR_ALL or isinstance(own.value, list):
         return own
     assert isinstance(bundled.value, list)
-    return Quantity([own.value] * len(bundled.value), own.unit, own.source, own.note)
+    return structs.replace(own, value=[own.value] * len(bundled.value))
 
 
 def _check(own: Quantity, bundled: Quantity, field: str) -> None:

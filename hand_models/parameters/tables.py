@@ -73,6 +73,14 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     source: Source
     note: str = ""
 
+    def changed(self, value: float, place: int | None = None) -> Quantity:
+        """Return it with another number, of a list that at a place, the first by default."""
+        if not isinstance(self.value, list):
+            return msgspec.structs.replace(self, value=value)
+        numbers = list(self.value)
+        numbers[place or 0] = value
+        return msgspec.structs.replace(self, value=numbers)
+
 
 class ParameterTable:
     """Quantities by section and name. Tables of the same content are equal.
@@ -241,42 +249,37 @@ def _refusal(raw: Any, complaint: str, field: str) -> InvalidInputError:
     return InvalidInputError(f"{said[:1].lower()}{said[1:]}; an entry is {ENTRY}", field=field)
 
 
+@cache
 def _bundled(name: str) -> ParameterTable:
     text = resources.files("hand_models.parameters").joinpath(name).read_text(encoding="utf-8")
     return ParameterTable.read(text, name)
 
 
-@cache
 def hand_table() -> ParameterTable:
     """Return the numbers of the SpinyHand, ``hand.toml``."""
     return _bundled("hand.toml")
 
 
-@cache
 def surface_table() -> ParameterTable:
     """Return the numbers of the surfaces, ``surfaces.toml``."""
     return _bundled("surfaces.toml")
 
 
-@cache
 def experiment_table() -> ParameterTable:
     """Return the numbers of the paper's experiments, ``experiments.toml``."""
     return _bundled("experiments.toml")
 
 
-@cache
 def scan_table() -> ParameterTable:
     """Return the numbers of scanned rock, ``scan.toml``."""
     return _bundled("scan.toml")
 
 
-@cache
 def spine_table() -> ParameterTable:
     """Return the numbers of a tile's spines and of the rock's asperities, ``spines.toml``."""
     return _bundled("spines.toml")
 
 
-@cache
 def draw_table() -> ParameterTable:
     """Return sets of numbers that meet the published data, ``draws.toml``."""
     return _bundled("draws.toml")

@@ -68,19 +68,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     They are of one tile's spines and of the rock, so no number of the hand's matters.
     """
     surface, array = Surface.named(SANDPAPER), SpineArray.named(SANDPAPER)
-    steps = 4
-    progress(0, steps)
+    progress(0, 1)
     limit = surface.pull_off_angle
     rng = np.random.default_rng(SEED)
     trials = np.stack([array.simulate(rng, REPEATS, angle) for angle in ANGLES])
     drag = statistics(array.simulate_drag(np.random.default_rng(SEED + 1), TRIALS))
     spread = statistics(array.simulate(np.random.default_rng(SEED + 1), TRIALS, CURVE))
     mean = drag.mean * array.share(CURVE)
-    progress(1, steps)
-    table = _table()
-    progress(2, steps)
-    gaps = _gaps(surface)
-    progress(3, steps)
     data: dict[str, Any] = {
         "surface": SANDPAPER,
         "trials": {"angle": ANGLES, "strength": trials},
@@ -101,12 +95,12 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "fit_of_trials": fit_line(np.repeat(ANGLES, REPEATS), trials.ravel(), limit)._asdict(),
         "fit_of_mean": fit_line(CURVE, mean, limit)._asdict(),
         "cartesian_line_of_mean": _cartesian_line(CURVE, mean, limit),
-        "tile_shear": table,
+        "tile_shear": _table(),
         "lateral_fit": fit_lateral(array, limit)._asdict(),
-        "bounds": gaps,
+        "bounds": _gaps(surface),
         "hull_over_surface": hull_over_surface(surface),
     }
-    progress(4, steps)
+    progress(1, 1)
     text = StudyText("fig10")
     _check(text, surface, array, data)
     return text.result(data)

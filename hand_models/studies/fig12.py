@@ -17,6 +17,9 @@ from hand_models.base import Array, Progress
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
 from hand_models.experiments import (
     COLOURS,
+    NEAR_FORCE,
+    NEAR_SHARE,
+    Conditions,
     StudyResult,
     StudyText,
     panels,
@@ -39,24 +42,18 @@ POINTS: Final = 45
 SIDEWAYS: Final = 24
 """Directions of (F_x, F_z) in which the shift of the base is looked at, too."""
 
-NEAR_SHARE: Final = 0.1
-NEAR_FORCE: Final = 0.3
-"""A force is that of the figure within this share of it, or these newtons."""
-
 NEAR_SHIFT: Final = 0.25
 """The base's shift is the paper's within this share of it."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Pull the gripper straight off, and in other directions of (F_x, F_z)."""
-    steps = 3
-    progress(0, steps)
+    progress(0, 1)
     table = experiment_table()
-    diameter, tension = table.scalar("fig12", "diameter"), table.scalar("fig12", "tension")
-    gripper = Gripper(diameter, tension, table=gripper_table(hand))
+    conditions = Conditions.of_figure("fig12")
+    gripper = conditions.gripper(gripper_table(hand))
     rest = unloaded(gripper)
     slip = pull(gripper, np.array([[0.0, -1.0, 0.0]]))
-    progress(1, steps)
     pulls = np.linspace(0.0, table.scalar("fig12", "pull"), POINTS)
     poses = pulled_off_poses(gripper, pulls)
     further = np.linspace(0.0, -slip.wrenches[0, 1], POINTS)
@@ -64,11 +61,10 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         gripper.finger_loads(at)[0]
         for at in (pulled_off_poses(gripper, further), slip.poses, poses)
     )
-    progress(2, steps)
     turns = np.linspace(-np.pi / 2, np.pi / 2, SIDEWAYS + 1)
     around = np.column_stack([np.sin(turns), -np.cos(turns), np.zeros(len(turns))])
     elsewhere = pull(gripper, around)
-    progress(3, steps)
+    progress(1, 1)
     # of each phalanx, the largest of its limits
     pieces = inner_half_planes(gripper.surface)
     used = [
@@ -76,8 +72,8 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         for piece in pieces
     ]
     data: dict[str, Any] = {
-        "diameter": diameter,
-        "tension": tension,
+        "diameter": conditions.diameter,
+        "tension": conditions.tension,
         "phalanges": PHALANGES,
         "pull": pulls[: len(poses)],
         "shear": loads.shears,

@@ -16,9 +16,13 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from trimesh.remesh import subdivide
 
 from hand_models.base import Array, Progress
-from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces, search
+from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces
 from hand_models.experiments import (
+    NEAR_EDGE,
+    NEAR_EDGE_ON_AVERAGE,
+    NEAR_SHARE,
     UNITS,
+    Conditions,
     Extents,
     StudyResult,
     StudyText,
@@ -26,23 +30,20 @@ from hand_models.experiments import (
     distance_along,
     edge,
     even_pulls,
+    explored,
     extents,
+    held_wrenches,
     in_paper_signs,
     label_solid,
     part,
-    pull,
     section,
     unloaded,
     vertices,
-    with_mirrored,
 )
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.wrench_spaces import hull
 
 __all__ = ["plot", "run"]
-
-PER_AXIS: Final = 60
-"""Poses of the wrist along each axis of the search."""
 
 DIRECTIONS: Final = 400
 """Of loads that are pulled until a tile lets go."""
@@ -60,42 +61,34 @@ GRID: Final = 81
 """Points of F_x, and of M_y, of the map of pull-off strengths."""
 
 STEPS: Final = 1000
-SEARCHED, PULLED, LISTED = 100, 300, 980
-"""Steps of progress in all, and at the end of the search, of the pulls, and of the list of sets."""
+PULLED, LISTED = 300, 980
+"""Steps of progress in all, and at the end of the pulls, and of the list of sets."""
 
 SYMMETRIC: Final = 1e-6
 """Of its extents, by how much a hull may be off its mirror image."""
 
-NEAR: Final = 0.1
 NEAR_SIDE: Final = 0.25
-"""Shares by which extents and the side view may be off the figure's."""
-
-NEAR_EDGE: Final = 0.2
-NEAR_EDGE_ON_AVERAGE: Final = 0.1
-"""By how much the surface's edge may be off [N·m]."""
+"""Share by which the side view may be off the figure's."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Search the poses of the wrist, and pull along directions."""
     table = experiment_table()
-    diameter, tension = table.scalar("fig13", "diameter"), table.scalar("fig13", "tension")
-    gripper = Gripper(diameter, tension, table=gripper_table(hand))
-    unloaded(gripper)
-    found = search(gripper, PER_AXIS, part(progress, 0, SEARCHED, STEPS))
-    whole = in_paper_signs(found.wrenches)
-    size = np.abs(clipped_vertices(whole)).max(axis=0)
-    pulled = pull(gripper, even_pulls(DIRECTIONS, size), part(progress, SEARCHED, PULLED, STEPS))
-    # a pull that a search of poses has missed is held all the same
-    whole = np.vstack([whole, pulled.wrenches])
+    conditions, numbers = Conditions.of_figure("fig13"), gripper_table(hand)
+    gripper = conditions.gripper(numbers)
+    found, pulled, whole = explored(gripper, DIRECTIONS, part(progress, 0, PULLED, STEPS))
+    size = np.abs(clipped_vertices(in_paper_signs(found.wrenches))).max(axis=0)
     full, shown = vertices(whole), clipped_vertices(whole)
-    held = np.vstack([_held(hand, table), pulled.wrenches])
+    # those that press no more than the paper's surface
+    pressing_less = conditions.gripper(numbers, table.scalar("fig13", "top"))
+    held = np.vstack([held_wrenches(pressing_less), pulled.wrenches])
     over = np.linalg.norm(pulled.wrenches * UNITS, axis=1)
     filled = distance_along(full, pulled.wrenches / over[:, None]) / over
     force_x, moment = (np.linspace(-1.0, 1.0, GRID) * size[i] for i in (0, 2))
     edge_at, side_at = table.vector("fig13", "edge_force_x"), table.scalar("fig13", "side_force_x")
     data: dict[str, Any] = {
-        "diameter": diameter,
-        "tension": tension,
+        "diameter": conditions.diameter,
+        "tension": conditions.tension,
         "poses_tried": found.tried,
         "poses_held": found.held,
         "hull_vertices": shown,
@@ -135,17 +128,6 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     text = StudyText("fig13")
     _check(text, data, table)
     return text.result(data)
-
-
-def _held(hand: ParameterTable, table: ParameterTable) -> Array:
-    """Return the outermost wrenches that are held and press no more than the paper's surface."""
-    gripper = Gripper(
-        table.scalar("fig13", "diameter"),
-        table.scalar("fig13", "tension"),
-        table=gripper_table(hand),
-        most_pressing=table.scalar("fig13", "top"),
-    )
-    return with_mirrored(in_paper_signs(search(gripper, PER_AXIS).wrenches))
 
 
 def _spread(values: Array) -> dict[str, float]:
@@ -242,7 +224,7 @@ def _check(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None
             f"{got:.3g} {unit} ({100 * (got / read - 1):+.0f} %); of straight pulls {pulled:.3g}, "
             f"of the whole hull's part F_z ≤ 0 {whole:.3g}"
         )
-        holds, near = abs(got / read - 1.0) <= NEAR, 100 * NEAR
+        holds, near = abs(got / read - 1.0) <= NEAR_SHARE, 100 * NEAR_SHARE
         text.check("extent", given, holds, extent=extent, near=near, read=read, unit=unit)
     off = np.abs(np.array(data["edge"]["moment"]) - data["edge"]["printed"])
     given = f"off by {off.max():.2f} at most, {off.mean():.2f} on average"

@@ -16,24 +16,23 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hand_models.base import Array, Progress
-from hand_models.compliance import Gripper, gripper_table, search
+from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     COLOURS,
     DRAGGED,
+    SANDPAPER,
     UNBALANCED,
+    Conditions,
     Role,
     StudyResult,
     StudyText,
     clipped_vertices,
-    even_pulls,
+    explored,
     extents,
-    in_paper_signs,
     label_solid,
     panels,
     part,
-    pull,
     section,
-    unloaded,
     volume,
 )
 from hand_models.finger import PHALANGES
@@ -42,9 +41,6 @@ from hand_models.wrench_spaces import TOLERANCE
 
 __all__ = ["loading_planes", "plot", "run"]
 
-PER_AXIS: Final = 60
-"""Poses of the wrist along each axis of the search."""
-
 DIRECTIONS: Final = 600
 """Of loads that are pulled until a tile lets go."""
 
@@ -52,8 +48,7 @@ PLANES: Final = 181
 """Planes of loading that are looked at."""
 
 STEPS: Final = 1000
-SEARCHED: Final = 100
-"""Steps of progress in all, and of each surface at the end of its search."""
+"""Steps of progress in all."""
 
 ABOUT: Final = 0.25
 """A figure printed as "about" is met within this share of it."""
@@ -68,15 +63,13 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     diameters, tension = table.vector("fig14", "diameters"), table.scalar("fig14", "tension")
     larger = max(diameters)
     cases = [
-        *((diameter, tension) for diameter in diameters),
-        *((larger, other) for other in table.vector("fig14", "other_tensions")),
+        *(Conditions(diameter, tension, SANDPAPER) for diameter in diameters),
+        *(Conditions(larger, held, SANDPAPER) for held in table.vector("fig14", "other_tensions")),
     ]
     surfaces = []
-    for done, (diameter, held) in enumerate(cases):
-        gripper = Gripper(diameter, held, table=gripper_table(hand))
+    for done, conditions in enumerate(cases):
         start, end = (STEPS * i // len(cases) for i in (done, done + 1))
-        found = _surface(gripper, part(progress, start, end, STEPS))
-        surfaces.append({"diameter": diameter, "tension": held, **found})
+        surfaces.append(_surface(conditions, hand, part(progress, start, end, STEPS)))
     progress(STEPS, STEPS)
     text = StudyText("fig14")
     _check_failures(text, *surfaces[:2])
@@ -85,20 +78,17 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     return text.result({"phalanges": PHALANGES, "surfaces": surfaces})
 
 
-def _surface(gripper: Gripper, progress: Progress) -> dict[str, Any]:
+def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -> dict[str, Any]:
     """Return hull, failures and planes of the gripper on one surface."""
-    progress(0, STEPS)
-    unloaded(gripper)
-    found = in_paper_signs(search(gripper, PER_AXIS).wrenches)
-    directions = even_pulls(DIRECTIONS, np.abs(clipped_vertices(found)).max(axis=0))
-    pulled = pull(gripper, directions, part(progress, SEARCHED, STEPS, STEPS))
-    # a pull that the search of poses has missed is held all the same
-    shown = clipped_vertices(np.vstack([found, pulled.wrenches]))
+    _, pulled, wrenches = explored(conditions.gripper(gripper_table(hand)), DIRECTIONS, progress)
+    shown = clipped_vertices(wrenches)
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
     # in how many of the directions each phalanx fails in each way
     counts = Counter(zip(pulled.phalanx, pulled.way, strict=True))
     return {
+        "diameter": conditions.diameter,
+        "tension": conditions.tension,
         "hull_vertices": shown,
         "extents": extents(shown)._asdict(),
         "volume": volume(shown),
@@ -109,7 +99,7 @@ def _surface(gripper: Gripper, progress: Progress) -> dict[str, Any]:
             "way": pulled.way,
         },
         "shares": [
-            {"phalanx": phalanx, "way": way, "share": count / len(directions)}
+            {"phalanx": phalanx, "way": way, "share": count / len(pulled.way)}
             for (phalanx, way), count in counts.most_common()
         ],
         "planes": loading_planes(shown),

@@ -1,7 +1,7 @@
 from .drive import TendonDrive as TendonDrive
 from .finger_tendon import FingerTendon as FingerTendon, TendonState as TendonState
 from .load_sharing import (
-    PalmTendon as PalmTendon,
+    check_palm as check_palm,
     share_load as share_load,
     shear_capacity as shear_capacity,
 )

@@ -31,7 +31,7 @@ import numpy as np
 from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.tendon.complementarity import stick_slip
 
-__all__ = ["PalmSharing", "PalmTendon", "share_load", "shear_capacity"]
+__all__ = ["PalmSharing", "check_palm", "share_load", "shear_capacity"]
 
 FRICTIONLESS: Final = 1e-8
 """A coefficient of friction that is as good as none: such pulleys are left out."""
@@ -58,94 +58,92 @@ class PalmSharing:
         return float(np.min(limits / self.tile_stiffness) * self.tile_stiffness.sum())
 
 
-@dataclass(frozen=True)
-class PalmTendon:
-    """Tiles on one tendon.
+def check_palm(
+    contact_stiffness: Sequence[float],
+    spring_stiffness: float,
+    friction: float,
+    own_friction: float,
+) -> None:
+    """Refuse numbers that no palm can have; parameters and errors as of `share_load`."""
+    k = [float(k_i) for k_i in contact_stiffness]
+    if not k or not all(math.isfinite(k_i) and k_i > 0.0 for k_i in k):
+        raise InvalidInputError(
+            f"stiffnesses above 0 N/m are needed, got {k}", field="contact_stiffness"
+        )
+    if not (math.isfinite(spring_stiffness) and spring_stiffness >= 0.0):
+        raise InvalidInputError(
+            f"must not be negative, got {spring_stiffness:g}", field="spring_stiffness"
+        )
+    for field, mu in (("friction", friction), ("own_friction", own_friction)):
+        if not 0.0 <= mu < 2.0:
+            raise InvalidInputError(f"must be in [0, 2), got {mu:g}", field=field)
 
-    Attributes
+
+def share_load(
+    contact_stiffness: Sequence[float],
+    spring_stiffness: float,
+    friction: float,
+    own_friction: float = 0.0,
+) -> PalmSharing:
+    """Return how N tiles on one tendon share the load from rest.
+
+    Tensions are in units of the mean contact stiffness (so they are lengths), the palm's travel is
+    one. The unknowns are the a of `complementarity`, one for each pulley with friction,
+    s′ = ρ s + ω a with ω = 1/ρ − ρ. They give all the strands s = G a + g s_0, with s_0 by the
+    tendon's length, and from these the slips δ = (k x − A − B)/(k + k_p) and the travels V δ.
+
+    Parameters
     ----------
-    contact_stiffness : tuple of float, length N
+    contact_stiffness : sequence of float, length N
         k_i in the tendon's order [N/m].
     spring_stiffness : float
         k_p [N/m].
     friction : float
         μ between the strands of a tile, in [0, 2).
-    own_friction : float
+    own_friction : float, optional
         The same at the palm's N − 1 pulleys between the tiles.
 
     Raises
     ------
     InvalidInputError
         If a stiffness is not above zero, k_p is negative, or a friction is out of range.
+    SolverError
+        If the complementarity problem ends without a solution.
     """
+    check_palm(contact_stiffness, spring_stiffness, friction, own_friction)
+    k = np.array(contact_stiffness, dtype=float)
+    scale = k.mean()
+    kappa = k / scale
+    compliance = 1.0 / (kappa + spring_stiffness / scale)
+    pull = compliance * kappa
+    ratio, travel_of_slip, beside = _thread(len(k), friction, own_friction)
 
-    contact_stiffness: tuple[float, ...]
-    spring_stiffness: float
-    friction: float
-    own_friction: float = 0.0
+    def pair(strands: Array) -> Array:
+        """Return A + B of every tile."""
+        return np.asarray(strands[beside[:, 0]] + strands[beside[:, 1]])
 
-    def __post_init__(self) -> None:
-        k = self.contact_stiffness
-        if not k or not all(math.isfinite(k_i) and k_i > 0.0 for k_i in k):
-            raise InvalidInputError(
-                f"stiffnesses above 0 N/m are needed, got {list(k)}", field="contact_stiffness"
-            )
-        if not (math.isfinite(self.spring_stiffness) and self.spring_stiffness >= 0.0):
-            raise InvalidInputError(
-                f"must not be negative, got {self.spring_stiffness:g}", field="spring_stiffness"
-            )
-        for field in ("friction", "own_friction"):
-            if not 0.0 <= getattr(self, field) < 2.0:
-                raise InvalidInputError(
-                    f"must be in [0, 2), got {getattr(self, field):g}", field=field
-                )
-
-    def sharing(self) -> PalmSharing:
-        """Return how the tiles share the load.
-
-        Tensions are in units of the mean contact stiffness (so they are lengths), the palm's travel
-        is one. The unknowns are the a of `complementarity`, one for each pulley with friction,
-        s′ = ρ s + ω a with ω = 1/ρ − ρ. They give all the strands s = G a + g s_0, with s_0 by the
-        tendon's length, and from these the slips δ = (k x − A − B)/(k + k_p) and the travels V δ.
-
-        Raises
-        ------
-        SolverError
-            If the complementarity problem ends without a solution.
-        """
-        k = np.array(self.contact_stiffness)
-        scale = k.mean()
-        kappa = k / scale
-        compliance = 1.0 / (kappa + self.spring_stiffness / scale)
-        pull = compliance * kappa
-        ratio, travel_of_slip, beside = _thread(self)
-
-        def pair(strands: Array) -> Array:
-            """Return A + B of every tile."""
-            return np.asarray(strands[beside[:, 0]] + strands[beside[:, 1]])
-
-        # G and g: products of the ratios between two strands
-        logs = np.concatenate([[0.0], np.cumsum(np.log(ratio))])
-        decay = np.tril(np.exp(np.minimum(logs[:, None] - logs[None, :], 0.0)))
-        by_first, by_a = decay[:, 0], decay[:, 1:] * (1.0 / ratio - ratio)
-        weight = np.zeros(len(logs))
-        np.add.at(weight, beside, compliance[:, None])
-        by_load = by_first / (weight @ by_first)
-        by_a = by_a - np.outer(by_load, weight @ by_a)
-        constant = by_load * pull.sum()
-        a = stick_slip(
-            (
-                -travel_of_slip @ (compliance[:, None] * pair(by_a)),
-                travel_of_slip @ (pull - compliance * pair(constant)),
-            ),
-            (by_a[:-1], constant[:-1]),
-        )
-        travel = 1.0 - pull + compliance * pair(by_a @ a + constant)
-        return PalmSharing(k * travel, travel)
+    # G and g: products of the ratios between two strands
+    logs = np.concatenate([[0.0], np.cumsum(np.log(ratio))])
+    decay = np.tril(np.exp(np.minimum(logs[:, None] - logs[None, :], 0.0)))
+    by_first, by_a = decay[:, 0], decay[:, 1:] * (1.0 / ratio - ratio)
+    weight = np.zeros(len(logs))
+    np.add.at(weight, beside, compliance[:, None])
+    by_load = by_first / (weight @ by_first)
+    by_a = by_a - np.outer(by_load, weight @ by_a)
+    constant = by_load * pull.sum()
+    a = stick_slip(
+        (
+            -travel_of_slip @ (compliance[:, None] * pair(by_a)),
+            travel_of_slip @ (pull - compliance * pair(constant)),
+        ),
+        (by_a[:-1], constant[:-1]),
+    )
+    travel = 1.0 - pull + compliance * pair(by_a @ a + constant)
+    return PalmSharing(k * travel, travel)
 
 
-def _thread(palm: PalmTendon) -> tuple[Array, Array, Indices]:
-    """Return how the tendon runs over the pulleys that have friction.
+def _thread(n: int, of_tiles: float, of_palm: float) -> tuple[Array, Array, Indices]:
+    """Return how the tendon of n tiles runs over the pulleys that have friction.
 
     Returns
     -------
@@ -156,45 +154,16 @@ def _thread(palm: PalmTendon) -> tuple[Array, Array, Indices]:
     strands : ndarray of int, shape (N, 2)
         Which of the P + 1 strands lie before and after each tile's pulley.
     """
-    n = len(palm.contact_stiffness)
     travels = np.empty((2 * n - 1, n))
     travels[::2] = 2.0 * np.tril(np.ones((n, n))) - np.eye(n)
     travels[1::2] = 2.0 * np.tril(np.ones((n - 1, n)))
-    friction = np.full(2 * n - 1, palm.friction, dtype=float)
-    friction[1::2] = palm.own_friction
+    friction = np.full(2 * n - 1, of_tiles, dtype=float)
+    friction[1::2] = of_palm
     rubs = friction > FRICTIONLESS
     after = np.cumsum(rubs)
     strands = np.stack([np.concatenate([[0], after[:-1]])[::2], after[::2]], axis=1)
     half = friction[rubs] / 2.0
     return (1.0 - half) / (1.0 + half), travels[rubs], strands
-
-
-def share_load(
-    contact_stiffness: Sequence[float],
-    spring_stiffness: float,
-    friction: float,
-    own_friction: float = 0.0,
-) -> PalmSharing:
-    """Solve the load sharing of N tiles from rest.
-
-    Parameters
-    ----------
-    contact_stiffness, spring_stiffness, friction, own_friction
-        As of `PalmTendon`.
-
-    Returns
-    -------
-    PalmSharing
-
-    Raises
-    ------
-    InvalidInputError
-        As of `PalmTendon`.
-    SolverError
-        If the complementarity problem ends without a solution.
-    """
-    stiffness = tuple(float(k) for k in contact_stiffness)
-    return PalmTendon(stiffness, spring_stiffness, friction, own_friction).sharing()
 
 
 @lru_cache(maxsize=4096)

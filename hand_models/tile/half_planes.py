@@ -172,7 +172,6 @@ def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     return tuple(pieces)
 
 
-@lru_cache(maxsize=256)
 def outer_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     """Return half-planes of the inner ones' normals that hold the whole limit surface, for T ≥ 0.
 

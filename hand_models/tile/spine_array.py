@@ -140,33 +140,25 @@ class SpineArray:
     strength_deviation: float
 
     def __post_init__(self) -> None:
+        def check(name: str, valid: bool, needed: str) -> None:
+            if not valid:
+                raise InvalidInputError(
+                    f"must be {needed}, got {getattr(self, name):g}", field=name
+                )
+
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InvalidInputError(
-                    f"must be finite and not negative, got {value}", field=field.name
-                )
+            check(field.name, math.isfinite(value) and value >= 0.0, "finite and not negative")
         for name in ("contact_stiffness", "shaft_strength", "strength_deviation"):
-            if getattr(self, name) <= 0.0:
-                raise InvalidInputError("must be above 0, got 0", field=name)
-        if self.spines < 1 or self.spines != int(self.spines):
-            raise InvalidInputError(f"must be a whole number, got {self.spines}", field="spines")
+            check(name, getattr(self, name) > 0.0, "above 0")
+        check("spines", self.spines >= 1 and self.spines == int(self.spines), "a whole number")
         for name in ("shaft_contact", "asperity_fraction"):
-            if getattr(self, name) > 1.0:
-                raise InvalidInputError(
-                    f"must be from 0 to 1, got {getattr(self, name):g}", field=name
-                )
-        if self.channel_friction < math.tan(self.channel_tilt):
-            raise InvalidInputError(
-                f"must be at least tan(channel_tilt) = {math.tan(self.channel_tilt):.3g}, "
-                f"got {self.channel_friction:g}",
-                field="channel_friction",
-            )
-        if not self.slope_min < self.slope_max <= math.pi:
-            raise InvalidInputError(
-                f"must be above slope_min and at most pi, got {self.slope_max:g}",
-                field="slope_max",
-            )
+            check(name, getattr(self, name) <= 1.0, "from 0 to 1")
+        least = math.tan(self.channel_tilt)
+        needed = f"at least tan(channel_tilt) = {least:.3g}"
+        check("channel_friction", self.channel_friction >= least, needed)
+        needed = "above slope_min and at most pi"
+        check("slope_max", self.slope_min < self.slope_max <= math.pi, needed)
 
     @classmethod
     def named(cls, surface: str) -> SpineArray:

@@ -34,8 +34,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache, cached_property, lru_cache
-from typing import Final, NamedTuple
+from functools import lru_cache
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +45,9 @@ from hand_models.parameters import ParameterTable, surface_table
 from hand_models.tile.half_planes import HalfPlane, inner_half_planes
 
 __all__ = ["Surface", "engaged_share", "pull_strength", "surface_names"]
+
+NO_PRESETS: Final = ("bounds", "defaults")
+"""Sections of ``surfaces.toml`` that are no kind of rock."""
 
 LEAST: Final = 1e-6
 """Share of spines that counts as none: far less than one, and too little to divide loads by."""
@@ -100,69 +103,44 @@ class Surface:
             value = getattr(self, name)
             if not math.isfinite(value):
                 raise InvalidInputError(f"must be finite, got {value}", field=name)
+
+        def check(name: str, valid: bool, needed: str, why: str = "") -> None:
+            if not valid:
+                got = f"must {needed}, got {getattr(self, name):g}{why}"
+                raise InvalidInputError(got, field=name)
+
         for name in ("shear_limit", "pull_off_limit", "lateral_limit"):
-            if getattr(self, name) <= 0.0:
-                raise InvalidInputError(
-                    f"must be a force above 0 N, got {getattr(self, name):g}", field=name
-                )
-        if self.pull_off_limit > self.shear_limit:
-            raise InvalidInputError(
-                f"must not exceed shear_limit = {self.shear_limit:g} N, "
-                f"got {self.pull_off_limit:g}",
-                field="pull_off_limit",
-            )
-        if not 0.0 < self.pull_off_angle <= math.pi / 2:
-            raise InvalidInputError(
-                f"must be in (0, pi/2] rad, got {self.pull_off_angle:g}", field="pull_off_angle"
-            )
+            check(name, getattr(self, name) > 0.0, "be a force above 0 N")
+        limit = f"shear_limit = {self.shear_limit:g} N"
+        check("pull_off_limit", self.pull_off_limit <= self.shear_limit, f"not exceed {limit}")
+        check("pull_off_angle", 0.0 < self.pull_off_angle <= math.pi / 2, "be in (0, pi/2] rad")
         for name in ("compression_gain", "shear_scatter", "friction"):
-            if getattr(self, name) < 0.0:
-                raise InvalidInputError(
-                    f"must not be negative, got {getattr(self, name):g}", field=name
-                )
-        bounds = _bounds()
-        if self.lateral_limit > bounds.lateral_ratio * self.shear_limit:
-            raise InvalidInputError(
-                f"must be at most {bounds.lateral_ratio:g} times shear_limit = "
-                f"{self.shear_limit:g} N, got {self.lateral_limit:g}: spines hold less sideways",
-                field="lateral_limit",
-            )
-        if self.compression_gain > bounds.compression_gain:
-            raise InvalidInputError(
-                f"must be at most {bounds.compression_gain:g}, got {self.compression_gain:g}: "
-                "newtons of shear strength for each newton of pressing",
-                field="compression_gain",
-            )
-        if self.friction > bounds.friction:
-            raise InvalidInputError(
-                f"must be at most {bounds.friction:g}, got {self.friction:g}: newtons of drag for "
-                "each newton of pull-off",
-                field="friction",
-            )
-        most = bounds.pull_off_exponent
-        if not 1.0 / most <= self.pull_off_exponent <= most:
-            raise InvalidInputError(
-                f"must be in [{1.0 / most:g}, {most:g}], got {self.pull_off_exponent:g}: strength "
-                "must fall all the way from pure shear to pull_off_angle",
-                field="pull_off_exponent",
-            )
-        if not 0.0 < self.lateral_pull_off_ratio <= 1.0:
-            raise InvalidInputError(
-                f"must be in (0, 1], got {self.lateral_pull_off_ratio:g}",
-                field="lateral_pull_off_ratio",
-            )
+            check(name, getattr(self, name) >= 0.0, "not be negative")
+        most = _bound("lateral_ratio")
+        check(
+            "lateral_limit",
+            self.lateral_limit <= most * self.shear_limit,
+            f"be at most {most:g} times {limit}",
+            ": spines hold less sideways",
+        )
+        for name, why in (
+            ("compression_gain", "newtons of shear strength for each newton of pressing"),
+            ("friction", "newtons of drag for each newton of pull-off"),
+        ):
+            most = _bound(name)
+            check(name, getattr(self, name) <= most, f"be at most {most:g}", f": {why}")
+        most = _bound("pull_off_exponent")
+        check(
+            "pull_off_exponent",
+            1.0 / most <= self.pull_off_exponent <= most,
+            f"be in [{1.0 / most:g}, {most:g}]",
+            ": strength must fall all the way from pure shear to pull_off_angle",
+        )
+        check("lateral_pull_off_ratio", 0.0 < self.lateral_pull_off_ratio <= 1.0, "be in (0, 1]")
         if not (1 <= self.half_planes <= 64 and self.half_planes == int(self.half_planes)):
             raise InvalidInputError(
                 f"must be a whole number from 1 to 64, got {self.half_planes}", field="half_planes"
             )
-
-    def __hash__(self) -> int:
-        return self._hash
-
-    @cached_property
-    def _hash(self) -> int:
-        # worked out once: surfaces are keys wherever hands are
-        return hash(tuple([getattr(self, name) for name in self._numbers()]))
 
     @classmethod
     def _numbers(cls) -> list[str]:
@@ -172,7 +150,7 @@ class Surface:
     @property
     def strongest_tile(self) -> float | None:
         """What all spines of a tile hold before they break [N], where the surface asks for more."""
-        most = _bounds().tile_strength
+        most = _bound("tile_strength")
         return most if self.shear_limit > most else None
 
     @classmethod
@@ -190,7 +168,7 @@ class Surface:
         InvalidInputError
             If there is no such preset; the message lists them.
         """
-        if name not in surface_names():
+        if name in NO_PRESETS or name not in surface_table().sections:
             raise InvalidInputError(
                 f"unknown surface {name!r}; known are {', '.join(surface_names())}"
             )
@@ -216,8 +194,8 @@ class Surface:
             raise InvalidInputError(
                 f"must be a force above 0 N, got {values['shear_limit']:g}", field="shear_limit"
             )
-        base = _from_ratios(values["shear_limit"], "defaults", surface_table())
-        return replace(base, **values)  # type: ignore[arg-type]
+        numbers = _by_ratios(values["shear_limit"], "defaults", surface_table())
+        return cls(**(numbers | dict(values)))  # type: ignore[arg-type]
 
     def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
         """Return the force at which a tile lets go, F(φ, θ); f_s(φ) of Eq. 21 in the finger plane.
@@ -331,47 +309,39 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
     return np.where(share > LEAST, share, 0.0)
 
 
-def _from_ratios(shear_limit: float, section: str, table: ParameterTable) -> Surface:
+def _by_ratios(shear_limit: float, section: str, table: ParameterTable) -> dict[str, float]:
+    """Return the numbers of a surface that follow from its strength by a section's ratios."""
+
     def ratio(name: str) -> float:
         own = name in table.sections.get(section, {})
         return table.scalar(section if own else "defaults", name)
 
-    return Surface(
-        shear_limit=shear_limit,
-        pull_off_limit=shear_limit * ratio("pull_off_ratio"),
-        pull_off_angle=ratio("pull_off_angle"),
-        lateral_limit=shear_limit * ratio("lateral_ratio"),
-        compression_gain=ratio("compression_gain"),
-        lateral_pull_off_ratio=ratio("lateral_pull_off_ratio"),
-        shear_scatter=shear_limit * ratio("scatter_ratio"),
-        friction=ratio("friction"),
-        pull_off_exponent=ratio("pull_off_exponent"),
-    )
+    return {
+        "shear_limit": shear_limit,
+        "pull_off_limit": shear_limit * ratio("pull_off_ratio"),
+        "pull_off_angle": ratio("pull_off_angle"),
+        "lateral_limit": shear_limit * ratio("lateral_ratio"),
+        "compression_gain": ratio("compression_gain"),
+        "lateral_pull_off_ratio": ratio("lateral_pull_off_ratio"),
+        "shear_scatter": shear_limit * ratio("scatter_ratio"),
+        "friction": ratio("friction"),
+        "pull_off_exponent": ratio("pull_off_exponent"),
+    }
 
 
-class _Bounds(NamedTuple):
-    """Section ``bounds`` of ``surfaces.toml``."""
-
-    lateral_ratio: float
-    compression_gain: float
-    friction: float
-    pull_off_exponent: float
-    tile_strength: float
+def _bound(name: str) -> float:
+    """Return a number of section ``bounds`` of ``surfaces.toml``."""
+    return surface_table().scalar("bounds", name)
 
 
-@cache
-def _bounds() -> _Bounds:
-    return _Bounds(*[surface_table().scalar("bounds", name) for name in _Bounds._fields])
-
-
-@cache
 def surface_names() -> tuple[str, ...]:
     """Return the names of the surface presets."""
-    return tuple(name for name in surface_table().sections if name not in ("bounds", "defaults"))
+    return tuple(name for name in surface_table().sections if name not in NO_PRESETS)
 
 
 def _from_table(name: str, table: ParameterTable) -> Surface:
-    return replace(_from_ratios(table.scalar(name, "shear_limit"), name, table), name=name)
+    numbers = _by_ratios(table.scalar(name, "shear_limit"), name, table)
+    return Surface(**numbers, name=name)  # type: ignore[arg-type]
 
 
 @lru_cache(maxsize=64)

@@ -94,7 +94,7 @@ class BlockSum:
             summands.append(extreme_points(image, len(columns)))
         return tuple(summands)
 
-    @cached_property
+    @property
     def base(self) -> Array:
         """A scaled wrench of the set."""
         start = self.origin * SCALE
@@ -121,9 +121,8 @@ class BlockSum:
         # as many as a hull of so many points can have
         return Sizes(candidates, candidates ** (r // 2))
 
-    @cached_property
     def _parts(self) -> list[Summand]:
-        """The summands that are more than a point, about `base`, in the coordinates of `axes`."""
+        """Return the summands of more than a point, about `base`, in the coordinates of `axes`."""
         directions, reach = self.axes
         summands = [s for s in self._summands if s.dimension]
         candidates = math.prod(len(s.points) for s in summands)
@@ -163,7 +162,7 @@ class BlockSum:
     @cached_property
     def facets(self) -> Facets:
         """Facets of the sum of the blocks, without wrench rows."""
-        parts, r = self._parts, len(self.axes[1])
+        parts, r = self._parts(), len(self.axes[1])
         if r == 0:
             return Facets(np.zeros((0, 0)), np.zeros(0))
         if self._whole is not None:
@@ -180,8 +179,9 @@ class BlockSum:
     @cached_property
     def vertices(self) -> Array:
         """Vertices of the sum of the blocks, without wrench rows."""
-        if not self._parts:
+        parts = self._parts()
+        if not parts:
             return np.zeros((1, 0))
-        if len(self._parts) == 1:
-            return self._parts[0].points
-        return sum_vertices(self._parts, *self.facets, self.rounding)
+        if len(parts) == 1:
+            return parts[0].points
+        return sum_vertices(parts, *self.facets, self.rounding)

@@ -12,15 +12,12 @@ import scipy
 
 from hand_models.base import Array, SolverError, UnsupportedError
 
-__all__ = ["ends_along", "farthest", "linear_program"]
+__all__ = ["ends_along", "linear_program"]
 
 SOLVED, EMPTY, UNBOUNDED = 0, 2, 3
 """Statuses of `scipy.optimize.linprog`."""
 
 PRESOLVED: Final = (True, False)
-
-EXACT: Final = 1e-9
-"""Tolerance of the linear program of a support function [N]."""
 
 
 def linear_program(
@@ -64,17 +61,6 @@ def linear_program(
     if found.status == UNBOUNDED:
         raise UnsupportedError(f"{what} has no bound: fingers that resist sideways would give one")
     raise SolverError(f"{what}: {found.message}")
-
-
-def farthest(slopes: Array, A: Array, b: Array) -> Array | None:
-    """Return the y of { y : A y ≤ b } with the largest slopes · y; None if there is none.
-
-    Raises
-    ------
-    SolverError
-        If the program fails.
-    """
-    return linear_program(-slopes, A, b, "support", tolerance=EXACT)
 
 
 def ends_along(

@@ -33,10 +33,13 @@ from hand_models.base import (
 from hand_models.wrench_spaces.block_sum import Block, BlockSum, Sizes, coupled_columns
 from hand_models.wrench_spaces.clipping import clipped
 from hand_models.wrench_spaces.half_spaces import FLATNESS, SCALE, Facets, HalfSpaces, lifted
-from hand_models.wrench_spaces.linear_programs import ends_along, farthest
+from hand_models.wrench_spaces.linear_programs import ends_along, linear_program
 from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope
 
 __all__ = ["Row", "WrenchSpace"]
+
+EXACT: Final = 1e-9
+"""Tolerance of the linear program of a support function [N]."""
 
 MOST_ROWS: Final = 250
 """Rows of more than two coupled columns whose polytope is listed: each takes a linear program."""
@@ -178,7 +181,7 @@ class WrenchSpace:
             blocks.append(Block(columns, vertices, A[facets], b[facets]))
         return tuple(blocks)
 
-    @cached_property
+    @property
     def _most_rows(self) -> int:
         """Rows of the largest block of more than two columns; zero without one."""
         return max((len(b) for columns, _, b in self._coupled if len(columns) > 2), default=0)
@@ -188,7 +191,7 @@ class WrenchSpace:
         """Whether rows couple few enough others for their loads' polytopes to be listed."""
         return self._most_rows <= MOST_ROWS
 
-    @cached_property
+    @property
     def _enough(self) -> tuple[Array, Array]:
         """Rows that are enough for the set at u = 1, as `A` and `b`."""
         if not self.listed:
@@ -244,7 +247,8 @@ class WrenchSpace:
 
     def _farthest(self, direction: Array) -> Array | None:
         """Return the wrench farthest along d over all rows at u = 1, by linear programming."""
-        y = farthest(self.generators.T @ direction, *self._enough)
+        cost = -(self.generators.T @ direction)
+        y = linear_program(cost, *self._enough, "support", tolerance=EXACT)
         return None if y is None else self.wrench(y)
 
     @cached_property

@@ -3,8 +3,7 @@
 import numpy as np
 from hypothesis import strategies as st
 
-from hand_models import FINGERS, Cylinder
-from hand_models.fixed_wrist import wrench_space
+from hand_models import Cylinder
 from hand_models.parameters import hand_table
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, pinch, settled_at
 from tests.suite.helpers.shares import given_some
@@ -95,22 +94,3 @@ def test_loads_are_those_of_the_full_system_of_equation_6(seed, tension):
         expected = equation_6(settled, i, tension)
         scale = 1.0 + np.abs(expected).max()
         np.testing.assert_allclose(loads[tiles, :2] / scale, expected / scale, atol=1e-9)
-
-
-@given_some(12, 100, seeds)
-def test_the_hands_wrench_is_the_sum_of_its_tiles_and_palms_forces(seed):
-    settled = settled_at(seed)
-    if settled is None:
-        return
-    rng = np.random.default_rng(seed)
-    space = wrench_space(settled)
-    y = rng.uniform(0.0, 100.0, len(space.columns))
-    value = dict(zip(space.columns, y, strict=True))
-    lateral = np.array([value.get(f"{finger}/lateral", 0.0) for finger in FINGERS])
-    loads = settled.tile_loads(y[:4], lateral)
-    forces = np.einsum("tk,tkx->tx", loads, settled.axes)
-    palm = np.array([-value.get("palm_shear", 0.0), 0.0, value.get("palm_pressing", 0.0)])
-    forces = np.vstack([forces, palm])
-    places = np.vstack([settled.positions, settled.palm.centre])
-    expected = np.concatenate([forces.sum(axis=0), np.cross(places, forces).sum(axis=0)])
-    np.testing.assert_allclose(space.wrench(y), expected, rtol=1e-9, atol=1e-9)

@@ -38,12 +38,16 @@ def test_without_scatter_it_is_the_nominal_capability():
     np.testing.assert_allclose(found.tenth, nominal, rtol=1e-9)
 
 
-def test_it_is_the_same_each_time_and_steady_under_another_scramble():
-    settled = HAND.settle(Cylinder(0.4), ROCK, Grasp(math.pi))
-    one, again = (robustness(HAND, settled, BOTH) for _ in range(2))
+def test_it_is_the_same_each_time():
+    one, again = (robustness(HAND, pinch(), BOTH, draws=8) for _ in range(2))
     np.testing.assert_array_equal(one.tenth, again.tenth)
     assert (one.hundredth <= one.tenth).all()
-    other = robustness(HAND, settled, BOTH, seed=1)
+
+
+@pytest.mark.slow
+def test_it_is_steady_under_another_scramble():
+    settled = HAND.settle(Cylinder(0.4), ROCK, Grasp(math.pi))
+    one, other = (robustness(HAND, settled, BOTH, seed=seed) for seed in (0, 1))
     assert not np.array_equal(one.tenth, other.tenth)
     np.testing.assert_allclose(other.tenth, one.tenth, rtol=0.1, atol=0.1 * np.abs(one.tenth).max())
 

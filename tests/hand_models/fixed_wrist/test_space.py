@@ -21,10 +21,8 @@ from tests.suite.helpers.hands import (
     limiting,
     partly,
     pinch,
-    settled_at,
     without_hand_load,
 )
-from tests.suite.helpers.shares import given_some
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -79,124 +77,6 @@ def test_without_palm_and_lateral_the_set_is_the_parallelepiped_of_equation_16(d
     gaps = np.linalg.norm(vertices[:, None] - corners, axis=2)
     np.testing.assert_allclose(gaps.min(axis=1), 0.0, atol=1e-7)
     np.testing.assert_allclose(gaps.min(axis=0), 0.0, atol=1e-7)
-
-
-def test_the_origin_is_c_sys_and_a_generator_is_c_act_of_equation_14():
-    settled = pinch(lateral=False)
-    space = wrench_space(settled)
-    units = np.concatenate(
-        [settled.axes, np.cross(settled.positions[:, None], settled.axes)], axis=2
-    )[:, :2]
-    c_sys = (settled.loads[:, :, :1] * units).sum(axis=(0, 1))
-    np.testing.assert_allclose(space.origin, c_sys, atol=1e-12)
-    for i in range(4):
-        mine = settled.finger_of == i
-        c_act = (settled.loads[mine][:, :, 1:] * units[mine]).sum(axis=(0, 1))
-        np.testing.assert_allclose(space.generators[:, i], c_act, atol=1e-12)
-
-
-@given_some(10, 80, seeds)
-def test_every_row_has_its_own_name_and_limits_come_before_hard_rows(seed):
-    settled = settled_at(seed)
-    if settled is None:
-        return
-    space = wrench_space(settled)
-    labels = [row.label for row in space.rows]
-    assert len(set(labels)) == len(labels) == len(space.A)
-    assert len(set(space.columns)) == len(space.columns)
-    kinds = [row.kind for row in space.rows]
-    assert kinds == ["limit"] * len(space.s) + ["hard"] * len(space.h)
-    assert (space.s > 0.0).all()
-    touching = {
-        (tile.finger, tile.phalanx)
-        for tile, touches in zip(settled.tiles, settled.touching, strict=True)
-        if touches
-    }
-    named = {(r.finger, r.phalanx) for r in space.rows if r.limit in ("shear", "pull_off")}
-    assert named == touching
-
-
-@given_some(10, 80, seeds)
-def test_rows_say_what_tile_by_tile_reckoning_says(seed):
-    """Utilisation from each tile's own load, and hard rows from its shear and the stops."""
-    settled = settled_at(seed)
-    if settled is None:
-        return
-    rng = np.random.default_rng(seed)
-    space = wrench_space(settled)
-    y = rng.uniform(-20.0, 120.0, len(space.columns))
-    value = dict(zip(space.columns, y, strict=True))
-    lateral = np.array([value.get(f"{finger}/lateral", 0.0) for finger in FINGERS])
-    loads = {
-        (tile.finger, tile.phalanx): load
-        for tile, load in zip(settled.tiles, settled.tile_loads(y[:4], lateral), strict=True)
-    }
-    holds = {
-        (tile.finger, tile.phalanx): share
-        for tile, share in zip(settled.tiles, settled.engagement, strict=True)
-    }
-    used = space.utilisations(y)
-    worst: dict = {}
-    for row, u in zip(space.rows, used, strict=False):
-        worst[row.finger, row.phalanx, row.limit] = max(
-            u, worst.get((row.finger, row.phalanx, row.limit), -math.inf)
-        )
-    for (finger, phalanx, limit), u in worst.items():
-        if limit in ("finger_shear", "fingertip_force", "hand_load"):
-            continue  # in test_structure.py
-        if limit == "finger_lateral":
-            # every tile of it at what it holds sideways without any shear
-            shares = sum(share for (name, _), share in holds.items() if name == finger)
-            reaction = abs(value[f"{finger}/lateral"])
-            expected = reaction / (settled.surface.lateral_limit * shares)
-        elif limit == "tendon_tension":
-            expected = value[f"{finger}/tension"] / 700.0
-        elif limit == "motor_torque":
-            expected = value[f"{finger}/tension"] * 0.0067 / (236.0 * 0.7) / 0.0286
-        elif limit == "motor_current":
-            torque = value[f"{finger}/tension"] * 0.0067 / (236.0 * 0.7)
-            expected = (torque / 0.0234 + 0.0263) / 1.24
-        elif limit == "palm_shear":
-            expected = value["palm_shear"] / settled.palm.shear_limit
-        elif limit == "palm_pressing":
-            expected = value["palm_pressing"] / settled.palm.pressing_limit
-        else:
-            shear, normal, side = loads[finger, phalanx]
-            expected = max(
-                (p.a_shear * shear + p.a_normal * normal + p.a_lateral * abs(side)) / p.capacity
-                for p in inner_half_planes(settled.surface)
-                if p.limit == limit
-            )
-            expected /= limiting(holds[finger, phalanx])
-        assert u == pytest.approx(expected, rel=1e-9, abs=1e-9)
-    kept = dict(
-        zip(
-            (row.label for row in space.rows[len(used) :]),
-            space.h - space.H @ y >= -1e-9,
-            strict=True,
-        )
-    )
-    for finger in FINGERS:
-        assert kept[f"{finger}/slack_tendon"] == (value[f"{finger}/tension"] >= -1e-9)
-    for tile in settled.tiles:
-        shear, normal, _ = loads[tile.finger, tile.phalanx]
-        name = f"{tile.finger}/{tile.phalanx}"
-        if tile.contact in ("face", "edge"):
-            pressed = normal
-            if tile.phalanx == "base":
-                pressed = holds[tile.finger, "base"] * loads[tile.finger, "proximal"][1]
-            held = holds[tile.finger, tile.phalanx]
-            allowed = settled.surface.shear_limit * (limiting(held) - held)
-            assert kept[f"{name}/dragged_backwards"] == (
-                shear + settled.surface.friction * pressed + allowed >= -1e-9
-            )
-        if tile.contact == "frame":
-            assert kept[f"{name}/frame_pulled"] == (normal >= -1e-9)
-    for i, joint, torque in settled.stops:
-        label = f"{FINGERS[i]}/{('proximal', 'middle', 'distal')[joint]}/joint_stop"
-        holding = float(torque @ [1.0, y[i]])
-        if abs(holding) > 1e-7:
-            assert kept[label] == (holding > 0.0)
 
 
 def test_a_sideways_load_is_shared_by_a_fingers_tiles_and_bounded_with_their_shear():
@@ -300,11 +180,6 @@ def test_a_tile_with_fewer_and_fewer_spines_limits_its_hand_less_and_less():
     assert least[-1] < -1e3
 
 
-def test_lateral_switched_off_leaves_no_lateral_column():
-    assert not any("lateral" in name for name in wrench_space(pinch(lateral=False)).columns)
-    assert sum("lateral" in name for name in wrench_space(pinch()).columns) == 4
-
-
 @pytest.mark.parametrize(("cap", "effective"), [(100.0, 100.0), (5000.0, 700.0), (None, 700.0)])
 def test_a_callers_cap_on_tension_counts_below_the_hands_own_maximum(cap, effective):
     settled = HAND.settle(Plane(), ROCK.from_values({"shear_limit": 1e4}), Grasp(palm=False))
@@ -315,17 +190,6 @@ def test_a_callers_cap_on_tension_counts_below_the_hands_own_maximum(cap, effect
     along = space.support([-1.0, 0, 0, 0, 0, 0])
     shear = -space.wrench([effective] * 4 + [0.0] * (len(space.columns) - 4))[0]
     assert along == pytest.approx(shear)
-
-
-def test_the_palm_shears_along_minus_x_and_presses_along_z_at_its_centre():
-    settled = pinch()
-    space = wrench_space(settled)
-    shear, pressing = space.generators[:, -2], space.generators[:, -1]
-    x, y, z = settled.palm.centre
-    for column, force in ((shear, [-1, 0, 0]), (pressing, [0, 0, 1])):
-        np.testing.assert_allclose(column, [*force, *np.cross([x, y, z], force)], atol=1e-15)
-    assert space.columns[-2:] == ("palm_shear", "palm_pressing")
-    assert not any("palm" in name for name in wrench_space(pinch(palm=False)).columns)
 
 
 def test_closing_beyond_what_tiles_hold_leaves_no_wrench():

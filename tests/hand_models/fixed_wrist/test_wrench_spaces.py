@@ -198,6 +198,8 @@ class ByHand:
 
     def check(self, space: WrenchSpace) -> None:
         assert set(space.columns) == set(self.columns)
+        kinds = [row.kind for row in space.rows]
+        assert kinds == ["limit"] * len(space.s) + ["hard"] * len(space.h)
         agree(space.origin, self.origin)
         for name, generator in zip(space.columns, space.generators.T, strict=True):
             agree(generator, self.columns[name])

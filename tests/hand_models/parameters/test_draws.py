@@ -45,6 +45,8 @@ def own(value: float, unit: str) -> dict[str, object]:
 def test_each_set_is_a_draw_with_its_own_numbers():
     sets, draws = draw_table(), bundled_draws()
     assert len(draws) == len(sets.vector("fit", "misfit")) >= 30
+    assert max(sets.vector("fit", "misfit")) <= 1.0
+    assert len(set(sets.vector("fit", "valley"))) >= 2
     proximal = hand_table().vector("finger", "pulley_radii")[0]
     for k, draw in enumerate(draws):
         radii = [proximal, *(sets.vector("finger", f"pulley_radii[{i}]")[k] for i in (1, 2))]

@@ -12,19 +12,25 @@ from hand_models import experiments
 from hand_models.studies import as_json, load_study, run_study
 
 COARSE = {
-    "fig13": {"PER_AXIS": 20, "DIRECTIONS": 40, "PIECE_DIRECTIONS": 8},
-    "fig14": {"PER_AXIS": 20, "DIRECTIONS": 40},
+    "fig13": {"DIRECTIONS": 40, "PIECE_DIRECTIONS": 8},
+    "fig14": {"DIRECTIONS": 40},
     "fig15": {"TENSIONS": 3, "RAYS": 100, "CUTS": 2, "STARTS": 1},
     "fig16": {"POINTS": 3, "COARSE_POINTS": 2},
 }
 """Numbers of the studies' modules."""
+
+PER_AXIS = 20
+"""Poses along each axis of their searches."""
 
 
 @cache
 def studied(name):
     """Return a study's result, its files and the steps that it told."""
     steps, coarse = [], COARSE.get(name)
-    with patch.multiple(load_study(name), **coarse) if coarse else nullcontext():
+    with (
+        patch.multiple(load_study(name), **coarse) if coarse else nullcontext(),
+        patch("hand_models.experiments.pulling.PER_AXIS", PER_AXIS),
+    ):
         folder = Path(tempfile.mkdtemp()) / "new" / "folder"
         result, files = run_study(name, folder, lambda *step: steps.append(step))
     return result, files, steps

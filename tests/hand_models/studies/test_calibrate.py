@@ -11,11 +11,9 @@ from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import GripperFit, edge, pulled_off_poses, with_mirrored
 from hand_models.parameters import (
     ParameterTable,
-    bundled_draws,
     draws_of,
     experiment_table,
     hand_table,
-    surface_table,
 )
 from hand_models.studies import calibrate
 from hand_models.studies.calibrate import as_draws, farthest_apart, global_search
@@ -68,21 +66,6 @@ def test_every_recorded_number_is_plausible():
     assert (now <= FIT.low + FIT.width).all()
 
 
-def test_the_hand_has_what_of_the_set_belongs_to_it():
-    gripper, hand, surfaces = gripper_table(), hand_table(), surface_table()
-    for section, names in calibrate.OF_HAND.items():
-        for name in {each.split("[")[0] for each in names}:
-            assert hand.vector(section, name) == gripper.vector(section, name)
-    assert surfaces.scalar("sandpaper-36", "shear_limit") == gripper.scalar(
-        "gripper", "shear_limit"
-    )
-    assert surfaces.scalar("defaults", "friction") == gripper.scalar("gripper", "friction")
-    # T + k P = T_max through the strength at the pull-off angle
-    angle = surfaces.scalar("defaults", "pull_off_angle")
-    slope = (1.0 / surfaces.scalar("defaults", "pull_off_ratio") - np.cos(angle)) / np.sin(angle)
-    assert slope == pytest.approx(gripper.scalar("gripper", "pull_off_slope"), rel=1e-3)
-
-
 def test_a_pull_is_balanced_at_its_pose():
     gripper = FIT.gripper(FIT.start())
     pulls = np.array([0.0, 5.0, 11.0])
@@ -127,13 +110,6 @@ def test_sets_farthest_apart_begin_with_the_ends():
     sets = np.array([[0.0], [0.1], [1.0], [0.6]])
     assert farthest_apart(sets, 3) == [0, 2, 3]
     assert sorted(farthest_apart(sets, 9)) == [0, 1, 2, 3]
-
-
-def test_at_least_thirty_sets_from_several_valleys_are_bundled():
-    table = ParameterTable.load(DRAWS)
-    assert len(bundled_draws()) == len(table.vector("fit", "misfit")) >= 30
-    assert len(set(table.vector("fit", "valley"))) >= 2
-    assert max(table.vector("fit", "misfit")) <= 1.0
 
 
 @pytest.mark.slow

@@ -137,19 +137,19 @@ def test_strength_by_hand():
     assert surface.strength(-math.pi / 4) == pytest.approx(120.0 * math.sqrt(2.0))
 
 
-@given_some(20, 150, surfaces(laws))
+@given_some(8, 150, surfaces(laws))
 def test_half_planes_stay_inside_the_law_in_every_direction(surface):
     assert (reach(surface, DIRECTIONS) <= law(surface, DIRECTIONS) * (1.0 + 1e-9)).all()
 
 
-@given_some(35, 100, surfaces())
+@given_some(10, 100, surfaces())
 def test_half_planes_meet_the_law_at_their_nodes(surface):
     surface = replace(surface, compression_gain=0.0)
     nodes = np.linspace(0.0, surface.pull_off_angle, surface.half_planes + 1)
     np.testing.assert_allclose(reach(surface, nodes), law(surface, nodes), rtol=1e-6)
 
 
-@given_some(20, 60, surfaces())
+@given_some(5, 60, surfaces())
 def test_the_gap_closes_with_the_square_of_the_number_of_half_planes(surface):
     surface = replace(surface, compression_gain=0.0)
     gaps = [area_between(replace(surface, half_planes=k)) for k in (1, 2, 4, 8, 16)]
@@ -157,7 +157,7 @@ def test_the_gap_closes_with_the_square_of_the_number_of_half_planes(surface):
         assert fine <= coarse * 0.35 + 1e-9 * surface.shear_limit**2
 
 
-@given_some(35, 100, surfaces())
+@given_some(10, 100, surfaces())
 def test_one_half_plane_more_is_needed_only_where_the_last_leaves_the_curve(surface):
     """Pure pull-off is capped at f_min: by the last chord, or by one more that closes it off."""
     pull = reach(surface, np.array([math.pi / 2]))[0]
@@ -240,7 +240,7 @@ def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(nam
     assert (directional_strength(outer_half_planes(surface), directions) >= exact).all()
 
 
-@given_some(20, 150, surfaces(laws), st.integers(0, 1000))
+@given_some(8, 150, surfaces(laws), st.integers(0, 1000))
 def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
     directions = np.concatenate([random_directions(2000, seed), edge_directions(surface)])
     exact = boat(surface, directions)
@@ -280,7 +280,7 @@ def test_excess_is_what_a_load_is_beyond_the_surface(surface, seed):
         np.testing.assert_allclose(found, (size - 1.0) * reaches, rtol=1e-6, atol=1e-6)
 
 
-@given_some(20, 60, surfaces())
+@given_some(8, 60, surfaces())
 def test_no_bound_could_be_nearer_to_the_surface(surface):
     """Every lateral coefficient and every outer capacity is as good as its normal allows."""
     directions = np.concatenate([random_directions(4000), edge_directions(surface)])
@@ -336,7 +336,7 @@ def test_what_one_straight_line_costs_sideways():
     assert reaches[0] / 68.1 == pytest.approx(1.0 / least, rel=0.01)
 
 
-@given_some(20, 50, surfaces(laws))
+@given_some(8, 50, surfaces(laws))
 def test_purely_sideways_no_piece_goes_beyond_the_lateral_limit(surface):
     for piece in inner_half_planes(surface):
         assert 0.0 < piece.capacity / piece.a_lateral <= surface.lateral_limit * (1.0 + 1e-9)
