@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from hand_models.base import Array, InvalidInputError, Pose
 
@@ -297,8 +296,19 @@ def _origin(owner: str, element: ElementTree.Element) -> Pose:
         return Pose.identity()
     position = _numbers(owner, origin, "xyz", 3, LONGEST, default=0.0)
     angles = _numbers(owner, origin, "rpy", 3, WIDEST, default=0.0)
-    # turned about the fixed axes x, y, z, one after the other
-    return Pose(np.array(position), Rotation.from_euler("xyz", angles).as_matrix())
+    return Pose(np.array(position), _rotation(*angles))
+
+
+def _rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation of URDF's angles about the fixed axes x, y, z, one after the other."""
+    (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
+            [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
+            [-sy, sx * cy, cx * cy],
+        ]
+    )
 
 
 def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
