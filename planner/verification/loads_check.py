@@ -92,8 +92,7 @@ class LoadsCheck:
         assert question.body_wrench is not None
         joints = check.joints(self.wrong, arrays.wrenches, question.body_wrench)
         self.idle = check.idle(joints)
-        asked = list(check.recompute_asked(arrays, joints))
-        residuals, again, _ = check.settled.recompute(self.wrong, arrays, asked)
+        residuals, again, _ = check.recompute(self.wrong, arrays, joints)
         named = np.array([y * (np.arange(len(y)) < len(names)) for names in self._columns])
         off = [r.values for r in residuals if r.kind == "zero" and not r.affine]
         off.append(self.loads_of(arrays) - named)
@@ -178,9 +177,8 @@ class LoadsCheck:
             return "the utilisation"
         if not (np.abs(found[of["zero"]]) <= allowed).all():
             return "a load or a wrench that is given"
-        tiles, settled = found[of["load"]].reshape(-1, 3), self._check.settled
-        curved = settled.recompute_curved(self._arrays, tiles, own)
-        for residual in (*curved, *self._check.asked.recompute_sizes(own)):
+        tiles = found[of["load"]].reshape(-1, 3)
+        for residual in self._check.recompute_curved(self._arrays, tiles, own):
             if not np.minimum.reduce(residual.values) >= -allowed:
                 return next(residual.off(np.full(len(own), allowed)))
         return None
