@@ -21,7 +21,7 @@ class WholeBlocks:
 
     def __init__(self, stances: Sequence[StanceData]) -> None:
         full = tuple(HandData(*map(np.ones_like, hand)) for hand in stances[0].hands)
-        there = _dense(program_of(unique, StanceData(full, stances[0].wrench)).conic()) != 0.0
+        there = _dense(program_of(unique, StanceData.of(full, stances[0].wrench)).conic()) != 0.0
         columns, rows = np.nonzero(there.T)
         starts = np.searchsorted(columns, np.arange(there.shape[1] + 1))
         programs = [program_of(unique, each).conic() for each in stances]

@@ -161,7 +161,6 @@ class ContactPattern(NamedTuple):
     holding: tuple[int, ...]
 
 
-@lru_cache(maxsize=KEPT_NAMES)
 def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
     """Return what hands with these tiles touch."""
     places = tile_index_of(tuple(map(len, hands)))

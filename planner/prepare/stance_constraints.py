@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import compress
 from typing import Final, NamedTuple
 
@@ -42,9 +41,6 @@ TENSION_CHANGE: Final = "tension_change"
 
 PASSIVE_JOINT: Final = "passive_joint"
 """Name of the hard rows of a joint without a motor."""
-
-KEPT: Final = 256
-"""Lists of names that are kept."""
 
 AXES: Final = ("fx+", "fx-", "fy+", "fy-", "fz+", "fz-")
 """Both ways along the axes of a cap's frame."""
@@ -229,7 +225,6 @@ class _Names(NamedTuple):
     changes: bool = False
 
 
-@lru_cache(maxsize=KEPT)
 def _rows_with(rows: tuple[Row, ...], apart: int, names: _Names) -> tuple[Row, ...]:
     """Return the names of a set's rows with further limit rows, after so many, and hard rows."""
     kinds = [JOINT_FORCE if slides else JOINT_TORQUE for slides in names.sliding]

@@ -10,8 +10,8 @@ What names alone decide is found once for each list of names.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import Final, NamedTuple
 
@@ -356,13 +356,25 @@ class HandRows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StanceData:
-    """All hands of a stance, and what their balance is to give, scaled, shape (nb,).
+    """All hands of a stance, and what their balance is to give, scaled.
 
-    First the body wrench (6,), then the components of hands' wrenches that are given.
+    Attributes
+    ----------
+    hands : tuple of HandData
+    wrench : ndarray, shape (nb,)
+        First the body wrench (6,), then the components of hands' wrenches that are given.
+    rows : HandRows
+        All hands' rows below each other.
     """
 
     hands: tuple[HandData, ...]
     wrench: Array
+    rows: HandRows
+
+    @classmethod
+    def of(cls, hands: tuple[HandData, ...], wrench: Array) -> StanceData:
+        """Return the data of hands and what they are to balance."""
+        return cls(hands, wrench, HandRows.of(hands, len(wrench)))
 
     @property
     def offset(self) -> Array:
@@ -371,12 +383,8 @@ class StanceData:
 
     def capped(self, utilisation: float) -> StanceData:
         """Return the stance with limits at a utilisation as hard rows, and no others."""
-        return StanceData(tuple(hand.capped(utilisation) for hand in self.hands), self.wrench)
-
-    @cached_property
-    def rows(self) -> HandRows:
-        """All hands' rows below each other."""
-        return HandRows.of(self.hands, len(self.wrench))
+        hands = tuple(hand.capped(utilisation) for hand in self.hands)
+        return StanceData.of(hands, self.wrench)
 
     def by_rows(
         self, values: Array, *, limits: bool = True
@@ -389,9 +397,7 @@ class StanceData:
 
     def turned(self, wrench: Array) -> StanceData:
         """Return the stance with another balance."""
-        turned = StanceData(self.hands, wrench)
-        turned.__dict__["rows"] = self.rows
-        return turned
+        return replace(self, wrench=wrench)
 
 
 def parted(whole: Array, sizes: Iterable[int]) -> tuple[Array, ...]:

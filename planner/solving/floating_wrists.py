@@ -155,7 +155,7 @@ def _less_tense_beside(prepared: PreparedStance, search: WristSolution) -> Wrist
     ]
     cap = prepared.question.limits.utilisation
     trade = tension_trade(search.measure.utilisation, cap)
-    found = programs.less_tension(StanceData(tuple(held), data.wrench), trade)
+    found = programs.less_tension(StanceData.of(tuple(held), data.wrench), trade)
     if not found.solved:
         return search
     pairs = zip(wrists, loads, found.loads, strict=True)
