@@ -1,74 +1,93 @@
 """How many modules one plan passes, and how often it goes from one to another.
 
-``python -m benchmarks.crossings``, from a checkout. Of a new stance of a shape that is known,
-from the closed hands on.
+``python -m benchmarks.crossings``, from a checkout: of a new stance of a known shape, from the
+bytes of its request to those of the reply. With ``--sequence`` every crossing, in its order. A
+generator that goes on counts as entered again.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import threading
 from collections import Counter
 from types import FrameType
 from typing import Any, NamedTuple
 
-from hand_models.rock import Cylinder
-from planner.prepare.settled_stance import settle_stance
-from planner.question import Load
-from planner.solving import plan
-from tests.suite.helpers.stances import PLACES, ask, on_wall
+import msgspec
+
+from service.answering import dispatch
+from service.wire import PLAN
+from tests.suite.helpers.requests import wall_request
 
 OWN = ("hand_models.", "planner.", "service.")
 
 
-class Passed(NamedTuple):
-    """What one plan passes: calls of each module, and of each pair of caller and module."""
+class Crossing(NamedTuple):
+    """A call from one module into another; ``beside``: in the thread beside the solver."""
 
-    modules: Counter[str]
-    crossings: Counter[tuple[str, str]]
+    caller: str
+    module: str
+    function: str
+    beside: bool
 
 
-def passed(diameter: float) -> Passed:
-    """Plan a stance on logs of this diameter, and watch."""
-    light = Load(mass=60.0)  # it holds: what does not is explained, too
-    question = ask(on_wall(Cylinder(diameter), limbs=tuple(PLACES)), load=light)
-    settle_stance(question.stance)
-    found = Passed(Counter(), Counter())
+class Watch:
+    """Counts the calls of each module, and all calls from one into another, of all threads."""
 
-    closed = False
+    def __init__(self) -> None:
+        self.clear()
 
-    def watch(frame: FrameType, event: str, _: Any) -> None:
-        nonlocal closed
+    def clear(self) -> None:
+        """Forget all calls."""
+        self.modules: Counter[str] = Counter()
+        self.crossings: list[Crossing] = []
+
+    def __call__(self, frame: FrameType, event: str, _: Any) -> None:
         name = frame.f_globals.get("__name__", "")
-        closed |= event == "return" and frame.f_code is settle_stance.__code__
-        if event != "call" or not closed or not name.startswith(OWN):
+        if event != "call" or not name.startswith(OWN):
             return
-        found.modules[name] += 1
+        self.modules[name] += 1
         caller = frame.f_back
         while caller is not None and not caller.f_globals.get("__name__", "").startswith(OWN):
             caller = caller.f_back
         before = "" if caller is None else caller.f_globals["__name__"]
         if before != name:
-            found.crossings[before, name] += 1
+            beside = threading.current_thread() is not threading.main_thread()
+            self.crossings.append(Crossing(before, name, frame.f_code.co_name, beside))
 
-    threading.setprofile(watch)
+
+def plan_on(diameter: float, watch: Watch) -> None:
+    """Plan a stance on logs of this diameter, and watch that alone."""
+    request = wall_request()
+    for hand in request["stance"]["hands"]:
+        hand["hold"]["diameter"] = diameter
+    payload = msgspec.json.encode(request)
+    watch.clear()
     sys.setprofile(watch)
     try:
-        plan(question)
+        answer = dispatch.handle(PLAN, payload)
     finally:
         sys.setprofile(None)
-        threading.setprofile(None)  # type: ignore[arg-type]
-    return found
+    assert answer.good, answer
 
 
 def main() -> None:
-    for warm in range(4):
-        passed(0.3 + 1e-4 * warm)
-    found = passed(0.31)
-    print(f"{len(found.modules)} modules, {found.crossings.total()} crossings between them,")
-    print(f"{len(found.crossings)} of them distinct; {found.modules.total()} calls")
-    for name, count in found.modules.most_common(12):
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sequence", action="store_true", help="print every crossing")
+    asked, watch = parser.parse_args(), Watch()
+    # of the thread beside the solver, which the first plan begins
+    threading.setprofile(watch)
+    for warm in range(5):
+        plan_on(0.3 + 1e-4 * warm, watch)
+    beside = sum(crossing.beside for crossing in watch.crossings)
+    print(f"{len(watch.modules)} modules, {len(watch.crossings)} crossings between them,")
+    print(f"{beside} of them beside the solver; {watch.modules.total()} calls")
+    entered = Counter(crossing.module for crossing in watch.crossings)
+    for name, count in entered.most_common(None if asked.sequence else 12):
         print(f"{count:5} {name}")
+    for crossing in watch.crossings if asked.sequence else ():
+        print(f"{crossing.caller:44} -> {crossing.module}.{crossing.function}")
 
 
 if __name__ == "__main__":
