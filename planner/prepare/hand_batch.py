@@ -62,8 +62,6 @@ class TileIndex:
 
     Attributes
     ----------
-    counts : tuple of int, length H
-        Tiles of each hand, of which all else follows.
     hand, finger : ndarray of int, shape (T,)
         Of each tile, the fingers counted through all hands.
     first : ndarray of int, shape (H,)
@@ -80,7 +78,6 @@ class TileIndex:
         Nails, whether they hook or not.
     """
 
-    counts: tuple[int, ...]
     hand: Indices
     finger: Indices
     first: Indices
@@ -90,17 +87,6 @@ class TileIndex:
     bases: Indices
     base_fingers: Indices
     nails: Indices
-
-    def __hash__(self) -> int:
-        return hash(self.counts)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, TileIndex) and self.counts == other.counts
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """(T, F, H)."""
-        return len(self.hand), len(self.first_of_finger), len(self.first)
 
 
 @lru_cache(maxsize=KEPT)
@@ -118,7 +104,6 @@ def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
     phalanges = np.flatnonzero(np.isin(phalanx, PHALANGES)).reshape(-1, len(PHALANGES))
     bases = np.flatnonzero(phalanx == "base")
     places = TileIndex(
-        counts=counts,
         hand=hand,
         finger=finger,
         first=np.searchsorted(hand, np.arange(len(counts))),
@@ -136,7 +121,7 @@ def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
 
 
 class ContactPattern(NamedTuple):
-    """What the tiles of some hands touch. Arrays are read-only.
+    """What the tiles of some hands touch.
 
     Attributes
     ----------
@@ -168,7 +153,7 @@ def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
     away = contacts != TOUCHING
     touches = 1.0 - away
     holds = touches + (contacts == CONTACTS[NAIL])
-    touch = ContactPattern(
+    return ContactPattern(
         contacts=contacts,
         touches=touches,
         framed=1.0 * (contacts == CONTACTS["frame"]),
@@ -177,9 +162,6 @@ def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
         idle=np.flatnonzero(contacts == NOTHING),
         holding=tuple(np.add.reduceat(holds, places.first_of_finger).astype(int).tolist()),
     )
-    for array in touch[:-1]:
-        array.setflags(write=False)
-    return touch
 
 
 @dataclass(frozen=True, eq=False)
