@@ -75,15 +75,10 @@ class LoadsCheck:
         sizes = [sum(len(rows) for kind, rows, _ in parts if kind == each) for each in KINDS]
         ends = np.cumsum([0, *sizes]).tolist()
         self._of = dict(zip(KINDS, map(slice, ends[:-1], ends[1:]), strict=True))
-        # a matrix of each hand, filled up to the most rows that one has, and where its rows go
         rows, owner = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
-        counts = np.bincount(owner, minlength=len(columns))
-        table = np.zeros((len(columns), counts.max(), self._size + 1))
-        self._index = np.empty(len(rows), dtype=np.intp)
-        for h, count in enumerate(counts.tolist()):
-            table[h, :count] = rows[owner == h]
-            self._index[owner == h] = h * counts.max() + np.arange(count)
-        self._constant, self._matrix = table[:, :, 0].copy(), table[:, :, 1:].copy()
+        matrix = np.zeros((len(rows), len(columns), self._size))
+        matrix[np.arange(len(rows)), owner] = rows[:, 1:]
+        self._constant, self._matrix = rows[:, 0].copy(), matrix.reshape(len(rows), -1)
 
     def _numbers(self, y: Array) -> list[tuple[str, Array, Indices]]:
         """Return the check's numbers of loads, the same y of each hand: kind, values and whose."""
@@ -159,9 +154,7 @@ class LoadsCheck:
         """
         if self.wrong:
             return self.wrong[0]
-        table = (self._matrix @ loads[:, :, None])[:, :, 0]
-        table += self._constant
-        found, of = table.take(self._index), self._of
+        found, of = self._matrix @ loads.ravel() + self._constant, self._of
         own = found[of["wrench"]].reshape(-1, 6)
         carried = np.abs(found[: of["palm"].stop])
         allowed = LOAD * max(1.0, float(most(carried)))

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 
-import clarabel
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -222,36 +221,6 @@ def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
         for name in ("x", "multipliers"):
             np.testing.assert_array_equal(getattr(found, name), getattr(fresh, name))
     assert kept.info().kept <= 2
-
-
-def test_a_new_wrench_refreshes_nothing_but_the_right_side(data, monkeypatch):
-    given = []
-
-    class Spy:
-        def __init__(self, *problem, original=clarabel.DefaultSolver):
-            given.append("new")
-            self.solver = original(*problem)
-
-        def update(self, **blocks):
-            given.append(set(blocks))
-            self.solver.update(**blocks)
-
-        def solve(self):
-            return self.solver.solve()
-
-    conic.SOLVERS.clear()
-    with monkeypatch.context() as patch:
-        patch.setattr(clarabel, "DefaultSolver", Spy)
-        solvers.unique(data)
-    assert given == ["new"]
-    wrench = 1.1 * data.wrench
-    turned = solvers.unique(data.turned(wrench))
-    assert given[1:] == [{"b"}]
-    weaker = tuple(hand._replace(L=1.1 * hand.L) for hand in data.hands)
-    solvers.unique(StanceData.of(weaker, wrench))
-    assert given[2:] == [{"A"}]
-    conic.SOLVERS.clear()
-    assert solvers.unique(data.turned(wrench)).value == turned.value
 
 
 def test_threads_do_not_disturb_each_other(data):

@@ -57,10 +57,6 @@ def test_slips_are_told_or_refused(slip, base, bases):
     assert found & telling
 
 
-def test_there_are_sixty_of_them():
-    assert len(BASES) * len(SLIPS) >= 60
-
-
 @pytest.mark.slow
 def test_nothing_is_odd_about_three_hundred_sound_stances():
     stances = list(sound_stances(300))
