@@ -28,7 +28,6 @@ from planner.programs import (
     ScaledRows,
     StanceData,
     hands_data,
-    scaled_rows,
 )
 from planner.question import Stance
 
@@ -177,7 +176,7 @@ class HandSets:
         known: tuple[ScaledRows, ...] | None = None,
     ) -> HandSets:
         """Return the hands of a stance; parameters as the attributes, ``known`` as ``scaled``."""
-        scaled = scaled_rows(spaces) if known is None else known
+        scaled = tuple(map(ScaledRows.of, spaces)) if known is None else known
         data = StanceData.of(hands_data(scaled, transports, held), wrench)
         floating = any(wrist is not None for wrist in wrists)
         of_all = wrists, transports, wrench, held, added

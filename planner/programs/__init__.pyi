@@ -35,7 +35,6 @@ from .stance_data import (
     hands_data as hands_data,
     is_effort as is_effort,
     parted as parted,
-    scaled_rows as scaled_rows,
 )
 from .stance_program import SOLVER as SOLVER
 from .supports import SilentHighs as SilentHighs, Support as Support

@@ -37,7 +37,6 @@ __all__ = [
     "hands_data",
     "is_effort",
     "parted",
-    "scaled_rows",
 ]
 
 LOAD_UNIT: Final = 100.0
@@ -88,6 +87,36 @@ class ScaledRows(NamedTuple):
     rest: Array
     unit: Array
 
+    @classmethod
+    def of(cls, space: WrenchSpace) -> ScaledRows:
+        """Return what the set of a hand gives the programs."""
+        roles = _roles(space.columns, space.rows, len(space.s))
+        scale, s = roles.scale, space.s
+        L, l0 = space.L * (scale / s[:, None]), space.l0 / s
+        if roles.over is None:
+            H, h = space.H, space.h / LOAD_UNIT
+        else:
+            H, h = space.H * scale / roles.over[:, None], space.h / roles.over
+        tie = roles.weight.copy()
+        tie[roles.measured] = (roles.forces / s.take(roles.measures)) ** 2
+        rest = tie * roles.other
+        generators = space.generators * scale
+        for array in (L, l0, H, h, tie, rest, generators):
+            array.setflags(write=False)
+        return cls(
+            generators=generators,
+            origin=space.origin,
+            L=L,
+            l0=l0,
+            H=H,
+            h=h,
+            E=L[roles.efforts],
+            e0=l0[roles.efforts],
+            tie=tie,
+            rest=rest,
+            unit=roles.unit,
+        )
+
 
 class _Roles(NamedTuple):
     """What a set's columns and rows are to the programs, by their names.
@@ -121,40 +150,6 @@ class _Roles(NamedTuple):
     forces: Array
     over: Array | None
     efforts: slice | Indices
-
-
-def scaled_rows(spaces: Sequence[WrenchSpace]) -> tuple[ScaledRows, ...]:
-    """Return what the set of each hand gives the programs."""
-    return tuple([_scaled(space) for space in spaces])
-
-
-def _scaled(space: WrenchSpace) -> ScaledRows:
-    roles = _roles(space.columns, space.rows, len(space.s))
-    scale, s = roles.scale, space.s
-    L, l0 = space.L * (scale / s[:, None]), space.l0 / s
-    if roles.over is None:
-        H, h = space.H, space.h / LOAD_UNIT
-    else:
-        H, h = space.H * scale / roles.over[:, None], space.h / roles.over
-    tie = roles.weight.copy()
-    tie[roles.measured] = (roles.forces / s.take(roles.measures)) ** 2
-    rest = tie * roles.other
-    generators = space.generators * scale
-    for array in (L, l0, H, h, tie, rest, generators):
-        array.setflags(write=False)
-    return ScaledRows(
-        generators=generators,
-        origin=space.origin,
-        L=L,
-        l0=l0,
-        H=H,
-        h=h,
-        E=L[roles.efforts],
-        e0=l0[roles.efforts],
-        tie=tie,
-        rest=rest,
-        unit=roles.unit,
-    )
 
 
 @lru_cache(maxsize=KEPT)
@@ -254,12 +249,7 @@ class HandData(NamedTuple):
             What the further rows of the balance take of this hand's wrench in H.
         """
         given = np.zeros((0, 6)) if held is None else held
-        return hands_data(scaled_rows([space]), transport[None], [given])[0]
-
-    @property
-    def shape(self) -> tuple[int, int, int, int]:
-        """(m, nl, nh, ne)."""
-        return self.G.shape[1], len(self.l0), len(self.h), len(self.e0)
+        return hands_data([ScaledRows.of(space)], transport[None], [given])[0]
 
     def capped(self, utilisation: float) -> HandData:
         """Return the hand with its limits at a utilisation as hard rows, and no others."""
@@ -344,12 +334,15 @@ class HandRows(NamedTuple):
         whole = np.zeros((balance + len(rest), len(unit)))
         left, limit, below = 0, balance, balance + limits
         for hand in hands:
-            m, nl, nh, _ = hand.shape
-            right = left + m
+            right, next_limit, end = (
+                left + len(hand.unit),
+                limit + len(hand.l0),
+                below + len(hand.h),
+            )
             whole[:balance, left:right] = hand.G
-            whole[limit : limit + nl, left:right] = hand.L
-            whole[below : below + nh, left:right] = hand.H
-            left, limit, below = right, limit + nl, below + nh
+            whole[limit:next_limit, left:right] = hand.L
+            whole[below:end, left:right] = hand.H
+            left, limit, below = right, next_limit, end
         tie = np.concatenate([hand.tie for hand in hands])
         return cls(whole, Columns.of(whole), rest, limits, unit, tie)
 

@@ -12,7 +12,7 @@ from hand_models.finger import PHALANGES
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, concatenated
-from planner.programs import LOAD_UNIT, ScaledRows, scaled_rows
+from planner.programs import LOAD_UNIT, ScaledRows
 from planner.result.hand_plan import PlanArrays
 from planner.result.load_layout import WRENCH, ZERO, layout_of
 
@@ -69,7 +69,7 @@ class LoadRecovery:
         self.least = layout.least.take(layout.columns)
         self.rows = np.zeros((*layout.shape, layout.columns.shape[1]))
         self.at_rest = np.zeros(layout.shape)
-        of_sets = scaled_rows(spaces) if scaled is None else scaled
+        of_sets = [ScaledRows.of(space) for space in spaces] if scaled is None else scaled
         for mine, rest, own in zip(self.rows, self.at_rest, of_sets, strict=True):
             end, columns = WRENCH + len(own.L), own.L.shape[1]
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
