@@ -334,11 +334,8 @@ class HandRows(NamedTuple):
         whole = np.zeros((balance + len(rest), len(unit)))
         left, limit, below = 0, balance, balance + limits
         for hand in hands:
-            right, next_limit, end = (
-                left + len(hand.unit),
-                limit + len(hand.l0),
-                below + len(hand.h),
-            )
+            right, end = left + len(hand.unit), below + len(hand.h)
+            next_limit = limit + len(hand.l0)
             whole[:balance, left:right] = hand.G
             whole[limit:next_limit, left:right] = hand.L
             whole[below:end, left:right] = hand.H
