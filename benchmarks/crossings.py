@@ -1,13 +1,14 @@
 """How many modules one plan passes, and how often it goes from one to another, bytes to bytes.
 
-``python -m benchmarks.crossings``, from a checkout. From the bytes of a request for a new stance,
-of a shape that is known, to the bytes of its reply, in a process that has answered before.
+``python -m benchmarks.crossings``, from a checkout: of a new stance of a known shape, from the
+bytes of its request to those of the reply, in a process that has answered before. With
+``--sequence`` every crossing, in its order. A generator that goes on counts as entered again.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
-import threading
 from collections import Counter
 from types import FrameType
 from typing import Any, NamedTuple
@@ -24,56 +25,66 @@ MASS = 60.0
 """Of the robot [kg]: it holds, and what does not is explained, too."""
 
 
-class Passed(NamedTuple):
-    """What one plan passes: calls of each module, and of each pair of caller and module."""
+class Crossing(NamedTuple):
+    """A call from one module into another."""
 
-    modules: Counter[str]
-    crossings: Counter[tuple[str, str]]
-
-
-def own_name(frame: FrameType | None) -> str:
-    """Name of the project's module that a frame is of, or nearest below it; none elsewhere."""
-    while frame is not None and not frame.f_globals.get("__name__", "").startswith(OWN):
-        frame = frame.f_back
-    return "" if frame is None else frame.f_globals["__name__"]
+    caller: str
+    module: str
+    function: str
 
 
-def passed(diameter: float) -> Passed:
-    """Plan a stance on logs of this diameter [m], and watch."""
+class Watch:
+    """Counts the calls of each module, and all calls from one into another."""
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all calls."""
+        self.modules: Counter[str] = Counter()
+        self.crossings: list[Crossing] = []
+
+    def __call__(self, frame: FrameType, event: str, _: Any) -> None:
+        name = frame.f_globals.get("__name__", "")
+        if event != "call" or not name.startswith(OWN):
+            return
+        self.modules[name] += 1
+        caller = frame.f_back
+        while caller is not None and not caller.f_globals.get("__name__", "").startswith(OWN):
+            caller = caller.f_back
+        before = "" if caller is None else caller.f_globals["__name__"]
+        if before != name:
+            self.crossings.append(Crossing(before, name, frame.f_code.co_name))
+
+
+def plan_on(diameter: float, watch: Watch) -> None:
+    """Plan a stance on logs of this diameter [m], and watch that alone."""
     request = wall_request(MASS)
     for hand in request["stance"]["hands"]:
         hand["hold"] = {"shape": "cylinder", "diameter": diameter}
     payload = msgspec.json.encode(request)
-    found = Passed(Counter(), Counter())
-
-    def watch(frame: FrameType, event: str, _: Any) -> None:
-        name = frame.f_globals.get("__name__", "")
-        if event != "call" or not name.startswith(OWN):
-            return
-        found.modules[name] += 1
-        before = own_name(frame.f_back)
-        if before != name:
-            found.crossings[before, name] += 1
-
-    threading.setprofile(watch)
+    watch.clear()
     sys.setprofile(watch)
     try:
         answer = handle(PLAN, payload)
     finally:
         sys.setprofile(None)
-        threading.setprofile(None)  # type: ignore[arg-type]
-    assert answer.status == "optimal"
-    return found
+    assert answer.status == "optimal", answer
 
 
 def main() -> None:
-    for warm in range(4):
-        passed(0.3 + 1e-4 * warm)
-    found = passed(0.31)
-    print(f"{len(found.modules)} modules, {found.crossings.total()} crossings between them,")
-    print(f"{len(found.crossings)} of them distinct; {found.modules.total()} calls")
-    for (before, name), count in found.crossings.most_common(20):
-        print(f"{count:5} {before or 'the caller'} → {name}")
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sequence", action="store_true", help="print every crossing")
+    asked, watch = parser.parse_args(), Watch()
+    for warm in range(5):
+        plan_on(0.3 + 1e-4 * warm, watch)
+    print(f"{len(watch.modules)} modules, {len(watch.crossings)} crossings between them,")
+    print(f"{watch.modules.total()} calls")
+    entered = Counter(crossing.module for crossing in watch.crossings)
+    for name, count in entered.most_common(None if asked.sequence else 12):
+        print(f"{count:5} {name}")
+    for crossing in watch.crossings if asked.sequence else ():
+        print(f"{crossing.caller:44} -> {crossing.module}.{crossing.function}")
 
 
 if __name__ == "__main__":

@@ -219,7 +219,7 @@ def whole_blocks(stances: Sequence[StanceData]) -> Clarabel:
     hands = tuple(HandData(*map(np.ones_like, hand)) for hand in stances[0].hands)
     full, *programs = (
         _dense(program_of(unique_program, each).conic())
-        for each in (StanceData(hands, stances[0].wrench), *stances)
+        for each in (StanceData.of(hands, stances[0].wrench), *stances)
     )
     return Clarabel(programs, program.SHARP, full)
 

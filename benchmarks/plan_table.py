@@ -93,7 +93,7 @@ class Rivals:
                 each.sets.spaces,
                 each.hands.transports,
                 each.question.needed_wrench(),
-                np.split(data.w, np.cumsum([hand.shape[0] for hand in each.sets.data.hands])[:-1]),
+                np.split(data.w, np.cumsum([len(hand.unit) for hand in each.sets.data.hands])[:-1]),
             )
             for each, data in zip(stances, plain, strict=True)
         ]

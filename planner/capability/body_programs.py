@@ -256,7 +256,7 @@ def _with_idle(data: StanceData, question: Question, where: Posture | None) -> S
         idle += [joints.gravity / joints.limits, -joints.gravity / joints.limits]
     l0 = np.concatenate([first.l0, *idle])
     L = np.pad(first.L, ((0, len(l0) - len(first.l0)), (0, 0)))
-    return StanceData((first._replace(L=L, l0=l0), *data.hands[1:]), data.wrench)
+    return StanceData.of((first._replace(L=L, l0=l0), *data.hands[1:]), data.wrench)
 
 
 def _motion(question: Question, where: Posture | None, point: LinearisationPoint) -> Motion | None:
@@ -299,7 +299,7 @@ def _error(
             hand._replace(l0=hand.l0 + torque @ t)
             for hand, torque in zip(data.hands, K, strict=True)
         )
-        data = StanceData(hands, data.wrench)
+        data = StanceData.of(hands, data.wrench)
     return max(missing, programs.beyond(data, loads, cap))
 
 

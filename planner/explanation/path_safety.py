@@ -183,7 +183,7 @@ def _pinned(
     ]
     planned = np.concatenate([z[i] for i in fixed])[places]
     way = np.concatenate([np.zeros(len(goal)), *changes.values()])
-    return StanceData(tuple(hands), np.concatenate([goal, planned])), way
+    return StanceData.of(tuple(hands), np.concatenate([goal, planned])), way
 
 
 def _least(data: StanceData, still: float) -> float | None:

@@ -115,7 +115,7 @@ class LeastEffort(Goal):
                     e0=np.concatenate([hand.e0, -R @ (y / hand.unit)]),
                 )
             )
-        return programs.effort(StanceData(tuple(hands), data.wrench), self.cap)
+        return programs.effort(StanceData.of(tuple(hands), data.wrench), self.cap)
 
     def restore(self, data: StanceData) -> Outcome:
         outcome = programs.margin(data)

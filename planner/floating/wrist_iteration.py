@@ -21,8 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -111,6 +110,8 @@ class WristSolution:
     error : float
         Largest disagreement of a hand's wrench with the sets of the last step: forces, and moments
         over 0.1 m [N].
+    measure : ExactMeasure
+        What the model says of the point.
     """
 
     found: Literal["least", "unproven", "nothing"]
@@ -119,16 +120,15 @@ class WristSolution:
     outcome: Outcome
     rounds: int
     error: float
+    measure: ExactMeasure = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "measure", self.sets.measure(self.point.loads))
 
     @property
     def exact(self) -> bool:
         """Whether the point is a plan."""
         return self.found != "nothing"
-
-    @cached_property
-    def measure(self) -> ExactMeasure:
-        """What the model says of the point."""
-        return self.sets.measure(self.point.loads)
 
 
 def _searching(

@@ -1,6 +1,5 @@
 from .hand_batch import (
     CONTACTS as CONTACTS,
-    KEPT as KEPT,
     KEPT_NAMES as KEPT_NAMES,
     NONE as NONE,
     NOTHING as NOTHING,

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -20,7 +19,6 @@ from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
 
 __all__ = [
     "CONTACTS",
-    "KEPT",
     "KEPT_NAMES",
     "NONE",
     "NOTHING",
@@ -33,14 +31,11 @@ __all__ = [
     "tile_index_of",
 ]
 
-KEPT: Final = 64
-"""Shapes of stances of which arrays are kept, those used last."""
-
 KEPT_NAMES: Final = 256
 """Lists of names (of tiles, columns, rows) of which something is kept: some 5 kB each."""
 
-PLAIN: Final = 14
-"""Tiles of a hand that does not cling with its nails."""
+BASE, NAIL_PART = 0, len(PHALANGES) + 1
+"""Parts of a finger with tiles: its rotating base, phalanges outward, and its nail."""
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -58,12 +53,10 @@ UNLIMITED: Final = (math.inf, math.inf)
 
 @dataclass(frozen=True, eq=False)
 class TileIndex:
-    """Which tile is whose, by how many each hand has. Arrays are read-only.
+    """Which tile is whose, by how many each hand has.
 
     Attributes
     ----------
-    counts : tuple of int, length H
-        Tiles of each hand, of which all else follows.
     hand, finger : ndarray of int, shape (T,)
         Of each tile, the fingers counted through all hands.
     first : ndarray of int, shape (H,)
@@ -80,7 +73,6 @@ class TileIndex:
         Nails, whether they hook or not.
     """
 
-    counts: tuple[int, ...]
     hand: Indices
     finger: Indices
     first: Indices
@@ -91,52 +83,46 @@ class TileIndex:
     base_fingers: Indices
     nails: Indices
 
-    def __hash__(self) -> int:
-        return hash(self.counts)
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, TileIndex) and self.counts == other.counts
+def _parts_of_hand(*, nails: bool) -> Indices:
+    """Return finger and part of each tile of a hand, shape (n, 2); parts by `BASE` and beyond."""
+    last = NAIL_PART if nails else NAIL_PART - 1
+    return np.array(
+        [
+            (i, part)
+            for i, name in enumerate(FINGERS)
+            for part in range(BASE if name.startswith("outer") else BASE + 1, last + 1)
+        ],
+        dtype=np.intp,
+    )
 
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """(T, F, H)."""
-        return len(self.hand), len(self.first_of_finger), len(self.first)
+
+PARTS: Final = {nails: _parts_of_hand(nails=nails) for nails in (False, True)}
+"""Fingers and parts of the tiles of a hand, by whether it clings with its nails."""
 
 
-@lru_cache(maxsize=KEPT)
-def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
+def tile_index_of(counts: Sequence[int]) -> TileIndex:
     """Return the places of hands that have so many tiles each."""
-    parts = [
-        (h, len(FINGERS) * h + i, phalanx)
-        for h, count in enumerate(counts)
-        for i, name in enumerate(FINGERS)
-        for phalanx in ("base", *PHALANGES, NAIL)
-        if (phalanx != "base" or name.startswith("outer")) and (phalanx != NAIL or count > PLAIN)
-    ]
-    hand, finger = (np.array([part[k] for part in parts], dtype=np.intp) for k in (0, 1))
-    phalanx = np.array([part[2] for part in parts])
-    phalanges = np.flatnonzero(np.isin(phalanx, PHALANGES)).reshape(-1, len(PHALANGES))
-    bases = np.flatnonzero(phalanx == "base")
-    places = TileIndex(
-        counts=counts,
+    hand = np.arange(len(counts)).repeat(counts)
+    of_each = np.concatenate([PARTS[count > len(PARTS[False])] for count in counts])
+    finger, part = len(FINGERS) * hand + of_each[:, 0], of_each[:, 1]
+    phalanges = np.flatnonzero((part != BASE) & (part != NAIL_PART)).reshape(-1, len(PHALANGES))
+    bases = np.flatnonzero(part == BASE)
+    return TileIndex(
         hand=hand,
         finger=finger,
-        first=np.searchsorted(hand, np.arange(len(counts))),
-        first_of_finger=np.searchsorted(finger, np.arange(len(phalanges))),
+        first=hand.searchsorted(np.arange(len(counts))),
+        first_of_finger=finger.searchsorted(np.arange(len(phalanges))),
         phalanges=phalanges,
         tips=phalanges[:, -1].copy(),
         bases=bases,
         base_fingers=finger[bases],
-        nails=np.flatnonzero(phalanx == NAIL),
+        nails=np.flatnonzero(part == NAIL_PART),
     )
-    for array in vars(places).values():
-        if isinstance(array, np.ndarray):
-            array.setflags(write=False)
-    return places
 
 
 class ContactPattern(NamedTuple):
-    """What the tiles of some hands touch. Arrays are read-only.
+    """What the tiles of some hands touch.
 
     Attributes
     ----------
@@ -161,7 +147,6 @@ class ContactPattern(NamedTuple):
     holding: tuple[int, ...]
 
 
-@lru_cache(maxsize=KEPT_NAMES)
 def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
     """Return what hands with these tiles touch."""
     places = tile_index_of(tuple(map(len, hands)))
@@ -169,7 +154,7 @@ def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
     away = contacts != TOUCHING
     touches = 1.0 - away
     holds = touches + (contacts == CONTACTS[NAIL])
-    touch = ContactPattern(
+    return ContactPattern(
         contacts=contacts,
         touches=touches,
         framed=1.0 * (contacts == CONTACTS["frame"]),
@@ -178,9 +163,6 @@ def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
         idle=np.flatnonzero(contacts == NOTHING),
         holding=tuple(np.add.reduceat(holds, places.first_of_finger).astype(int).tolist()),
     )
-    for array in touch[:-1]:
-        array.setflags(write=False)
-    return touch
 
 
 @dataclass(frozen=True, eq=False)

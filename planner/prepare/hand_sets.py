@@ -28,7 +28,6 @@ from planner.programs import (
     ScaledRows,
     StanceData,
     hands_data,
-    scaled_rows,
 )
 from planner.question import Stance
 
@@ -177,8 +176,8 @@ class HandSets:
         known: tuple[ScaledRows, ...] | None = None,
     ) -> HandSets:
         """Return the hands of a stance; parameters as the attributes, ``known`` as ``scaled``."""
-        scaled = scaled_rows(spaces) if known is None else known
-        data = StanceData(hands_data(scaled, transports, held), wrench)
+        scaled = tuple(map(ScaledRows.of, spaces)) if known is None else known
+        data = StanceData.of(hands_data(scaled, transports, held), wrench)
         floating = any(wrist is not None for wrist in wrists)
         of_all = wrists, transports, wrench, held, added
         return cls(tuple(spaces), scaled, *of_all, data, floating)
@@ -237,7 +236,7 @@ class HandSets:
                 if farthest is not None:
                     space = _near_rest(space, farthest[i])
                 spaces[i], parts[i] = self._floating_hand(i, space)
-        return Sets(tuple(spaces), StanceData(tuple(parts), self.goal(point.factor)))
+        return Sets(tuple(spaces), StanceData.of(tuple(parts), self.goal(point.factor)))
 
     def _floating_hand(self, i: int, space: WrenchSpace) -> tuple[WrenchSpace, HandData]:
         """Return the set of a floating hand with what the stance adds, and its data."""

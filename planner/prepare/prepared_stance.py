@@ -19,7 +19,7 @@ from planner.prepare.hand_sets import HandSets, Sets, wrists_at
 from planner.prepare.joint_posture import Posture, posture
 from planner.prepare.settled_stance import settle_stance
 from planner.prepare.stance_constraints import NOTHING, StanceConstraints
-from planner.programs import WRENCH_UNIT, ScaledRows, scaled_rows
+from planner.programs import WRENCH_UNIT, ScaledRows
 from planner.question import Question
 
 __all__ = ["NO_WRENCH", "PreparedStance", "assemble", "checked_question", "prepare_stance"]
@@ -158,7 +158,7 @@ def assemble(
 
     def made() -> tuple[HandBatch, list[WrenchSpace], tuple[ScaledRows, ...]]:
         spaces = _spaces_of(settled, wrists, added, cap)
-        return HandBatch.of(settled), spaces, scaled_rows(spaces)
+        return HandBatch.of(settled), spaces, tuple(map(ScaledRows.of, spaces))
 
     # sets are of this stance alone where a wrist floats, or the stance adds rows
     own = any(each is not None for each in wrists) or any(each is not NOTHING for each in added)

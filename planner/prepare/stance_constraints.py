@@ -12,10 +12,10 @@ any other:
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import compress
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +42,6 @@ TENSION_CHANGE: Final = "tension_change"
 
 PASSIVE_JOINT: Final = "passive_joint"
 """Name of the hard rows of a joint without a motor."""
-
-KEPT: Final = 256
-"""Lists of names that are kept."""
 
 AXES: Final = ("fx+", "fx-", "fy+", "fy-", "fz+", "fz-")
 """Both ways along the axes of a cap's frame."""
@@ -144,11 +141,13 @@ class StanceConstraints:
         """
         D, d0, s = [np.zeros((0, 6))], [np.zeros(0)], [np.zeros(0)]
         H, h = [space.H], [space.h]
-        names = _Names()
+        limits, hard = list[Row](), list[Row]()
         if self.joints is not None:
             joints, passive = self.joints.driven, self.joints.passive
-            sliding = tuple(joints.sliding.tolist())
-            names = names._replace(driven=joints.names, sliding=sliding, passive=passive.names)
+            slides = [JOINT_FORCE if each else JOINT_TORQUE for each in joints.sliding.tolist()]
+            kinds = list(zip(slides, joints.names, strict=True))
+            limits += _joint_rows("limit", kinds)
+            hard += _joint_rows("hard", [(PASSIVE_JOINT, name) for name in passive.names])
             D += [joints.jacobian.T, -joints.jacobian.T]
             d0 += [joints.gravity, -joints.gravity]
             s += [joints.limits, joints.limits]
@@ -158,10 +157,8 @@ class StanceConstraints:
         if self.cap is not None:
             ways, directions, most = self._cap()
             bounded, closed = np.isfinite(most) & (most > 0.0), most == 0.0
-            names = names._replace(
-                capped=tuple(compress(ways, bounded.tolist())),
-                barred=tuple(compress(ways, closed.tolist())),
-            )
+            limits += _force_rows("limit", compress(ways, bounded.tolist()))
+            hard += _force_rows("hard", compress(ways, closed.tolist()))
             forces = np.hstack([directions, np.zeros_like(directions)])
             D.append(forces[bounded])
             d0.append(np.zeros(len(most[bounded])))
@@ -170,12 +167,12 @@ class StanceConstraints:
             H.append(C @ space.generators)
             h.append(-(C @ space.origin))
         if self.present is not None and math.isfinite(self.change):
-            names = names._replace(changes=True)
+            hard += CHANGE_ROWS
             columns = np.repeat([space.columns.index(f"{finger}/tension") for finger in FINGERS], 2)
             signs = np.tile([1.0, -1.0], len(FINGERS))
             H.append(signs[:, None] * np.eye(len(space.columns))[columns])
             h.append(self.change + signs * np.repeat(self.present, 2))
-        if not any(names):
+        if not (limits or hard):
             return space
         # wrench rows stay last among the limit rows
         apart, added = len(space.s) - len(space.D), np.concatenate(D)
@@ -184,7 +181,7 @@ class StanceConstraints:
             origin=space.origin,
             generators=space.generators,
             columns=space.columns,
-            rows=_rows_with(space.rows, apart, names),
+            rows=(*space.rows[:apart], *limits, *space.rows[apart:], *hard),
             L=np.concatenate([space.L[:apart], added @ space.generators, space.L[apart:]]),
             l0=np.concatenate([space.l0[:apart], l0, space.l0[apart:]]),
             s=np.concatenate([space.s[:apart], *s, space.s[apart:]]),
@@ -202,48 +199,19 @@ class StanceConstraints:
         return AXES, axes, np.array([most for low, high in self.cap for most in (high, -low)])
 
 
+def _joint_rows(kind: Literal["limit", "hard"], names: Sequence[tuple[str, str]]) -> list[Row]:
+    """Return rows of joints, by limit and name, turned either way."""
+    return [
+        Row(None, None, limit, kind, f"{limit}/{name}{sign}", name)
+        for sign in "+-"
+        for limit, name in names
+    ]
+
+
+def _force_rows(kind: Literal["limit", "hard"], ways: Iterable[str]) -> list[Row]:
+    """Return rows of a cap on a hand's force."""
+    return [Row(None, None, FORCE_CAP, kind, f"{FORCE_CAP}/{way}") for way in ways]
+
+
 NOTHING: Final = StanceConstraints()
 """No rows."""
-
-
-class _Names(NamedTuple):
-    """Names of what a stance adds to a hand's set.
-
-    Attributes
-    ----------
-    driven, passive : tuple of str
-        Joints with a motor and without.
-    sliding : tuple of bool
-        Of those with one.
-    capped, barred : tuple of str
-        Directions in which the hand's force is capped, and in which there may be none.
-    changes : bool
-        Whether tensions stay near the present ones.
-    """
-
-    driven: tuple[str, ...] = ()
-    sliding: tuple[bool, ...] = ()
-    passive: tuple[str, ...] = ()
-    capped: tuple[str, ...] = ()
-    barred: tuple[str, ...] = ()
-    changes: bool = False
-
-
-@lru_cache(maxsize=KEPT)
-def _rows_with(rows: tuple[Row, ...], apart: int, names: _Names) -> tuple[Row, ...]:
-    """Return the names of a set's rows with further limit rows, after so many, and hard rows."""
-    kinds = [JOINT_FORCE if slides else JOINT_TORQUE for slides in names.sliding]
-    limits = [
-        Row(None, None, kind, "limit", f"{kind}/{name}{sign}", name)
-        for sign in "+-"
-        for name, kind in zip(names.driven, kinds, strict=True)
-    ]
-    limits += [Row(None, None, FORCE_CAP, "limit", f"{FORCE_CAP}/{way}") for way in names.capped]
-    hard = [
-        Row(None, None, PASSIVE_JOINT, "hard", f"{PASSIVE_JOINT}/{name}{sign}", name)
-        for sign in "+-"
-        for name in names.passive
-    ]
-    hard += [Row(None, None, FORCE_CAP, "hard", f"{FORCE_CAP}/{way}") for way in names.barred]
-    changes = CHANGE_ROWS if names.changes else ()
-    return (*rows[:apart], *limits, *rows[apart:], *hard, *changes)

@@ -2,6 +2,7 @@ from .conic import PROVEN as PROVEN, UNBOUNDED as UNBOUNDED, Outcome as Outcome,
 from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
 from .solvers import (
     SLACK as SLACK,
+    TensionTrade as TensionTrade,
     beyond as beyond,
     body_wrench as body_wrench,
     curved as curved,
@@ -14,6 +15,7 @@ from .solvers import (
     nearest as nearest,
     nearest_body as nearest_body,
     reach as reach,
+    tension_trade as tension_trade,
     tie_break as tie_break,
     unique as unique,
     used as used,
@@ -33,8 +35,6 @@ from .stance_data import (
     hands_data as hands_data,
     is_effort as is_effort,
     parted as parted,
-    scaled_rows as scaled_rows,
 )
 from .stance_program import SOLVER as SOLVER
 from .supports import SilentHighs as SilentHighs, Support as Support
-from .trade import TensionTrade as TensionTrade, tension_trade as tension_trade

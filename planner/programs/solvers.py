@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from importlib import resources
+from typing import Final, NamedTuple
 
 import numpy as np
 import scipy
 
 from hand_models.base import Array
+from hand_models.parameters import ParameterTable
 from planner import deadline
 from planner.programs.conic import LATE, Outcome, Reached
 from planner.programs.program import Best, Nearest, Reach, Residuals, tie_weight
 from planner.programs.stance_data import StanceData
-from planner.programs.trade import TensionTrade
 
 __all__ = [
     "SLACK",
+    "TensionTrade",
     "beyond",
     "body_wrench",
     "curved",
@@ -29,6 +31,7 @@ __all__ = [
     "nearest",
     "nearest_body",
     "reach",
+    "tension_trade",
     "tie_break",
     "unique",
     "used",
@@ -41,6 +44,58 @@ SLACK: Final = 1e-6
 
 SHARP_SLACK: Final = 1e-9
 """The same where the least utilisation has all its digits."""
+
+
+_PLANS = resources.files("planner.parameters").joinpath("plans.toml")
+_TABLE = ParameterTable.read(_PLANS.read_text("utf-8"), _PLANS.name)
+
+GIVEN_AWAY: Final = _TABLE.positive("tension", "given_away")
+"""Part of the least utilisation that a plan gives away at most."""
+
+WEIGHT: Final = _TABLE.positive("tension", "weight")
+"""w"""
+
+
+class TensionTrade(NamedTuple):
+    """How much of the least utilisation u* a plan may give away for less tension.
+
+    Least utilisation alone pulls a tendon to its strength for a ten-thousandth of it. So a plan is
+    meant that minimises
+
+        u + w Σ (tension / maximum)²   with   u ≤ u* + r,   r = min(`given_away` u*, cap − u*) ≥ 0:
+
+    near the cap, and beyond, nothing is given away. The plan is unique, and changes continuously
+    with u* and the rows, as the objective is strictly convex and r continuous. Where no tendon
+    pulls for next to nothing it is the plan of least utilisation itself, of these the one of least
+    Σ (tension / maximum)². No plan within u* + r has a sum that is less by more than r/w.
+
+    Attributes
+    ----------
+    weight : float
+        w of the sum of squared relative tensions.
+    most : float
+        Largest utilisation of the plan.
+    whole : float
+        What is given away at most, far from the cap.
+    """
+
+    weight: float
+    most: float
+    whole: float = 0.0
+
+
+def tension_trade(least: float, cap: float) -> TensionTrade:
+    """Return what a plan may give away.
+
+    Parameters
+    ----------
+    least : float
+        The least utilisation.
+    cap : float
+        On the utilisation, that the question asks for.
+    """
+    whole = GIVEN_AWAY * abs(least)
+    return TensionTrade(WEIGHT, least + max(min(whole, cap - least), 0.0), whole)
 
 
 def margin(data: StanceData) -> Outcome:

@@ -10,8 +10,8 @@ What names alone decide is found once for each list of names.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import Final, NamedTuple
 
@@ -37,7 +37,6 @@ __all__ = [
     "hands_data",
     "is_effort",
     "parted",
-    "scaled_rows",
 ]
 
 LOAD_UNIT: Final = 100.0
@@ -88,6 +87,36 @@ class ScaledRows(NamedTuple):
     rest: Array
     unit: Array
 
+    @classmethod
+    def of(cls, space: WrenchSpace) -> ScaledRows:
+        """Return what the set of a hand gives the programs."""
+        roles = _roles(space.columns, space.rows, len(space.s))
+        scale, s = roles.scale, space.s
+        L, l0 = space.L * (scale / s[:, None]), space.l0 / s
+        if roles.over is None:
+            H, h = space.H, space.h / LOAD_UNIT
+        else:
+            H, h = space.H * scale / roles.over[:, None], space.h / roles.over
+        tie = roles.weight.copy()
+        tie[roles.measured] = (roles.forces / s.take(roles.measures)) ** 2
+        rest = tie * roles.other
+        generators = space.generators * scale
+        for array in (L, l0, H, h, tie, rest, generators):
+            array.setflags(write=False)
+        return cls(
+            generators=generators,
+            origin=space.origin,
+            L=L,
+            l0=l0,
+            H=H,
+            h=h,
+            E=L[roles.efforts],
+            e0=l0[roles.efforts],
+            tie=tie,
+            rest=rest,
+            unit=roles.unit,
+        )
+
 
 class _Roles(NamedTuple):
     """What a set's columns and rows are to the programs, by their names.
@@ -121,40 +150,6 @@ class _Roles(NamedTuple):
     forces: Array
     over: Array | None
     efforts: slice | Indices
-
-
-def scaled_rows(spaces: Sequence[WrenchSpace]) -> tuple[ScaledRows, ...]:
-    """Return what the set of each hand gives the programs."""
-    return tuple([_scaled(space) for space in spaces])
-
-
-def _scaled(space: WrenchSpace) -> ScaledRows:
-    roles = _roles(space.columns, space.rows, len(space.s))
-    scale, s = roles.scale, space.s
-    L, l0 = space.L * (scale / s[:, None]), space.l0 / s
-    if roles.over is None:
-        H, h = space.H, space.h / LOAD_UNIT
-    else:
-        H, h = space.H * scale / roles.over[:, None], space.h / roles.over
-    tie = roles.weight.copy()
-    tie[roles.measured] = (roles.forces / s.take(roles.measures)) ** 2
-    rest = tie * roles.other
-    generators = space.generators * scale
-    for array in (L, l0, H, h, tie, rest, generators):
-        array.setflags(write=False)
-    return ScaledRows(
-        generators=generators,
-        origin=space.origin,
-        L=L,
-        l0=l0,
-        H=H,
-        h=h,
-        E=L[roles.efforts],
-        e0=l0[roles.efforts],
-        tie=tie,
-        rest=rest,
-        unit=roles.unit,
-    )
 
 
 @lru_cache(maxsize=KEPT)
@@ -254,12 +249,7 @@ class HandData(NamedTuple):
             What the further rows of the balance take of this hand's wrench in H.
         """
         given = np.zeros((0, 6)) if held is None else held
-        return hands_data(scaled_rows([space]), transport[None], [given])[0]
-
-    @property
-    def shape(self) -> tuple[int, int, int, int]:
-        """(m, nl, nh, ne)."""
-        return self.G.shape[1], len(self.l0), len(self.h), len(self.e0)
+        return hands_data([ScaledRows.of(space)], transport[None], [given])[0]
 
     def capped(self, utilisation: float) -> HandData:
         """Return the hand with its limits at a utilisation as hard rows, and no others."""
@@ -344,25 +334,37 @@ class HandRows(NamedTuple):
         whole = np.zeros((balance + len(rest), len(unit)))
         left, limit, below = 0, balance, balance + limits
         for hand in hands:
-            m, nl, nh, _ = hand.shape
-            right = left + m
+            right, end = left + len(hand.unit), below + len(hand.h)
+            next_limit = limit + len(hand.l0)
             whole[:balance, left:right] = hand.G
-            whole[limit : limit + nl, left:right] = hand.L
-            whole[below : below + nh, left:right] = hand.H
-            left, limit, below = right, limit + nl, below + nh
+            whole[limit:next_limit, left:right] = hand.L
+            whole[below:end, left:right] = hand.H
+            left, limit, below = right, next_limit, end
         tie = np.concatenate([hand.tie for hand in hands])
         return cls(whole, Columns.of(whole), rest, limits, unit, tie)
 
 
 @dataclass(frozen=True, eq=False)
 class StanceData:
-    """All hands of a stance, and what their balance is to give, scaled, shape (nb,).
+    """All hands of a stance, and what their balance is to give, scaled.
 
-    First the body wrench (6,), then the components of hands' wrenches that are given.
+    Attributes
+    ----------
+    hands : tuple of HandData
+    wrench : ndarray, shape (nb,)
+        First the body wrench (6,), then the components of hands' wrenches that are given.
+    rows : HandRows
+        All hands' rows below each other.
     """
 
     hands: tuple[HandData, ...]
     wrench: Array
+    rows: HandRows
+
+    @classmethod
+    def of(cls, hands: tuple[HandData, ...], wrench: Array) -> StanceData:
+        """Return the data of hands and what they are to balance."""
+        return cls(hands, wrench, HandRows.of(hands, len(wrench)))
 
     @property
     def offset(self) -> Array:
@@ -371,12 +373,8 @@ class StanceData:
 
     def capped(self, utilisation: float) -> StanceData:
         """Return the stance with limits at a utilisation as hard rows, and no others."""
-        return StanceData(tuple(hand.capped(utilisation) for hand in self.hands), self.wrench)
-
-    @cached_property
-    def rows(self) -> HandRows:
-        """All hands' rows below each other."""
-        return HandRows.of(self.hands, len(self.wrench))
+        hands = tuple(hand.capped(utilisation) for hand in self.hands)
+        return StanceData.of(hands, self.wrench)
 
     def by_rows(
         self, values: Array, *, limits: bool = True
@@ -389,9 +387,7 @@ class StanceData:
 
     def turned(self, wrench: Array) -> StanceData:
         """Return the stance with another balance."""
-        turned = StanceData(self.hands, wrench)
-        turned.__dict__["rows"] = self.rows
-        return turned
+        return replace(self, wrench=wrench)
 
 
 def parted(whole: Array, sizes: Iterable[int]) -> tuple[Array, ...]:

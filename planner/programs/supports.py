@@ -10,7 +10,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.wrench_spaces import WrenchSpace
-from planner.programs.stance_data import scaled_rows
+from planner.programs.stance_data import ScaledRows
 
 __all__ = ["SilentHighs", "Support"]
 
@@ -78,7 +78,7 @@ class Support:
     """
 
     def __init__(self, space: WrenchSpace, cap: float) -> None:
-        (rows,) = scaled_rows([space])
+        rows = ScaledRows.of(space)
         self._generators, self._origin = rows.generators, rows.origin
         A, most = np.vstack([rows.L, rows.H]), np.concatenate([cap - rows.l0, rows.h])
         free = np.full(A.shape[1], np.inf)

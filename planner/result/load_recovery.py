@@ -28,7 +28,7 @@ from planner.prepare import (
     contact_pattern_of,
     tile_index_of,
 )
-from planner.programs import LOAD_UNIT, ScaledRows, is_effort, scaled_rows
+from planner.programs import LOAD_UNIT, ScaledRows, is_effort
 from planner.result.hand_plan import HandPlan, PlanArrays, WristPlan
 from planner.result.plain_parts import Palm
 
@@ -208,7 +208,7 @@ class LoadRecovery:
         self.least = layout.least.take(layout.columns)
         self.rows = np.zeros((*layout.shape, layout.columns.shape[1]))
         self.at_rest = np.zeros(layout.shape)
-        of_sets = scaled_rows(spaces) if scaled is None else scaled
+        of_sets = [ScaledRows.of(space) for space in spaces] if scaled is None else scaled
         for mine, rest, own in zip(self.rows, self.at_rest, of_sets, strict=True):
             end, columns = WRENCH + len(own.L), own.L.shape[1]
             mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L

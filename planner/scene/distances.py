@@ -197,7 +197,7 @@ def _pairs(first: Sequence[Solid], second: Sequence[Solid], which: Indices) -> _
 def _with_rock(scene: Scene, solids: Sequence[Solid], rocks: Sequence[Solid]) -> _Pairs:
     """Return everything with all rock; of rock that is not smooth no bound is known."""
     least = np.full((len(solids), len(rocks)), -np.inf)
-    smooth = [i for i, hand in enumerate(scene.hands) if hand.hold.swept is not None]
+    smooth = [i for i, swept in enumerate(scene.swept) if swept is not None]
     if smooth and solids:
         middles = np.array([solid.middle for solid in solids])
         bounds = np.array([solid.bound for solid in solids])

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, InvalidInputError
 from planner.result import Finding
-from planner.scene.rock import bounded, depth
 from planner.scene.scene import Scene
 from planner.scene.solids import capsule_solids, distance_between, hand_solids
 
@@ -174,21 +173,23 @@ def _depths(scene: Scene, hands: Sequence[int]) -> list[float]:
     how deep B's origin is.
     """
     points, radii = _body_points(*scene.stance.robot.body_capsules)
-    smooth = [i for i in hands if scene.hands[i].hold.swept is not None]
+    smooth = [i for i in hands if scene.swept[i] is not None]
     found = {}
     if smooth:
         deep = scene.smooth_depths(smooth, points)
         for i, origin in zip(smooth, deep[:, 0].tolist(), strict=True):
-            hand = scene.hands[i]
-            if origin > DEEP and bounded(hand.hold):
+            hand, shape = scene.hands[i], scene.swept[i]
+            # an edge's rock has no end
+            if origin > DEEP and shape is not None and not shape.sine:
                 raise InvalidInputError(
                     f"the body's origin is {origin:.2g} m deep in the rock of {hand.limb}; "
                     f"up to {DEEP:g} m is taken for a rough shape",
                     field="stance.body.position",
                 )
         found = dict(zip(smooth, (deep + radii).max(axis=1).tolist(), strict=True))
+    into_rock = (0.0, 0.0, 1.0)
     return [
-        found[i] if i in found else depth(scene.hands[i].hold, scene.rocks[i].position)
+        found[i] if i in found else -scene.hands[i].hold.entry(scene.rocks[i].position, into_rock)
         for i in hands
     ]
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from hand_models.base import Array, Pose
 from hand_models.hand import SettledHand
+from hand_models.sections import Swept
 from planner.question import HandOnHold, Stance
-from planner.scene.rock import smooth_depths
 
-__all__ = ["Scene", "scene_of"]
+__all__ = ["Scene", "scene_of", "smooth_depths"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +22,9 @@ class Scene:
     Attributes
     ----------
     stance : Stance
+    hands : tuple of HandOnHold
+    swept : tuple of Swept or None
+        Their rock where it is smooth.
     places : ndarray, shape (n, 3)
         H's origins in B [m].
     axes : ndarray, shape (n, 3, 3)
@@ -33,22 +36,19 @@ class Scene:
     """
 
     stance: Stance
+    hands: tuple[HandOnHold, ...]
+    swept: tuple[Swept | None, ...]
     places: Array
     axes: Array
     shoulders: Array
     rocks: tuple[Pose, ...]
-
-    @property
-    def hands(self) -> tuple[HandOnHold, ...]:
-        """The stance's."""
-        return self.stance.hands
 
     def smooth_depths(self, hands: Sequence[int], points: Array) -> Array:
         """Return how deep points (n, 3) in B are in the smooth rock of hands, shape (k, n) [m]."""
         rocks = [self.rocks[i] for i in hands]
         turned = points @ np.array([rock.rotation.T for rock in rocks])
         seen = turned + np.array([rock.position for rock in rocks])[:, None]
-        shapes = [self.hands[i].hold.swept for i in hands]
+        shapes = [self.swept[i] for i in hands]
         return smooth_depths([shape for shape in shapes if shape is not None], seen)
 
     @property
@@ -85,6 +85,8 @@ def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:
     origins = -np.einsum("nxy,nx->ny", rock_axes, rock_places)
     return Scene(
         stance=stance,
+        hands=hands,
+        swept=tuple([hand.hold.swept for hand in hands]),
         places=places,
         axes=axes,
         shoulders=np.array([chains[hand.limb].shoulder for hand in hands]),
@@ -92,3 +94,27 @@ def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:
             [Pose(origin, each.T) for origin, each in zip(origins, rock_axes, strict=True)]
         ),
     )
+
+
+def smooth_depths(shapes: Sequence[Swept], points: Array) -> Array:
+    """Return how deep points are in smooth holds, shape (k, n) [m].
+
+    That is the distance from their surface, of an ellipsoid no more than that; negative outside.
+
+    Parameters
+    ----------
+    shapes : sequence of Swept, length k
+        Balls that are swept along faces (`hand_models.sections.Swept`).
+    points : ndarray, shape (k, n, 3)
+        In each hold's frame [m].
+    """
+    numbers = np.array(shapes)
+    scales, (middle, radius, sine, cosine) = numbers[:, None, :3], numbers[:, 3:7].T[:, :, None]
+    scaled = points * scales
+    scaled[:, :, 2] -= scales[:, :, 2] * middle
+    away = np.sqrt(np.einsum("knx,knx->kn", scaled, scaled))
+    if sine.any():
+        x, z = np.abs(scaled[:, :, 0]), scaled[:, :, 2]
+        beside = (sine > 0.0) & (sine * x + cosine * z >= 0.0)
+        away = np.where(beside, cosine * x - sine * z, away)
+    return np.asarray((radius - away) / scales.max(axis=2))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache
 from typing import Final
 
 import numpy as np
@@ -244,7 +243,6 @@ def _surfaces(stance: Stance) -> Iterator[Finding]:
         yield _finding(field, message, strength, "N", hand.limb)
 
 
-@cache
 def _presets() -> tuple[float, float]:
     """Return what a tile holds in shear on the weakest and on the strongest preset [N]."""
     strengths = [Surface.named(name).shear_limit for name in surface_names()]

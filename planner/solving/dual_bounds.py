@@ -10,7 +10,14 @@ import numpy as np
 from hand_models.base import Array
 from planner.programs import TIE, Outcome, StanceData, tie_weight
 
-__all__ = ["OPTIMAL", "convex_bound", "is_least", "least_bound", "unique_bound"]
+__all__ = [
+    "OPTIMAL",
+    "convex_bound",
+    "is_least",
+    "least_bound",
+    "unique_bound",
+    "unproven_sentences",
+]
 
 OPTIMAL: Final = 1e-5
 """How far, relatively, the utilisation may be above its proven lower bound."""
@@ -25,6 +32,16 @@ STATIONARY: Final = 1e-5
 def is_least(value: float, bound: float) -> bool:
     """Whether a utilisation, or an effort, is as low as its bound, as far as it counts."""
     return value - bound <= OPTIMAL * max(1.0, value)
+
+
+def unproven_sentences(words: str, value: float, bound: float) -> tuple[str, ...]:
+    """Return why a value is not proven the least, if its bound does not prove it.
+
+    ``words``: what the value is.
+    """
+    if is_least(value, bound):
+        return ()
+    return (f"{words} {value:.6g} is only proven to be above {bound:.6g}",)
 
 
 def least_bound(data: StanceData, outcome: Outcome) -> float:

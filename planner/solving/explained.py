@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -65,7 +66,7 @@ def explained_plan(
     answer: Answer,
     factor: LoadFactor,
     attempt: Attempt,
-    times: Callable[[], Time],
+    moments: tuple[float, float, float],
 ) -> Plan:
     """Return the plan, explained, with all that is wanted beside it.
 
@@ -77,10 +78,11 @@ def explained_plan(
     factor : LoadFactor
     attempt : callable
         Plans another stance, for the spread.
-    times : callable
-        Returns where the time went.
+    moments : tuple of (float, float, float)
+        When it began, was prepared, and was solved, on the clock of `time.perf_counter`.
     """
     question, where, solution = prepared.question, prepared.where, answer.solution
+    start, prepared_at, solved = moments
     odd = wrench_findings(question)
     unfinished = solution.unfinished + (("load_factor",) if factor.unfinished else ())
     further: list[str] = []
@@ -119,7 +121,7 @@ def explained_plan(
         findings=(*checks.findings, *odd),
         warnings=warnings,
         solver=Solver(SOLVER, solution.least.status, solution.least.iterations),
-        time=times(),
+        time=Time(prepared_at - start, solved - prepared_at, time.perf_counter() - start),
         unfinished=unfinished,
         **parts,
     )

@@ -19,9 +19,9 @@ from planner.deadline import Budget, Unfinished, late
 from planner.prepare import HandSets, PreparedStance, Sets
 from planner.programs import SLACK, Outcome, StanceData, tension_trade
 from planner.result import LoadFactor
-from planner.solving import dual_bounds
+from planner.solving.dual_bounds import least_bound, unproven_sentences
 from planner.solving.objectives import MAX_MARGIN, CappedObjective
-from planner.solving.solution import Solution, unproven_sentences
+from planner.solving.solution import Solution
 from planner.solving.spare_hands import SpareHand, less_tense
 from planner.solving.unique_plan import LeastUtilisation, least_utilisation
 
@@ -69,7 +69,7 @@ class FixedSolution(Solution):
         """
         cap, faults = prepared.question.limits.utilisation, tuple[str, ...]()
         if least.solved:
-            bound = dual_bounds.least_bound(sets.data, least) if bound is None else bound
+            bound = least_bound(sets.data, least) if bound is None else bound
             faults = unproven_sentences("utilisation", least.value, bound)
         return cls(
             sets=sets,

@@ -20,9 +20,9 @@ from planner.floating import (
 from planner.prepare import PreparedStance
 from planner.programs import SLACK, StanceData, tension_trade
 from planner.result import LoadFactor, WristPlan
-from planner.solving import dual_bounds
+from planner.solving.dual_bounds import least_bound, unproven_sentences
 from planner.solving.objectives import MAX_MARGIN, CappedObjective
-from planner.solving.solution import Solution, unproven_sentences
+from planner.solving.solution import Solution
 
 __all__ = ["FloatingSolution", "floating_solution", "wrench_is_given"]
 
@@ -139,7 +139,7 @@ def floating_solution(
 
 def _unproven_use(search: WristSolution, used: float) -> tuple[str, ...]:
     """Return why a search's multipliers do not prove its utilisation the least of its sets."""
-    bound = dual_bounds.least_bound(search.sets.data, search.outcome)
+    bound = least_bound(search.sets.data, search.outcome)
     return unproven_sentences("utilisation", used, bound)
 
 
@@ -155,7 +155,7 @@ def _less_tense_beside(prepared: PreparedStance, search: WristSolution) -> Wrist
     ]
     cap = prepared.question.limits.utilisation
     trade = tension_trade(search.measure.utilisation, cap)
-    found = programs.less_tension(StanceData(tuple(held), data.wrench), trade)
+    found = programs.less_tension(StanceData.of(tuple(held), data.wrench), trade)
     if not found.solved:
         return search
     pairs = zip(wrists, loads, found.loads, strict=True)

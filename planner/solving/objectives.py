@@ -62,7 +62,7 @@ class Objective(ABC):
 
 
 class MaxMargin(Objective):
-    """Least utilisation, but for what less tension is worth (`planner.programs.trade`)."""
+    """Least utilisation, but for what less tension is worth (`planner.programs.TensionTrade`)."""
 
     name = "max_margin"
     words = "utilisation"

@@ -14,7 +14,6 @@ from planner.deadline import Budget, Unfinished
 from planner.prepare import PreparedStance, Sets
 from planner.programs import SLACK, Outcome
 from planner.result import Certificate, HandPlan, LoadFactor, PlanArrays, WristPlan
-from planner.solving.dual_bounds import is_least
 from planner.solving.objectives import CappedObjective, Objective
 
 __all__ = [
@@ -25,18 +24,7 @@ __all__ = [
     "Solution",
     "Verified",
     "load_factor_of",
-    "unproven_sentences",
 ]
-
-
-def unproven_sentences(words: str, value: float, bound: float) -> tuple[str, ...]:
-    """Return why a value is not proven the least, if its bound does not prove it.
-
-    ``words``: what the value is.
-    """
-    if is_least(value, bound):
-        return ()
-    return (f"{words} {value:.6g} is only proven to be above {bound:.6g}",)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -94,12 +94,8 @@ def plan_on(
     factor = LoadFactor()
     if "load_factor" in question.want:
         factor = load_factor_of(prepared, answer, budget, overloaded=checks.overloaded)
-    solved = time.perf_counter()
-
-    def times() -> Time:
-        return Time(modelled - start, solved - modelled, time.perf_counter() - start)
-
-    found = explained_plan(prepared, checks, answer, factor, try_stance, times)
+    moments = start, modelled, time.perf_counter()
+    found = explained_plan(prepared, checks, answer, factor, try_stance, moments)
     return found, answer.solution
 
 

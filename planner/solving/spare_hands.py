@@ -85,7 +85,7 @@ def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[
             continue
         if deadline.expired():
             break
-        others = StanceData((*data.hands[:i], *data.hands[i + 1 :]), data.wrench)
+        others = StanceData.of((*data.hands[:i], *data.hands[i + 1 :]), data.wrench)
         without = programs.margin(others)
         if without.solved and without.value < trade.most:
             far = min((trade.most - without.value) / trade.whole, 1.0)
@@ -115,7 +115,7 @@ def at_closing(
         centres[i][: len(FINGERS)] = part * closing[i] / LOAD_UNIT
         stiffness = 1.0 / max(1.0 - part, 1.0 / STIFFEST)
         hands[i] = hands[i].about(centres[i], stiffness)
-    outcome = programs.less_tension(StanceData(tuple(hands), data.wrench), trade)
+    outcome = programs.less_tension(StanceData.of(tuple(hands), data.wrench), trade)
     loads = [
         y + centre * hand.unit
         for y, centre, hand in zip(outcome.loads, centres, data.hands, strict=False)

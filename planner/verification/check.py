@@ -1,13 +1,14 @@
 """The check that every plan passes before it leaves: from its numbers back to the rock.
 
 Nothing here is shared with the way the plan was found. The plan's own forces must balance every
-joint and tendon (`joint_balance`), which says nothing of the affine maps of Eq. 14, and motors and
-winches must fit (`drives`); wrenches are summed force by force (`hands`); limits are Eq. 21 itself
-and the plan's half-planes (`tiles`), and the structure's published figures; balance is added up
-about the body's origin. What is different where a wrist floats is in `floating`, what nails need
-in `nails`, what joints and callers ask in `limbs`.
+joint and tendon (`joint_balance`), which says nothing of the affine maps of Eq. 14, and motors,
+winches and nails must fit (`fingers`); wrenches are summed force by force (`hands`); limits are
+Eq. 21 itself and the plan's half-planes (`tiles`), and the structure's published figures; balance
+is added up about the body's origin. What is different where a wrist floats is in `floating`, what
+joints and callers ask in `limbs`.
 
-Each of these recomputes its residuals from a plan's numbers, of all hands at once, in arrays.
+Each of these is one kind of `Limits` and recomputes its residuals from a plan's numbers, of all
+hands at once, in arrays.
 Where numbers are not near enough to be right whatever their size, it is worked out by how much
 each is off, and how much it may be.
 """
@@ -24,12 +25,11 @@ from hand_models.base import SKEW, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
 from planner.question import HandOnHold, Question
 from planner.result import PlanArrays
-from planner.verification.drives import DriveLimits
+from planner.verification.fingers import DriveLimits, NailLimits
 from planner.verification.floating import recompute_floating
 from planner.verification.hands import HandLimits, check_contacts
-from planner.verification.joint_balance import JointBalance, wrenches_of
+from planner.verification.joint_balance import JointBalance
 from planner.verification.limbs import AskedLimits, JointUse, check_limbs, recompute_joints
-from planner.verification.nails import NailLimits
 from planner.verification.residuals import (
     COUNT,
     UTILISATION,
@@ -62,6 +62,12 @@ class SettledLimits:
         have tightened its tendons if its wrist floats [N], by default the closing tension.
     strength : float
         What every tendon may hold [N].
+
+    Attributes
+    ----------
+    names : Names
+    limits : tuple of Limits
+        But for nails, whose residuals come with what is recomputed of them.
     """
 
     def __init__(self, known: HandBatch, places: Sequence[HandOnHold], strength: float) -> None:
@@ -73,72 +79,25 @@ class SettledLimits:
             for h, place in enumerate(places)
             if place.wrist == "floating"
         }
-        self._balance = JointBalance(names, self.wound)
-        self._tiles, self._hands = TileLimits(names), HandLimits(names)
-        self._drives = DriveLimits(names, self._balance.left, strength)
-        self._nails = NailLimits(names)
-        self._each = np.arange(len(places))
+        self._balance = balance = JointBalance(names, self.wound)
+        self.nails = nails = NailLimits(names)
+        drives = DriveLimits(names, balance.left, strength, nails.fingers)
+        self.limits = (balance, TileLimits(names, nails.tiles), drives, HandLimits(names))
 
-    def recompute(
-        self, found: list[str], arrays: PlanArrays, asked: Sequence[Residual]
-    ) -> tuple[list[Residual], Recomputed, Array]:
-        """Recompute what a plan's numbers do to the hands.
-
-        Parameters
-        ----------
-        found : list of str
-            What is wrong so far; what is found on the way is appended.
-        arrays : PlanArrays
-        asked : sequence of Residual
-            What is asked of the hands beside their own limits: caps, joints.
-
-        Returns
-        -------
-        residuals : list of Residual
-        again : Recomputed
-        used : ndarray, shape (H,)
-            Utilisation of each hand.
-        """
-        each = wrenches_of(arrays.points, arrays.forces)
-        again = self._again(found, arrays)
-        nails, angles, pulled = self._nails.recompute(arrays)
-        residuals = [
-            *self._balance.recompute(again),
-            *self._tiles.recompute(again, self._nails.tiles, pulled),
-            *self._drives.recompute(again, self._nails.fingers, angles),
-            *self._hands.recompute(again, each),
-            *nails,
-            *asked,
-        ]
-        uses = [each for each in residuals if each.kind == "use"]
-        rows = np.concatenate([np.maximum.reduce(each.values, axis=1) for each in uses])
-        used = np.zeros(len(self._each))
-        np.maximum.at(used, np.concatenate([each.hand for each in uses]), rows)
-        name, said = self.names.limb, arrays.utilisations
-        return (
-            [*residuals, claim(used, said, self._each, UTILISATION, name, "utilisation")],
-            again,
-            used,
-        )
-
-    def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
-        """Recompute what is not affine in loads (T, 3) and wrenches (H, 6) of settled hands."""
-        law = self._tiles.recompute_law(arrays.half_planes, loads)
-        return [law, self._hands.recompute_held(wrenches)]
-
-    def _again(self, found: list[str], arrays: PlanArrays) -> Recomputed:
+    def recompute(self, found: list[str], arrays: PlanArrays) -> Recomputed:
         """Return what tensions, or where wrists go, do to the fingers; with the plan's numbers."""
         balance, f, lateral = self._balance, arrays.tensions, arrays.loads[:, 2]
+        nails = self.nails.recompute(arrays)
         if not any(arrays.wrists):
             loads, left = balance.loads(f, lateral)
-            return Recomputed(arrays, loads, left, f, loads[:, 0])
+            return Recomputed(arrays, loads, left, f, loads[:, 0], nails)
         # the motors of hands that float stand still where they have tightened their tendons
         wound = f.copy()
         for h, tension in self.wound.items():
             wound[COUNT * h : COUNT * (h + 1)] = tension
         shear, normal, left = recompute_floating(found, self.names, balance, arrays, wound)
         loads, (drawn, _) = np.column_stack((shear, normal, lateral)), balance.loads(wound, lateral)
-        return Recomputed(arrays, loads, left, wound, drawn[:, 0])
+        return Recomputed(arrays, loads, left, wound, drawn[:, 0], nails)
 
 
 KNOWN: Final[BoundedStore[Hashable, SettledLimits]] = BoundedStore("limits of settled hands", 64)
@@ -170,7 +129,6 @@ class Check:
     Attributes
     ----------
     settled : SettledLimits
-    asked : AskedLimits
     carry : ndarray, shape (6, 6 H)
         From the hands' wrenches on the rock, each in its H, to the rock's reaction in B.
     """
@@ -182,7 +140,7 @@ class Check:
         self.strength = most if cap is None else min(most, cap)
         self.settled = _settled_limits(known, stance.hands, self.strength)
         self.limbs = self.settled.names.limbs
-        self.asked = AskedLimits(question, self.settled.names)
+        self._limits = (*self.settled.limits, AskedLimits(question, self.settled.names))
         poses = [place.pose for place in stance.hands]
         into_body = stance.body.rotation.T
         turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
@@ -215,8 +173,7 @@ class Check:
         found: list[str] = []
         with np.errstate(invalid="ignore", over="ignore"):
             joints = self.joints(found, arrays.wrenches, body_wrench)
-            asked = list(self.recompute_asked(arrays, joints))
-            residuals, _, used = self.settled.recompute(found, arrays, asked)
+            residuals, _, used = self.recompute(found, arrays, joints)
             misplaced = [*self._wrists(arrays), *check_contacts(self.settled.names, arrays)]
             if misplaced or not is_near(residuals):
                 allowed = allowed_errors(self.known, arrays)
@@ -247,14 +204,47 @@ class Check:
         alone = [use for limb, use in joints.items() if limb not in self.limbs]
         return max([float(np.abs(use.shares).max()) for use in alone], default=0.0)
 
-    def recompute_asked(
-        self, arrays: PlanArrays, joints: Mapping[str, JointUse]
-    ) -> Iterator[Residual]:
-        """Yield the residuals of what is asked of the hands beside their own limits."""
-        yield from self.asked.recompute(arrays.tensions, arrays.wrenches)
+    def recompute(
+        self, found: list[str], arrays: PlanArrays, joints: Mapping[str, JointUse]
+    ) -> tuple[list[Residual], Recomputed, Array]:
+        """Recompute what a plan's numbers do to the hands.
+
+        Parameters
+        ----------
+        found : list of str
+            What is wrong so far; what is found on the way is appended.
+        arrays : PlanArrays
+        joints : mapping of str to JointUse
+            What the limbs' joints bear.
+
+        Returns
+        -------
+        residuals : list of Residual
+        again : Recomputed
+        used : ndarray, shape (H,)
+            Utilisation of each hand.
+        """
+        again = self.settled.recompute(found, arrays)
+        residuals: list[Residual] = []
+        for limits in self._limits:
+            residuals += limits.recompute(again)
+            residuals += limits.recompute_curved(arrays, again.loads, arrays.wrenches)
+        residuals += again.nails.residuals
         for h, limb in enumerate(self.limbs):
             if limb in joints:
-                yield from recompute_joints(limb, h, joints[limb])
+                residuals += recompute_joints(limb, h, joints[limb])
+        uses = [each for each in residuals if each.kind == "use"]
+        rows = np.concatenate([np.maximum.reduce(each.values, axis=1) for each in uses])
+        used = np.zeros(len(self.limbs))
+        np.maximum.at(used, np.concatenate([each.hand for each in uses]), rows)
+        name, said, hand = self.settled.names.limb, arrays.utilisations, np.arange(len(used))
+        residuals.append(claim(used, said, hand, UTILISATION, name, "utilisation"))
+        return residuals, again, used
+
+    def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
+        """Recompute what is not affine in the loads, see `Limits.recompute_curved`."""
+        of_all = [limits.recompute_curved(arrays, loads, wrenches) for limits in self._limits]
+        return [residual for residuals in of_all for residual in residuals]
 
     def unbalanced(self, wrenches: Array, body_wrench: Array) -> Iterator[str]:
         """Yield by how much hands' wrenches (H, 6) do not balance the body, if they do not."""

@@ -10,7 +10,15 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.hand import HELD
 from planner.result import PlanArrays
-from planner.verification.residuals import UTILISATION, Names, Recomputed, Residual, claim
+from planner.verification.joint_balance import wrenches_of
+from planner.verification.residuals import (
+    UTILISATION,
+    Limits,
+    Names,
+    Recomputed,
+    Residual,
+    claim,
+)
 
 __all__ = ["HandLimits", "check_contacts"]
 
@@ -21,7 +29,7 @@ PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Signs of a palm's shear along x and pressing along z."""
 
 
-class HandLimits:
+class HandLimits(Limits):
     """Limits of palms and whole hands, and their wrenches as sums of forces.
 
     Parameters
@@ -36,48 +44,40 @@ class HandLimits:
         self._palm_shares = PALM_SIGNS / known.palm_limits
         self._hand_load = known.hands[0].hand.structure.hand_load
 
-    def recompute(self, again: Recomputed, each: Array) -> Iterator[Residual]:
-        """Yield what forces leave of their sums, and use of palms and hands.
-
-        ``each``: the wrenches of all forces, shape (T + H, 6).
-        """
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return what forces leave of their sums, and use of palms and hands."""
         planned, names, own = again.arrays, self._names, self._each
         tiles, palms = len(planned.loads), planned.palms
         off = planned.forces[:tiles] - (planned.loads[:, None] @ planned.axes)[:, 0]
-        text = ": force and loads disagree"
-        yield Residual("zero", off, self._known.places.hand, names.tile, text)
+        each = wrenches_of(planned.points, planned.forces)
         wrenches = np.add.reduceat(each[:tiles], self._known.places.first)
         wrenches += each[tiles:]
         wrenches[:, 3:] += planned.palm_moments
-        text = "the wrench is not the sum of its tiles' and palm's forces"
-        yield Residual("zero", wrenches - planned.wrenches, own, names.limb, text)
-        text = "the palm cannot exert {:.6g}, {:.6g}, {:.6g} N"
-        numbers = palms[:, 0], palms[:, 1], palms[:, 2]
-        yield Residual("zero", palms[:, 1], own, names.limb, text, numbers)
-        pressing = palms[:, ::2]
-        yield Residual("least", pressing * PALM_SIGNS, own, names.limb, text, numbers)
+        pressing, numbers = palms[:, ::2], (palms[:, 0], palms[:, 1], palms[:, 2])
         used, said = pressing * self._palm_shares, planned.palm_utilisations
-        yield Residual("use", used, own)
         most = np.maximum.reduce(used, axis=1)
-        yield claim(most, said, own, UTILISATION, names.limb, "palm: utilisation")
         along = planned.wrenches[:, :3] @ HELD.T
-        yield Residual("use", along / self._hand_load, own)
-        yield self.recompute_held(planned.wrenches, along)
+        disagree = ": force and loads disagree"
+        no_sum = "the wrench is not the sum of its tiles' and palm's forces"
+        cannot = "the palm cannot exert {:.6g}, {:.6g}, {:.6g} N"
+        return [
+            Residual("zero", off, self._known.places.hand, names.tile, disagree),
+            Residual("zero", wrenches - planned.wrenches, own, names.limb, no_sum),
+            Residual("zero", palms[:, 1], own, names.limb, cannot, numbers),
+            Residual("least", pressing * PALM_SIGNS, own, names.limb, cannot, numbers),
+            Residual("use", used, own),
+            claim(most, said, own, UTILISATION, names.limb, "palm: utilisation"),
+            Residual("use", along / self._hand_load, own),
+        ]
 
-    def recompute_held(self, wrenches: Array, along: Array | None = None) -> Residual:
-        """Return what rows say that hands hold, beyond what they do: across and away from rock.
-
-        Of wrenches (H, 6) on the rock [N]; ``along``: the rows, if they are known.
-        """
+    def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
+        """Return what rows say that hands hold, beyond what they do: across and away from rock."""
         forces = wrenches[:, :3]
-        along = forces @ HELD.T if along is None else along
         held = np.minimum(forces, PULLING)
         size = np.sqrt(np.add.reduce(held * held, axis=1))
-        left, text = np.maximum.reduce(along, axis=1) - size, "the hand holds {:.6g} N, more than "
-        name = self._names.limb
-        return Residual(
-            "least", left, self._each, name, text + "its rows say", (size,), affine=False
-        )
+        left, limb = np.maximum.reduce(forces @ HELD.T, axis=1) - size, self._names.limb
+        text = "the hand holds {:.6g} N, more than its rows say"
+        return [Residual("least", left, self._each, limb, text, (size,), affine=False)]
 
 
 def check_contacts(names: Names, arrays: PlanArrays) -> Iterator[str]:

@@ -17,7 +17,7 @@ tensions.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from hand_models.base import SKEW, Array
 from hand_models.finger import PHALANGES, STOPS
 from hand_models.hand import HandModel
 from planner.prepare import NONE, NOTHING, TileIndex
-from planner.verification.residuals import COUNT, Names, Recomputed, Residual
+from planner.verification.residuals import COUNT, Limits, Names, Recomputed, Residual
 
 __all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
 
@@ -104,7 +104,7 @@ class Fingers(NamedTuple):
     axes: Array
 
 
-class JointBalance:
+class JointBalance(Limits):
     """The balance of the fingers of settled hands, and what their tendons and stops cannot do.
 
     Parameters
@@ -197,28 +197,30 @@ class JointBalance:
         loads[:, 2] = lateral
         return loads, self._left_at_zero + self._left_per_newton * tensions[:, None]
 
-    def recompute(self, again: Recomputed) -> Iterator[Residual]:
-        """Yield what loads leave of the balance, of tendons that pull and of joints' stops."""
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return what loads leave of the balance, of tendons that pull and of joints' stops."""
         names, (shear, normal, _) = self._names, again.loads.T
         planned, tensions, hands = again.arrays.loads, again.arrays.tensions, self._hand_of_finger
         off = planned[:, :2] - again.loads[:, :2]
         if len(self._known.places.nails):
             off[self._known.places.nails] = 0.0
         text = " carries {:.6g}, {:.6g} N, not what the plan says"
-        of_tile = self._known.places.hand
-        yield Residual("zero", off, of_tile, names.tile, text, (shear, normal))
         tension = names.of_fingers("tension", np.arange(len(hands)))
-        yield Residual("least", tensions, hands, tension, " is {:g} N", (tensions,))
+        residuals = [
+            Residual("zero", off, self._known.places.hand, names.tile, text, (shear, normal)),
+            Residual("least", tensions, hands, tension, " is {:g} N", (tensions,)),
+        ]
         if len(self._drawing):
             own = hands[self._drawing]
             slack = tensions[self._drawing] - self._closing[own]
             text = " would stick, slackened {:.3g} N"
             name = names.of_fingers("tendon", self._drawing)
-            yield Residual("least", slack, own, name, text, (-slack,))
+            residuals.append(Residual("least", slack, own, name, text, (-slack,)))
         if len(self.stop_fingers):
             stops, text = self.stops(again.left), " would leave its stop"
             own, name = hands[self.stop_fingers], names.of_fingers("a joint", self.stop_fingers)
-            yield Residual("least", stops, own, name, text, error=STOP)
+            residuals.append(Residual("least", stops, own, name, text, error=STOP))
+        return residuals
 
     def stops(self, left: Array) -> Array:
         """Return how each joint that stands at a limit presses on it, shape (k,) [N·m]."""

@@ -6,7 +6,7 @@ the Jacobians and the Newton–Euler pass that the program's rows are made of.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,8 +15,9 @@ import scipy
 from hand_models.base import Array, Indices
 from planner.prepare import BALL, Posture
 from planner.question import ForceCap, Question
+from planner.result import PlanArrays
 from planner.robots import LimbTorques, LinkTree
-from planner.verification.residuals import COUNT, Names, Residual
+from planner.verification.residuals import COUNT, Limits, Names, Recomputed, Residual
 
 __all__ = ["AskedLimits", "JointUse", "check_limbs", "recompute_joints"]
 
@@ -106,14 +107,15 @@ def check_limbs(
     return uses
 
 
-def recompute_joints(limb: str, h: int, use: JointUse) -> Iterator[Residual]:
-    """Yield what the joints of hand h use of their torque, and bear without a motor."""
+def recompute_joints(limb: str, h: int, use: JointUse) -> list[Residual]:
+    """Return what the joints of hand h use of their torque, and bear without a motor."""
     hand, torques = np.array([h]), np.array([*use.passive.values()])
-    yield Residual("use", np.concatenate((use.shares, -use.shares))[None], hand)
+    residuals = [Residual("use", np.concatenate((use.shares, -use.shares))[None], hand)]
     if use.passive:
         each, names = hand.repeat(len(torques)), [f"{limb}: joint {name}" for name in use.passive]
-        text = " has no motor, and bears {:.6g} N·m"
-        yield Residual("zero", torques / ARM, each, names.__getitem__, text, (torques,))
+        text, zero = " has no motor, and bears {:.6g} N·m", torques / ARM
+        residuals.append(Residual("zero", zero, each, names.__getitem__, text, (torques,)))
+    return residuals
 
 
 def _limits(question: Question, limb: str) -> Array:
@@ -218,7 +220,7 @@ def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
     return _Cap(hand, turn[axis] / ends[axis, end][:, None], none, axes, ball=False)
 
 
-class AskedLimits:
+class AskedLimits(Limits):
     """Limits that a question puts on hands: caps, given wrenches, small changes of tensions.
 
     Parameters
@@ -249,34 +251,41 @@ class AskedLimits:
         }
         self._most = limits.tension_change or 0.0
 
-    def recompute(self, tensions: Array, wrenches: Array) -> Iterator[Residual]:
-        """Yield what tensions (F,) and wrenches (H, 6) leave of what is asked."""
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return what tensions and wrenches leave of what is asked."""
+        tensions, wrenches = again.arrays.tensions, again.arrays.wrenches
+        residuals: list[Residual] = []
         for cap in self._caps:
             force, limb = wrenches[cap.hand[0], :3], self._names.limb_of(cap.hand)
-            yield Residual("use", (cap.use @ force)[None], cap.hand)
+            residuals.append(Residual("use", (cap.use @ force)[None], cap.hand))
             for along, axis in zip(cap.none @ force, cap.axes, strict=True):
                 text, left = f"{{:.6g}} N along {axis}, of none", along[None]
-                yield Residual("least", left, cap.hand, limb, text, (np.abs(left),))
-        yield from self.recompute_sizes(wrenches)
+                residuals.append(Residual("least", left, cap.hand, limb, text, (np.abs(left),)))
         if self._given:
             hand, j, value = self._given
             own, limb = wrenches[hand, j], self._names.limb_of(hand)
             text = "component {} of the wrench is {:.6g}, not {:.6g}"
-            yield Residual("zero", own - value, hand, limb, text, (j + 1, own, value))
+            numbers = j + 1, own, value
+            residuals.append(Residual("zero", own - value, hand, limb, text, numbers))
         for h, present in self._present.items():
             fingers = np.arange(COUNT * h, COUNT * (h + 1))
             name = self._names.of_fingers("tension", fingers)
             text = f" changes by {{:.6g}} N, more than {self._most:g}"
             change, hand = tensions[fingers] - present, np.full(COUNT, h)
-            for left in (self._most - change, self._most + change):
-                yield Residual("least", left, hand, name, text, (change,))
+            residuals += [
+                Residual("least", left, hand, name, text, (change,))
+                for left in (self._most - change, self._most + change)
+            ]
+        return residuals
 
-    def recompute_sizes(self, wrenches: Array) -> Iterator[Residual]:
-        """Yield what rows say of forces that are capped in all directions, beyond their size."""
+    def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
+        """Return what rows say of forces that are capped in all directions, beyond their size."""
+        residuals = []
         for cap in self._caps:
             if cap.ball:
                 force, limb = wrenches[cap.hand, :3], self._names.limb_of(cap.hand)
                 size = np.linalg.norm(force, axis=1)
                 left = (force @ BALL.T).max(axis=1) - size
-                text = "the hand exerts {:.6g} N, more than its rows say"
-                yield Residual("least", left, cap.hand, limb, text, (size,), affine=False)
+                text, by = "the hand exerts {:.6g} N, more than its rows say", (size,)
+                residuals.append(Residual("least", left, cap.hand, limb, text, by, affine=False))
+        return residuals

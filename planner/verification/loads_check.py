@@ -75,15 +75,10 @@ class LoadsCheck:
         sizes = [sum(len(rows) for kind, rows, _ in parts if kind == each) for each in KINDS]
         ends = np.cumsum([0, *sizes]).tolist()
         self._of = dict(zip(KINDS, map(slice, ends[:-1], ends[1:]), strict=True))
-        # a matrix of each hand, filled up to the most rows that one has, and where its rows go
         rows, owner = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
-        counts = np.bincount(owner, minlength=len(columns))
-        table = np.zeros((len(columns), counts.max(), self._size + 1))
-        self._index = np.empty(len(rows), dtype=np.intp)
-        for h, count in enumerate(counts.tolist()):
-            table[h, :count] = rows[owner == h]
-            self._index[owner == h] = h * counts.max() + np.arange(count)
-        self._constant, self._matrix = table[:, :, 0].copy(), table[:, :, 1:].copy()
+        matrix = np.zeros((len(rows), len(columns), self._size))
+        matrix[np.arange(len(rows)), owner] = rows[:, 1:]
+        self._constant, self._matrix = rows[:, 0].copy(), matrix.reshape(len(rows), -1)
 
     def _numbers(self, y: Array) -> list[tuple[str, Array, Indices]]:
         """Return the check's numbers of loads, the same y of each hand: kind, values and whose."""
@@ -92,8 +87,7 @@ class LoadsCheck:
         assert question.body_wrench is not None
         joints = check.joints(self.wrong, arrays.wrenches, question.body_wrench)
         self.idle = check.idle(joints)
-        asked = list(check.recompute_asked(arrays, joints))
-        residuals, again, _ = check.settled.recompute(self.wrong, arrays, asked)
+        residuals, again, _ = check.recompute(self.wrong, arrays, joints)
         named = np.array([y * (np.arange(len(y)) < len(names)) for names in self._columns])
         off = [r.values for r in residuals if r.kind == "zero" and not r.affine]
         off.append(self.loads_of(arrays) - named)
@@ -160,9 +154,7 @@ class LoadsCheck:
         """
         if self.wrong:
             return self.wrong[0]
-        table = (self._matrix @ loads[:, :, None])[:, :, 0]
-        table += self._constant
-        found, of = table.take(self._index), self._of
+        found, of = self._matrix @ loads.ravel() + self._constant, self._of
         own = found[of["wrench"]].reshape(-1, 6)
         carried = np.abs(found[: of["palm"].stop])
         allowed = LOAD * max(1.0, float(most(carried)))
@@ -178,9 +170,8 @@ class LoadsCheck:
             return "the utilisation"
         if not (np.abs(found[of["zero"]]) <= allowed).all():
             return "a load or a wrench that is given"
-        tiles, settled = found[of["load"]].reshape(-1, 3), self._check.settled
-        curved = settled.recompute_curved(self._arrays, tiles, own)
-        for residual in (*curved, *self._check.asked.recompute_sizes(own)):
+        tiles = found[of["load"]].reshape(-1, 3)
+        for residual in self._check.recompute_curved(self._arrays, tiles, own):
             if not np.minimum.reduce(residual.values) >= -allowed:
                 return next(residual.off(np.full(len(own), allowed)))
         return None

@@ -1,12 +1,13 @@
 """Residuals of limits and laws in a plan's numbers, and whether they are more than rounding.
 
-Every kind of limit recomputes its residuals from the numbers of a plan (`recompute`), and nothing
-else says what the limit is: the check of a plan judges these, and the check of a stream tabulates
-those that are affine in the loads.
+Every kind of limit (`Limits`) recomputes its residuals from the numbers of a plan, and nothing else
+says what the limit is: the check of a plan judges these, and the check of a stream tabulates those
+that are affine in the loads.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final, Literal, NamedTuple
 
@@ -22,8 +23,10 @@ __all__ = [
     "LOAD",
     "NEAR",
     "UTILISATION",
+    "Limits",
     "Names",
     "Recomputed",
+    "RecomputedNails",
     "Residual",
     "allowed_errors",
     "claim",
@@ -42,6 +45,23 @@ NEAR: Final = 1e-9
 COUNT: Final = len(FINGERS)
 
 
+class RecomputedNails(NamedTuple):
+    """What a plan's forces do to the k nails that hook.
+
+    Attributes
+    ----------
+    residuals : list of Residual
+    angles : ndarray, shape (k,)
+        How far each has turned, by where it hooks [rad].
+    used : ndarray, shape (k,)
+        Utilisation of each, by shear of its finger and by what its tip bears.
+    """
+
+    residuals: list[Residual]
+    angles: Array
+    used: Array
+
+
 class Recomputed(NamedTuple):
     """A plan's numbers, and what its tensions, or where its wrists go, do to the fingers.
 
@@ -57,6 +77,7 @@ class Recomputed(NamedTuple):
         Tensions to which the winches have drawn the tendons [N].
     drawn : ndarray, shape (T,)
         Shears of the tiles when they had [N].
+    nails : RecomputedNails
     """
 
     arrays: PlanArrays
@@ -64,6 +85,7 @@ class Recomputed(NamedTuple):
     left: Array
     wound: Array
     drawn: Array
+    nails: RecomputedNails
 
 
 class Residual(NamedTuple):
@@ -116,6 +138,28 @@ class Residual(NamedTuple):
             row = i // (self.values.size // len(self.values))
             numbers = [each.flat[i if each.size == room.size else row] for each in self.numbers]
             yield self.name(row) + self.text.format(*numbers)
+
+
+class Limits(ABC):
+    """One kind of limits of the hands of a stance."""
+
+    @abstractmethod
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return the residuals that are affine in the hands' loads, and what a plan claims."""
+
+    def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
+        """Return the residuals that are not affine in the loads; none by default.
+
+        Parameters
+        ----------
+        arrays : PlanArrays
+            Of its numbers, those that no load changes.
+        loads : ndarray, shape (T, 3)
+            Of the tiles [N].
+        wrenches : ndarray, shape (H, 6)
+            Of the hands on the rock [N, N·m].
+        """
+        return []
 
 
 def claim(

@@ -6,7 +6,7 @@ not by the half-planes that a plan is made of; by these only what the plan says 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -14,7 +14,16 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.tile import HalfPlane, Surface
 from planner.prepare import HandBatch
-from planner.verification.residuals import LOAD, UTILISATION, Names, Recomputed, Residual, claim
+from planner.result import PlanArrays
+from planner.verification.residuals import (
+    LOAD,
+    UTILISATION,
+    Limits,
+    Names,
+    Recomputed,
+    Residual,
+    claim,
+)
 
 __all__ = ["LimitCurves", "TileLimits"]
 
@@ -105,18 +114,20 @@ def limiting_shares(known: HandBatch) -> Array:
     return np.where(share < least, 0.5 * least * (1.0 + (share / least) ** 2), share)
 
 
-class TileLimits:
+class TileLimits(Limits):
     """Limits of tiles: friction, the law's surface, and what a plan's half-planes say is used.
 
     Parameters
     ----------
     names : Names
+    nails : ndarray of int, shape (k,)
+        Nails that hook, counted among the tiles.
     """
 
-    def __init__(self, names: Names) -> None:
+    def __init__(self, names: Names, nails: Indices) -> None:
         known = names.known
         surfaces, self._of = [hand.surface for hand in known.hands], known.places.hand
-        self._names, self._known = names, known
+        self._names, self._known, self._nails = names, known, nails
         self._framed = bool(known.touch.framed.any())
         # tiles that touch nothing use nothing of their limits
         shares = np.where(known.touch.away, 1.0, limiting_shares(known))
@@ -127,10 +138,10 @@ class TileLimits:
         self._lateral = np.array([each.lateral_limit for each in surfaces])[self._of, None]
         self._planes: tuple[tuple[tuple[HalfPlane, ...], ...], Array] = (), np.zeros(0)
 
-    def recompute(self, again: Recomputed, nails: Indices, pulled: Array) -> Iterator[Residual]:
-        """Yield what loads leave of friction, of frames that only rest on rock, and of the law.
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return what loads leave of friction and of frames that only rest on rock, and their use.
 
-        ``nails``: those that hook, and what is used of them, which the plan says with the tiles'.
+        The plan says with the tiles' what is used of nails.
         """
         known, name, planned = self._known, self._names.tile, again.arrays
         shear, normal, _ = again.loads.T
@@ -138,21 +149,18 @@ class TileLimits:
         pressed[bases] = known.engagement[bases] * normal[bases + 1]
         backwards = " is pulled off or dragged backwards: {:.3g} N along, {:.3g} N across"
         rubs, across = shear + known.friction * pressed + self._allowances, (shear, normal)
-        yield Residual("least", rubs, self._of, name, backwards, across)
+        residuals = [Residual("least", rubs, self._of, name, backwards, across)]
         if self._framed:
             text, pressed = ": its bare frame would be pulled off", normal * known.touch.framed
-            yield Residual("least", pressed, self._of, name, text)
+            residuals.append(Residual("least", pressed, self._of, name, text))
         planes = self._used(planned.half_planes, again.loads) * self._per_share
-        yield Residual("use", planes, self._of)
+        residuals.append(Residual("use", planes, self._of))
         used = np.maximum.reduce(planes, axis=1)
-        used[nails] = pulled
+        used[self._nails] = again.nails.used
         used, said = np.maximum(used, 0.0), planned.tile_utilisations
-        yield claim(used, said, self._of, UTILISATION, name, ": utilisation")
-        yield self.recompute_law(planned.half_planes, again.loads)
+        return [*residuals, claim(used, said, self._of, UTILISATION, name, ": utilisation")]
 
-    def recompute_law(
-        self, half_planes: tuple[tuple[HalfPlane, ...], ...], loads: Array
-    ) -> Residual:
+    def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
         """Return how far loads (T, 3) are within the law's surface [N]; zero beyond half-planes.
 
         There a tile may be outside the surface, too, and the plan says that it is overloaded.
@@ -160,10 +168,11 @@ class TileLimits:
         inside = -self._curves.excess(loads[:, 0], loads[:, 1], loads[:, 2], UTILISATION)
         if not np.minimum.reduce(inside) >= -LOAD:
             sides = loads[:, 2:] / self._lateral * SIDES
-            used = np.hstack([self._used(half_planes, loads), sides]) * self._per_share
+            planes = self._used(arrays.half_planes, loads)
+            used = np.hstack([planes, sides]) * self._per_share
             inside[(used.max(axis=1) > 1.0) | self._known.touch.away] = 0.0
         text = " is beyond its limit curve"
-        return Residual("least", inside, self._of, self._names.tile, text, affine=False)
+        return [Residual("least", inside, self._of, self._names.tile, text, affine=False)]
 
     def _used(self, half_planes: tuple[tuple[HalfPlane, ...], ...], loads: Array) -> Array:
         """Return what loads use of half-planes, if all spines held, shape (T, 2 p)."""

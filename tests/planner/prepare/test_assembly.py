@@ -13,7 +13,7 @@ from hand_models.base import Pose, wrench_transport, wrench_transports
 from hand_models.hand import FINGERS
 from hand_models.rock import Cylinder
 from planner.prepare import HandSets, assemble, posture
-from planner.programs import HandData, StanceData, scaled_rows
+from planner.programs import HandData, ScaledRows, StanceData
 from planner.question import ForceCap, Limits, Question
 from tests.suite.helpers.shares import given_some
 from tests.suite.helpers.stances import ask, moved, on_wall, random_stance
@@ -75,7 +75,8 @@ def check_hand(
         else:
             assert tie == pytest.approx((0.01 * LOAD / most.get(column, LOAD)) ** 2, rel=1e-12)
             assert rest == pytest.approx(0.1 * tie, rel=1e-12)
-    assert hand.shape == (len(y), len(used), len(space.h), len(efforts))
+    sizes = len(hand.unit), len(hand.l0), len(hand.h), len(hand.e0)
+    assert sizes == (len(y), len(used), len(space.h), len(efforts))
 
 
 def check(question: Question, seed: int = 0) -> StanceData:
@@ -151,7 +152,7 @@ def test_a_hand_elsewhere_gives_the_very_same_rows():
 
 def test_scaled_rows_cannot_be_written_to():
     hands, _ = gathered(ask(on_wall(Cylinder(0.41), limbs=("front_left",))))
-    (rows,) = scaled_rows(hands.spaces[:1])
+    rows = ScaledRows.of(hands.spaces[0])
     for name in ("generators", "origin", "L", "l0", "H", "h", "E", "e0", "tie", "rest", "unit"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(rows, name)[...] = 1.0

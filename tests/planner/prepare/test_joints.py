@@ -12,7 +12,6 @@ from hand_models.base import InvalidInputError, Pose, wrench_transport
 from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.prepare import posture
-from planner.prepare.stance_constraints import JointLoads
 from planner.question import EARTH, Limits, Load, Question
 from planner.result import Plan
 from planner.robots import LinkTree, RobotFile, robosimian, robot_of
@@ -357,10 +356,3 @@ def test_given_angles_that_do_not_reach_the_hands_are_refused():
     with pytest.raises(InvalidInputError) as found:
         plan(Question(replace(stance, joints={limb: np.zeros(7) for limb in robosimian().limbs})))
     assert found.value.field == "stance.hands[0].pose"
-
-
-def test_joint_loads_of_no_wrench_are_those_of_gravity():
-    loads = JointLoads(
-        ("a", "b"), np.zeros(2, bool), np.array([1.0, -2.0]), np.ones((6, 2)), np.ones(2)
-    )
-    np.testing.assert_array_equal(loads.torques(np.zeros(6)), [1.0, -2.0])

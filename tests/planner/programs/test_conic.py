@@ -7,7 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 
-import clarabel
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -82,7 +81,7 @@ def drawn(rng: np.random.Generator) -> Draw:
 
 def random_data(shape: tuple, draw: Draw) -> StanceData:
     count, hands = shape
-    return StanceData(
+    return StanceData.of(
         tuple(
             HandData(
                 G=draw(count, m),
@@ -224,36 +223,6 @@ def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
     assert kept.info().kept <= 2
 
 
-def test_a_new_wrench_refreshes_nothing_but_the_right_side(data, monkeypatch):
-    given = []
-
-    class Spy:
-        def __init__(self, *problem, original=clarabel.DefaultSolver):
-            given.append("new")
-            self.solver = original(*problem)
-
-        def update(self, **blocks):
-            given.append(set(blocks))
-            self.solver.update(**blocks)
-
-        def solve(self):
-            return self.solver.solve()
-
-    conic.SOLVERS.clear()
-    with monkeypatch.context() as patch:
-        patch.setattr(clarabel, "DefaultSolver", Spy)
-        solvers.unique(data)
-    assert given == ["new"]
-    wrench = 1.1 * data.wrench
-    turned = solvers.unique(data.turned(wrench))
-    assert given[1:] == [{"b"}]
-    weaker = tuple(hand._replace(L=1.1 * hand.L) for hand in data.hands)
-    solvers.unique(StanceData(weaker, wrench))
-    assert given[2:] == [{"A"}]
-    conic.SOLVERS.clear()
-    assert solvers.unique(data.turned(wrench)).value == turned.value
-
-
 def test_threads_do_not_disturb_each_other(data):
     conic.SOLVERS.clear()
     wrenches = [data.wrench * (1.0 + 0.02 * i) for i in range(24)]
@@ -270,7 +239,7 @@ def test_the_solvers_that_wait_are_bounded(data):
         # another entry that is zero: another pattern
         L = hand.L.copy()
         L[j, i] = 0.0 if L[j, i] else 1.0
-        solvers.margin(StanceData((hand._replace(L=L), *data.hands[1:]), data.wrench))
+        solvers.margin(StanceData.of((hand._replace(L=L), *data.hands[1:]), data.wrench))
     assert conic.SOLVERS.info()[2:] == (conic.KEPT, conic.KEPT)
     conic.SOLVERS.clear()
     assert conic.SOLVERS.info() == stores()["solvers"] == (0, 0, 0, conic.KEPT)
@@ -285,7 +254,7 @@ def test_numbers_that_are_none_cost_only_their_own_question(data):
     # in the weights, too: what a solver keeps of them it takes along
     for number in (np.nan, np.inf):
         hands = tuple(hand._replace(tie=hand.tie * number) for hand in data.hands)
-        assert not solvers.unique(StanceData(hands, data.wrench)).solved
+        assert not solvers.unique(StanceData.of(hands, data.wrench)).solved
         again = solvers.unique(data)
         for one, two in zip(again.loads, honest.loads, strict=True):
             np.testing.assert_array_equal(one, two)

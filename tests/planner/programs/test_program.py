@@ -83,15 +83,6 @@ def test_load_factor_goes_as_one_over_the_wrench(size):
     assert answer.load_factor == pytest.approx(reference / size, rel=AGREE)
 
 
-def test_a_program_remembers_nothing_of_the_question_before():
-    first, second = ask(on_wall()), ask(on_wall(overhang=-0.4, off=0.2))
-    alone = plan(first)
-    plan(second)
-    again = plan(first)
-    assert again.utilisation == alone.utilisation
-    np.testing.assert_array_equal(tensions(again), tensions(alone))
-
-
 def test_threads_that_share_a_program_get_the_answers_of_one_thread():
     questions = [ask(on_wall(overhang=angle), "load_factor") for angle in (-0.6, -0.3, 0.0, 0.2)]
     alone = [plan(question) for question in questions]

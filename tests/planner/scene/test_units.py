@@ -195,10 +195,6 @@ def test_another_unit_is_told_with_its_field(slip, base):
     assert len(found) == (len(asked.stance.hands) if "strength of a tile" in slip else 1)
 
 
-def test_there_are_sixty_of_them():
-    assert len(WRONG) * len(BASES) >= 60
-
-
 def load_factor_probe(axis, sign):
     direction = np.zeros(6)
     direction[axis] = sign

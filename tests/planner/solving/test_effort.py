@@ -291,7 +291,7 @@ def test_the_program_of_any_number_of_hands_is_proven_by_highs(count, seed):
     hands = tuple(random_hand(rng) for _ in range(count))
     inside = [rng.uniform(0.0, 0.1, len(hand.unit)) for hand in hands]
     wrench = sum(hand.G @ z + hand.g for hand, z in zip(hands, inside, strict=True))
-    data = StanceData(hands, wrench)
+    data = StanceData.of(hands, wrench)
     outcome = solvers.effort(data, 1.0)
     assert outcome.solved
     value, gap = effort_gap(data, 1.0, outcome.loads)
@@ -405,7 +405,7 @@ def test_prices_of_limits_are_those_of_their_rows_while_efforts_are_measured_ali
             weaker = np.where(mine, space.s / (space.s + step), 1.0)
             other = hand._replace(L=hand.L * weaker[:, None], l0=hand.l0 * weaker)
             hands = (*data.hands[:index], other, *data.hands[index + 1 :])
-            outcome = solvers.effort(StanceData(hands, data.wrench), cap)
+            outcome = solvers.effort(StanceData.of(hands, data.wrench), cap)
             assert outcome.solved
             gained.append((at - solvers.used_effort(data, outcome.loads)) / step)
         assert between(price.price, gained[0], gained[1]), (name, price.price, gained)

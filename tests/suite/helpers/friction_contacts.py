@@ -72,7 +72,7 @@ def stance_of(case: dict) -> StanceData:
         hands.append(contact(np.array(point), edges))
     weight = np.array([0.0, 0.0, case["mass"] * GRAVITY])
     wrench = np.concatenate([weight, np.cross(case["com"], weight)])
-    return StanceData(tuple(hands), wrench / WRENCH_UNIT)
+    return StanceData.of(tuple(hands), wrench / WRENCH_UNIT)
 
 
 def our_margin(case: dict) -> float | None:

@@ -195,4 +195,4 @@ def program_data(question: Question) -> StanceData:
         _, space = hand_space(question.stance, hand.limb)
         transport = wrench_transport(body @ hand.pose)
         hands.append(HandData.of(space, transport))
-    return StanceData(tuple(hands), question.needed_wrench() / WRENCH_UNIT)
+    return StanceData.of(tuple(hands), question.needed_wrench() / WRENCH_UNIT)

@@ -1,0 +1,189 @@
+"""Fingers in the check of plans: tendons, motors, winches, published figures, and nails that hook.
+
+P across a nail follows from the balance about its pin; A along it is a load of its own.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array, Indices
+from hand_models.hand import FINGERS, NAIL
+from planner.prepare import CONTACTS
+from planner.result import PlanArrays
+from planner.verification.residuals import (
+    COUNT,
+    Limits,
+    Names,
+    Recomputed,
+    RecomputedNails,
+    Residual,
+    claim,
+)
+
+__all__ = ["DriveLimits", "NailLimits"]
+
+DRIVE: Final = 1e-9
+"""Largest error of a motor's torque, current or winch angle that a plan says, relative."""
+
+DRIVES: Final = ("motor torque", "motor current", "winch angle")
+"""Rows of `PlanArrays.drives`."""
+
+WINCH, DRIVEN, SHEAR, LATERAL, TIP = 2, 3, 6, slice(7, 9), 9
+"""Rows of what tensions do, after the motors' torque and current: winches, the first that is a
+utilisation, shears of fingers, their lateral reactions to either side, their tips."""
+
+SIDES: Final = np.array([[1.0], [-1.0]])
+"""Signs of a lateral reaction to either side."""
+
+
+class DriveLimits(Limits):
+    """Limits of tendons, motors and fingers, and the angles of their winches.
+
+    Parameters
+    ----------
+    names : Names
+    left : ndarray, shape (T,)
+        Part of a tendon's tension that is left at each tile.
+    strength : float
+        What every tendon may hold [N].
+    hooked : ndarray of int, shape (k,)
+        Fingers whose nails hook.
+    """
+
+    def __init__(self, names: Names, left: Array, strength: float, hooked: Indices) -> None:
+        known = names.known
+        hands, index, body = known.hands, known.places, known.hands[0].hand
+        self._names, self._places, self._body, self._hooked = names, index, body, hooked
+        lateral = np.array([hand.surface.lateral_limit for hand in hands])[index.hand]
+        aside = lateral * known.engagement * known.touch.touches
+        aside = np.add.reduceat(aside, index.first_of_finger)
+        # fingers without rock have no reaction
+        self._aside = SIDES / np.where(aside > 0.0, aside, np.inf)
+        drive, nail = body.drive, body.nail
+        self._winch = drive.winch_radius
+        # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
+        travel = drive.pulley_ratio / drive.tile_stiffness / self._winch
+        torque = self._winch / drive.gear_ratio / drive.efficiency
+        current, idle = torque / drive.torque_constant, drive.no_load_current
+        driven = [torque / drive.maximum_torque, current / drive.maximum_current]
+        self._per_newton, self._at_zero = np.zeros((2, TIP + 1, COUNT * len(hands)))
+        ratings = np.array([torque, current, 0.0, 1.0 / strength, *driven])
+        self._per_newton[:SHEAR] = ratings[:, None]
+        strands = np.add.reduceat(left, index.first_of_finger)
+        self._per_newton[WINCH] = travel * drive.pulley_ratio * strands
+        self._at_zero[1], self._at_zero[SHEAR - 1] = idle, idle / drive.maximum_current
+        bent = known.bends @ np.array(body.finger.pulley_radii)
+        self._at_zero[WINCH] = (bent + nail.pulley_radius * nail.retraction) / self._winch
+        # shears of a finger's tiles together pull them away from the winch
+        self._per_shear = np.zeros((TIP + 1, 1))
+        self._per_shear[WINCH] = -travel
+        self._per_shear[SHEAR] = 1.0 / body.structure.finger_shear
+        self._hand = np.arange(len(hands)).repeat(COUNT)
+        self._hand_of_drive = np.tile(self._hand, len(DRIVES))
+
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return what tensions use of tendons, motors and fingers, and how far drives are off."""
+        first, planned = self._places.first_of_finger, again.arrays
+        f, nail = planned.tensions, self._body.nail
+        shear, normal, lateral = again.loads.T
+        uses = self._per_newton * f
+        uses += self._at_zero
+        uses += self._per_shear * np.add.reduceat(shear, first)
+        uses[LATERAL] = self._aside * np.add.reduceat(lateral, first)
+        uses[TIP] = normal.take(self._places.tips) / self._body.structure.fingertip_force
+        if again.wound is not f:
+            # the motors of hands that float stand still where they have tightened their tendons
+            uses[WINCH] += self._per_newton[WINCH] * (again.wound - f)
+            uses[WINCH] += self._per_shear[WINCH] * np.add.reduceat(again.drawn - shear, first)
+        if len(self._hooked):
+            turned = again.nails.angles - nail.retraction
+            uses[WINCH, self._hooked] += nail.pulley_radius / self._winch * turned
+        own, said, hand = uses[:DRIVEN].ravel(), planned.drives.ravel(), self._hand_of_drive
+        return [
+            Residual("use", uses[DRIVEN:].T, self._hand),
+            claim(own, said, hand, DRIVE, self._name),
+        ]
+
+    def _name(self, i: int) -> str:
+        drive, finger = divmod(i, len(self._hand))
+        return self._names.finger(DRIVES[drive], finger)
+
+
+class NailLimits:
+    """The nails of settled hands that hook: balance, friction and strength.
+
+    Parameters
+    ----------
+    names : Names
+
+    Attributes
+    ----------
+    tiles, fingers : ndarray of int, shape (k,)
+        Which of the tiles they are, and whose, counted through all hands.
+    """
+
+    def __init__(self, names: Names) -> None:
+        known, self._names = names.known, names
+        self.tiles = np.flatnonzero(known.touch.contacts == CONTACTS[NAIL])
+        self.fingers = known.places.finger[self.tiles]
+        if not len(self.tiles):
+            return
+        body = known.hands[0].hand
+        self._nail, self._model, structure = body.nail, body.finger, body.structure
+        self._strengths = np.array([-structure.finger_shear, structure.fingertip_force])
+        radii = np.array(self._model.pulley_radii)
+        # from the base outward, each pulley leaves less of the tension; the pin's is the last
+        loss = 1.0 - self._model.friction
+        self._local = np.empty((len(self.tiles), len(radii) + 1))
+        frames, outs = [], []
+        for local, finger in zip(self._local, self.fingers.tolist(), strict=True):
+            h, i = divmod(finger, len(FINGERS))
+            hand = known.hands[h]
+            local[:] = loss ** (np.arange(len(local)) + FINGERS[i].startswith("outer"))
+            frames.append(hand.hand.frames(hand.grasp.outer_rotation)[i])
+            outs.append(hand.nail_normals[i])
+        self._far: Array = self._model.joint_spacing * np.arange(len(radii), 0.0, -1.0)
+        self._pulls = np.append(radii, self._nail.pulley_radius)
+        self._along = np.array([frame.along for frame in frames]).reshape(-1, 3)
+        self._joints = np.array([frame.joint for frame in frames]).reshape(-1, 3)
+        self._outs = np.array(outs).reshape(-1, 3)
+        self._sideways = np.cross(self._outs, np.cross(self._along, [0.0, 0.0, 1.0]))
+
+    def recompute(self, arrays: PlanArrays) -> RecomputedNails:
+        """Return what a plan's forces leave of balance and friction of k nails, and use of them."""
+        if not len(self.tiles):
+            return RecomputedNails([], np.zeros(0), np.zeros(0))
+        nail, force = self._nail, arrays.forces[self.tiles]
+        hand, name = self.fingers // COUNT, self._names.of_fingers(NAIL, self.fingers)
+        arm = arrays.points[self.tiles] - self._joints - self._far[0] * self._along
+        x, z = (arm * self._along).sum(axis=1), arm[:, 2]
+        along, into = (force * self._along).sum(axis=1), force[:, 2]
+        angles, reach = np.arctan2(z, x), np.hypot(x, z)
+        pulls = self._local * self._pulls * arrays.tensions[self.fingers, None]
+        about_pin = x * into - z * along
+        # what keeps the joints of its finger from closing, and what is left about its pin
+        opening = np.outer(into, self._far) + about_pin[:, None]
+        opening -= pulls[:, :-1] - self._model.joint_preload
+        turning = pulls[:, -1] - nail.preload - nail.stiffness * angles - about_pin
+        pressed = -(force * self._outs).sum(axis=1)
+        # along the rock: in the finger's plane, and in all
+        aside = (force * self._sideways).sum(axis=1)
+        dragged = np.linalg.norm(force + pressed[:, None] * self._outs, axis=1)
+        held = nail.friction * pressed
+        grips = np.column_stack([pressed, held - aside, held + aside])
+        used = np.column_stack([along, into]) / self._strengths
+        balanced = " is out of balance by {:.3g} N·m"
+        closes = " lets a joint of its finger close, by {:.3g} N·m"
+        slips = " would slip: {:.3g} N along rock pressed with {:.3g} N"
+        numbers = dragged, pressed
+        residuals = [
+            Residual("zero", turning / reach, hand, name, balanced, (turning,)),
+            Residual("least", opening / self._far, hand, name, closes, (-opening,)),
+            Residual("least", grips, hand, name, slips, numbers),
+            Residual("least", held - dragged, hand, name, slips, numbers, affine=False),
+            Residual("use", used, hand),
+        ]
+        return RecomputedNails(residuals, angles, np.maximum.reduce(used, axis=1))
