@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial import ConvexHull
 
 from hand_models import InvalidInputError
@@ -53,7 +53,6 @@ def test_limits_of_a_box():
         assert limit(BOX, measure).value == pytest.approx(expected)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_a_limit_is_a_combination_of_its_corners_and_its_direction_bounds_it(seed):
     points = np.random.default_rng(seed).normal(size=(30, 3)) * (20.0, 10.0, 0.5)

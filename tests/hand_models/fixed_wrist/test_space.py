@@ -95,7 +95,7 @@ def test_the_origin_is_c_sys_and_a_generator_is_c_act_of_equation_14():
         np.testing.assert_allclose(space.generators[:, i], c_act, atol=1e-12)
 
 
-@given_some(10, 80, seeds)
+@given_some(5, 80, seeds)
 def test_every_row_has_its_own_name_and_limits_come_before_hard_rows(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -116,7 +116,7 @@ def test_every_row_has_its_own_name_and_limits_come_before_hard_rows(seed):
     assert named == touching
 
 
-@given_some(10, 80, seeds)
+@given_some(5, 80, seeds)
 def test_rows_say_what_tile_by_tile_reckoning_says(seed):
     """Utilisation from each tile's own load, and hard rows from its shear and the stops."""
     settled = settled_at(seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models import (
     FINGERS,
@@ -138,7 +138,6 @@ def test_mirrored_holds_and_poses_have_mirrored_hands(seed):
     check_mirrored(hold, rng, 1e-9)
 
 
-@settings(max_examples=4, deadline=None)
 @given(seeds)
 def test_mirrored_meshes_have_mirrored_hands(seed):
     rng = np.random.default_rng(seed)

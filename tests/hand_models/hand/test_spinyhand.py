@@ -198,7 +198,7 @@ def test_tiles_move_continuously_as_the_outer_fingers_turn(hold):
     assert sum(a.tiles != b.tiles for a, b in itertools.pairwise(hands)) <= 20
 
 
-@given_some(12, 100, seeds)
+@given_some(5, 100, seeds)
 def test_tiles_said_to_touch_are_on_the_rock(seed):
     settled = settled_at(seed)
     if settled is None:

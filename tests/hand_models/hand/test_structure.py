@@ -70,7 +70,7 @@ def test_pressing_counts_for_nothing_and_both_sides_of_the_hand_are_alike():
         assert gaps.min(axis=1).max() < 1e-12
 
 
-@given_some(15, 60, seeds)
+@given_some(8, 60, seeds)
 def test_rows_say_what_the_tiles_and_the_whole_wrench_say(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -97,7 +97,7 @@ def test_rows_say_what_the_tiles_and_the_whole_wrench_say(seed):
     assert max(most, 0.0) <= 1.12 * held(force) / LIMIT + 1e-9
 
 
-@given_some(15, 60, seeds)
+@given_some(8, 60, seeds)
 def test_wrench_rows_are_functions_of_the_wrench_alone(seed):
     settled = settled_at(seed)
     if settled is None:

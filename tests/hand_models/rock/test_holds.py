@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.optimize import minimize_scalar
 
 from hand_models import Cylinder, Edge, InvalidInputError, Plane, Sphere
@@ -114,7 +114,6 @@ def test_a_face_that_turns_about_the_centre_of_a_disc_never_enters_it():
     assert Disc(0j, 0.1).rest(0j, FACE, LOW, HIGH) is None
 
 
-@settings(max_examples=300, deadline=None)
 @given(seeds)
 def test_entry_is_where_a_line_first_meets_the_rock(seed):
     rng = np.random.default_rng(seed)
@@ -140,7 +139,6 @@ def test_entry_is_where_a_line_first_meets_the_rock(seed):
         assert along(np.linspace(-20.0, found, 1000)).min() > -1e-9
 
 
-@settings(max_examples=100, deadline=None)
 @given(seeds)
 def test_the_crest_is_on_the_rock_nearest_the_palm_with_z_into_it(seed):
     rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models import InvalidInputError, Surface
 from hand_models.parameters import experiment_table
@@ -22,7 +22,7 @@ from tests.suite.helpers.shares import given_some
 LINEAR = st.just(1.0)
 """The exponent of Eq. 21."""
 
-DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 7201)[1:]
+DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 1441)[1:]
 """Loading angles φ, from pressing (< 0) through pure shear (0) to pure pull-off (π/2)."""
 
 
@@ -97,7 +97,7 @@ def edge_directions(surface, count=400):
 
 def area_between(surface):
     """Between the law and the half-planes, for 0 ≤ φ ≤ φ_max [N²]."""
-    angles = np.linspace(0.0, surface.pull_off_angle, 4001)
+    angles = np.linspace(0.0, surface.pull_off_angle, 1001)
     gap = law(surface, angles) ** 2 - reach(surface, angles) ** 2
     return float(np.trapezoid(0.5 * gap, angles))
 
@@ -121,7 +121,7 @@ laws = st.one_of(st.just(1.0), st.sampled_from([0.5, 2.0]), st.floats(0.25, 4.0)
 """Exponents with which strength falls toward pull-off: Eq. 21's, a root, a square, any."""
 
 
-@given_some(20, 60, surfaces(laws))
+@given_some(8, 60, surfaces(laws))
 def test_strength_is_the_declared_law_of_the_loading_angle(surface):
     angles = DIRECTIONS[:: len(DIRECTIONS) // 200]
     np.testing.assert_allclose(surface.strength(angles), law(surface, angles), rtol=1e-9)
@@ -137,19 +137,19 @@ def test_strength_by_hand():
     assert surface.strength(-math.pi / 4) == pytest.approx(120.0 * math.sqrt(2.0))
 
 
-@given_some(20, 150, surfaces(laws))
+@given_some(8, 150, surfaces(laws))
 def test_half_planes_stay_inside_the_law_in_every_direction(surface):
     assert (reach(surface, DIRECTIONS) <= law(surface, DIRECTIONS) * (1.0 + 1e-9)).all()
 
 
-@given_some(35, 100, surfaces())
+@given_some(12, 100, surfaces())
 def test_half_planes_meet_the_law_at_their_nodes(surface):
     surface = replace(surface, compression_gain=0.0)
     nodes = np.linspace(0.0, surface.pull_off_angle, surface.half_planes + 1)
     np.testing.assert_allclose(reach(surface, nodes), law(surface, nodes), rtol=1e-6)
 
 
-@given_some(20, 60, surfaces())
+@given_some(4, 60, surfaces())
 def test_the_gap_closes_with_the_square_of_the_number_of_half_planes(surface):
     surface = replace(surface, compression_gain=0.0)
     gaps = [area_between(replace(surface, half_planes=k)) for k in (1, 2, 4, 8, 16)]
@@ -157,7 +157,7 @@ def test_the_gap_closes_with_the_square_of_the_number_of_half_planes(surface):
         assert fine <= coarse * 0.35 + 1e-9 * surface.shear_limit**2
 
 
-@given_some(35, 100, surfaces())
+@given_some(12, 100, surfaces())
 def test_one_half_plane_more_is_needed_only_where_the_last_leaves_the_curve(surface):
     """Pure pull-off is capped at f_min: by the last chord, or by one more that closes it off."""
     pull = reach(surface, np.array([math.pi / 2]))[0]
@@ -217,7 +217,6 @@ def test_strength_out_of_the_finger_plane_by_hand():
     assert pressed == pytest.approx(60.0 * math.sqrt(2.0))
 
 
-@settings(max_examples=60, deadline=None)
 @given(surfaces(laws))
 def test_strength_is_the_boat_shaped_surface(surface):
     directions = random_directions(500)
@@ -231,16 +230,16 @@ def test_strength_is_the_boat_shaped_surface(surface):
 
 
 @pytest.mark.parametrize("name", surface_names())
-@pytest.mark.parametrize("count", [1, 2, 4, 8])
-def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(name, count):
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_on_ten_thousand_directions_inner_bounds_stay_in_and_outer_out(name, count):
     surface = replace(Surface.named(name), half_planes=count)
-    directions = random_directions(100_000)
+    directions = random_directions(10_000)
     exact = boat(surface, directions)
     assert (directional_strength(inner_half_planes(surface), directions) <= exact).all()
     assert (directional_strength(outer_half_planes(surface), directions) >= exact).all()
 
 
-@given_some(20, 150, surfaces(laws), st.integers(0, 1000))
+@given_some(8, 150, surfaces(laws), st.integers(0, 1000))
 def test_bounds_hold_on_any_surface_and_where_they_touch_it(surface, seed):
     directions = np.concatenate([random_directions(2000, seed), edge_directions(surface)])
     exact = boat(surface, directions)
@@ -270,7 +269,7 @@ def test_a_chord_across_a_dent_is_moved_inward_until_it_touches():
         assert first.capacity / first.a_shear < ends[0] * (0.999 if count == 5 else 0.99)
 
 
-@given_some(30, 200, surfaces(laws), st.integers(0, 10**6))
+@given_some(12, 200, surfaces(laws), st.integers(0, 10**6))
 def test_excess_is_what_a_load_is_beyond_the_surface(surface, seed):
     directions = random_directions(200, seed)
     reaches = boat(surface, directions)
@@ -280,10 +279,10 @@ def test_excess_is_what_a_load_is_beyond_the_surface(surface, seed):
         np.testing.assert_allclose(found, (size - 1.0) * reaches, rtol=1e-6, atol=1e-6)
 
 
-@given_some(20, 60, surfaces())
+@given_some(8, 60, surfaces())
 def test_no_bound_could_be_nearer_to_the_surface(surface):
     """Every lateral coefficient and every outer capacity is as good as its normal allows."""
-    directions = np.concatenate([random_directions(4000), edge_directions(surface)])
+    directions = np.concatenate([random_directions(2000), edge_directions(surface)])
     directions = directions[(directions[:, 1] <= 0.0) & (np.abs(directions[:, 2]) > 1e-3)]
     points = boat(surface, directions)[:, None] * np.abs(directions)
     for piece in outer_half_planes(surface):
@@ -336,7 +335,7 @@ def test_what_one_straight_line_costs_sideways():
     assert reaches[0] / 68.1 == pytest.approx(1.0 / least, rel=0.01)
 
 
-@given_some(20, 50, surfaces(laws))
+@given_some(8, 50, surfaces(laws))
 def test_purely_sideways_no_piece_goes_beyond_the_lateral_limit(surface):
     for piece in inner_half_planes(surface):
         assert 0.0 < piece.capacity / piece.a_lateral <= surface.lateral_limit * (1.0 + 1e-9)

@@ -219,7 +219,7 @@ def test_the_load_factor_is_left_out(monkeypatch, clock):
     assert told(answer) == f"the deadline of {LONG:g} s came before the load factor was found"
 
 
-def test_the_robust_load_factor_is_left_out_and_nothing_else(monkeypatch, clock):
+def test_the_robust_load_factor_is_left_out_and_nothing_else(monkeypatch, clock, few_places):
     late_at(monkeypatch, clock, programs, "load_factor", 3)
     answer = late(ask(on_wall(), "load_factor", "robust"))
     assert answer.unfinished == ("robust",)
@@ -373,7 +373,7 @@ def test_whenever_the_time_is_over_what_leaves_is_verified_and_says_what_is_miss
     whole, last = held(question, 10**6, monkeypatch)
     assert whole.unfinished == ()
     seen = set()
-    for ticks in sorted({*range(1, 40, 2), *range(40, last + 1, max(1, last // 25)), last + 1}):
+    for ticks in sorted({*range(1, 40, 4), *range(40, last + 1, max(1, last // 12)), last + 1}):
         answer, _ = held(question, ticks, monkeypatch)
         if answer is None:
             assert "plan" not in seen

@@ -66,8 +66,7 @@ def looks(work: Callable[[], object], most: float = np.inf) -> int:
     ("half_planes", "lateral", "diameter", "least"),
     [
         (3, True, 0.26, 20),
-        pytest.param(3, True, 0.34, 20, marks=pytest.mark.slow),
-        *((planes, False, 0.28 + 0.01 * planes, 2) for planes in (3, 4, 5, 8, 16)),
+        *((planes, False, 0.28 + 0.01 * planes, 2) for planes in (3, 8)),
     ],
 )
 def test_vertices_are_broken_off_wherever_they_are_and_found_again(
@@ -80,7 +79,7 @@ def test_vertices_are_broken_off_wherever_they_are_and_found_again(
     # each is a chunk of candidates, a cut or a linear program
     count = looks(work)
     assert count > least
-    for part in (0.0, 0.2, 0.5, 0.8):
+    for part in (0.0, 0.5):
         with pytest.raises(EnoughError):
             looks(work, 1 + int(part * count))
     assert listed(space_request(half_planes, lateral, diameter)) == whole

@@ -154,7 +154,7 @@ def has_loads(parts: HardRowSystem, names) -> bool:
 whole = st.integers(-3, 3)
 
 
-@given_some(20, 60, st.data())
+@given_some(8, 60, st.data())
 def test_every_smaller_set_of_small_systems_has_loads(data):
     """Against a look at every subset."""
     size = data.draw(st.integers(1, 3))

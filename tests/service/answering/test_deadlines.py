@@ -53,6 +53,7 @@ def answered(key: str, request: dict, **more: object) -> dict:
 KEYS = ("plan", "wrench_space", "body_space", "stream")
 
 
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize("key", KEYS)
 def test_ids_are_echoed(key: str) -> None:
     assert answered(key, asked(key))["id"] == f"of {key}"
@@ -74,6 +75,7 @@ def refused(reply: dict) -> bool:
     return isinstance(reply.get("error"), dict)
 
 
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize("key", ["wrench_space", "body_space", "stream"])
 def test_a_deadline_ends_an_answer_soon_wherever_it_comes(
     key: str, monkeypatch: pytest.MonkeyPatch
@@ -87,8 +89,8 @@ def test_a_deadline_ends_an_answer_soon_wherever_it_comes(
 
     reply, whole = late(10**9)
     assert not refused(reply)
-    assert whole > 40
-    for part in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
+    assert whole > 15
+    for part in (0.0, 0.3, 0.7, 1.0):
         looks = 2 + int(part * (whole - 3))
         reply, needed = late(looks)
         assert reply["error"]["kind"] == "deadline"

@@ -40,6 +40,7 @@ def answered(key: str, request: dict, form: Format, streams: Streams | None = No
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("status", STANCES)
 @pytest.mark.parametrize("objective", ["min_effort", "max_margin"])
@@ -51,6 +52,7 @@ def test_plans_travel(status, form, objective):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize("form", FORMS)
 def test_plans_of_stances_with_joints_and_floating_wrists_travel(form):
     assert answered("plan", request_with_joints() | {"want": WANT}, form)["joint_torque"]
@@ -60,6 +62,7 @@ def test_plans_of_stances_with_joints_and_floating_wrists_travel(form):
     assert answered("plan", msgspec.to_builtins(bundled), form)["hands"]
 
 
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("status", STANCES)
 def test_spaces_travel(status, form):

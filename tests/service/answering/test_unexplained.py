@@ -49,7 +49,7 @@ def test_the_command_line_leaves_it_out_of_a_plan(tmp_path, capfd):
     assert result(capfd)["certificate"] is None
     assert run(["plan", str(path), "--json"]) == OVERLOADED
     assert result(capfd)["certificate"] is not None
-    assert run(["plan", str(path), "--no-explain"]) == OVERLOADED
+    assert run(["plan", str(path), "--no-explain", "-q"]) == OVERLOADED
     assert "leave no balance" not in capfd.readouterr().out
 
 

@@ -93,9 +93,7 @@ def test_the_plan_is_printed_before_advice_is_looked_for(
 
     monkeypatch.setattr(answering, "with_advice", looks)
     path = stance_file(wall_request(HEAVY))
-    for number, more in enumerate(
-        ([], ["--advice", str(tmp_path)], ["-q", "--advice", str(tmp_path)])
-    ):
+    for number, more in enumerate(([], ["-q", "--advice", str(tmp_path)])):
         assert run(["plan", path, *more]) == OVERLOADED
         assert len(told) == number + 1
         out, err = told[-1]
@@ -106,16 +104,7 @@ def test_the_plan_is_printed_before_advice_is_looked_for(
         assert "would h" in capfd.readouterr().out
 
 
-def test_json_is_one_line_with_the_advice_in_it(
-    stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    path = stance_file(wall_request(HEAVY))
-    assert run(["plan", path, "--json", "--advice", str(tmp_path)]) == OVERLOADED
-    assert result(capfd)["advice"]
-    assert run(["plan", path, "--json"]) == OVERLOADED
-    assert "advice" not in result(capfd)
-
-
+@pytest.mark.usefixtures("few_places")
 def test_a_file_of_advice_is_the_stance_but_for_its_changes(
     stance_file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

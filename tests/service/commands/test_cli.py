@@ -60,7 +60,8 @@ def test_the_exit_status_of_a_plan(
 ) -> None:
     assert run(["plan", stance_file(request_), "--json"]) == code
     assert result(capfd)["status"] == status
-    assert run(["plan", stance_file(request_)]) == code
+    brief = ["-q"] if status == "infeasible" else []
+    assert run(["plan", stance_file(request_), *brief]) == code
     out, err = capfd.readouterr()
     assert err == ""
     assert out.startswith(status.upper())
@@ -98,6 +99,7 @@ def test_a_plan_says_how_much_hangs_on_the_palms(
         assert hand["limb"] in out
 
 
+@pytest.mark.usefixtures("few_places")
 def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(
     stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -107,7 +109,7 @@ def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(
     run(["plan", path, "--robust"])
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 2048 draws:" in out
+    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 128 draws:" in out
     low, high = robust["tenth_interval"]
     told = f"nine in ten above {robust['tenth']:.3f} ({low:.3f} to {high:.3f})"
     assert told in out.replace("\n", " ")
@@ -393,6 +395,7 @@ def test_a_wrench_space(stance_file, capfd: pytest.CaptureFixture[str]) -> None:
         assert f"{limit['tension']:.1f}" in out
 
 
+@pytest.mark.usefixtures("few_places")
 def test_a_wrench_space_where_the_hand_is_a_little_elsewhere(
     stance_file, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -400,7 +403,7 @@ def test_a_wrench_space_where_the_hand_is_a_little_elsewhere(
     assert run(arguments) == DONE
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "at 128 places within 2 mm and 20 mrad" in out
+    assert "at 8 places within 2 mm and 20 mrad" in out
     assert run([*arguments, "--json"]) == DONE
     assert f"{-result(capfd)['robust']['hundredth']['-fx']:.2f}" in out
 
@@ -547,12 +550,3 @@ def test_help_lists_the_commands_and_bundled_stances(capfd: pytest.CaptureFixtur
     for name in COMMANDS:
         assert f"  {name} " in out
     assert all(name in out for name in bundled())
-
-
-def test_a_plan_is_drawn_where_asked(
-    stance_file, tmp_path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    picture = tmp_path / "plan.png"
-    assert run(["plan", stance_file(wall_request()), "--plot", str(picture), "--json"]) == DONE
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert result(capfd)["status"] == "optimal"

@@ -35,6 +35,7 @@ def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("few_places")
 def test_holds_are_written_sorted_told_and_drawn(
     rock: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

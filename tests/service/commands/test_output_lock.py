@@ -75,7 +75,7 @@ def hold_lock() -> Iterator[Callable[[Path], subprocess.Popen[bytes]]]:
 
 
 @watched
-@pytest.mark.parametrize("name", ["replies.jsonl", "table.csv"])
+@pytest.mark.parametrize("name", ["replies.jsonl"])
 def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(
     name: str, lines: Path, tmp_path: Path
 ) -> None:

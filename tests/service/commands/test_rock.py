@@ -275,7 +275,7 @@ def test_stray_points_are_told_and_dropped(
         assert words in complaint(capfd)
 
 
-@pytest.mark.parametrize("ending", ["ply", "stl", "obj", "off"])
+@pytest.mark.parametrize("ending", ["ply", "obj"])
 def test_the_triangles_of_a_file_are_kept(
     ending: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

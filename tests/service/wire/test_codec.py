@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import msgspec
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models.base import InvalidInputError
 from service.answering import dispatch
@@ -147,7 +147,6 @@ def test_two_thousand_spoilt_requests_get_a_plan_or_an_error() -> None:
     check_spoilt(2000)
 
 
-@settings(max_examples=200, deadline=None)
 @given(payload=st.binary(max_size=300), form=st.sampled_from([JSON, MSGPACK]))
 def test_random_bytes_are_never_more_than_an_error(payload: bytes, form: str) -> None:
     answer = dispatch.handle(PLAN, payload, form)

@@ -65,7 +65,7 @@ def test_every_key_that_is_there_twice_is_named(form: Format) -> None:
 
 @pytest.mark.parametrize("form", Format)
 def test_in_a_scan_too(form: Format) -> None:
-    request = mesh_request(20_000)
+    request = mesh_request(3_000)
     assert len(written(request, form)) > 2**16
     assert decode_request(written(request, form), PlanRequest, form)
     for path in (("id",), ("stance", "hands", 3, "hold"), ("stance", "hands", 2, "hold", "faces")):

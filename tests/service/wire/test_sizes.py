@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models.base import CruxError, LimitError
 from service.answering import dispatch
@@ -37,7 +37,6 @@ ANY_TEXT = st.text(st.characters(codec=None), max_size=5000) | st.builds(
 
 
 @pytest.mark.parametrize("form", Format)
-@settings(max_examples=150, deadline=None)
 @given(
     name=st.none() | st.text(max_size=256),
     field=st.none() | ANY_TEXT,
