@@ -65,10 +65,8 @@ with contextlib.suppress(SystemExit):
     "words",
     [
         "crux pl",
-        "crux plan wall",
         "crux study f",
         "crux route s",
-        "crux query --h",
         "crux holds wall.ply --s",
         "crux wrench-space wall-300 --hand f",
         "crux stream w",

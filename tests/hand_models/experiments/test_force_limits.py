@@ -86,7 +86,7 @@ def test_mirrored_poses_have_the_mirrored_wrenches(grasp, points):
     assert len(points.phalanges) == len(points.poses)
 
 
-@pytest.mark.parametrize("measure", ["shear", "normal", "moment"])
+@pytest.mark.parametrize("measure", ["shear", "moment"])
 def test_sharper_hulls_go_farther_and_their_poses_hold(grasp, points, measure):
     before = limit(points.wrenches, measure).value
     sharper, found = sharpened(grasp, points, measure, 12, 1)

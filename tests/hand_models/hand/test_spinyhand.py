@@ -151,7 +151,7 @@ def test_four_of_eight_palm_tiles_engage_in_a_pinch_of_300_mm():
     )  # alike tiles share alike
 
 
-@pytest.mark.parametrize("steps", [100, pytest.param(501, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("steps", [25, pytest.param(501, marks=pytest.mark.slow)])
 def test_what_a_palm_carries_fades_with_its_distance_from_the_rock(steps):
     palms = [settled.palm for settled in off_a_wall(np.linspace(0.0, 5.01e-3, steps + 1))]
     found = np.array([(palm.shear_limit, palm.pressing_limit) for palm in palms])
@@ -167,8 +167,10 @@ def test_a_grasp_without_palm_has_none():
     assert (palm.shear_limit, palm.pressing_limit) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("rotation", [0.0, 0.7, 1.9, math.pi])
-@pytest.mark.parametrize("hold", [Cylinder(0.3), Sphere(0.5), Edge(0.1, 1.5), Plane()])
+@pytest.mark.parametrize(
+    ("hold", "rotation"),
+    [(Cylinder(0.3), 0.0), (Sphere(0.5), 0.7), (Edge(0.1, 1.5), 1.9), (Plane(), math.pi)],
+)
 def test_left_and_right_mirror_each_other(hold, rotation):
     settled = HAND.settle(hold, ROCK, Grasp(outer_rotation=rotation))
     for left, right in ((0, 3), (1, 2)):
@@ -277,7 +279,7 @@ def test_beyond_that_it_is_refused(angle):
 
 def test_a_base_tile_fades_with_its_distance_from_the_rock():
     """From rock that stands through its plane, within the spines' travel too, to beyond it."""
-    found, offs = [], np.linspace(-2e-4, 6e-3, 125)
+    found, offs = [], np.linspace(-2e-4, 6e-3, 32)
     for settled in off_a_wall(offs):
         assert settled.tiles[0].contact == ("face" if settled.engagement[0] > 0.0 else "none")
         others = settled.engagement[1:4].sum()

@@ -165,7 +165,7 @@ def random_palm(rng, n, own):
 
 @pytest.mark.parametrize("own", [False, True], ids=["tiles", "tiles and palm"])
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
-@pytest.mark.parametrize("palms", [3, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("palms", [1, pytest.param(8, marks=pytest.mark.slow)])
 def test_the_loads_are_those_of_every_consistent_friction_pattern(n, own, palms):
     rng = np.random.default_rng(n)
     for _ in range(palms):

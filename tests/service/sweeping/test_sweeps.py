@@ -159,33 +159,27 @@ VARIATIONS = (
     (["hands.front_left.surface=rock,concrete-fine"], {}),
     (["load.mass=50:150:4", SHEAR + "=30:80:3"], {}),
     (["load.mass=50:150:4", "hands.front_left.surface=rock,concrete-fine"], {}),
-    ([f"{TENSION}=1:40:4", "load.mass=50:150:4"], {}),
     ([f"{TENSION}=1:40:3", "load.mass=50:150:3", SHEAR + "=30:80:2", "hands.*.wrist=fixed"], {}),
-    (["load.mass=50:150", SHEAR + "=30:80"], {"samples": 8}),
     (["load.mass=50:150", SHEAR + "=30:80", f"{TENSION}=1:40"], {"samples": 8}),
     (["load.mass=50"], {}),
 )
 
 
 @pytest.mark.parametrize(("variations", "options"), VARIATIONS, ids=str)
-@pytest.mark.parametrize("ending", [pytest.param("png", marks=pytest.mark.slow), "svg"])
 def test_pictures_have_their_axes_with_units(
-    variations: list[str], options: dict, ending: str, tmp_path: Path
+    variations: list[str], options: dict, tmp_path: Path
 ) -> None:
     found = service.sweep(WALL, variations, **options)
-    file = tmp_path / f"sweep.{ending}"
+    file = tmp_path / "sweep.svg"
     import matplotlib as mpl
 
     with mpl.rc_context({"svg.fonttype": "none"}):
         plot_sweep(found, file, "wall")
-    data = file.read_bytes()
-    assert data
-    if ending == "svg":
-        text = data.decode()
-        varying = [found.design.labels[i] for i in found.design.varying]
-        for label in varying[:2]:
-            assert label in text
-        assert "utilisation" in text
+    text = file.read_text(encoding="utf-8")
+    varying = [found.design.labels[i] for i in found.design.varying]
+    for label in varying[:2]:
+        assert label in text
+    assert "utilisation" in text
 
 
 def test_a_picture_is_over_the_chosen_pair(tmp_path: Path) -> None:
