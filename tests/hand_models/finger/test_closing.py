@@ -224,17 +224,19 @@ def balanced(finger, tension):
     return normals
 
 
-@pytest.mark.parametrize("diameter", [0.3, 0.7])
-def test_on_a_cylinder_a_path_ends_where_a_finger_is_laid(diameter):
-    closed, laid = on_cylinder(diameter)
-    # tangents from a joint to a circle are alike: contacts alternate
-    c = MODEL.joint_spacing - laid.contacts[0].along
-    turns = [2.0 * math.atan(each / (0.5 * diameter + H)) for each in (c, laid.contacts[0].along)]
-    np.testing.assert_allclose(laid.joint_angles[1:], turns, atol=1e-9)
-    np.testing.assert_allclose(closed.finger.joint_angles, laid.joint_angles, atol=1.5e-3)
-    assert kinds(closed) == [("face", None)] * 3
-    np.testing.assert_allclose(closed.normals @ [1.0, 37.0], balanced(laid, 37.0), atol=0.2)
-    np.testing.assert_allclose(closed.finger.engagement, 1.0, atol=0.01)
+def test_on_a_cylinder_a_path_ends_where_a_finger_is_laid():
+    for diameter in [0.3, 0.7]:
+        closed, laid = on_cylinder(diameter)
+        # tangents from a joint to a circle are alike: contacts alternate
+        c = MODEL.joint_spacing - laid.contacts[0].along
+        turns = [
+            2.0 * math.atan(each / (0.5 * diameter + H)) for each in (c, laid.contacts[0].along)
+        ]
+        np.testing.assert_allclose(laid.joint_angles[1:], turns, atol=1e-9)
+        np.testing.assert_allclose(closed.finger.joint_angles, laid.joint_angles, atol=1.5e-3)
+        assert kinds(closed) == [("face", None)] * 3
+        np.testing.assert_allclose(closed.normals @ [1.0, 37.0], balanced(laid, 37.0), atol=0.2)
+        np.testing.assert_allclose(closed.finger.engagement, 1.0, atol=0.01)
 
 
 def test_on_a_cylinder_phalanges_come_to_the_rock_one_after_the_other():
@@ -429,18 +431,15 @@ def test_a_finger_in_the_rock_says_how_deep_and_how_to_leave_it():
     assert isinstance(lower, Refused)
 
 
-@pytest.mark.parametrize(
-    "radius",
-    [
+def test_a_finger_amid_rock_cannot_be_lifted_out_of_it():
+    for radius in [
         0.14,
         1.0,
-    ],
-)
-def test_a_finger_amid_rock_cannot_be_lifted_out_of_it(radius):
-    refused = close_one(Disc(0.05 + 0j, radius), ROCK, 37.0)
-    assert isinstance(refused, Refused)
-    assert refused.depth > 0.0
-    assert math.isinf(refused.lift)
+    ]:
+        refused = close_one(Disc(0.05 + 0j, radius), ROCK, 37.0)
+        assert isinstance(refused, Refused)
+        assert refused.depth > 0.0
+        assert math.isinf(refused.lift)
 
 
 def test_a_straight_finger_clings_where_no_rock_is_in_its_way():

@@ -66,14 +66,14 @@ def reached(angles, contacts, heights):
     return np.array(places)
 
 
-@pytest.mark.parametrize("radius", [0.1, 0.15, 0.35, 2.0])
-def test_on_a_circle_contacts_alternate_and_joints_turn_by_the_closed_form(radius):
-    finger = on_circle(radius)
-    assert [c.kind for c in finger.contacts] == ["face"] * 3
-    c = [contact.along for contact in finger.contacts]
-    np.testing.assert_allclose(c, [0.0247, L - 0.0247, 0.0247], atol=1e-9)
-    turns = [2.0 * math.atan(along / (radius + H)) for along in (L - 0.0247, 0.0247)]
-    np.testing.assert_allclose(finger.joint_angles, [0.25, *turns], atol=1e-9)
+def test_on_a_circle_contacts_alternate_and_joints_turn_by_the_closed_form():
+    for radius in [0.1, 0.15, 0.35, 2.0]:
+        finger = on_circle(radius)
+        assert [c.kind for c in finger.contacts] == ["face"] * 3
+        c = [contact.along for contact in finger.contacts]
+        np.testing.assert_allclose(c, [0.0247, L - 0.0247, 0.0247], atol=1e-9)
+        turns = [2.0 * math.atan(along / (radius + H)) for along in (L - 0.0247, 0.0247)]
+        np.testing.assert_allclose(finger.joint_angles, [0.25, *turns], atol=1e-9)
 
 
 @given(seeds)

@@ -50,14 +50,14 @@ def test_a_bar_is_as_high_as_its_tile_and_as_thick_as_the_frame():
     assert SHAPE.end == MODEL.joint_spacing
 
 
-@pytest.mark.parametrize("off", [-1e-4, 0.0, 1e-4, 3e-3])
-def test_the_gap_of_a_face_that_lies_flat_is_its_distance(off):
-    found = beside(flat(H + off), 0.0)
-    assert found.gap == pytest.approx(off, abs=2e-7)
-    assert found.tile_gap == pytest.approx(off, abs=2e-6)
-    assert found.place.real == pytest.approx(MODEL.tile_centre, abs=5e-4)
-    assert found.place.imag == pytest.approx(H, abs=1e-5)
-    assert found.push == pytest.approx(1j, abs=0.03)
+def test_the_gap_of_a_face_that_lies_flat_is_its_distance():
+    for off in [-1e-4, 0.0, 1e-4, 3e-3]:
+        found = beside(flat(H + off), 0.0)
+        assert found.gap == pytest.approx(off, abs=2e-7)
+        assert found.tile_gap == pytest.approx(off, abs=2e-6)
+        assert found.place.real == pytest.approx(MODEL.tile_centre, abs=5e-4)
+        assert found.place.imag == pytest.approx(H, abs=1e-5)
+        assert found.push == pytest.approx(1j, abs=0.03)
 
 
 def test_the_force_wanders_to_the_edge_of_a_face_that_tilts_without_a_jump():

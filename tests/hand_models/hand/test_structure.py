@@ -181,13 +181,11 @@ def test_rows_of_a_hand_in_the_air_are_constant_and_leave_its_only_wrench():
     assert space.support([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]) == 0.0
 
 
-@pytest.mark.parametrize(
-    "name", ["finger_shear", "fingertip_force", "held_mass", "standard_gravity"]
-)
-def test_a_structure_that_bears_nothing_is_refused_by_name(name):
-    with pytest.raises(InvalidInputError) as caught:
-        changed_hand("structure", name, 0.0)
-    assert caught.value.field == f"structure.{name}"
+def test_a_structure_that_bears_nothing_is_refused_by_name():
+    for name in ["finger_shear", "fingertip_force", "held_mass", "standard_gravity"]:
+        with pytest.raises(InvalidInputError) as caught:
+            changed_hand("structure", name, 0.0)
+        assert caught.value.field == f"structure.{name}"
 
 
 def test_limits_of_one_hand_have_one_name_each():

@@ -380,9 +380,8 @@ def test_what_brief_replies_do_not_tell_is_not_found(monkeypatch, detail):
     assert asked[0].want == ({"load_factor"} if detail == "hands" else set())
 
 
-@pytest.mark.parametrize(
-    ("draws", "field"),
-    [
+def test_draws_that_cannot_be_are_refused_by_their_field():
+    for draws, field in [
         ([own_draw(60.0), own_draw(60.0, "kN")], "draws[1].surfaces.rock.shear_limit"),
         ([own_draw(-1.0)], "draws[0].surfaces.rock.shear_limit"),
         ([own_draw(0.0)], "draws[0].surfaces.rock.shear_limit"),
@@ -391,16 +390,14 @@ def test_what_brief_replies_do_not_tell_is_not_found(monkeypatch, detail):
         ([{"stance": {}}], "draws[0].stance"),
         ([{}], "draws[0]"),
         ([own_draw(60.0)] * 101, "draws"),
-    ],
-)
-def test_draws_that_cannot_be_are_refused_by_their_field(draws, field):
-    asked = flat_request() | {"want": ["spread"], "draws": draws}
-    answer = dispatch.handle(PLAN, json.dumps(asked).encode())
-    assert not answer.good
-    error = json.loads(answer.payload)["error"]
-    assert error["kind"] == "invalid"
-    assert error["field"] == field
-    assert "\n" not in error["message"]
+    ]:
+        asked = flat_request() | {"want": ["spread"], "draws": draws}
+        answer = dispatch.handle(PLAN, json.dumps(asked).encode())
+        assert not answer.good
+        error = json.loads(answer.payload)["error"]
+        assert error["kind"] == "invalid"
+        assert error["field"] == field
+        assert "\n" not in error["message"]
 
 
 def test_robust_is_told_of_fixed_wrists_only():

@@ -63,12 +63,12 @@ def test_ids_are_echoed(key: str) -> None:
     assert late["error"]["message"] == "1 s were over before an answer was begun; allow longer"
 
 
-@pytest.mark.parametrize("key", KEYS)
-@pytest.mark.parametrize("seconds", [601.0, 1e6])
-def test_no_deadline_is_longer_than_ten_minutes(key: str, seconds: float) -> None:
-    error = answered(key, asked(key, deadline=seconds))["error"]
-    assert (error["kind"], error["field"]) == ("invalid", "deadline")
-    assert error["message"] == f"expected a number <= 600.0, in s, got {seconds:.0f}"
+def test_no_deadline_is_longer_than_ten_minutes() -> None:
+    for seconds in [601.0, 1e6]:
+        for key in KEYS:
+            error = answered(key, asked(key, deadline=seconds))["error"]
+            assert (error["kind"], error["field"]) == ("invalid", "deadline")
+            assert error["message"] == f"expected a number <= 600.0, in s, got {seconds:.0f}"
 
 
 def refused(reply: dict) -> bool:
