@@ -48,7 +48,7 @@ def test_advice_is_written_as_requests_whose_plans_give_what_is_printed(
 def test_advice_leaves_a_scan_in_its_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     folder = tmp_path / "stances"
     folder.mkdir()
-    vertices, faces = cylinder_mesh(0.3)
+    vertices, faces = cylinder_mesh(0.3, 64)
     trimesh.Trimesh(vertices, faces, process=False).export(folder / "log.ply")
     request = wall_request(HEAVY)
     hand = request["stance"]["hands"][0]

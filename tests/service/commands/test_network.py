@@ -127,7 +127,7 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file) -> None:
     )
 
 
-@pytest.mark.parametrize("mode", ["client", "peer"])
+@pytest.mark.parametrize("mode", ["client", pytest.param("peer", marks=pytest.mark.slow)])
 def test_a_query_waits_for_a_service_that_is_not_there_yet(mode: str, stance_file) -> None:
     endpoint = free_endpoint()
     flags = ["-m", mode, "-e", endpoint, "--no-multicast-scouting", "--wait", str(PATIENCE)]
@@ -215,6 +215,7 @@ def test_bad_flags(
     assert complaint(capfd).startswith(line)
 
 
+@pytest.mark.slow
 def test_demo(tmp_path: Path) -> None:
     picture = tmp_path / "demo.png"
     shown = process("demo", "-o", str(picture), "--json")

@@ -57,7 +57,7 @@ KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, STREAM, SET_POINTS]
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    server = Served(free_endpoint())
+    server = Served(free_endpoint(), "--workers", "1")
     yield server
     server.stop(signal.SIGTERM)
     assert server.process.returncode == 0
@@ -247,6 +247,7 @@ def test_a_reply_that_is_none(alone: zenoh.Session, payload: bytes) -> None:
 # Faults and floods --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_service_that_ends_is_not_there_any_more(alone: zenoh.Session) -> None:
     client = CruxClient(alone, timeout=PATIENCE)
     with PlanService(alone, workers=1):
@@ -284,15 +285,9 @@ def test_a_server_says_what_it_serves(served: Served) -> None:
     assert served.ready == {"v": 1, "keys": KEYS, "listen": [served.endpoint]}
 
 
+@pytest.mark.slow  # `served` is stopped by a signal at all times
 @pytest.mark.parametrize(
-    ("number", "busy"),
-    [
-        (signal.SIGINT, True),
-        # without questions that wait, `served` is stopped so as well
-        pytest.param(signal.SIGTERM, True, marks=pytest.mark.slow),
-        pytest.param(signal.SIGTERM, False, marks=pytest.mark.slow),
-        pytest.param(signal.SIGINT, False, marks=pytest.mark.slow),
-    ],
+    ("number", "busy"), [(signal.SIGINT, True), (signal.SIGTERM, True), (signal.SIGINT, False)]
 )
 def test_a_signal_stops_the_server_cleanly(number: int, busy: bool) -> None:
     server = Served(free_endpoint(), "--workers", "1")
