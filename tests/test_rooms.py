@@ -8,8 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from tests.suite.helpers.checkout import ROOT
 
 PACKAGES = ("hand_models", "planner", "service")
@@ -39,39 +37,39 @@ def exported(index: Path) -> dict[str, str]:
     return found
 
 
-@pytest.mark.parametrize("room", ROOMS, ids=dotted)
-def test_a_room_is_a_dozen_modules_of_one_concept_each(room):
-    modules = [path for path in room.glob("*.py") if path.name != "__init__.py"]
-    assert 1 <= len(modules) <= MODULES
-    for module in modules:
-        assert len(module.read_text("utf-8").splitlines()) <= LINES, module
+def test_a_room_is_a_dozen_modules_of_one_concept_each():
+    for room in ROOMS:
+        modules = [path for path in room.glob("*.py") if path.name != "__init__.py"]
+        assert 1 <= len(modules) <= MODULES
+        for module in modules:
+            assert len(module.read_text("utf-8").splitlines()) <= LINES, module
 
 
-@pytest.mark.parametrize("index", INDICES, ids=dotted)
-def test_what_an_index_exports_is_what_the_module_defines_and_no_module_hides_it(index):
-    package = importlib.import_module(dotted(index))
-    names = exported(index)
-    assert names
-    assert sorted(package.__all__) == sorted(names)
-    for name, module in names.items():
-        assert getattr(package, name) is getattr(importlib.import_module(module), name)
-        if module == dotted(index):
-            # a room that is exported whole
-            continue
-        assert not (index / f"{name}.py").exists()
-        assert not (index / name / "__init__.py").exists()
+def test_what_an_index_exports_is_what_the_module_defines_and_no_module_hides_it():
+    for index in INDICES:
+        package = importlib.import_module(dotted(index))
+        names = exported(index)
+        assert names
+        assert sorted(package.__all__) == sorted(names)
+        for name, module in names.items():
+            assert getattr(package, name) is getattr(importlib.import_module(module), name)
+            if module == dotted(index):
+                # a room that is exported whole
+                continue
+            assert not (index / f"{name}.py").exists()
+            assert not (index / name / "__init__.py").exists()
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_nothing_is_found_by_an_objects_identity(package):
-    for path in (ROOT / package).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            asked = isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-            assert not (asked and node.func.id == "id"), f"{path}:{node.lineno}"
-            weak = isinstance(node, ast.Name) and node.id.endswith(
-                ("KeyDictionary", "ValueDictionary")
-            )
-            assert not weak, path
+def test_nothing_is_found_by_an_objects_identity():
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                asked = isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+                assert not (asked and node.func.id == "id"), f"{path}:{node.lineno}"
+                weak = isinstance(node, ast.Name) and node.id.endswith(
+                    ("KeyDictionary", "ValueDictionary")
+                )
+                assert not weak, path
 
 
 def test_every_room_has_an_index():
@@ -82,21 +80,18 @@ def test_every_room_has_an_index():
     } == set(ROOMS)
 
 
-@pytest.mark.parametrize(
-    ("statement", "absent"),
-    [
+def test_importing_a_name_does_not_load_the_house():
+    for statement, absent in [
         ("from hand_models import Pose", ("scipy", "trimesh", "hand_models.hand", "matplotlib")),
         ("from planner import Load, Limits", ("cvxpy", "clarabel", "planner.solving")),
         ("from service import PlanRequest", ("numpy", "zenoh", "planner.solving")),
         ("from service import CruxClient", ("cvxpy", "pinocchio", "planner.solving")),
-    ],
-)
-def test_importing_a_name_does_not_load_the_house(statement, absent):
-    code = f"import sys; {statement}; print([n for n in {absent!r} if n in sys.modules])"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "[]"
+    ]:
+        code = f"import sys; {statement}; print([n for n in {absent!r} if n in sys.modules])"
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.strip() == "[]"
 
 
 def test_threads_may_be_the_first_to_import():
@@ -122,17 +117,14 @@ print(failed)
     assert done.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize(
-    ("old", "room", "names"),
-    [
+def test_imports_of_old_give_the_same():
+    for old, room, names in [
         ("hand_models.wrist_inverse", "hand_models.compliance", ("wrist_pose",)),
         ("hand_models.wrist_limit", "hand_models.compliance", ("farthest",)),
         ("service.many", "service", ("Planners", "plan_many")),
         ("service.config", "service.serving", ("zenoh_config",)),
         ("service.errors", "service", ("NoServiceError", "ServiceError", "ServiceTimeout")),
-    ],
-)
-def test_imports_of_old_give_the_same(old, room, names):
-    before, now = importlib.import_module(old), importlib.import_module(room)
-    for name in names:
-        assert getattr(before, name) is getattr(now, name)
+    ]:
+        before, now = importlib.import_module(old), importlib.import_module(room)
+        for name in names:
+            assert getattr(before, name) is getattr(now, name)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models import InvalidInputError, Pose
@@ -74,7 +74,6 @@ def test_what_is_no_pose_is_refused_by_field(position, orientation, field):
     assert caught.value.field == field
 
 
-@settings(max_examples=50, deadline=None)
 @given(seeds)
 def test_a_quaternion_and_its_negative_are_one_orientation_given_back_with_w_positive(seed):
     q = np.random.default_rng(seed).normal(size=4)
@@ -85,7 +84,6 @@ def test_a_quaternion_and_its_negative_are_one_orientation_given_back_with_w_pos
     np.testing.assert_allclose(one.quaternion(), np.copysign(1.0, q[3]) * q, atol=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seeds)
 def test_poses_compose_and_invert_as_homogeneous_matrices(seed):
     rng = np.random.default_rng(seed)
@@ -97,7 +95,6 @@ def test_poses_compose_and_invert_as_homogeneous_matrices(seed):
     np.testing.assert_allclose(Pose.identity().apply(points), points)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seeds)
 def test_a_wrench_does_the_same_work_in_every_frame(seed):
     """The parent's origin, moved with the body, has velocity R v − ω × p, with ω turned by R."""
@@ -110,7 +107,6 @@ def test_a_wrench_does_the_same_work_in_every_frame(seed):
     assert carried @ np.concatenate([at_parent, turned]) == pytest.approx(power, abs=1e-12)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seeds)
 def test_transport_follows_composition(seed):
     rng = np.random.default_rng(seed)

@@ -223,7 +223,7 @@ def test_the_search_of_a_whole_hand_reaches_as_far_as_the_linear_programs_nearly
 
 
 def test_the_farthest_wrench_is_a_local_maximum():
-    for way in ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.3, -1.0, 10.0]):
+    for way in ([1.0, 0.0, 0.0], [0.3, -1.0, 10.0]):
         direction = planar(way)
         found = farthest(GRIPPER, direction)
         assert found.limiting is not None

@@ -50,7 +50,7 @@ HOLDS: dict[str, tuple[Hold, Grasp, Pose | None]] = {
     "beside": (Sphere(0.2), CURLED, Pose(np.array([0.0, 0.3, 0.0]), np.eye(3))),
 }
 
-RESTLESS = (4, 11, 33, 48, 50, 51)
+RESTLESS = (4, 11, 33)
 """Random hands that do not hold at rest."""
 
 

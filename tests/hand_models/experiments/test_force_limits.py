@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial import ConvexHull
 
 from hand_models import InvalidInputError
@@ -53,7 +53,6 @@ def test_limits_of_a_box():
         assert limit(BOX, measure).value == pytest.approx(expected)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_a_limit_is_a_combination_of_its_corners_and_its_direction_bounds_it(seed):
     points = np.random.default_rng(seed).normal(size=(30, 3)) * (20.0, 10.0, 0.5)
@@ -87,7 +86,7 @@ def test_mirrored_poses_have_the_mirrored_wrenches(grasp, points):
     assert len(points.phalanges) == len(points.poses)
 
 
-@pytest.mark.parametrize("measure", ["shear", "normal", "moment"])
+@pytest.mark.parametrize("measure", ["shear", "moment"])
 def test_sharper_hulls_go_farther_and_their_poses_hold(grasp, points, measure):
     before = limit(points.wrenches, measure).value
     sharper, found = sharpened(grasp, points, measure, 12, 1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.optimize import linprog
 
 from hand_models.experiments import (
@@ -140,7 +140,6 @@ def test_a_cut_along_a_face_takes_all_of_a_hull_or_nothing(shift):
     assert clipped_vertices(np.add(HALF, (0.0, 20.0 + shift, 0.0))).shape == (0, 3)
 
 
-@settings(max_examples=20, deadline=None)
 @given(CLOUDS)
 def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hull(points):
     """The origin is inside the whole hull, where nothing is in doubt, and on the part's face."""
@@ -160,7 +159,6 @@ def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hul
 # Against linear programs --------------------------------------------------------------------------
 
 
-@settings(max_examples=20, deadline=None)
 @given(CLOUDS, st.floats(-0.5, 0.5), st.integers(0, 1000))
 def test_a_cut_holds_what_the_hull_holds_below_the_plane(points, offset, seed):
     points = points - (0.0, offset, 0.0)
@@ -171,7 +169,6 @@ def test_a_cut_holds_what_the_hull_holds_below_the_plane(points, offset, seed):
         assert inside(below, wrench) == (wrench[1] <= 0.0)
 
 
-@settings(max_examples=20, deadline=None)
 @given(CLOUDS, st.integers(0, 1000))
 def test_reach_is_that_of_a_linear_program(points, seed):
     rng = np.random.default_rng(seed)
@@ -183,7 +180,6 @@ def test_reach_is_that_of_a_linear_program(points, seed):
     )
 
 
-@settings(max_examples=20, deadline=None)
 @given(CLOUDS, st.integers(0, 1000))
 def test_a_section_is_bounded_by_reaches_in_its_plane(points, seed):
     direction = np.random.default_rng(seed).normal(size=3) / UNITS

@@ -51,7 +51,7 @@ def close_one(*opened, model=MODEL):
 # Everywhere ---------------------------------------------------------------------------------------
 
 
-@given_some(20, 2000, seeds)
+@given_some(8, 2000, seeds)
 @example(235630260)
 def test_wherever_a_finger_closes_it_is_clear_of_rock_whole_and_in_balance(seed):
     on_hold = random_opening(MODEL, seed)
@@ -224,17 +224,19 @@ def balanced(finger, tension):
     return normals
 
 
-@pytest.mark.parametrize("diameter", [0.3, 0.7])
-def test_on_a_cylinder_a_path_ends_where_a_finger_is_laid(diameter):
-    closed, laid = on_cylinder(diameter)
-    # tangents from a joint to a circle are alike: contacts alternate
-    c = MODEL.joint_spacing - laid.contacts[0].along
-    turns = [2.0 * math.atan(each / (0.5 * diameter + H)) for each in (c, laid.contacts[0].along)]
-    np.testing.assert_allclose(laid.joint_angles[1:], turns, atol=1e-9)
-    np.testing.assert_allclose(closed.finger.joint_angles, laid.joint_angles, atol=1.5e-3)
-    assert kinds(closed) == [("face", None)] * 3
-    np.testing.assert_allclose(closed.normals @ [1.0, 37.0], balanced(laid, 37.0), atol=0.2)
-    np.testing.assert_allclose(closed.finger.engagement, 1.0, atol=0.01)
+def test_on_a_cylinder_a_path_ends_where_a_finger_is_laid():
+    for diameter in [0.3, 0.7]:
+        closed, laid = on_cylinder(diameter)
+        # tangents from a joint to a circle are alike: contacts alternate
+        c = MODEL.joint_spacing - laid.contacts[0].along
+        turns = [
+            2.0 * math.atan(each / (0.5 * diameter + H)) for each in (c, laid.contacts[0].along)
+        ]
+        np.testing.assert_allclose(laid.joint_angles[1:], turns, atol=1e-9)
+        np.testing.assert_allclose(closed.finger.joint_angles, laid.joint_angles, atol=1.5e-3)
+        assert kinds(closed) == [("face", None)] * 3
+        np.testing.assert_allclose(closed.normals @ [1.0, 37.0], balanced(laid, 37.0), atol=0.2)
+        np.testing.assert_allclose(closed.finger.engagement, 1.0, atol=0.01)
 
 
 def test_on_a_cylinder_phalanges_come_to_the_rock_one_after_the_other():
@@ -302,10 +304,10 @@ def assert_alike(one, other, atol=1e-9):
         np.testing.assert_allclose(mine, theirs, atol=100.0 * atol * size)
 
 
-@given_some(4, 30, seeds)
+@given_some(3, 30, seeds)
 def test_fingers_close_together_as_they_do_alone(seed):
     rng = np.random.default_rng(seed)
-    closings = random_closings(rng, 5)
+    closings = random_closings(rng, 3)
     together = close_all(MODEL, closings)
     backward = close_all(MODEL, closings[::-1])[::-1]
     for closing, closed, other in zip(closings, together, backward, strict=True):
@@ -314,7 +316,7 @@ def test_fingers_close_together_as_they_do_alone(seed):
         assert_alike(other, alone)
 
 
-@given_some(7, 40, seeds)
+@given_some(4, 40, seeds)
 def test_what_is_scaled_closes_alike(seed):
     """Lengths by a, forces by b: springs' torques by a b, stiffness of the bed by b / a."""
     rng = np.random.default_rng(seed)
@@ -360,7 +362,7 @@ def test_the_same_rock_told_otherwise_is_the_same(seed):
         np.testing.assert_allclose(flat.finger.joint_angles, drawn.finger.joint_angles, atol=2e-4)
 
 
-@given_some(10, 60, seeds)
+@given_some(5, 60, seeds)
 def test_a_mirrored_hold_holds_a_mirrored_finger(seed):
     """Seen along −y in a hold that is alike on both sides of its plane y = 0."""
     rng = np.random.default_rng(seed)
@@ -385,9 +387,9 @@ def test_a_little_change_of_the_rock_changes_little():
     discs = [
         ((float(x), float(z) + float(r)), float(r))
         for x, z, r in zip(
-            rng.uniform(-0.02, 0.1, 60),
-            rng.uniform(0.005, 0.03, 60),
-            rng.uniform(0.02, 0.3, 60),
+            rng.uniform(-0.02, 0.1, 30),
+            rng.uniform(0.005, 0.03, 30),
+            rng.uniform(0.02, 0.3, 30),
             strict=True,
         )
     ]
@@ -402,7 +404,7 @@ def test_a_little_change_of_the_rock_changes_little():
         for mine, theirs in zip(one, other, strict=True)
         if isinstance(mine, ClosedFinger) and isinstance(theirs, ClosedFinger)
     ]
-    assert len(moved) > 50
+    assert len(moved) > 20
     assert np.mean(np.array(moved) < 1e-3) > 0.95
 
 
@@ -429,18 +431,15 @@ def test_a_finger_in_the_rock_says_how_deep_and_how_to_leave_it():
     assert isinstance(lower, Refused)
 
 
-@pytest.mark.parametrize(
-    "radius",
-    [
+def test_a_finger_amid_rock_cannot_be_lifted_out_of_it():
+    for radius in [
         0.14,
         1.0,
-    ],
-)
-def test_a_finger_amid_rock_cannot_be_lifted_out_of_it(radius):
-    refused = close_one(Disc(0.05 + 0j, radius), ROCK, 37.0)
-    assert isinstance(refused, Refused)
-    assert refused.depth > 0.0
-    assert math.isinf(refused.lift)
+    ]:
+        refused = close_one(Disc(0.05 + 0j, radius), ROCK, 37.0)
+        assert isinstance(refused, Refused)
+        assert refused.depth > 0.0
+        assert math.isinf(refused.lift)
 
 
 def test_a_straight_finger_clings_where_no_rock_is_in_its_way():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models.finger.phalanx_gaps import (
     NearPoints,
@@ -50,19 +50,19 @@ def test_a_bar_is_as_high_as_its_tile_and_as_thick_as_the_frame():
     assert SHAPE.end == MODEL.joint_spacing
 
 
-@pytest.mark.parametrize("off", [-1e-4, 0.0, 1e-4, 3e-3])
-def test_the_gap_of_a_face_that_lies_flat_is_its_distance(off):
-    found = beside(flat(H + off), 0.0)
-    assert found.gap == pytest.approx(off, abs=2e-7)
-    assert found.tile_gap == pytest.approx(off, abs=2e-6)
-    assert found.place.real == pytest.approx(MODEL.tile_centre, abs=5e-4)
-    assert found.place.imag == pytest.approx(H, abs=1e-5)
-    assert found.push == pytest.approx(1j, abs=0.03)
+def test_the_gap_of_a_face_that_lies_flat_is_its_distance():
+    for off in [-1e-4, 0.0, 1e-4, 3e-3]:
+        found = beside(flat(H + off), 0.0)
+        assert found.gap == pytest.approx(off, abs=2e-7)
+        assert found.tile_gap == pytest.approx(off, abs=2e-6)
+        assert found.place.real == pytest.approx(MODEL.tile_centre, abs=5e-4)
+        assert found.place.imag == pytest.approx(H, abs=1e-5)
+        assert found.push == pytest.approx(1j, abs=0.03)
 
 
 def test_the_force_wanders_to_the_edge_of_a_face_that_tilts_without_a_jump():
     """About the face's far end, which stays on the rock: from the middle to that."""
-    tilts = np.arange(0.0, 0.03, 1e-5)
+    tilts = np.arange(0.0, 0.03, 1e-4)
     corner = complex(SHAPE.far, SHAPE.lift)
     joints = corner - corner * np.exp(1j * tilts)
     found = beside(flat(H), tilts, joints)
@@ -70,9 +70,9 @@ def test_the_force_wanders_to_the_edge_of_a_face_that_tilts_without_a_jump():
     place = found.place.real
     assert place[0] == pytest.approx(MODEL.tile_centre, abs=5e-4)
     assert place[-1] == pytest.approx(SHAPE.far, abs=2e-3)
-    assert np.abs(np.diff(place)).max() < 1e-4
+    assert np.abs(np.diff(place)).max() < 1e-3
     assert np.diff(place).min() > -5e-5
-    assert np.abs(np.diff(np.angle(found.push))).max() < 1e-3
+    assert np.abs(np.diff(np.angle(found.push))).max() < 1e-2
     # it presses along the rock's normal, wherever on the bar it does
     np.testing.assert_allclose(found.push * np.exp(1j * tilts), 1j, atol=0.03)
 
@@ -123,7 +123,6 @@ def bed(section, q, depth):
     return SHAPE.beside(near, joints, u, depths), joints, u
 
 
-@settings(max_examples=150, deadline=None)
 @given(seeds)
 def test_the_gap_falls_by_the_arm_of_the_push(seed):
     """Of a bed that is pressed in by no more than what makes its level: virtual work."""
@@ -176,7 +175,6 @@ def test_phalanges_fan_out_from_the_first_joint():
     np.testing.assert_allclose(joints, [0.0, 0.04 * u[0], 0.04 * (u[0] + u[1])])
 
 
-@settings(max_examples=60, deadline=None)
 @given(seeds)
 def test_of_the_points_that_may_press_phalanges_are_as_beside_all_rock(seed):
     """Where they are, and wherever they may yet turn to."""

@@ -62,7 +62,7 @@ def test_a_grid_covers_the_rock_and_hands_come_against_its_normal(wall):
 
 
 def test_what_is_found_is_what_a_hand_placed_there_can_carry(wall):
-    trials = grid_of_trials(wall, 0.2, 1, radius=RADIUS)
+    trials = grid_of_trials(wall, 0.2, 1, radius=RADIUS)[::2]
     found = try_holds(HAND, wall, ROCK, trials)
     held = 0
     for trial, each in zip(trials, found, strict=True):
@@ -78,7 +78,7 @@ def test_what_is_found_is_what_a_hand_placed_there_can_carry(wall):
             axis, sign = DIRECTIONS[way]
             assert space.support(sign * np.eye(6)[axis]) == pytest.approx(reach, rel=1e-9)
     # where fingers point outward at the border they are too near it
-    assert 4 <= held < len(trials)
+    assert 2 <= held < len(trials)
 
 
 def test_the_border_of_a_scan_is_no_edge_to_hold(wall):

@@ -55,11 +55,11 @@ def test_it_is_steady_under_another_scramble():
 def test_places_where_the_hand_cannot_be_count_as_a_reach_of_zero():
     """On a plane with its palm on it, half of the places are in the rock."""
     settled = HAND.settle(Plane(), ROCK, Grasp(), Pose.identity())
-    found = robustness(HAND, settled, BOTH, draws=32)
-    assert 4 < found.without < 32
+    found = robustness(HAND, settled, BOTH, draws=16)
+    assert 2 < found.without < 16
     # more than a tenth of them reach nowhere
     np.testing.assert_array_equal(found.tenth[found.tenth > 0.0], [])
-    alone = [robustness(HAND, settled, BOTH, draws=1, seed=seed) for seed in range(8)]
+    alone = [robustness(HAND, settled, BOTH, draws=1, seed=seed) for seed in range(4)]
     assert {each.without for each in alone} == {0, 1}
     for each in alone:
         assert (each.tenth == 0.0).all() == (each.without == 1)

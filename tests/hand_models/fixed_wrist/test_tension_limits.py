@@ -38,7 +38,7 @@ def own_tiles(settled, i):
     return np.flatnonzero((settled.finger_of == i) & settled.touching)
 
 
-@given_some(10, 60, seeds)
+@given_some(5, 60, seeds)
 def test_from_closing_up_to_f_t_max_a_scan_finds_no_tile_beyond_its_law(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -55,7 +55,7 @@ def test_from_closing_up_to_f_t_max_a_scan_finds_no_tile_beyond_its_law(seed):
         assert (limit.phalanx is None) == math.isinf(limit.tension)
 
 
-@given_some(12, 100, seeds)
+@given_some(5, 100, seeds)
 def test_just_below_f_t_max_every_tile_holds_and_just_above_its_tile_lets_go(seed):
     settled = settled_at(seed)
     if settled is None:

@@ -22,13 +22,13 @@ HEIGHT = 1e-6
 """How far off a palm may be seated [m]."""
 
 
-@pytest.mark.parametrize("diameter", [0.15, 0.2, 0.3, 0.7, 1.5])
-@pytest.mark.parametrize("rotation", [0.0, math.pi])
-def test_a_meshed_cylinder_seats_as_the_cylinder(diameter, rotation):
-    want = seating_on(Cylinder(diameter), Grasp(rotation))
-    got = seating_on(Mesh(*cylinder_mesh(diameter, 512)), Grasp(rotation))
-    assert got.rule == want.rule
-    np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
+def test_a_meshed_cylinder_seats_as_the_cylinder():
+    for rotation in [0.0, math.pi]:
+        for diameter in [0.15, 0.2, 0.3, 0.7, 1.5]:
+            want = seating_on(Cylinder(diameter), Grasp(rotation))
+            got = seating_on(Mesh(*cylinder_mesh(diameter, 512)), Grasp(rotation))
+            assert got.rule == want.rule
+            np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
 
 
 def test_a_meshed_ball_seats_as_the_ball():
@@ -39,7 +39,7 @@ def test_a_meshed_ball_seats_as_the_ball():
     np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
 
 
-@given_some(8, 60, seeds)
+@given_some(5, 60, seeds)
 def test_a_seated_palm_is_on_the_rock_or_off_it_in_a_pinch(seed):
     rng = np.random.default_rng(seed)
     hold = random_mesh(rng) if rng.random() < 0.5 else random_profile(rng)

@@ -70,7 +70,7 @@ def test_pressing_counts_for_nothing_and_both_sides_of_the_hand_are_alike():
         assert gaps.min(axis=1).max() < 1e-12
 
 
-@given_some(15, 60, seeds)
+@given_some(8, 60, seeds)
 def test_rows_say_what_the_tiles_and_the_whole_wrench_say(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -97,7 +97,7 @@ def test_rows_say_what_the_tiles_and_the_whole_wrench_say(seed):
     assert max(most, 0.0) <= 1.12 * held(force) / LIMIT + 1e-9
 
 
-@given_some(15, 60, seeds)
+@given_some(8, 60, seeds)
 def test_wrench_rows_are_functions_of_the_wrench_alone(seed):
     settled = settled_at(seed)
     if settled is None:
@@ -181,13 +181,11 @@ def test_rows_of_a_hand_in_the_air_are_constant_and_leave_its_only_wrench():
     assert space.support([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]) == 0.0
 
 
-@pytest.mark.parametrize(
-    "name", ["finger_shear", "fingertip_force", "held_mass", "standard_gravity"]
-)
-def test_a_structure_that_bears_nothing_is_refused_by_name(name):
-    with pytest.raises(InvalidInputError) as caught:
-        changed_hand("structure", name, 0.0)
-    assert caught.value.field == f"structure.{name}"
+def test_a_structure_that_bears_nothing_is_refused_by_name():
+    for name in ["finger_shear", "fingertip_force", "held_mass", "standard_gravity"]:
+        with pytest.raises(InvalidInputError) as caught:
+            changed_hand("structure", name, 0.0)
+        assert caught.value.field == f"structure.{name}"
 
 
 def test_limits_of_one_hand_have_one_name_each():

@@ -34,7 +34,7 @@ def wall(count: int, without: tuple[float, float, float] | None = None) -> Mesh:
     return Mesh(vertices, faces)
 
 
-@given_some(30, 100, seeds)
+@given_some(12, 100, seeds)
 def test_a_closed_mesh_has_no_border(seed):
     assert random_mesh(np.random.default_rng(seed)).border.shape == (0, 2, 3)
 

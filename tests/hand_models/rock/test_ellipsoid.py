@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models import Cylinder, Ellipsoid, Grasp, InvalidInputError, Sphere
 from service.answering import dispatch
@@ -26,7 +26,6 @@ def level(hold: Ellipsoid, points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(centred / hold.semi_axes, axis=-1)
 
 
-@settings(max_examples=100, deadline=None)
 @given(axes, seeds)
 def test_entry_is_the_first_point_of_a_line_on_the_rock(semi_axes, seed):
     rng = np.random.default_rng(seed)
@@ -44,7 +43,6 @@ def test_a_line_that_misses_enters_nowhere():
     assert Ellipsoid((0.1, 0.2, 0.3)).entry((0.11, 0.0, 0.0), (0.0, 0.0, 1.0)) == math.inf
 
 
-@settings(max_examples=100, deadline=None)
 @given(axes, seeds)
 def test_a_section_is_the_rock_in_its_plane(semi_axes, seed):
     rng = np.random.default_rng(seed)
@@ -105,7 +103,6 @@ def test_a_seated_hand_touches_at_c1_with_its_palm_where_the_grasp_wants_it(semi
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
 @given(axes, st.floats(0.0, math.pi))
 def test_faces_are_on_the_rock_and_edges_within_the_spines_reach(semi_axes, rotation):
     hold = Ellipsoid(semi_axes)

@@ -25,7 +25,7 @@ def strays(count, seed=0, step=0.002, half=0.12):
     return np.vstack([rock, place])
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_circles_are_the_largest_without_corners_whose_middle_is_in_the_triangle(seed):
     """Against a fine grid of middles in each triangle."""
     corners = np.random.default_rng(seed).random((3, 3))
@@ -36,7 +36,7 @@ def test_circles_are_the_largest_without_corners_whose_middle_is_in_the_triangle
     assert found == pytest.approx(2.0 * nearest.max(), rel=0.02)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_the_rim_of_a_closed_wall_is_no_hole_whatever_its_rounding(seed, tmp_path):
     """Points of a straight rim lie off it by rounding, as those of 32-bit floats do."""
     rng = np.random.default_rng(seed)
@@ -46,7 +46,7 @@ def test_the_rim_of_a_closed_wall_is_no_hole_whatever_its_rounding(seed, tmp_pat
     assert (rock.holes, rock.steps) == ((), ())
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_hole_is_wider_than_the_largest_empty_circle(seed, tmp_path):
     """Against the vertices of the Voronoi diagram that lie within the rock's outline."""
     rng = np.random.default_rng(seed)
@@ -61,7 +61,7 @@ def test_no_hole_is_wider_than_the_largest_empty_circle(seed, tmp_path):
     assert min(hole.width for hole in rock.holes) > 0.02
 
 
-@pytest.mark.parametrize("count", [1, 5, 20, 60])
+@pytest.mark.parametrize("count", [1, 60])
 def test_stray_points_leave_steps_and_no_holes_and_can_be_dropped(count, tmp_path):
     scan = scanned(strays(count), tmp_path)
     rock = mesh_scan(scan)
@@ -113,8 +113,7 @@ def lines(seed, apart):
     return np.column_stack([x, 1.0 - relief(x, z), z])
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("apart", [0.016, 0.018, 0.02, 0.03])
+@pytest.mark.parametrize(("seed", "apart"), [(0, 0.016), (1, 0.02), (2, 0.03)])
 def test_what_is_advised_leaves_what_was_said(seed, apart, tmp_path):
     scan = scanned(lines(seed, apart), tmp_path)
     rock = mesh_scan(scan)
@@ -133,15 +132,14 @@ def test_stray_points_are_told_before_bridges(tmp_path):
     assert found == ("std_ratio", 2.0, 0, None)
 
 
-@pytest.mark.parametrize("width", [0.08, 0.1])
-def test_nothing_is_advised_where_nothing_helps(width, tmp_path):
+def test_nothing_is_advised_where_nothing_helps(tmp_path):
     """Rock with windows wider than a palm."""
-    points = wall(0.004, 0.4)
-    middles = np.stack(np.meshgrid(*2 * [np.arange(-0.3, 0.31, 0.15)]), axis=-1).reshape(-1, 2)
+    points = wall(0.004, 0.25)
+    middles = np.stack(np.meshgrid(*2 * [np.arange(-0.15, 0.16, 0.15)]), axis=-1).reshape(-1, 2)
     away = np.linalg.norm(points[:, None, [0, 2]] - middles, axis=2).min(axis=1)
-    scan = scanned(points[away > 0.5 * width], tmp_path)
+    scan = scanned(points[away > 0.04], tmp_path)
     rock = mesh_scan(scan)
-    assert len(rock.holes) == 25
+    assert len(rock.holes) == 9
     assert remedy(scan, rock, 0.02) is None
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models import Cylinder, Edge
 from hand_models.sections import (
@@ -55,7 +55,6 @@ def random_polyline(rng):
     return hold.section(origin, axes[:, 0], axes[:, 2])
 
 
-@settings(max_examples=200, deadline=None)
 @given(seeds)
 def test_points_lie_on_the_rock_at_most_a_spacing_apart(seed):
     section = random_smooth(np.random.default_rng(seed))
@@ -68,7 +67,6 @@ def test_points_lie_on_the_rock_at_most_a_spacing_apart(seed):
     assert (np.abs(section.clearances(points)) < 5e-6).all()
 
 
-@settings(max_examples=200, deadline=None)
 @given(seeds)
 def test_outlines_have_the_rock_on_their_left(seed):
     section = random_smooth(np.random.default_rng(seed))
@@ -83,7 +81,6 @@ def test_outlines_have_the_rock_on_their_left(seed):
 
 
 @pytest.mark.parametrize("kind", [random_smooth, random_polyline])
-@settings(max_examples=100, deadline=None)
 @given(seeds)
 def test_distances_of_many_places_are_their_clearances_one_by_one(kind, seed):
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models import Cylinder, Edge, Ellipsoid, Plane, Sphere
 from hand_models.rock import Hold
@@ -48,7 +48,6 @@ def random_cut(seed: int):
     return cut, away, joint
 
 
-@settings(max_examples=200, deadline=None)
 @given(seeds)
 def test_places_are_in_the_rock_where_their_distance_is_negative(seed):
     found = random_cut(seed)
@@ -64,7 +63,7 @@ def test_places_are_in_the_rock_where_their_distance_is_negative(seed):
         assert far < 1e-9 or told > 0.0
 
 
-@given_some(80, 300, seeds)
+@given_some(12, 300, seeds)
 def test_a_tangent_line_touches_the_rock_and_does_not_cut_it(seed):
     found = random_cut(seed)
     if found is None:
@@ -83,7 +82,7 @@ def test_a_tangent_line_touches_the_rock_and_does_not_cut_it(seed):
     assert away(contact + 1j * u * 1e-6) < 0.0
 
 
-@given_some(80, 300, seeds, st.sampled_from([FACE.start, FACE.end]))
+@given_some(12, 300, seeds, st.sampled_from([FACE.start, FACE.end]))
 def test_where_a_point_on_a_circle_enters_the_rock_is_found(seed, along):
     found = random_cut(seed)
     if found is None:
@@ -105,7 +104,7 @@ def test_where_a_point_on_a_circle_enters_the_rock_is_found(seed, along):
     assert len(into) <= len(told) <= len(into) + 1
 
 
-@given_some(80, 300, seeds, st.floats(-3.1, 3.1))
+@given_some(12, 300, seeds, st.floats(-3.1, 3.1))
 def test_a_face_is_clear_where_all_its_places_are_outside(seed, angle):
     found = random_cut(seed)
     if found is None:
@@ -123,7 +122,7 @@ def test_a_face_is_clear_where_all_its_places_are_outside(seed, angle):
         assert away(grid).min() > -1e-9
 
 
-@given_some(40, 150, seeds)
+@given_some(12, 150, seeds)
 def test_a_face_rests_where_it_first_meets_the_rock(seed):
     """By the rock's distance function alone: clear until then, and on it there."""
     found = random_cut(seed)

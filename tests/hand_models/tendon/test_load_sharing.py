@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.optimize import linprog
 
 from hand_models import InvalidInputError
@@ -100,7 +100,6 @@ def loads_by_enumeration(stiffness, springs, mu, own_mu, rng):
     return np.array(found)
 
 
-@settings(max_examples=100, deadline=None)
 @given(stiffness, stiffness, st.floats(0.0, 5000.0), friction)
 def test_two_tiles_share_by_equation_1_or_stick(a, b, kp, mu):
     """Up to the stiffness ratio of Eq. 2 nothing slips, and each tile travels with the palm."""
@@ -123,7 +122,6 @@ def test_the_papers_pairs_follow_equations_1_and_3(k1, k2, mu):
     assert limit == pytest.approx(equation_3(k1, k2, KP, mu), rel=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
 @given(stiffness, st.floats(1.0, 20.0), st.floats(0.0, 5000.0))
 def test_the_friction_of_equation_2_loads_both_tiles_alike_for_their_stiffness(k2, times, kp):
     k1 = times * k2
@@ -167,7 +165,7 @@ def random_palm(rng, n, own):
 
 @pytest.mark.parametrize("own", [False, True], ids=["tiles", "tiles and palm"])
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
-@pytest.mark.parametrize("palms", [3, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("palms", [1, pytest.param(8, marks=pytest.mark.slow)])
 def test_the_loads_are_those_of_every_consistent_friction_pattern(n, own, palms):
     rng = np.random.default_rng(n)
     for _ in range(palms):
@@ -184,7 +182,6 @@ def test_the_loads_are_those_of_every_consistent_friction_pattern(n, own, palms)
         assert (sharing.tile_travel > 0.0).all()
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.lists(stiffness, min_size=1, max_size=8), friction)
 def test_threading_the_tendon_from_the_other_end_loads_the_same_tiles(k, mu):
     """(Not the same strands: their tensions are open where pulleys stick.)"""
@@ -193,7 +190,6 @@ def test_threading_the_tendon_from_the_other_end_loads_the_same_tiles(k, mu):
         np.testing.assert_allclose(one.tile_stiffness, other.tile_stiffness[::-1], rtol=1e-6)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.lists(stiffness, min_size=2, max_size=8), friction, st.floats(1e-3, 1e3))
 def test_loads_scale_with_all_stiffnesses(k, mu, factor):
     one = share_load(k, KP, mu)

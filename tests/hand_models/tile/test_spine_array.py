@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from scipy.stats import truncnorm
 
@@ -47,7 +47,6 @@ def test_forces_of_three_spines_by_hand():
     np.testing.assert_array_equal(spine_forces(np.full(3, np.inf), np.zeros(3), 1e4), 0.0)
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.integers(1, 30), st.floats(0.0, 1e-3), st.integers(0, 10_000))
 def test_the_first_spine_at_its_limit_ends_the_travel(spines, backlash, seed):
     numbers = rng(seed)
@@ -131,7 +130,6 @@ def held_over(array, angle, azimuth):
     return channel * quad(density, low, array.slope_max, points=breaks or None)[0]
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     st.floats(0.0, math.pi / 2),
     st.floats(0.0, math.pi),
@@ -171,9 +169,9 @@ def test_a_pressed_tile_adds_friction_of_its_body():
 def test_the_monte_carlo_has_the_mean_of_the_published_law(array):
     angles = np.radians([0.0, 15.0, 30.0, 45.0, 60.0])[:, None]
     azimuths = np.radians([0.0, 45.0, 90.0, 150.0])
-    trials = 20_000
+    trials = 4_000
     held = array.simulate(rng(), trials, angles, azimuths)
-    drag = array.simulate_drag(rng(9), 200_000).mean()
+    drag = array.simulate_drag(rng(9), 100_000).mean()
     found = statistics(held)
     error = 4.5 * np.maximum(found.deviation, 1e-9) / math.sqrt(trials) + 0.005 * found.mean
     assert (np.abs(found.mean - drag * array.share(angles, azimuths)) <= error).all()

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models import InvalidInputError, Surface
 from hand_models.parameters import experiment_table
@@ -22,7 +22,7 @@ from tests.suite.helpers.shares import given_some
 LINEAR = st.just(1.0)
 """The exponent of Eq. 21."""
 
-DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 7201)[1:]
+DIRECTIONS = np.linspace(-math.pi / 2, math.pi / 2, 1441)[1:]
 """Loading angles φ, from pressing (< 0) through pure shear (0) to pure pull-off (π/2)."""
 
 
@@ -97,7 +97,7 @@ def edge_directions(surface, count=400):
 
 def area_between(surface):
     """Between the law and the half-planes, for 0 ≤ φ ≤ φ_max [N²]."""
-    angles = np.linspace(0.0, surface.pull_off_angle, 4001)
+    angles = np.linspace(0.0, surface.pull_off_angle, 1001)
     gap = law(surface, angles) ** 2 - reach(surface, angles) ** 2
     return float(np.trapezoid(0.5 * gap, angles))
 
@@ -121,7 +121,7 @@ laws = st.one_of(st.just(1.0), st.sampled_from([0.5, 2.0]), st.floats(0.25, 4.0)
 """Exponents with which strength falls toward pull-off: Eq. 21's, a root, a square, any."""
 
 
-@given_some(20, 60, surfaces(laws))
+@given_some(8, 60, surfaces(laws))
 def test_strength_is_the_declared_law_of_the_loading_angle(surface):
     angles = DIRECTIONS[:: len(DIRECTIONS) // 200]
     np.testing.assert_allclose(surface.strength(angles), law(surface, angles), rtol=1e-9)
@@ -217,7 +217,6 @@ def test_strength_out_of_the_finger_plane_by_hand():
     assert pressed == pytest.approx(60.0 * math.sqrt(2.0))
 
 
-@settings(max_examples=60, deadline=None)
 @given(surfaces(laws))
 def test_strength_is_the_boat_shaped_surface(surface):
     directions = random_directions(500)
@@ -231,10 +230,10 @@ def test_strength_is_the_boat_shaped_surface(surface):
 
 
 @pytest.mark.parametrize("name", surface_names())
-@pytest.mark.parametrize("count", [1, 2, 4, 8])
-def test_on_a_hundred_thousand_directions_inner_bounds_stay_in_and_outer_out(name, count):
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_on_ten_thousand_directions_inner_bounds_stay_in_and_outer_out(name, count):
     surface = replace(Surface.named(name), half_planes=count)
-    directions = random_directions(100_000)
+    directions = random_directions(10_000)
     exact = boat(surface, directions)
     assert (directional_strength(inner_half_planes(surface), directions) <= exact).all()
     assert (directional_strength(outer_half_planes(surface), directions) >= exact).all()
@@ -270,7 +269,7 @@ def test_a_chord_across_a_dent_is_moved_inward_until_it_touches():
         assert first.capacity / first.a_shear < ends[0] * (0.999 if count == 5 else 0.99)
 
 
-@given_some(30, 200, surfaces(laws), st.integers(0, 10**6))
+@given_some(12, 200, surfaces(laws), st.integers(0, 10**6))
 def test_excess_is_what_a_load_is_beyond_the_surface(surface, seed):
     directions = random_directions(200, seed)
     reaches = boat(surface, directions)
@@ -283,7 +282,7 @@ def test_excess_is_what_a_load_is_beyond_the_surface(surface, seed):
 @given_some(8, 60, surfaces())
 def test_no_bound_could_be_nearer_to_the_surface(surface):
     """Every lateral coefficient and every outer capacity is as good as its normal allows."""
-    directions = np.concatenate([random_directions(4000), edge_directions(surface)])
+    directions = np.concatenate([random_directions(2000), edge_directions(surface)])
     directions = directions[(directions[:, 1] <= 0.0) & (np.abs(directions[:, 2]) > 1e-3)]
     points = boat(surface, directions)[:, None] * np.abs(directions)
     for piece in outer_half_planes(surface):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial import ConvexHull
 
 from hand_models.base import SolverError
@@ -31,7 +31,6 @@ def same_corners(found, wanted, tolerance):
         assert np.linalg.norm(found - corner, axis=1).min() <= tolerance
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(3, 40), st.integers(0, 2**32 - 1), st.floats(-3.0, 3.0))
 def test_a_polygon_is_found_exactly(count, seed, stretch):
     chance = np.random.default_rng(seed)

@@ -66,8 +66,7 @@ def looks(work: Callable[[], object], most: float = np.inf) -> int:
     ("half_planes", "lateral", "diameter", "least"),
     [
         (3, True, 0.26, 20),
-        pytest.param(3, True, 0.34, 20, marks=pytest.mark.slow),
-        *((planes, False, 0.28 + 0.01 * planes, 2) for planes in (3, 4, 5, 8, 16)),
+        *((planes, False, 0.28 + 0.01 * planes, 2) for planes in (3, 8)),
     ],
 )
 def test_vertices_are_broken_off_wherever_they_are_and_found_again(
@@ -80,7 +79,7 @@ def test_vertices_are_broken_off_wherever_they_are_and_found_again(
     # each is a chunk of candidates, a cut or a linear program
     count = looks(work)
     assert count > least
-    for part in (0.0, 0.2, 0.5, 0.8):
+    for part in (0.0, 0.5):
         with pytest.raises(EnoughError):
             looks(work, 1 + int(part * count))
     assert listed(space_request(half_planes, lateral, diameter)) == whole
@@ -130,15 +129,15 @@ def merged_one_by_one(given: Triangles) -> Triangles:
     return Triangles(np.array(vertices)[used], np.searchsorted(used, faces))
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_vertices_that_coincide_become_the_first_of_them(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    whole = mesh(int(rng.integers(3, 12)), seed)
-    # some doubled exactly, some to within rounding, some that no triangle names, in any order
-    vertices = whole.vertices + rng.choice([0.0, 1e-12], whole.vertices.shape)
-    vertices = np.vstack([vertices, rng.normal(size=(5, 3))])
-    faces = rng.permutation(np.vstack([whole.faces, whole.faces[:3]]))
-    given = Triangles(vertices, faces)
-    found, expected = weld(given), merged_one_by_one(given)
-    np.testing.assert_array_equal(found.vertices, expected.vertices)
-    np.testing.assert_array_equal(found.faces, expected.faces)
+def test_vertices_that_coincide_become_the_first_of_them() -> None:
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        whole = mesh(int(rng.integers(3, 12)), seed)
+        # some doubled exactly, some to within rounding, some that no triangle names, in any order
+        vertices = whole.vertices + rng.choice([0.0, 1e-12], whole.vertices.shape)
+        vertices = np.vstack([vertices, rng.normal(size=(5, 3))])
+        faces = rng.permutation(np.vstack([whole.faces, whole.faces[:3]]))
+        given = Triangles(vertices, faces)
+        found, expected = weld(given), merged_one_by_one(given)
+        np.testing.assert_array_equal(found.vertices, expected.vertices)
+        np.testing.assert_array_equal(found.faces, expected.faces)

@@ -125,32 +125,22 @@ def test_the_reason_says_what_is_missing():
     assert "missing" in answer.reason
 
 
-@pytest.mark.parametrize(
-    ("seed", "times", "status"),
-    [
+def test_what_is_next_to_what_can_be_had_has_its_proof_too():
+    """The way to the nearest loads is short then: what proves has a unit of its own."""
+    for seed, times, status in [
         (5117, 0.9, "infeasible"),
         (5071, 1.0001, "overloaded"),
         (5013, 1.0001, "overloaded"),
         (5020, 1.00001, "overloaded"),
         (5284, 1.00001, "infeasible"),
-    ],
-    ids=[
-        "mN off what one hand can give",
-        "a little over its limits",
-        "a little over those of a weak hand",
-        "a hair over those of two hands",
-        "a hair off, of next to no wrench",
-    ],
-)
-def test_what_is_next_to_what_can_be_had_has_its_proof_too(seed, times, status):
-    """The way to the nearest loads is short then: what proves has a unit of its own."""
-    asked = random_question(seed, "load_factor")
-    needed = times * plan(asked).load_factor * asked.needed_wrench()
-    answer = plan(replace(asked, body_wrench=needed))
-    assert answer.status == status
-    assert answer.verified
-    assert answer.certificate is not None
-    assert answer.certificate.supremum < answer.certificate.needed
+    ]:
+        asked = random_question(seed, "load_factor")
+        needed = times * plan(asked).load_factor * asked.needed_wrench()
+        answer = plan(replace(asked, body_wrench=needed))
+        assert answer.status == status
+        assert answer.verified
+        assert answer.certificate is not None
+        assert answer.certificate.supremum < answer.certificate.needed
 
 
 def test_a_plan_that_the_checks_refuse_by_a_hair_is_sought_next_to_what_is_needed():

@@ -7,7 +7,7 @@ import weakref
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.optimize import linprog
 
 from planner.explanation.infeasibility import FarkasProgram
@@ -40,7 +40,6 @@ def least_t(G, goal, H, h, tied, rows) -> float:
     return float(result.fun)
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     st.integers(0, 10**6),
     st.lists(st.lists(st.booleans(), min_size=7 + ROWS, max_size=7 + ROWS), min_size=1, max_size=4),

@@ -70,19 +70,19 @@ def with_torque(question: Question, price: Price):
     return changed, limits.joint_torque[limb][index]
 
 
-@pytest.mark.parametrize("limbs", [ROBOT.limbs, ROBOT.limbs[:3], ROBOT.limbs[:2]], ids=len)
-def test_price_of_a_joint_lies_between_the_one_sided_differences(limbs):
-    torque = {limb: tuple(np.linspace(60.0, 20.0, 7)) for limb in ROBOT.limbs}
-    question = with_joints(limbs, torque)
-    answer = plan(question)
-    prices = [price for price in answer.prices if price.name.limit == "joint_torque"]
-    assert prices
-    for price in prices:
-        assert price.unit == "N·m"
-        more, less = slopes(*with_torque(question, price))
-        slack = 2e-3 * max(more, less) + 1e-7
-        assert more - slack <= price.price <= less + slack
-        assert price.price > 0.0
+def test_price_of_a_joint_lies_between_the_one_sided_differences():
+    for limbs in [ROBOT.limbs, ROBOT.limbs[:3], ROBOT.limbs[:2]]:
+        torque = {limb: tuple(np.linspace(60.0, 20.0, 7)) for limb in ROBOT.limbs}
+        question = with_joints(limbs, torque)
+        answer = plan(question)
+        prices = [price for price in answer.prices if price.name.limit == "joint_torque"]
+        assert prices
+        for price in prices:
+            assert price.unit == "N·m"
+            more, less = slopes(*with_torque(question, price))
+            slack = 2e-3 * max(more, less) + 1e-7
+            assert more - slack <= price.price <= less + slack
+            assert price.price > 0.0
 
 
 def test_price_of_a_limb_that_holds_nothing_is_its_joints_alone():

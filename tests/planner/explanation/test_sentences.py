@@ -30,10 +30,10 @@ def bundled(name: str) -> Question:
     return replace(question, want=frozenset({"prices", "load_factor"}))
 
 
-@pytest.mark.parametrize("name", ["wall-300", "overhang", "slab"])
-def test_of_limits_that_tie_the_dearest_is_named(name: str):
-    answer = plan(bundled(name))
-    assert answer.limiting == answer.prices[0].name
+def test_of_limits_that_tie_the_dearest_is_named():
+    for name in ["wall-300", "overhang", "slab"]:
+        answer = plan(bundled(name))
+        assert answer.limiting == answer.prices[0].name
 
 
 def test_of_a_tendon_and_a_motor_as_strong_as_it_the_tendon_is_named():

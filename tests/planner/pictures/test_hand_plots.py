@@ -29,16 +29,10 @@ HOLDS = {
 }
 
 
-SHOWN = ("cylinder", "too small to hold")
-"""At all times; the others with the slow tests."""
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hold", "rotation"),
-    [
-        pytest.param(*own, id=name, marks=() if name in SHOWN else pytest.mark.slow)
-        for name, own in HOLDS.items()
-    ],
+    [pytest.param(*own, id=name) for name, own in HOLDS.items()],
 )
 def test_every_hold_has_a_picture(hold, rotation, tmp_path):
     settled = HAND.settle(hold, ROCK, Grasp(rotation, lateral=False))
@@ -100,7 +94,7 @@ def test_contacts_and_forces_are_drawn_where_they_are():
         np.testing.assert_allclose(tip, hand_plots.ARROW * force[[0, 2]] / largest, atol=1e-9)
 
 
-def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypatch, tmp_path):
+def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypatch):
     settled = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
     wrist = FloatingWrist(CompliantHand(settled, [40.0, 50.0, 60.0, 45.0]))
     at_rest = wrist.hand.loads(np.zeros((1, 6)))
@@ -109,9 +103,7 @@ def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypa
     np.testing.assert_allclose(drawn[:, 1], at_rest.normals[0], atol=1e-9)
     titles = []
     monkeypatch.setattr(SubFigure, "suptitle", lambda _, text, **how: titles.append(text))
-    hand_plots.plot_wrench_space(
-        settled, wrist.linearised(), tmp_path / "hand.png", "a hand", wrist.hand.preload
-    )
+    hand_plots.draw_wrench_space(settled, wrist.linearised(), "a hand", wrist.hand.preload)
     assert "preload of 40, 50, 60, 45 N, wrist floating" in titles[0]
     assert "linearised at rest" in titles[1]
 

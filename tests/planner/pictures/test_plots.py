@@ -65,7 +65,6 @@ def answered(name):
         "infeasible": lambda: Question(bare, body_wrench=np.array([0.0, 100, 800, 300, 0, 0])),
         "flat wall": lambda: Question(on_wall(Plane(), off=OFF, outer_rotation=0.0)),
         "nails": lambda: requested("ledge"),
-        "bundled": lambda: requested("wall-300-joints"),
         "one limb": lambda: Question(standing("leg")),
         "two limbs": lambda: Question(
             own, body_wrench=attainable_wrench(own, np.random.default_rng(0))
@@ -102,6 +101,14 @@ def drawn(name):
     return draw_plan(plan, question)
 
 
+@cache
+def laid_out(name):
+    """The same with its texts where they are drawn."""
+    figure = drawn(name)
+    figure.draw_without_rendering()
+    return figure
+
+
 def panels(figure):
     """The view in W, the one facing the rock and that from the side."""
     return figure.axes[:3]
@@ -130,11 +137,10 @@ LONG = ("plain", "ceiling", "one limb", "two limbs")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in KINDS]
 )
-def test_every_kind_of_stance_has_a_picture_with_units_on_its_axes(name, tmp_path):
+def test_every_kind_of_stance_has_a_picture_with_units_on_its_axes(name):
     question, plan = answered(name)
     assert plan.status == STATUSES.get(name, plan.status)
     figure = drawn(name)
-    figure.savefig(tmp_path / "plan.png", dpi=30)
     space, facing, side = panels(figure)
     labels = [space.get_xlabel(), space.get_ylabel(), space.get_zlabel()]
     assert labels == ["x of W [m]", "y of W [m]", "z of W [m]"]
@@ -150,11 +156,10 @@ def test_every_kind_of_stance_has_a_picture_with_units_on_its_axes(name, tmp_pat
     assert figure.get_suptitle() == f"{plan.status}{used}"
 
 
-@pytest.mark.parametrize(("ending", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
-def test_a_picture_is_written_in_the_form_of_its_name(ending, begin, tmp_path):
+def test_a_picture_is_written_in_the_form_of_its_name(tmp_path):
     question, plan = answered("two hands")
-    plot_plan(plan, question, tmp_path / f"plan.{ending}")
-    assert (tmp_path / f"plan.{ending}").read_bytes().startswith(begin)
+    plot_plan(plan, question, tmp_path / "plan.svg")
+    assert (tmp_path / "plan.svg").read_bytes().startswith(b"<?xml")
 
 
 def test_a_plan_is_not_solved_again_for_its_picture(tmp_path, monkeypatch, capfd):
@@ -164,7 +169,7 @@ def test_a_plan_is_not_solved_again_for_its_picture(tmp_path, monkeypatch, capfd
     )
     picture = tmp_path / "plan.png"
     assert run(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
-    assert picture.exists()
+    assert picture.read_bytes().startswith(b"\x89PNG")
     # once as asked, once without palms
     palms = [[hand.grasp.palm for hand in question.stance.hands] for question in solved]
     assert palms == [[True] * 4, [False] * 4]
@@ -199,7 +204,7 @@ def test_notes_and_arrows_stay_in_the_picture_and_off_each_other(name):
             assert not any(box.contains(*tip) for tip in ends[1::2])
 
 
-@pytest.mark.parametrize("off", [0.3, OFF, 0.6])
+@pytest.mark.parametrize("off", [0.3, 0.6])
 def test_under_a_ceiling_the_body_and_its_weight_are_seen_beside_the_hands(off):
     question = Question(on_wall(overhang=math.pi / 2, off=off))
     plan = replace(answered("ceiling")[1], hands=None, joints=None, certificate=None)
@@ -220,8 +225,7 @@ def test_under_a_ceiling_the_body_and_its_weight_are_seen_beside_the_hands(off):
 
 @pytest.mark.parametrize("name", ["plain", "nails"])
 def test_titles_of_columns_do_not_run_together(name):
-    figure = drawn(name)
-    figure.draw_without_rendering()
+    figure = laid_out(name)
     titles = figure.axes[3].get_xticklabels()
     assert ("nail" in [title.get_text() for title in titles]) == (name == "nails")
     if titles[0].get_rotation() == 0.0:

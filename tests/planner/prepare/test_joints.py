@@ -114,7 +114,7 @@ def test_a_plan_of_one_arm_balances_its_trunk_by_hand():
 # --- the same by another way
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_moments_about_each_axis_are_the_jacobians_and_newton_euler(seed):
     question = random_question_with_joints(seed)
     rng = np.random.default_rng(seed)
@@ -137,7 +137,7 @@ def test_moments_about_each_axis_are_the_jacobians_and_newton_euler(seed):
         np.testing.assert_allclose(own.hands[limb].rotation, pose.rotation, atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_acceleration_is_the_rate_of_momentum(seed):
     """The body moves as a rigid one from rest: m v and its moment of momentum, differenced.
 
@@ -219,7 +219,7 @@ def test_torques_and_the_body_wrench_scale_with_gravity(part):
 # --- plans
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_plans_with_joints_pass_the_check(seed):
     answer = plan(random_question_with_joints(seed))
     assert answer.status in ("optimal", "overloaded", "infeasible")

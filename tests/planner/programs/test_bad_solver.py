@@ -1,6 +1,7 @@
 """A solver that lies or gives up never leaves as ``optimal``, ``overloaded`` or ``infeasible``."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall, program_
 QUESTION = ask(on_wall(), load=structs.replace(CALIBRATION_LOAD, com=(0.0, 0.05, 0.0)))
 
 
+@cache
 def honest_outcome() -> Outcome:
     found = {}
 

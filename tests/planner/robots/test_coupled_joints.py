@@ -22,7 +22,7 @@ GRAVITY = np.array([0.6, -1.1, -9.3])
 LIMBS = ("left", "right")
 KINDS = ("revolute", "continuous", "prismatic")
 STEP = 1e-6
-SEEDS = range(12)
+SEEDS = range(4)
 
 
 def name_of(limb, k):
@@ -201,7 +201,7 @@ def test_a_limit_that_binds_on_a_slide_is_a_force():
     assert "N·m" not in answer.reason
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_poses_are_solved_with_slides_and_followers(seed):
     robot, _ = random_arms(seed)
     angles = random_angles(robot, np.random.default_rng(seed))
@@ -249,7 +249,7 @@ def with_passive(robot, count, rng):
     return limits
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_joints_without_a_motor_bear_nothing(seed, wall_with_joints):
     rng = np.random.default_rng(seed)
     stance = wall_with_joints

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import Pose, wrench_transport
@@ -286,7 +286,6 @@ def test_the_body_may_be_another_link_than_the_root():
 # --- manners
 
 
-@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_hands_stay_within_the_reach_of_their_shoulder(seed):
     robot = robosimian()

@@ -81,7 +81,7 @@ def test_only_limbs_that_are_out_of_reach_are_named():
     assert list(caught.value.missing) == ["right"]
 
 
-@pytest.mark.parametrize("joints", [2, 3, 5])
+@pytest.mark.parametrize("joints", [2, 5])
 def test_no_angles_come_nearer(joints):
     """Found again from many starts, by forward kinematics alone, within the limits."""
     robot, rng = robot_with(joints), np.random.default_rng(joints)
@@ -122,7 +122,7 @@ def barely_out_of_reach(robot, limb, rng, by=0.006):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(3))
 def test_no_posture_of_seven_joints_comes_nearer(seed):
     """Many minima: twenty random postures are followed down."""
     robot, rng = robosimian(), np.random.default_rng(seed)

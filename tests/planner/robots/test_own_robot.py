@@ -362,6 +362,7 @@ def test_serve_and_query_a_robot_and_a_hand(
     assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_query_that_names_the_robot_goes_to_its_service(
     served: Served, file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -370,6 +371,7 @@ def test_a_query_that_names_the_robot_goes_to_its_service(
     assert told(capfd)["status"] == "optimal"
 
 
+@pytest.mark.slow
 def test_a_service_says_what_its_robot_does_not_reach(served: Served, file: Path) -> None:
     far = hanging(file, "solve")
     far["stance"]["hands"][1]["pose"]["position"][2] += 1.0

@@ -45,16 +45,16 @@ def bases():
     return {name: make() for name, make in BASES.items()}
 
 
-@pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("slip", SLIPS)
-def test_slips_are_told_or_refused(slip, base, bases):
-    assert look(bases[base]) == ()
-    make, telling = SLIPS[slip]
-    try:
-        found = kinds(make(bases[base]))
-    except InvalidInputError as error:
-        found = {REFUSED if error.field else ""}
-    assert found & telling
+def test_slips_are_told_or_refused(bases):
+    for slip in SLIPS:
+        for base in BASES:
+            assert look(bases[base]) == ()
+            make, telling = SLIPS[slip]
+            try:
+                found = kinds(make(bases[base]))
+            except InvalidInputError as error:
+                found = {REFUSED if error.field else ""}
+            assert found & telling
 
 
 @pytest.mark.slow
@@ -83,19 +83,17 @@ def told(stance) -> list:
     return sorted(found)
 
 
-@pytest.mark.parametrize(
-    "slip", [name for name, (_, kinds) in SLIPS.items() if REFUSED not in kinds]
-)
-def test_findings_are_the_same_wherever_the_world_begins(slip, bases):
-    stance = SLIPS[slip][0](bases["slab"])
-    turn = Rotation.from_rotvec([0.0, 0.0, 1.3]).as_matrix()
-    assert told(moved(stance, Pose(np.array([3.0, -2.0, 40.0]), turn))) == told(stance)
-    # only gravity is judged by where up is
-    around = Rotation.from_rotvec([0.9, 2.0, -0.4]).as_matrix()
-    inner = [each for each in told(stance) if each[0] != "gravity_up"]
-    there = told(moved(stance, Pose(np.array([0.1, 0.2, -3.0]), around)))
-    if slip != "gravity's sign":
-        assert [each for each in there if each[0] != "gravity_up"] == inner
+def test_findings_are_the_same_wherever_the_world_begins(bases):
+    for slip in [name for name, (_, signs) in SLIPS.items() if REFUSED not in signs]:
+        stance = SLIPS[slip][0](bases["slab"])
+        turn = Rotation.from_rotvec([0.0, 0.0, 1.3]).as_matrix()
+        assert told(moved(stance, Pose(np.array([3.0, -2.0, 40.0]), turn))) == told(stance)
+        # only gravity is judged by where up is
+        around = Rotation.from_rotvec([0.9, 2.0, -0.4]).as_matrix()
+        inner = [each for each in told(stance) if each[0] != "gravity_up"]
+        there = told(moved(stance, Pose(np.array([0.1, 0.2, -3.0]), around)))
+        if slip != "gravity's sign":
+            assert [each for each in there if each[0] != "gravity_up"] == inner
 
 
 @pytest.mark.parametrize(
@@ -219,4 +217,4 @@ def test_without_a_known_back_most_hands_tell_where_the_belly_is(bases):
     assert kinds(asked(SLIPS["the body beyond the wall"][0](bases["logs"]))) == {"body_in_rock"}
     # which way round such a body is meant to be nobody knows
     assert "body_reversed" not in kinds(asked(SLIPS["the body rolled over"][0](bases["logs"])))
-    assert not any(look(asked(stance)) for stance in sound_stances(10, seed=2))
+    assert not any(look(asked(stance)) for stance in sound_stances(2, seed=2))

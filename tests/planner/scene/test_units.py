@@ -179,20 +179,23 @@ WRONG = {
 """Slips, and the field that tells of each."""
 
 
-@pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("slip", WRONG)
-def test_another_unit_is_told_with_its_field(slip, base):
-    asked = Question(BASES[base]())
-    assert told(asked) == []
-    make, field = WRONG[slip]
-    found = told(make(asked))
-    assert found[0] == field
-    # who reads the words alone is told whose number it is
-    words = [each.message for each in (*unit_findings(make(asked)), *wrench_findings(make(asked)))]
-    limbs = asked.stance.robot.limbs
-    assert all(each.startswith((field, *limbs)) for each in words)
-    # all hands are on rock of that strength
-    assert len(found) == (len(asked.stance.hands) if "strength of a tile" in slip else 1)
+def test_another_unit_is_told_with_its_field():
+    for slip in WRONG:
+        for base in BASES:
+            asked = Question(BASES[base]())
+            assert told(asked) == []
+            make, field = WRONG[slip]
+            found = told(make(asked))
+            assert found[0] == field
+            # who reads the words alone is told whose number it is
+            words = [
+                each.message
+                for each in (*unit_findings(make(asked)), *wrench_findings(make(asked)))
+            ]
+            limbs = asked.stance.robot.limbs
+            assert all(each.startswith((field, *limbs)) for each in words)
+            # all hands are on rock of that strength
+            assert len(found) == (len(asked.stance.hands) if "strength of a tile" in slip else 1)
 
 
 def load_factor_probe(axis, sign):
@@ -252,31 +255,33 @@ SOUND = {
 }
 
 
-@pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("case", SOUND)
-def test_what_may_be_meant_is_left_alone(case, base):
-    assert told(SOUND[case](Question(BASES[base]()))) == []
+def test_what_may_be_meant_is_left_alone():
+    for case in SOUND:
+        for base in BASES:
+            assert told(SOUND[case](Question(BASES[base]()))) == []
 
 
-@pytest.mark.parametrize("size", SMALL_BODIES)
-@pytest.mark.parametrize("tilt", [0.0, 0.6])
-def test_gravity_of_small_bodies_is_left_alone(size, tilt):
-    stance = with_gravity(on_wall(Plane(), outer_rotation=0.0), size)
-    turned = Rotation.from_rotvec([tilt, 0.0, 0.0]).as_matrix() @ stance.gravity
-    asked = Question(replace(stance, gravity=turned))
-    assert told(asked) == []
-    assert told(wrench(1.0)(asked)) == []
-    # what the Earth asks for may be asked for there, too
-    there = replace(asked, body_wrench=needed(Question(on_wall(Plane(), outer_rotation=0.0))))
-    assert told(there) == []
+def test_gravity_of_small_bodies_is_left_alone():
+    for tilt in [0.0, 0.6]:
+        for size in SMALL_BODIES:
+            stance = with_gravity(on_wall(Plane(), outer_rotation=0.0), size)
+            turned = Rotation.from_rotvec([tilt, 0.0, 0.0]).as_matrix() @ stance.gravity
+            asked = Question(replace(stance, gravity=turned))
+            assert told(asked) == []
+            assert told(wrench(1.0)(asked)) == []
+            # what the Earth asks for may be asked for there, too
+            there = replace(
+                asked, body_wrench=needed(Question(on_wall(Plane(), outer_rotation=0.0)))
+            )
+            assert told(there) == []
 
 
-@pytest.mark.parametrize("gravity", GRAVITIES)
-def test_a_body_wrench_of_another_place_is_left_alone(gravity):
+def test_a_body_wrench_of_another_place_is_left_alone():
     """A wrench of the Moon, asked about on the Earth, is a sixth of the weight, not a tenth."""
-    here = Question(on_wall(Plane(), outer_rotation=0.0))
-    there = Question(replace(here.stance, gravity=np.array(gravity)))
-    assert told(replace(here, body_wrench=needed(there))) == []
+    for gravity in GRAVITIES:
+        here = Question(on_wall(Plane(), outer_rotation=0.0))
+        there = Question(replace(here.stance, gravity=np.array(gravity)))
+        assert told(replace(here, body_wrench=needed(there))) == []
 
 
 @pytest.mark.slow
@@ -289,11 +294,11 @@ def test_nothing_is_odd_about_three_hundred_sound_stances_and_their_wrenches():
         assert told(replace(asked, load=Load(), body_wrench=carried)) == []
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_the_bundled_questions_are_left_alone(name):
-    asked = question(read_request(name))
-    assert told(asked) == []
-    assert told(wrench(1.0)(asked)) == []
+def test_the_bundled_questions_are_left_alone():
+    for name in EXAMPLES:
+        asked = question(read_request(name))
+        assert told(asked) == []
+        assert told(wrench(1.0)(asked)) == []
 
 
 # Robots -------------------------------------------------------------------------------------------

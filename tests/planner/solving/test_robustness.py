@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models.base import CruxError, InvalidInputError, Pose
 from hand_models.hand import Grasp
@@ -24,7 +24,7 @@ LIGHT = Load(mass=95.0, com=(0.0, 0.0, 0.0))
 
 FAR = Pose(np.array([0.0, 0.0, 1.0]), np.eye(3))
 
-SEEDS = range(200, 208)
+SEEDS = range(200, 202)
 MORE_SEEDS = range(208, 300)
 
 ONCE_FAILED = (4557, 87, 102, 1093)
@@ -235,7 +235,6 @@ numbers = st.one_of(
 vectors = st.tuples(numbers, numbers, numbers)
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     where=vectors,
     com=vectors,
@@ -263,7 +262,7 @@ def test_any_numbers_get_an_answer_or_a_crux_error(where, com, acceleration, gra
 
 
 @given_some(
-    8,
+    5,
     40,
     shear_limit=st.floats(1e-3, 1e5),
     closing_tension=st.floats(1e-3, 700.0),

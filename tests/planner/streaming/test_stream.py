@@ -81,7 +81,7 @@ def complaints(question: Question, points: SetPoints) -> list[str]:
 # Plans --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_set_points_within_the_radius_are_plans_with_a_true_gap(seed, stream):
     rng = np.random.default_rng(seed)
     wrench = within(rng, WEIGHT, rng.uniform(0.0, 0.79))
@@ -94,9 +94,9 @@ def test_set_points_within_the_radius_are_plans_with_a_true_gap(seed, stream):
 
 
 CASES = [
-    *(("plain", seed) for seed in (0, 1, 8, 11, 14)),
-    *(("with joints", seed) for seed in (1, 3, 7)),
-    *(("request", seed) for seed in (6, 25, 28, 54, 82)),
+    *(("plain", seed) for seed in (0, 8)),
+    *(("with joints", seed) for seed in (1, 7)),
+    *(("request", seed) for seed in (6, 28, 82)),
 ]
 
 
@@ -343,7 +343,7 @@ def test_several_threads_may_ask(stream):
 
     def walk(seed: int) -> None:
         rng = np.random.default_rng(seed)
-        for _ in range(200):
+        for _ in range(40):
             wrench = within(rng, WEIGHT, rng.uniform(0.0, 2.0))
             points = stream.set_points(wrench)
             if not (points.verified and (points.body_wrench == wrench).all()):

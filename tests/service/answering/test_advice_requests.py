@@ -63,9 +63,8 @@ WRITTEN = b"""{"stance": {"hands": [
  "limits": {"utilisation": 1, "joint_torque": {"a": [80, 8e1]}}, "v": 1}"""
 
 
-@pytest.mark.parametrize(
-    ("changes", "edits"),
-    [
+def test_a_request_is_written_anew_as_it_was_but_for_what_changes() -> None:
+    for changes, edits in [
         ({}, []),
         ({"load.mass": 107.4}, [(b'"mass": 125', b'"mass": 107.4')]),
         ({"load.mass": 125.0}, []),
@@ -98,24 +97,19 @@ WRITTEN = b"""{"stance": {"hands": [
         ({"limits.utilisation": 0.9}, [(b'"utilisation": 1', b'"utilisation": 0.9')]),
         ({"limits.joint_torque": {"a": [80.0, 90.0]}}, [(b"8e1", b"90.0")]),
         ({"stance.hands[1].pose.position": [0.0, 0.12, -0.6]}, [(b"0.10,", b"0.12,")]),
-    ],
-)
-def test_a_request_is_written_anew_as_it_was_but_for_what_changes(
-    changes: dict, edits: list[tuple[bytes, bytes]]
-) -> None:
-    before = decode_request(WRITTEN, PlanRequest)
-    after = advised(before, advice(of=changes))
-    text = rewritten(WRITTEN, before, after)
-    meant = WRITTEN.replace(b', "advice"]', b"]")
-    for old, new in edits:
-        assert meant.count(old) == 1
-        meant = meant.replace(old, new)
-    assert msgspec.json.format(text) == msgspec.json.format(meant)
+    ]:
+        before = decode_request(WRITTEN, PlanRequest)
+        after = advised(before, advice(of=changes))
+        text = rewritten(WRITTEN, before, after)
+        meant = WRITTEN.replace(b', "advice"]', b"]")
+        for old, new in edits:
+            assert meant.count(old) == 1
+            meant = meant.replace(old, new)
+        assert msgspec.json.format(text) == msgspec.json.format(meant)
 
 
-@pytest.mark.parametrize(
-    ("changes", "limbs"),
-    [
+def test_hands_that_stay_are_written_as_they_were() -> None:
+    for changes, limbs in [
         ({"stance.hands[0]": None}, ["b", "c"]),
         ({"stance.hands[1]": None}, ["a", "c"]),
         ({"stance.hands[2]": None}, ["a", "b"]),
@@ -132,19 +126,17 @@ def test_a_request_is_written_anew_as_it_was_but_for_what_changes(
             },
             ["a", "c", "b"],
         ),
-    ],
-)
-def test_hands_that_stay_are_written_as_they_were(changes: dict, limbs: list[str]) -> None:
-    before = decode_request(WRITTEN, PlanRequest)
-    after = advised(before, advice(of=changes))
-    text = rewritten(WRITTEN, before, after)
-    assert decode_request(text, PlanRequest) == msgspec.structs.replace(after, want=["prices"])
-    stance = msgspec.json.decode(WRITTEN, type=dict[str, msgspec.Raw])["stance"]
-    hands = msgspec.json.decode(stance, type=dict[str, msgspec.Raw])["hands"]
-    given = msgspec.json.decode(hands, type=list[msgspec.Raw])
-    was = {msgspec.json.decode(hand)["limb"]: bytes(hand) for hand in given}
-    told = msgspec.json.decode(text)["stance"]["hands"]
-    assert [hand["limb"] for hand in told] == limbs
-    for limb in {*limbs} & {*was}:
-        new = "stance.hands[3].limb" in changes and changes["stance.hands[3].limb"] == limb
-        assert (was[limb] in text) == (not new)
+    ]:
+        before = decode_request(WRITTEN, PlanRequest)
+        after = advised(before, advice(of=changes))
+        text = rewritten(WRITTEN, before, after)
+        assert decode_request(text, PlanRequest) == msgspec.structs.replace(after, want=["prices"])
+        stance = msgspec.json.decode(WRITTEN, type=dict[str, msgspec.Raw])["stance"]
+        hands = msgspec.json.decode(stance, type=dict[str, msgspec.Raw])["hands"]
+        given = msgspec.json.decode(hands, type=list[msgspec.Raw])
+        was = {msgspec.json.decode(hand)["limb"]: bytes(hand) for hand in given}
+        told = msgspec.json.decode(text)["stance"]["hands"]
+        assert [hand["limb"] for hand in told] == limbs
+        for limb in {*limbs} & {*was}:
+            new = "stance.hands[3].limb" in changes and changes["stance.hands[3].limb"] == limb
+            assert (was[limb] in text) == (not new)

@@ -53,6 +53,7 @@ def answered(key: str, request: dict, **more: object) -> dict:
 KEYS = ("plan", "wrench_space", "body_space", "stream")
 
 
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize("key", KEYS)
 def test_ids_are_echoed(key: str) -> None:
     assert answered(key, asked(key))["id"] == f"of {key}"
@@ -62,18 +63,19 @@ def test_ids_are_echoed(key: str) -> None:
     assert late["error"]["message"] == "1 s were over before an answer was begun; allow longer"
 
 
-@pytest.mark.parametrize("key", KEYS)
-@pytest.mark.parametrize("seconds", [601.0, 1e6])
-def test_no_deadline_is_longer_than_ten_minutes(key: str, seconds: float) -> None:
-    error = answered(key, asked(key, deadline=seconds))["error"]
-    assert (error["kind"], error["field"]) == ("invalid", "deadline")
-    assert error["message"] == f"expected a number <= 600.0, in s, got {seconds:.0f}"
+def test_no_deadline_is_longer_than_ten_minutes() -> None:
+    for seconds in [601.0, 1e6]:
+        for key in KEYS:
+            error = answered(key, asked(key, deadline=seconds))["error"]
+            assert (error["kind"], error["field"]) == ("invalid", "deadline")
+            assert error["message"] == f"expected a number <= 600.0, in s, got {seconds:.0f}"
 
 
 def refused(reply: dict) -> bool:
     return isinstance(reply.get("error"), dict)
 
 
+@pytest.mark.usefixtures("few_places")
 @pytest.mark.parametrize("key", ["wrench_space", "body_space", "stream"])
 def test_a_deadline_ends_an_answer_soon_wherever_it_comes(
     key: str, monkeypatch: pytest.MonkeyPatch
@@ -87,8 +89,8 @@ def test_a_deadline_ends_an_answer_soon_wherever_it_comes(
 
     reply, whole = late(10**9)
     assert not refused(reply)
-    assert whole > 40
-    for part in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
+    assert whole > 15
+    for part in (0.0, 0.3, 0.7, 1.0):
         looks = 2 + int(part * (whole - 3))
         reply, needed = late(looks)
         assert reply["error"]["kind"] == "deadline"

@@ -96,15 +96,15 @@ def largest(answer: Plan) -> Plan:
     )
 
 
-@pytest.mark.parametrize("status", ["optimal", "overloaded", "infeasible", "failed"])
-def test_set_points_are_small_whatever_the_status(status: str) -> None:
-    answer = largest(replace(plan(question(plan_request())), status=status))
-    for each in (answer, replace(answer, hands=None)):
-        for name in (None, "8f14e45f-ceea-467f-a0e6-1d2b3c4d5e6f"):
-            reply = brief_plan_reply(each, name, hands=False)
-            assert reply.reason.endswith("…")
-            for form, most in MOST.items():
-                assert len(form.encode(reply)) < most, (form, reply)
+def test_set_points_are_small_whatever_the_status() -> None:
+    for status in ["optimal", "overloaded", "infeasible", "failed"]:
+        answer = largest(replace(plan(question(plan_request())), status=status))
+        for each in (answer, replace(answer, hands=None)):
+            for name in (None, "8f14e45f-ceea-467f-a0e6-1d2b3c4d5e6f"):
+                reply = brief_plan_reply(each, name, hands=False)
+                assert reply.reason.endswith("…")
+                for form, most in MOST.items():
+                    assert len(form.encode(reply)) < most, (form, reply)
 
 
 def check_small(requests: list[dict]) -> None:
@@ -157,17 +157,17 @@ def test_streams_tell_as_much_as_is_asked_for(form: Format) -> None:
         assert less.items() <= more.items()
 
 
-@pytest.mark.parametrize("name", ["wall-300", "wall-300-joints", "ledge"])
-def test_a_streams_winches_stand_where_a_plans_do(name: str) -> None:
-    request = _bundled(name)
-    plan = json.loads(answered({"v": 1} | stream_request(request), "hands"))
-    payload = Format.JSON.encode(stream_request(request))
-    declared = json.loads(dispatch.handle("crux/robosimian/stream", payload).payload)
-    asked = {"v": 1, "stream": declared["stream"], "body_wrench": plan["body_wrench"]}
-    points = json.loads(answered(asked, "full", key="crux/robosimian/set_points"))
-    for ours, theirs in zip(points["hands"], plan["hands"], strict=True):
-        assert ours["tensions"] == pytest.approx(theirs["tensions"], rel=1e-4)
-        assert ours["winch_angle"] == pytest.approx(theirs["winch_angle"], rel=1e-5)
+def test_a_streams_winches_stand_where_a_plans_do() -> None:
+    for name in ["wall-300", "wall-300-joints", "ledge"]:
+        request = _bundled(name)
+        plan = json.loads(answered({"v": 1} | stream_request(request), "hands"))
+        payload = Format.JSON.encode(stream_request(request))
+        declared = json.loads(dispatch.handle("crux/robosimian/stream", payload).payload)
+        asked = {"v": 1, "stream": declared["stream"], "body_wrench": plan["body_wrench"]}
+        points = json.loads(answered(asked, "full", key="crux/robosimian/set_points"))
+        for ours, theirs in zip(points["hands"], plan["hands"], strict=True):
+            assert ours["tensions"] == pytest.approx(theirs["tensions"], rel=1e-4)
+            assert ours["winch_angle"] == pytest.approx(theirs["winch_angle"], rel=1e-5)
 
 
 @pytest.mark.parametrize("detail", DETAILS)

@@ -98,26 +98,21 @@ def test_a_wrench_space_and_a_best_seat_at_a_place() -> None:
     assert set(reply.poses) == {hand["limb"]}
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "field"),
-    [
+def test_a_place_that_cannot_be_is_refused_by_name() -> None:
+    for path, value, field in [
         (("place", "approach"), [0, 0, 0], "place.approach"),
         (("place", "approach"), [1, 0, 0], "place.approach"),
         (("place", "up"), [0.05, 0, 1], "place.approach"),
         (("pose",), WALL, "pose"),
         (("hold", "pose_in_hand"), WALL, "hold"),
-    ],
-)
-def test_a_place_that_cannot_be_is_refused_by_name(
-    path: tuple[str, ...], value: object, field: str
-) -> None:
-    request = put(placed(), ("stance", "hands", 0, *path), value)
-    if path[0] == "hold":
-        del request["stance"]["hands"][0]["hold"]["pose"]
-        field = "hold.pose_in_hand"
-    with pytest.raises(InvalidInputError) as caught:
-        questions.question(plan_request(request))
-    assert caught.value.field == f"stance.hands[0].{field}"
+    ]:
+        request = put(placed(), ("stance", "hands", 0, *path), value)
+        if path[0] == "hold":
+            del request["stance"]["hands"][0]["hold"]["pose"]
+            field = "hold.pose_in_hand"
+        with pytest.raises(InvalidInputError) as caught:
+            questions.question(plan_request(request))
+        assert caught.value.field == f"stance.hands[0].{field}"
 
 
 def test_a_plan_for_a_person_tells_where_hands_are(capsys: pytest.CaptureFixture[str]) -> None:
@@ -127,12 +122,12 @@ def test_a_plan_for_a_person_tells_where_hands_are(capsys: pytest.CaptureFixture
     assert f"front_right is at ({x:.4f}, " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("angle", [15.0, 30.0, 45.0, 57.3, 90.0, 180.0, 270.0, 360.0, -90.0, -45.0])
-def test_an_angle_of_the_wrist_in_degrees_is_refused(angle: float) -> None:
-    with pytest.raises(InvalidInputError) as caught:
-        plan(plan_request(placed(wrist_angle=angle)))
-    assert caught.value.field == "stance.hands[0].place.wrist_angle"
-    assert f"got {angle:g}: is it in rad?" in caught.value.message
+def test_an_angle_of_the_wrist_in_degrees_is_refused() -> None:
+    for angle in [15.0, 30.0, 45.0, 57.3, 90.0, 180.0, 270.0, 360.0, -90.0, -45.0]:
+        with pytest.raises(InvalidInputError) as caught:
+            plan(plan_request(placed(wrist_angle=angle)))
+        assert caught.value.field == "stance.hands[0].place.wrist_angle"
+        assert f"got {angle:g}: is it in rad?" in caught.value.message
 
 
 def test_more_than_a_turn_is_the_same_as_the_rest_of_it() -> None:

@@ -58,7 +58,7 @@ SOME = ((2, "fixed"), (5, "fixed"))
     ("half_planes", "wrist"),
     [
         pytest.param(*case, marks=() if case in SOME else pytest.mark.slow)
-        for case in itertools.product((1, 2, 3, 4, 5, 8, 16, 64), ("fixed", "floating"))
+        for case in itertools.product((1, 2, 5, 8, 64), ("fixed", "floating"))
     ],
 )
 def test_a_wrench_space_of_any_number_of_half_planes_is_told_or_refused(
@@ -144,9 +144,8 @@ def test_the_same_in_this_process() -> None:
     assert reply.half_spaces == answering.wrench_space(request).half_spaces
 
 
-@pytest.mark.parametrize(
-    ("hold", "grasp"),
-    [
+def test_a_floating_wrist_that_nothing_holds_some_way_adds_nothing() -> None:
+    for hold, grasp in [
         # no finger reaches it; above 45 N the joints close in the air up to their stops
         (
             {"shape": "sphere", "diameter": 0.004},
@@ -157,16 +156,12 @@ def test_the_same_in_this_process() -> None:
             {"shape": "edge", "fillet_radius": 0.0012, "angle": 3.05},
             {"palm": False, "lateral": False, "outer_rotation": 0.0},
         ),
-    ],
-)
-def test_a_floating_wrist_that_nothing_holds_some_way_adds_nothing(
-    hold: dict[str, Any], grasp: dict[str, Any]
-) -> None:
-    request = asked(1, wrist="floating")
-    request["stance"]["hands"][0] |= {"hold": hold, "grasp": grasp, "surface": "rock"}
-    reply = answered(request)
-    assert reply["dimension"] is not None
-    assert reply["dimension"] < 6
+    ]:
+        request = asked(1, wrist="floating")
+        request["stance"]["hands"][0] |= {"hold": hold, "grasp": grasp, "surface": "rock"}
+        reply = answered(request)
+        assert reply["dimension"] is not None
+        assert reply["dimension"] < 6
 
 
 def test_a_body_space_without_a_bound_is_refused_as_such(monkeypatch: pytest.MonkeyPatch) -> None:

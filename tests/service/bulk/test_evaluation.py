@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 
 from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
@@ -165,7 +165,6 @@ def test_another_version_is_not_answered():
         assert here.startswith(f"{name} 0.0.none;")
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.lists(st.integers(0, 9), max_size=60), st.integers(1, 3))
 def test_answers_are_in_order_however_chunks_come_back(picks, width):
     """Requests that are none are told so at once, by their names."""

@@ -136,7 +136,7 @@ def test_explanations_are_in_a_table_if_they_are_asked_for(lines, tmp_path, capf
 @watched
 @pytest.mark.parametrize(
     ("ending", "number"),
-    [(".csv", signal.SIGINT), (".csv", signal.SIGKILL), (".parquet", signal.SIGINT)],
+    [(".csv", signal.SIGKILL), (".parquet", signal.SIGINT)],
 )
 def test_what_is_ended_by_a_signal_goes_on_and_is_the_same_table(
     ending, number, lines, tmp_path, capfd
@@ -167,14 +167,14 @@ def test_what_is_ended_by_a_signal_goes_on_and_is_the_same_table(
     assert content(path) == content(whole)
 
 
-@pytest.mark.parametrize("cut", ["in the header", "after the header", "in a row"])
+@pytest.mark.parametrize("cut", ["in the header", "in a row"])
 def test_what_a_kill_has_left_half_done_is_done_again(cut, lines, tmp_path, capfd):
     whole, path = tmp_path / "whole.csv", tmp_path / "table.csv"
     for each in (whole, path):
         run(["batch", str(lines), "-o", str(each), "--json"])
     data = state(path).read_bytes().splitlines(keepends=True)
-    left = {"in the header": data[0][:30], "after the header": data[0]}
-    state(path).write_bytes(left.get(cut, b"".join(data[:7]) + data[7][:20]))
+    in_row = b"".join(data[:7]) + data[7][:20]
+    state(path).write_bytes(in_row if cut == "in a row" else data[0][:30])
     capfd.readouterr()
     assert run(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
     assert json.loads(capfd.readouterr().out)["requests"] == COUNT

@@ -58,7 +58,8 @@ from tests.suite.helpers.rocks import cylinder_mesh
 def test_the_exit_status_of_a_plan(request_, status, code, stance_file, capfd):
     assert run(["plan", stance_file(request_), "--json"]) == code
     assert result(capfd)["status"] == status
-    assert run(["plan", stance_file(request_)]) == code
+    brief = ["-q"] if status == "infeasible" else []
+    assert run(["plan", stance_file(request_), *brief]) == code
     out, err = capfd.readouterr()
     assert err == ""
     assert out.startswith(status.upper())
@@ -99,7 +100,7 @@ def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(stance_
     run(["plan", path, "--robust"])
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 2048 draws:" in out
+    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 128 draws:" in out
     low, high = robust["tenth_interval"]
     told = f"nine in ten above {robust['tenth']:.3f} ({low:.3f} to {high:.3f})"
     assert told in out.replace("\n", " ")
@@ -369,7 +370,7 @@ def test_a_wrench_space_where_the_hand_is_a_little_elsewhere(stance_file, capfd)
     assert run(arguments) == DONE
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "at 128 places within 2 mm and 20 mrad" in out
+    assert "at 8 places within 2 mm and 20 mrad" in out
     assert run([*arguments, "--json"]) == DONE
     assert f"{-result(capfd)['robust']['hundredth']['-fx']:.2f}" in out
 

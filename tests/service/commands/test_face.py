@@ -54,9 +54,7 @@ def test_names_of_stances_are_completed(command):
     ("words", "names"),
     [
         (["plan", "wall-300-"], ["wall-300-floating", "wall-300-joints"]),
-        (["route", "si"], ["six-moves"]),
         (["wrench-space", "boulders", "--hand", "front_"], ["front_right", "front_left"]),
-        (["study", "fig06"], ["fig06"]),
     ],
 )
 def test_bash_offers_the_names(words, names, tmp_path):

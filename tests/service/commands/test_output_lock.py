@@ -15,7 +15,7 @@ import trimesh
 
 from service.commands.cli import run
 from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint
-from tests.suite.helpers.processes import begun, ended, until, watched
+from tests.suite.helpers.processes import begun, until, watched
 from tests.suite.helpers.requests import wall_request
 from tests.suite.helpers.rocks import fractal_wall
 
@@ -76,15 +76,13 @@ def hold_lock() -> Iterator[Callable[[Path], subprocess.Popen[bytes]]]:
 
 @watched
 @pytest.mark.parametrize("name", ["replies.jsonl", "table.csv"])
-def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(name, lines, tmp_path):
+def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(name, lines, tmp_path, capfd):
     output, lock = tmp_path / name, tmp_path / f".{name}.lock"
     first = begun("batch", str(lines), "-o", str(output), "--workers", "2", stderr=None)
     until(lambda: lock.exists() and lock.read_text().strip() and lines_there(output), first)
     for more in ([], ["--resume"]):
-        second = begun("batch", str(lines), "-o", str(output), *more)
-        status, error = ended(second)
-        assert status == BAD_INPUT
-        assert error == (
+        assert run(["batch", str(lines), "-o", str(output), *more]) == BAD_INPUT
+        assert complaint(capfd) == (
             f"crux: -o: {output}: another run (process {first.pid}) is writing there; wait until "
             "it has ended, or give another output\n"
         )
@@ -94,8 +92,7 @@ def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(name, lines
     assert lock.exists()
     few = lines.with_name("few.jsonl")
     few.write_text(lines.read_text("utf-8").partition("\n")[0] + "\n", encoding="utf-8")
-    third = begun("batch", str(few), "-o", str(output))
-    assert ended(third) == (OVERLOADED, "")
+    assert run(["batch", str(few), "-o", str(output)]) == OVERLOADED
     assert not lock.exists()
 
 

@@ -227,7 +227,7 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(tmp_path, ca
 
 @pytest.mark.parametrize(
     "values",
-    [MASS, "hands.front_left.grasp.closing_tension=1,40", "limits.utilisation=0.1:1:3"],
+    [MASS, "hands.front_left.grasp.closing_tension=1,40"],
 )
 def test_what_is_read_again_is_told_as_before(values, tmp_path, capfd):
     given = ["sweep", "wall-300", "--vary", values, "-o", str(tmp_path)]

@@ -131,9 +131,8 @@ HOLD = ("stance", "hands", 2, "hold")
 ROCK = ("stance", "rocks", "wall")
 
 
-@pytest.mark.parametrize(
-    ("place", "value", "field", "words"),
-    [
+def test_errors_name_the_field() -> None:
+    for place, value, field, words in [
         (
             (*HOLD, "rock"),
             "roof",
@@ -159,12 +158,10 @@ ROCK = ("stance", "rocks", "wall")
             "stance.rocks.wall.shape",
             "not known; valid: plane",
         ),
-    ],
-)
-def test_errors_name_the_field(place: tuple, value: object, field: str, words: str) -> None:
-    _, blamed, message = refusal(put(on_wall(), place, value))
-    assert blamed == field
-    assert words in message
+    ]:
+        _, blamed, message = refusal(put(on_wall(), place, value))
+        assert blamed == field
+        assert words in message
 
 
 def test_a_rock_may_begin_anywhere_but_where_a_hand_is_seated() -> None:

@@ -159,9 +159,7 @@ VARIATIONS = (
     (["hands.front_left.surface=rock,concrete-fine"], {}),
     (["load.mass=50:150:4", SHEAR + "=30:80:3"], {}),
     (["load.mass=50:150:4", "hands.front_left.surface=rock,concrete-fine"], {}),
-    ([f"{TENSION}=1:40:4", "load.mass=50:150:4"], {}),
     ([f"{TENSION}=1:40:3", "load.mass=50:150:3", SHEAR + "=30:80:2", "hands.*.wrist=fixed"], {}),
-    (["load.mass=50:150", SHEAR + "=30:80"], {"samples": 8}),
     (["load.mass=50:150", SHEAR + "=30:80", f"{TENSION}=1:40"], {"samples": 8}),
     (["load.mass=50"], {}),
 )

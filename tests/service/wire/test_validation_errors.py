@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 
 import pytest
 
@@ -58,24 +57,19 @@ def test_an_unknown_field_is_named_wherever_it_is() -> None:
             assert "unknown field; known are " in message
 
 
-@pytest.mark.parametrize("form", [JSON, MSGPACK])
-@pytest.mark.parametrize(
-    ("hold", "known"),
-    [
+def test_an_unknown_field_of_a_hold_is_told_those_of_its_shape() -> None:
+    for hold, known in [
         ({"shape": "cylinder", "diameter": 0.3}, "diameter"),
         ({"shape": "edge", "fillet_radius": 0.1, "angle": 1.0}, "fillet_radius, angle"),
         ({"diameter": 0.3, "radius": 0.15, "shape": "sphere"}, "diameter"),
         ({"shape": "plane"}, None),
-    ],
-)
-def test_an_unknown_field_of_a_hold_is_told_those_of_its_shape(
-    hold: dict, known: str | None, form: str
-) -> None:
-    request = put(wall_request(), (*FRONT, "hold"), hold | {"radius": 0.15})
-    where, message = refusal(request, form=form)[1:]
-    assert where == "stance.hands[0].hold.radius"
-    own = f", {known}" if known else ""
-    assert message == f"unknown field; known are shape, pose, pose_in_hand{own}"
+    ]:
+        for form in [JSON, MSGPACK]:
+            request = put(wall_request(), (*FRONT, "hold"), hold | {"radius": 0.15})
+            where, message = refusal(request, form=form)[1:]
+            assert where == "stance.hands[0].hold.radius"
+            own = f", {known}" if known else ""
+            assert message == f"unknown field; known are shape, pose, pose_in_hand{own}"
 
 
 def test_an_unknown_field_of_a_shared_rock_is_told_those_of_its_shape() -> None:
@@ -93,27 +87,27 @@ def test_no_field_that_is_refused_is_offered() -> None:
     assert "confidence" not in offered
 
 
-@pytest.mark.parametrize("form", [JSON, MSGPACK])
-def test_limbs_are_names_too_and_have_to_be_limbs(form: str) -> None:
-    request = request_with_joints()
-    places = [path for path in paths(request) if path and path[-1] == "front_left"]
-    assert len(places) == 4
-    for path in places:
-        where = (*path[:-1], "nose")
-        kind, field, message = refusal(put(request, where, at(request, path)), form=form)
-        assert (kind, field) == ("invalid", dotted(where))
-        assert "front_left" in message
+def test_limbs_are_names_too_and_have_to_be_limbs() -> None:
+    for form in [JSON, MSGPACK]:
+        request = request_with_joints()
+        places = [path for path in paths(request) if path and path[-1] == "front_left"]
+        assert len(places) == 4
+        for path in places:
+            where = (*path[:-1], "nose")
+            kind, field, message = refusal(put(request, where, at(request, path)), form=form)
+            assert (kind, field) == ("invalid", dotted(where))
+            assert "front_left" in message
 
 
-@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("asked", [full_request, request_with_joints])
-def test_no_number_may_be_other_than_finite(asked: Callable[[], dict], number: float) -> None:
-    request = asked() | {"body_wrench": [0.0, 0.0, 10.0, 0.0, 0.0, 0.0]}
-    floats = [p for p in paths(request) if type(at(request, p)) is float]
-    assert len(floats) > 60
-    for path in floats:
-        kind, field, _ = refusal(put(request, path, number), form=MSGPACK)
-        assert (kind, field) == ("invalid", dotted(path))
+def test_no_number_may_be_other_than_finite() -> None:
+    for asked in [full_request, request_with_joints]:
+        for number in [math.nan, math.inf, -math.inf]:
+            request = asked() | {"body_wrench": [0.0, 0.0, 10.0, 0.0, 0.0, 0.0]}
+            floats = [p for p in paths(request) if type(at(request, p)) is float]
+            assert len(floats) > 60
+            for path in floats:
+                kind, field, _ = refusal(put(request, path, number), form=MSGPACK)
+                assert (kind, field) == ("invalid", dotted(path))
 
 
 INVALID = [
@@ -229,13 +223,11 @@ INVALID = [
 ]
 
 
-@pytest.mark.parametrize(("path", "value", "field", "hint"), INVALID)
-def test_a_bad_value_is_named_with_what_would_be_valid(
-    path: tuple, value: object, field: str | None, hint: str
-) -> None:
-    kind, blamed, message = refusal(put(wall_request(), path, value))
-    assert (kind, blamed) == ("invalid", field)
-    assert hint in message
+def test_a_bad_value_is_named_with_what_would_be_valid() -> None:
+    for path, value, field, hint in INVALID:
+        kind, blamed, message = refusal(put(wall_request(), path, value))
+        assert (kind, blamed) == ("invalid", field)
+        assert hint in message
 
 
 DEGREES = "a number <= 3.14209, in rad, got 180; in degrees? 180° are 3.142 rad"
@@ -269,21 +261,19 @@ OUT_OF_RANGE = [
 ]
 
 
-@pytest.mark.parametrize("form", [JSON, MSGPACK])
-@pytest.mark.parametrize(("path", "value", "wanted"), OUT_OF_RANGE)
-def test_a_number_out_of_range_is_told_in_its_unit(
-    path: tuple, value: object, wanted: str, form: str
-) -> None:
-    assert refusal(put(wall_request(), path, value), form=form)[2] == f"expected {wanted}"
+def test_a_number_out_of_range_is_told_in_its_unit() -> None:
+    for path, value, wanted in OUT_OF_RANGE:
+        for form in [JSON, MSGPACK]:
+            assert refusal(put(wall_request(), path, value), form=form)[2] == f"expected {wanted}"
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 7, 50])
-def test_the_wrong_one_of_many_entries_is_found(count: int) -> None:
-    for wrong in range(count):
-        limbs = {f"[...] limb {i}": {"largest_force": 9.0} for i in range(count)}
-        limbs[f"[...] limb {wrong}"]["largest_force"] = "much"
-        field = refusal(wall_request() | {"limits": {"per_hand": limbs}})[1]
-        assert field == f"limits.per_hand.[...] limb {wrong}.largest_force"
+def test_the_wrong_one_of_many_entries_is_found() -> None:
+    for count in [1, 2, 3, 7, 50]:
+        for wrong in range(count):
+            limbs = {f"[...] limb {i}": {"largest_force": 9.0} for i in range(count)}
+            limbs[f"[...] limb {wrong}"]["largest_force"] = "much"
+            field = refusal(wall_request() | {"limits": {"per_hand": limbs}})[1]
+            assert field == f"limits.per_hand.[...] limb {wrong}.largest_force"
 
 
 @pytest.mark.parametrize("form", [JSON, MSGPACK])
@@ -323,11 +313,9 @@ def test_errors_of_the_models_come_with_the_whole_path() -> None:
     assert "inside the palm" in message
 
 
-@pytest.mark.parametrize(("path", "value", "field"), LATER)
-@pytest.mark.parametrize("form", [JSON, MSGPACK])
-def test_what_later_versions_will_do_is_refused_by_name(
-    path: tuple, value: object, field: str, form: str
-) -> None:
-    kind, blamed, message = refusal(put(wall_request(), path, value), form=form)
-    assert (kind, blamed) == ("unsupported", field)
-    assert "not supported in this version; " in message
+def test_what_later_versions_will_do_is_refused_by_name() -> None:
+    for form in [JSON, MSGPACK]:
+        for path, value, field in LATER:
+            kind, blamed, message = refusal(put(wall_request(), path, value), form=form)
+            assert (kind, blamed) == ("unsupported", field)
+            assert "not supported in this version; " in message
