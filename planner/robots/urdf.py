@@ -296,19 +296,16 @@ def _origin(owner: str, element: ElementTree.Element) -> Pose:
         return Pose.identity()
     position = _numbers(owner, origin, "xyz", 3, LONGEST, default=0.0)
     angles = _numbers(owner, origin, "rpy", 3, WIDEST, default=0.0)
-    return Pose(np.array(position), _rotation(*angles))
-
-
-def _rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation of URDF's angles about the fixed axes x, y, z, one after the other."""
-    (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
-    return np.array(
+    # turned about the fixed axes x, y, z, one after the other
+    (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in angles)
+    rotation = np.array(
         [
             [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
             [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
             [-sy, sx * cy, cx * cy],
         ]
     )
+    return Pose(np.array(position), rotation)
 
 
 def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:

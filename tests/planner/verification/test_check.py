@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 
+import msgspec
 import numpy as np
 import pytest
 from msgspec import structs
@@ -42,13 +43,14 @@ def honest() -> Plan:
 
 
 def spoilt(thing, path, change):
-    """A copy of nested tuples and dataclasses with ``change`` made at the end of ``path``."""
+    """A copy of nested tuples, dataclasses and structs with ``change`` at the end of ``path``."""
     head, *rest = path
     part = thing[head] if isinstance(head, int) else getattr(thing, head)
     part = spoilt(part, rest, change) if rest else change(part)
     if isinstance(head, int):
         return (*thing[:head], part, *thing[head + 1 :])
-    return replace(thing, **{head: part})
+    copied = msgspec.structs.replace if isinstance(thing, msgspec.Struct) else replace
+    return copied(thing, **{head: part})
 
 
 def complaints(answer: Plan, question=QUESTION, wrench=None) -> list[str]:

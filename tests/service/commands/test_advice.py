@@ -108,6 +108,7 @@ def test_json_is_one_line_with_the_advice_in_it(stance_file, tmp_path, capfd):
     assert "advice" not in result(capfd)
 
 
+@pytest.mark.usefixtures("few_places")
 def test_a_file_of_advice_is_the_stance_but_for_its_changes(stance_file, tmp_path, capfd):
     given = wall_request(HEAVY)
     given = dict(reversed(given.items())) | {"limits": {"utilisation": 1}}

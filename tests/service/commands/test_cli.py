@@ -93,6 +93,7 @@ def test_a_plan_says_how_much_hangs_on_the_palms(stance_file, capfd):
         assert hand["limb"] in out
 
 
+@pytest.mark.usefixtures("few_places")
 def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(stance_file, capfd):
     path = stance_file(flat_request())
     run(["plan", path, "--robust", "--json"])
@@ -365,6 +366,7 @@ def test_a_wrench_space(stance_file, capfd):
         assert f"{limit['tension']:.1f}" in out
 
 
+@pytest.mark.usefixtures("few_places")
 def test_a_wrench_space_where_the_hand_is_a_little_elsewhere(stance_file, capfd):
     arguments = ["wrench-space", stance_file(flat_request()), "--hand", "front_left", "--robust"]
     assert run(arguments) == DONE

@@ -35,6 +35,7 @@ def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("few_places")
 def test_holds_are_written_sorted_told_and_drawn(rock, tmp_path, capfd):
     output, picture = tmp_path / "holds.json", tmp_path / "holds.png"
     twice = ["--outer-rotation", "0"]  # which is no other hand
