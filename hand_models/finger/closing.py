@@ -72,6 +72,11 @@ INCREMENT: Final = 2.0 / 37.0
 LEAST_INCREMENT: Final = 1e-4
 """By how much it grows where a contact changes, in the same parts."""
 
+STEADY: Final = 3e-4
+"""Turn at one tension up to which joints are on their path where a gap begins to grow: its spines
+hold at the least there was, and that of an increment may be out by a tenth of the turn's square
+in metres, 10 nm [rad]."""
+
 RESTS_DAMPED: Final = 1e-7
 """Of an increment at the end of the path, with damping [rad]."""
 
@@ -90,8 +95,9 @@ SLOW, PATIENCE = 0.1, 100
 """After so many increments in a row with more than this part of the most damping there is no rest;
 those that come to rest had 28 at most on 2,000 rough surfaces."""
 
-DEEPEST: Final = 1.0 / 120.0
-"""By how much more a phalanx may be in rock after an increment, in parts of its tile's length."""
+DEEPEST, DEEPER = 1.0 / 120.0, 1.0 / 300.0
+"""By how much more a phalanx may be in rock after an increment, in parts of its tile's length: of a
+finger that comes through the air, and of one on the rock, which goes past its path with more."""
 
 LIFTED: Final = 1.0 / 240.0
 """How far, in parts of its length, a tile goes from where it was pulled off to catch again."""
@@ -176,6 +182,7 @@ def _increment(
     clear = around.gap.min(axis=1) / (0.5 * JOINTS * (JOINTS + 1) * shape.end)
     most = np.minimum(stride, np.where(air, np.maximum(clear, FIRST_STRIDE), MOST_STRIDE))
     rate = times(around.d_gap, grow)
+    opens = caught & (mode == OFF) & (rate > 0.0) & (now.gap < state.least)
     until = np.where(~active & (rate < 0.0), (now.gap + 2.0 * slack) / -rate, np.inf).min(axis=1)
     end = drive.end
     target = np.where(state.s < drive.closing, drive.closing, end)
@@ -187,7 +194,9 @@ def _increment(
     ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~now.caught & (rate < 0.0))
     until = np.where(ends, -force / rate, np.inf).min(axis=1)
     more = np.minimum(more, until.clip(LEAST_INCREMENT * drive.closing))
-    more = np.where(waits | turns_back | (size > most) | (now.clear < 1.0), 0.0, more)
+    # where a gap begins to grow, its least is to be that of the path, not of an increment beside it
+    beside = (size > STEADY) & opens.any(axis=1) & ~air
+    more = np.where(waits | turns_back | beside | (size > most) | (now.clear < 1.0), 0.0, more)
     part = np.minimum(now.clear, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
     step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
     normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
@@ -234,7 +243,8 @@ def _judged(
     damped, moved = np.abs(after.left).max(axis=1), np.abs(after.step).max(axis=1)
     deeper = np.minimum(around.gap, 0.0) - np.minimum(there.gap, 0.0)
     too_far = (wrong > AGREES * drive.torque) & (wrong > FARTHEST * damped)
-    too_far |= deeper.max(axis=1) > DEEPEST * shape.length
+    most = np.where((state.mode == OFF).all(axis=1), DEEPEST, DEEPER) * shape.length
+    too_far |= deeper.max(axis=1) > most
     too_far &= moved > 2.0 * LEAST_STRIDE
     stride = np.where(wrong < EXACT * drive.torque, 2.0, 1.3) * after.stride
     # a damped increment that was as foreseen may be damped less

@@ -3,7 +3,7 @@
 A tile of length w bridges whatever is smaller than itself: it rests on the highest points under it.
 So a raw polyline is
 
-1. sampled at equal steps of its length,
+1. sampled at equal steps of its length from where it begins,
 2. fitted with a parabola over every stretch of length w, and once more over w/2, so that no kink
    of the first fit is left (Savitzky–Golay). That leaves circles as they are: their radius R
    changes by 0.0038 (w/2)⁴/R³, 3 µm at R = 30 mm,
@@ -16,6 +16,7 @@ at most a few millimetres off the rock.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,6 +45,9 @@ STRAIGHT: Final = 1e-7
 
 FEWEST: Final = 5
 """Points that a smoothed piece has at least."""
+
+ROUNDING: Final = 1e-9
+"""Of how many steps a piece has."""
 
 
 @dataclass(frozen=True)
@@ -119,30 +123,35 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     if total < scale.bridged_gap:
         return None
     closed = np.array_equal(points[0], points[-1])
-    count = max(round(total / scale.spacing) + 1, FEWEST)
-    at = np.linspace(0.0, total, count)
     place = np.concatenate([[0.0], np.cumsum(lengths)])
-    raw = np.column_stack([np.interp(at, place, points[:, i]) for i in range(2)])
+    # steps from its beginning, whatever its length, as that changes with every move of the plane
+    step = min(scale.spacing, total / (FEWEST - 1))
+    count = round(total / step) if closed else math.floor(total / step + ROUNDING) + 1
+    half = min(round(0.5 * scale.tile / step), (count - 1) // 2)
+    over = 2 * half if closed else 0
+    at = step * np.arange(-over, count + over)
     if closed:
-        raw = raw[:-1]
-    half = min(round(0.5 * scale.tile / (total / (count - 1))), (len(raw) - 1) // 2)
+        at %= total
+    raw = np.column_stack([np.interp(at, place, points[:, i]) for i in range(2)])
     curve = raw
     for part in (half, half // 2):
-        curve = _fitted(curve, part, closed)
+        curve = _fitted(curve, part)
+    raw, curve = raw[over : over + count], curve[over : over + count]
+    rest = total / step - (count - 1)
+    if not closed and rest > ROUNDING:
+        curve = np.vstack([curve, curve[-1] + rest * (curve[-1] - curve[-2])])
     curve = _raised(curve, np.vstack([raw, points]), half, closed)
     return np.vstack([curve, curve[:1]]) if closed else curve
 
 
-def _fitted(curve: Array, part: int, closed: bool) -> Array:
+def _fitted(curve: Array, part: int) -> Array:
     """Return the middles of parabolas over ``part`` points on both sides of each; at ends, theirs.
 
     This is `scipy.signal.savgol_filter`, which works its weights out anew each time.
     """
     weights = _weights(part)
-    fitted = scipy.ndimage.correlate1d(
-        curve, weights[part], axis=0, mode="wrap" if closed else "nearest"
-    )
-    if not closed and part:
+    fitted = scipy.ndimage.correlate1d(curve, weights[part], axis=0, mode="nearest")
+    if part:
         fitted[:part] = weights[:part] @ curve[: 2 * part + 1]
         fitted[-part:] = weights[part + 1 :] @ curve[-2 * part - 1 :]
     return np.asarray(fitted)

@@ -77,7 +77,15 @@ class Rest(NamedTuple):
 
 
 class Section(ABC):
-    """Rock in a plane with coordinates (s, t); t grows into the rock."""
+    """Rock in a plane with coordinates (s, t); t grows into the rock.
+
+    Attributes
+    ----------
+    pieced : bool
+        Whether it is known by straight pieces.
+    """
+
+    pieced = False
 
     @abstractmethod
     def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:

@@ -153,6 +153,23 @@ def test_no_raw_rock_stands_out_of_a_smoothed_cut(seed):
     assert PolylineSection([curve]).clearances(raw[inner] @ [1.0, 1j]).max() < 1e-4
 
 
+def test_cuts_that_begin_a_micrometre_on_are_smoothed_alike():
+    """As long as half a step more than whole ones; some rough ones are raised once more, or not."""
+    scale, moved = Scale.of(), []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        x = np.sort(rng.uniform(-0.2, 0.2, 80))
+        raw = np.column_stack([x, 0.05 * rng.random() * np.abs(x) + 4e-3 * rng.random(80)])
+        along = (raw[1] - raw[0]) / np.hypot(*(raw[1] - raw[0]))
+        odd = np.hypot(*np.diff(raw, axis=0).T).sum() / scale.spacing - 0.5
+        raw[0] -= along * ((math.ceil(odd) - odd) * scale.spacing + 0.5e-6)
+        on = np.vstack([raw[0] + 1e-6 * along, raw[1:]])
+        curve, other = (smooth(each, scale) for each in (raw, on))
+        inner = curve[np.abs(curve[:, 0]) < 0.15] @ [1.0, 1j]
+        moved.append(np.abs(PolylineSection([other]).clearances(inner)).max())
+    assert np.quantile(moved, 0.85) < 0.5e-6
+
+
 @given_some(5, 60, seeds)
 def test_entry_is_where_a_line_first_meets_the_rock(seed):
     rng = np.random.default_rng(seed)
