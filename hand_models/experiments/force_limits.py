@@ -1,7 +1,7 @@
-"""How much a gripper holds: limits of its wrench hull in shear, pull-off and moment, or none.
+"""Find how much a gripper holds: limits of its wrench hull in shear, pull-off and moment, or none.
 
 Signs are the paper's. A limit is a linear program over the points of which the hull is made; its
-multipliers tell in which direction a farther point would raise it, and there a point is looked for.
+multipliers give the direction in which a farther point would raise it, and a point is sought there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What Figs. 12 to 14 say of the paper's gripper, and how far a set of its numbers is from it.
+"""Data of Figs. 12 to 14 on the paper's gripper, and the residuals of a set of its numbers.
 
 Each datum has a tolerance, and a residual is what the model is off in tolerances. First come the
 ends of Fig. 12's lines (a tenth, or 0.3 N), the extents of Fig. 13 (a tenth) and the edge of its

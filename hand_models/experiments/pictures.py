@@ -1,4 +1,4 @@
-"""What the pictures of studies have in common: panels, solids of wrenches, maps of sweeps."""
+"""Draw what the pictures of studies have in common: panels, solids of wrenches, maps of sweeps."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
 
 
 def legend(figure: Figure, maps: Sequence[dict[str, Any]]) -> None:
-    """Tell below the maps of a figure what their colours and the diamond mean."""
+    """Draw the legend of colours and the diamond below the maps of a figure."""
     met = {state for data in maps for state in data["state"].flat}
     handles: list[Any] = [
         Patch(color=colour, label=text) for state, (colour, text) in STATES.items() if state in met

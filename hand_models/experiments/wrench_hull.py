@@ -42,7 +42,7 @@ MIRROR: Final = (-1.0, 1.0, -1.0)
 
 
 class Extents(NamedTuple):
-    """How far a set of wrenches goes: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
+    """Extents of a set of wrenches: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
 
     force_x: float
     force_z: float

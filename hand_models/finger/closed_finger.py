@@ -1,4 +1,4 @@
-"""Closes fingers on the rock, and tells how they ended."""
+"""Close fingers on the rock, and report how they ended."""
 
 from __future__ import annotations
 

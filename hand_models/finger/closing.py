@@ -1,4 +1,4 @@
-"""How fingers close on rock: the path from the open finger to the closing tension (Section 5.1).
+"""Close fingers on rock along the path from the open finger to the closing tension (Section 5.1).
 
 A finger's state is the turn q of its three joints at a tendon's tension f. Joint i is balanced when
 

@@ -1,4 +1,4 @@
-"""What touches and holds in an increment of fingers that close: a complementarity problem.
+"""Find what touches and holds in an increment of closing fingers: a complementarity problem.
 
 Of a contact state, which phalanges are on the rock or held by their spines, which joints stand at
 their limits and which spines are caught, the linearised torques give the turns of the joints and
@@ -57,7 +57,7 @@ SWITCHES: Final = 20
 """Of contacts and stops, at an increment."""
 
 LONGEST: Final = 4
-"""Of the circles of contact states that are told [switches]."""
+"""Length of the longest circle of contact states that is detected [switches]."""
 
 DIGITS: Final = 3 ** np.arange(4 * JOINTS)
 """Of the codes of a contact state, each of which is one of three."""
@@ -77,10 +77,7 @@ ROUNDING: Final = 1e-9
 
 
 class Forces(NamedTuple):
-    """What acts on fingers, and how it changes: torques [N·m], their slopes in f, and −∂/∂q.
-
-    And the shears of their tiles [N].
-    """
+    """Torques on fingers [N·m], their slopes in f and their −∂/∂q, and the tiles' shears [N]."""
 
     torque: Array
     slope: Array

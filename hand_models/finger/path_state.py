@@ -95,7 +95,7 @@ class OpenFinger(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What moves n fingers; SI units.
+    """Torques, drags and limits that move n fingers; SI units.
 
     Attributes
     ----------
@@ -104,11 +104,11 @@ class Drive(NamedTuple):
     closing : ndarray, shape (n,)
         Tension at the end.
     depth : ndarray, shape (n, 3)
-        How far tiles are pressed in.
+        Depth to which tiles are pressed in.
     limits : ndarray, shape (n, 5)
         `Surface.straight_law` and μ of the surfaces.
     torque : ndarray, shape (n,)
-        About the proximal joint at the closing tension.
+        Torque about the proximal joint at the closing tension.
     stiffness, preload, lower, upper : ndarray, shape (n, 3)
         Of the joints.
     """
@@ -149,7 +149,7 @@ class Drive(NamedTuple):
 
     @property
     def end(self) -> Array:
-        """How far along fingers are at the ends of their paths; see `State` [N]."""
+        """Place of the ends of the fingers' paths along them; see `State` [N]."""
         return (1.0 + CATCHING) * self.closing
 
 

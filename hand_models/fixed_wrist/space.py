@@ -54,7 +54,7 @@ WRENCH_PARTS: Final = 6 + len(HELD)
 """A wrench, and what of its force is held along each of `HELD`."""
 
 ROUNDING: Final = 1e-14
-"""What is left of forces that cancel [N per newton, N·m per newton]: a zero, and told as one."""
+"""Residual of forces that cancel [N per newton, N·m per newton]; it counts as zero."""
 
 HELD_ROWS: Final = np.hstack([HELD, np.zeros_like(HELD)])
 """D of every hand: the rows of `HELD` of a wrench."""

@@ -27,7 +27,7 @@ NOTHING: Final = Swept(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Placement(NamedTuple):
-    """What a hand is to close on, and how.
+    """Hold on which a hand is to close, with its surface, grasp and place.
 
     Attributes
     ----------
@@ -137,9 +137,9 @@ class PlacedHands:
 
     @cached_property
     def gaps(self) -> list[list[float]]:
-        """From the base tiles and the palm's tiles of each hand to the rock along z of H [m].
+        """Gaps from the base tiles and the palm's tiles of each hand to the rock, along z of H [m].
 
-        Infinite where there is none.
+        Infinite where there is no rock.
         """
         return [
             self._gaps_on(i) if shape is None else entry_distances(shape, seen[TILES], seen[INTO])

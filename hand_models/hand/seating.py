@@ -1,4 +1,4 @@
-"""Where a hand goes on a hold that was given no place.
+"""Find a seat for a hand on a hold for which no place is given.
 
 Axes of the hold are parallel to H's. The proximal tiles of the inner fingers touch at
 ``seated_contact`` (c₁) from their joints: of the hold's place (x, z) in H one number is given by
@@ -69,7 +69,7 @@ NARROW: Final = 1e-8
 
 @dataclass(frozen=True)
 class Seating:
-    """Where a hold is in the hand. Arrays are read-only.
+    """Pose of a hold in the hand, and how it was found. Arrays are read-only.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ def propose(
 
 
 def touches_seat(hand: HandModel, along: float) -> bool:
-    """Whether an inner finger's proximal tile touches where a seat meant it to."""
+    """Return True if an inner finger's proximal tile touches where a seat meant it to."""
     return abs(along - hand.seated_contact) < PLACED
 
 
@@ -271,7 +271,7 @@ def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seatin
     limits = model.joint_lower[0], model.joint_upper[0]
 
     def miss(places: Array) -> Array:
-        """By how much proximal contacts miss c₁; least in rock, most where there is none."""
+        """Return by how much proximal contacts miss c₁; least in rock, most without rock."""
         missed = np.full(len(places), math.nan)
         there = np.isfinite(places[:, 1])
         if not there.any():

@@ -141,7 +141,7 @@ class ParameterTable:
 
     @property
     def units(self) -> dict[str, dict[str, str]]:
-        """By section and name."""
+        """Units by section and name."""
         return {
             section: {name: quantity.unit for name, quantity in quantities.items()}
             for section, quantities in self.sections.items()

@@ -216,7 +216,7 @@ def cut(
     """
     vertices, faces = triangles
     normal = np.cross(s_axis, t_axis)
-    # each vertex by itself, so that triangles that share it are told the same
+    # each vertex by itself, so that triangles that share it get the same result
     beyond = np.empty((3, len(faces)), dtype=bool)
     heights = np.empty((3, len(faces)))
     for i in range(3):

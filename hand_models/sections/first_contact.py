@@ -1,4 +1,4 @@
-"""Where faces that turn first meet a boundary of short segments, many at once.
+"""Find where turning faces first meet a boundary of short segments, many at once.
 
 A face that turns about a joint at the distance h above it meets such rock first either
 

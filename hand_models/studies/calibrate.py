@@ -7,7 +7,7 @@ sets at random. It makes least
     (Σ r_i⁸)^(1/8) + 0.2 √(mean r_i²),
 
 with r the residuals of `GripperFit` in tolerances, so that the worst count most. All sets that are
-met on the way and whose misfit is at most one meet the data as well as anyone can tell. Of them
+met on the way and whose misfit is at most one meet the data as well as can be known. Of them
 those are kept that are farthest apart: what they leave of a number's plausible range is what the
 data leave of it, and what a plan does over all of them is how sure it is (``draws.toml``).
 
@@ -180,7 +180,7 @@ def farthest_apart(sets: Array, count: int) -> list[int]:
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the gripper's numbers, keep what meets the data, and tell what each aim costs."""
+    """Search the gripper's numbers, keep what meets the data, and return what each aim costs."""
     fit = GripperFit(gripper_table(hand))
     n, looks = len(fit.numbers), TRIED * SETS
     total = STARTS * EVALUATIONS + len(VARIANTS) * REFITS + looks + 1

@@ -68,8 +68,8 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     for key, surfaces, n, measures in jobs:
         axes, data[key] = radius_axes(table, n), {}
         for name, conditions in surfaces.items():
-            tell = part(progress, done, done + n * n, total)
-            data[key][name] = sweep_map(table, *axes, conditions, measures, tell)
+            report = part(progress, done, done + n * n, total)
+            data[key][name] = sweep_map(table, *axes, conditions, measures, report)
             done += n * n
     data["in_use"] = {
         name: {

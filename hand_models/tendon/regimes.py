@@ -34,7 +34,7 @@ CONSISTENT: Final = 1e-9
 
 
 class TendonResponse(NamedTuple):
-    """What a finger's tendon does, shapes (m, n); ``regime`` has shape (m,).
+    """Tensions and shears of a finger's tendon, shapes (m, n); ``regime`` has shape (m,).
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class TendonRegimes:
 
 
 class _Regime(NamedTuple):
-    """Which boundaries slip, and the tensions then: a + B_x pushed + B_q wound."""
+    """Boundaries that slip, and the tensions then: a + B_x pushed + B_q wound."""
 
     choice: tuple[int, ...]
     constant: Array
