@@ -66,10 +66,10 @@ PARAMETER_STUDIES: Final = "parameter_studies"
 """Section of ``experiments.toml`` with what Figs. 15 and 16 have in common."""
 
 MIRRORED: Final = np.array([-1.0, 1.0, -1.0])
-"""Of a pose or a wrench, when left and right change places."""
+"""Signs of a pose or a wrench when left and right change places."""
 
 GAIN: Final = 1e-3
-"""What a new point must promise to be worth another, relative to the limit."""
+"""Least gain of a new point that is worth another search, relative to the limit."""
 
 STEPS: Final = 101
 """Poses on the way back from the rock at which the fingers' push is looked at first."""

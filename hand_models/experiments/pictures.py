@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
-"""Of phalanges, in every picture; for failures the paper's are red and blue, too."""
+"""Colours of phalanges, in every picture; for failures the paper's are red and blue, too."""
 
 NO_GRASP: Final = "no grasp"
 STATES: Final = {
@@ -39,7 +39,7 @@ STATES: Final = {
 """Colour and legend of cells without limits."""
 
 SHOWN: Final = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
-"""By SI unit, the scale and the unit that pictures have instead."""
+"""Scale and unit that pictures have in place of an SI unit."""
 
 
 def panels(

@@ -52,7 +52,7 @@ BALANCED: Final = 1e-8
 """Largest part of a wrench that a pose may leave over [N]."""
 
 INCREMENT: Final = 1.0
-"""Of the load along each direction; halved where the next load does not hold [N]."""
+"""Increment of the load along each direction; halved where the next load does not hold [N]."""
 
 FINEST: Final = 2.0**-7
 """Increment at which a direction is done [N]."""

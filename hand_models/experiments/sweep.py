@@ -223,7 +223,7 @@ class Sweep:
 
 
 run, plot = Sweep().run, Sweep().plot
-"""Of the study without options: the axes and the conditions of Fig. 16."""
+"""Run and plot the study without options: the axes and the conditions of Fig. 16."""
 
 
 def _summary(found: dict[str, Any]) -> list[str]:

@@ -31,7 +31,7 @@ SANDPAPER: Final = "sandpaper-36"
 """Surface of the paper's experiments; what they publish of it replaces the preset's numbers."""
 
 MOST_POINTS: Final = 201
-"""Of an axis."""
+"""Most points of an axis."""
 
 IDLE: Final = frozenset({("tile", "base_engagement")})
 """Entries that are read and do nothing: the gripper has no base tile."""

@@ -38,7 +38,7 @@ UNITS: Final = SCALE[list(PLANAR)]
 
 
 MIRROR: Final = (-1.0, 1.0, -1.0)
-"""What mirrors wrenches (F_x, F_z, M_y) of a gripper that is symmetric."""
+"""Signs that mirror wrenches (F_x, F_z, M_y) of a symmetric gripper."""
 
 
 class Extents(NamedTuple):

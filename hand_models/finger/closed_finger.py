@@ -43,7 +43,7 @@ SAMPLES: Final = 24
 """Places of a phalanx at which an open finger is looked at."""
 
 HALVINGS: Final = 24
-"""Of the search for a lift."""
+"""Bisections in the search for a lift."""
 
 
 class ClosedFinger(NamedTuple):

@@ -49,14 +49,14 @@ POINTS: Final = 192
 slides over them as over the rock between."""
 
 FINENESS: Final = 4800.0
-"""Of the gap, in parts of the length of a tile."""
+"""Length of a tile over the fineness of the gap."""
 
 ROUNDINGS: Final = 2.4e6
 """Gaps that may be negative without being closed, in as many parts of it."""
 
 MOST_STEPS: Final = 20
 LEVEL: Final = 1e-12
-"""Of the search for a level: how many steps, and how exactly, in parts of a tile's length."""
+"""Steps of the search for a level, and its tolerance in parts of a tile's length."""
 
 TINY: Final = 1e-30
 

@@ -20,10 +20,10 @@ from hand_models.tile import Surface
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
 
 DIGITS: Final = 15
-"""Of lengths in metres, and of directions, that count."""
+"""Digits that count of lengths in metres, and of directions."""
 
 NOTHING: Final = Swept(0.0, 0.0, 0.0, 0.0, 0.0)
-"""In place of a hold that is not swept."""
+"""Shape that stands for a hold that is not swept."""
 
 
 class Placement(NamedTuple):

@@ -46,7 +46,7 @@ LEVEL: Final = 1e-3
 """How far a finger that lies flat may be out of the palm's plane [rad]."""
 
 SPACING: Final = 5e-4
-"""Of the points of outlines that are made of smooth rock [m]."""
+"""Spacing of the points of outlines that are made of smooth rock [m]."""
 
 LINES: Final = 5
 """Lines along the palm on which the highest rock under it is looked for."""
@@ -64,7 +64,7 @@ ABOUT: Final = np.array([-(2.0**-7), -(2.0**-11), 2.0**-11, 2.0**-7])
 """Others, about where a straight line between its ends is zero, in parts of the bracket."""
 
 NARROW: Final = 1e-8
-"""How wide a bracket is in the end [m]."""
+"""Width of a bracket in the end [m]."""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ from hand_models.sections import FingerPlane, cut_of
 __all__ = ["seated", "settle_hands"]
 
 CLEAR: Final = 1e-6
-"""By how much a hand that backs off is clear of rock [m]."""
+"""Clearance from rock of a hand that backs off [m]."""
 
 SEATED: Final = FINGERS.index("inner_left")
 """The finger whose proximal contact seats a hand."""

@@ -25,7 +25,7 @@ from hand_models.parameters import ParameterTable
 __all__ = ["HELD", "Structure"]
 
 ELEVATION: Final = math.radians(40.7)
-"""Of the second ring of directions, at which the polyhedron is closest to the ball."""
+"""Elevation of the second ring of directions, at which the polyhedron is closest to the ball."""
 
 
 def _held() -> Array:

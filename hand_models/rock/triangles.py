@@ -35,7 +35,7 @@ COINCIDE: Final = 1e-8
 resolves, and above the rounding of coordinates of 10⁴ m."""
 
 SIDE: Final = 0.03
-"""Of a cell of triangles; what is found does not depend on it [m]."""
+"""Side of a cell of triangles; what is found does not depend on it [m]."""
 
 
 def edges_of(faces: Indices) -> Indices:

@@ -42,7 +42,7 @@ from hand_models.wrench_spaces import TOLERANCE
 __all__ = ["loading_planes", "plot", "run"]
 
 DIRECTIONS: Final = 600
-"""Of loads that are pulled until a tile lets go."""
+"""Directions of loads that are pulled until a tile lets go."""
 
 PLANES: Final = 181
 """Planes of loading that are looked at."""

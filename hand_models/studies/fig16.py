@@ -45,7 +45,7 @@ MEASURES_SHOWN: Final[tuple[Measure, ...]] = ("shear", "normal")
 SURFACES: Final = ("A", "B")
 
 STEP: Final = 1e-3
-"""Of a radius, relative to itself, for derivatives of the contact forces."""
+"""Step of a radius, relative to itself, for derivatives of the contact forces."""
 
 UNMOVED: Final = 1e-6
 """Newtons per millimetre of radius below which a contact force does not depend on it."""

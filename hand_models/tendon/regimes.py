@@ -27,10 +27,10 @@ from hand_models.tendon.finger_tendon import FRICTIONLESS, FingerTendon, TendonS
 __all__ = ["MotorScheme", "TendonRegimes", "TendonResponse"]
 
 MotorScheme = Literal["held", "tension"]
-"""What the motor does while the load changes: it stands still, or keeps its tension."""
+"""Motor while the load changes: it stands still (held), or keeps its tension."""
 
 CONSISTENT: Final = 1e-9
-"""By how many newtons a regime may seem to contradict itself, by rounding."""
+"""Tolerance of a regime's consistency, for rounding [N]."""
 
 
 class TendonResponse(NamedTuple):

@@ -26,7 +26,7 @@ SLIVER: Final = 1e-6
 """Least singular value of a facet's edges, relative to the largest, at which they span a plane."""
 
 BEYOND: Final = 1e-6
-"""By how much a row must clear a bounding box to be left out at once."""
+"""Distance by which a row must clear a bounding box to be left out at once."""
 
 CHUNK: Final = 2_000_000
 """Numbers of a table that is worked through part by part."""
