@@ -1,4 +1,4 @@
-"""Where `hand_models.compliance` was before: an import of old keeps working."""
+"""Former place of `hand_models.compliance`: old imports keep working."""
 
 from hand_models.compliance import WristPose, wrist_pose
 

@@ -18,7 +18,7 @@ P = ParamSpec("P")
 
 
 class StoreInfo(NamedTuple):
-    """How stores of a name have served.
+    """Statistics of the stores of one name.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class StoreInfo(NamedTuple):
 
 
 class Store(Protocol):
-    """What keeps things for later."""
+    """Protocol of a cache that reports its statistics."""
 
     name: str
 
@@ -51,7 +51,7 @@ _listing = Lock()
 
 
 def enlist(store: Store) -> None:
-    """Let `stores` tell of a store as long as its owner has it."""
+    """Let `stores` list a store as long as its owner has it."""
     with _listing:
         _stores.add(store)
 

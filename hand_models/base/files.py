@@ -69,7 +69,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         part = target = path
     else:
         target = path.resolve()
-        # with the ending, which tells what kind of picture it is to be
+        # with the ending, which determines the picture's format
         part = target.with_name(f".{target.stem}.part{target.suffix}")
     try:
         try:

@@ -69,7 +69,7 @@ def turns_about(vectors: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where a child frame is in its parent.
+    """Pose of a child frame in its parent.
 
     Attributes
     ----------

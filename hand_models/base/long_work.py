@@ -1,4 +1,4 @@
-"""Long work: it tells how far it is, and may be broken off, whatever is called on the way."""
+"""Report the progress of long work, and let a caller stop it, however deep its calls go."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextvars import ContextVar
 __all__ = ["Progress", "broken_off_by", "go_on"]
 
 Progress = Callable[[int, int], None]
-"""Told how many steps are done, of how many."""
+"""Callback that gets the number of steps done, and of all steps."""
 
 _check: ContextVar[Callable[[], object] | None] = ContextVar("_check", default=None)
 

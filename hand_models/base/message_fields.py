@@ -1,7 +1,7 @@
-"""What parts of requests are made of, below the service too: strict structs, bounded numbers.
+"""Types of the fields of requests, for all packages: strict structs and bounded numbers.
 
-Bounds are far beyond any climbing robot; they keep arithmetic finite. They hold for what travels:
-who builds a part in Python has the checks of its own class.
+Bounds are far beyond any climbing robot; they keep arithmetic finite. They hold for messages:
+a part that is built in Python has the checks of its own class.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the paper's experiments do: pulls, hulls, force limits, sweeps of parameters."""
+"""The paper's experiments: pulls, hulls, force limits, sweeps of parameters."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,7 +1,7 @@
-"""How much a gripper holds: limits of its wrench hull in shear, pull-off and moment, or none.
+"""Find how much a gripper holds: limits of its wrench hull in shear, pull-off and moment, or none.
 
 Signs are the paper's. A limit is a linear program over the points of which the hull is made; its
-multipliers tell in which direction a farther point would raise it, and there a point is looked for.
+multipliers give the direction in which a farther point would raise it, and a point is sought there.
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ PARAMETER_STUDIES: Final = "parameter_studies"
 """Section of ``experiments.toml`` with what Figs. 15 and 16 have in common."""
 
 MIRRORED: Final = np.array([-1.0, 1.0, -1.0])
-"""Of a pose or a wrench, when left and right change places."""
+"""Signs of a pose or a wrench when left and right change places."""
 
 GAIN: Final = 1e-3
-"""What a new point must promise to be worth another, relative to the limit."""
+"""Least gain of a new point that is worth another search, relative to the limit."""
 
 STEPS: Final = 101
 """Poses on the way back from the rock at which the fingers' push is looked at first."""

@@ -1,4 +1,4 @@
-"""What Figs. 12 to 14 say of the paper's gripper, and how far a set of its numbers is from it.
+"""Data of Figs. 12 to 14 on the paper's gripper, and the residuals of a set of its numbers.
 
 Each datum has a tolerance, and a residual is what the model is off in tolerances. First come the
 ends of Fig. 12's lines (a tenth, or 0.3 N), the extents of Fig. 13 (a tenth) and the edge of its
@@ -34,21 +34,21 @@ __all__ = [
 
 NEAR_SHARE: Final = 0.1
 NEAR_FORCE: Final = 0.3
-"""By what share a force of Fig. 12 or an extent may be off, a force at least by so much [N]."""
+"""Tolerance of a force of Fig. 12 or an extent, relative; and the least one of a force [N]."""
 
 NEAR_EDGE: Final = 0.2
 NEAR_EDGE_ON_AVERAGE: Final = 0.1
-"""By how much the edge of the surface may be off [N·m]."""
+"""Tolerances of the edge of the surface, everywhere and on average [N·m]."""
 
 WIDE: Final = 1.0
 ABOUT: Final = 0.4
 """Shares by which the side view and the planes may be off: what they count beside the others."""
 
 RAYS: Final = 350
-"""Of the boundary of the wrenches held; more are sent in the directions `TOWARD`."""
+"""Rays to the boundary of the wrenches held; more are sent in the directions `TOWARD`."""
 
 SHORT: Final = 1.008
-"""By what factor the fine hull's wrenches are larger than those of the rays, about."""
+"""Factor by which the fine hull's wrenches are larger than those of the rays, about."""
 
 TOWARD: Final = np.array(
     [

@@ -19,7 +19,7 @@ __all__ = ["PalmExperiment"]
 
 @dataclass(frozen=True)
 class PalmExperiment:
-    """What does not change from one configuration of springs to the next.
+    """Numbers of the palm experiment that all configurations of its springs share.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the pictures of studies have in common: panels, solids of wrenches, maps of sweeps."""
+"""Draw what the pictures of studies have in common: panels, solids of wrenches, maps of sweeps."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
-"""Of phalanges, in every picture; for failures the paper's are red and blue, too."""
+"""Colours of phalanges, in every picture; for failures the paper's are red and blue, too."""
 
 NO_GRASP: Final = "no grasp"
 STATES: Final = {
@@ -39,7 +39,7 @@ STATES: Final = {
 """Colour and legend of cells without limits."""
 
 SHOWN: Final = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
-"""By SI unit, the scale and the unit that pictures have instead."""
+"""Scale and unit that pictures have in place of an SI unit."""
 
 
 def panels(
@@ -127,7 +127,7 @@ def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
 
 
 def legend(figure: Figure, maps: Sequence[dict[str, Any]]) -> None:
-    """Tell below the maps of a figure what their colours and the diamond mean."""
+    """Draw the legend of colours and the diamond below the maps of a figure."""
     met = {state for data in maps for state in data["state"].flat}
     handles: list[Any] = [
         Patch(color=colour, label=text) for state, (colour, text) in STATES.items() if state in met

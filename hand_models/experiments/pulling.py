@@ -52,7 +52,7 @@ BALANCED: Final = 1e-8
 """Largest part of a wrench that a pose may leave over [N]."""
 
 INCREMENT: Final = 1.0
-"""Of the load along each direction; halved where the next load does not hold [N]."""
+"""Increment of the load along each direction; halved where the next load does not hold [N]."""
 
 FINEST: Final = 2.0**-7
 """Increment at which a direction is done [N]."""
@@ -66,14 +66,14 @@ GOLDEN: Final = np.pi * (3.0 - np.sqrt(5.0))
 
 @dataclass(frozen=True, eq=False)
 class Pulled:
-    """Where a gripper lets go.
+    """Wrenches and poses at which a gripper lets go.
 
     Attributes
     ----------
     wrenches : ndarray, shape (m, 3)
-        The last that hold [N, N, N·m].
+        Last wrenches that hold [N, N, N·m].
     poses : ndarray, shape (m, 3)
-        Of the wrist there, (x, z, ω_y) [m, rad].
+        Poses of the wrist there, (x, z, ω_y) [m, rad].
     side, phalanx : tuple of (str or None), length m
         The tile that fails; None where no pose balances the next load.
     way : tuple of str, length m
@@ -183,7 +183,7 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     directions : ndarray, shape (m, 3)
         Of any length.
     progress : callable, optional
-        Told how many directions are done, of how many, after each increment.
+        Called with (directions done, directions in all) after each increment.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a study finds: data, and claims of the paper beside what the model gives."""
+"""Result of a study: data, and claims of the paper beside what the model gives."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found.
+    """Result of a study.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class StudyText:
 
 
 def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
-    """Yield items, and tell how many of them are done."""
+    """Yield items, and report how many of them are done."""
     for done, item in enumerate(items):
         progress(done, len(items))
         yield item
@@ -135,5 +135,5 @@ def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
 
 
 def part(progress: Progress, start: int, end: int, total: int) -> Progress:
-    """Return what tells the progress of a part of the work, from ``start`` to ``end`` of all."""
+    """Return a callback for a part of the work: ``start`` to ``end`` of ``total`` steps."""
     return lambda done, of: progress(start + (end - start) * done // of, total)

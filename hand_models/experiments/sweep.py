@@ -1,4 +1,4 @@
-"""What two numbers of the gripper do to what it holds: maps over any two entries of its table.
+"""Map what the gripper holds over any two entries of its table.
 
 Fig. 16 is such a map, over the pulley radii of the middle and the distal joint.
 """
@@ -200,7 +200,7 @@ class Sweep:
             raise InvalidInputError(f"must not be that of --x, {x.entry}", field="--y")
         found = sweep_map(table, x, y, conditions, self.measures, progress)
         if (found["state"] == NO_GRASP).all():
-            # tells why
+            # raises the reason
             conditions.gripper(y.set(x.set(table, x.values[0]), y.values[0]))
         data = {
             **found,
@@ -223,7 +223,7 @@ class Sweep:
 
 
 run, plot = Sweep().run, Sweep().plot
-"""Of the study without options: the axes and the conditions of Fig. 16."""
+"""Run and plot the study without options: the axes and the conditions of Fig. 16."""
 
 
 def _summary(found: dict[str, Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a sweep varies and what it keeps: entries of the gripper's table, and the rock."""
+"""Axes and fixed conditions of a sweep: entries of the gripper's table, and the rock."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ CONCRETE: Final = "concrete-fine"
 """The surface of Figs. 15 and 16."""
 
 SANDPAPER: Final = "sandpaper-36"
-"""That of the paper's experiments: what they tell of it stands in the place of the preset."""
+"""Surface of the paper's experiments; what they publish of it replaces the preset's numbers."""
 
 MOST_POINTS: Final = 201
-"""Of an axis."""
+"""Most points of an axis."""
 
 IDLE: Final = frozenset({("tile", "base_engagement")})
 """Entries that are read and do nothing: the gripper has no base tile."""
@@ -39,7 +39,7 @@ IDLE: Final = frozenset({("tile", "base_engagement")})
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a gripper holds on to: diameter [m], both tendons' tension [N], and a surface's name."""
+    """Rock and tension of a gripper: diameter [m], tension of both tendons [N], surface's name."""
 
     diameter: float
     tension: float

@@ -38,11 +38,11 @@ UNITS: Final = SCALE[list(PLANAR)]
 
 
 MIRROR: Final = (-1.0, 1.0, -1.0)
-"""What mirrors wrenches (F_x, F_z, M_y) of a gripper that is symmetric."""
+"""Signs that mirror wrenches (F_x, F_z, M_y) of a symmetric gripper."""
 
 
 class Extents(NamedTuple):
-    """How far a set of wrenches goes: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
+    """Extents of a set of wrenches: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
 
     force_x: float
     force_z: float

@@ -1,4 +1,4 @@
-"""Closes fingers on the rock, and tells how they ended."""
+"""Close fingers on the rock, and report how they ended."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SAMPLES: Final = 24
 """Places of a phalanx at which an open finger is looked at."""
 
 HALVINGS: Final = 24
-"""Of the search for a lift."""
+"""Bisections in the search for a lift."""
 
 
 class ClosedFinger(NamedTuple):

@@ -1,4 +1,4 @@
-"""How fingers close on rock: the path from the open finger to the closing tension (Section 5.1).
+"""Close fingers on rock along the path from the open finger to the closing tension (Section 5.1).
 
 A finger's state is the turn q of its three joints at a tendon's tension f. Joint i is balanced when
 
@@ -70,7 +70,7 @@ INCREMENT: Final = 2.0 / 37.0
 """Most of the tension in an increment, in parts of the closing tension."""
 
 LEAST_INCREMENT: Final = 1e-4
-"""By how much it grows where a contact changes, in the same parts."""
+"""Least growth of the tension where a contact changes, in the same parts."""
 
 STEADY: Final = 3e-4
 """Turn at one tension up to which joints are on their path where a gap begins to grow: its spines
@@ -78,26 +78,26 @@ hold at the least there was, and that of an increment may be out by a tenth of t
 in metres, 10 nm [rad]."""
 
 RESTS_DAMPED: Final = 1e-7
-"""Of an increment at the end of the path, with damping [rad]."""
+"""Largest turn in an increment at which a damped finger rests at the end of its path [rad]."""
 
 DAMPING, LEAST_DAMPING, TOUGH = 0.1, 0.025, 4.0
 """D at first and at last where it is needed, in parts of the torque of the proximal joint at the
 closing tension over a turn of one radian; and by how much it grows."""
 
 EXACT, AGREES, FARTHEST = 0.003, 0.03, 0.3
-"""By how much torques may differ from their linearisation, in parts of the proximal joint's at the
+"""Largest difference of torques from their linearisation, in parts of the proximal joint's at the
 closing tension: for larger strides, on the path, and in parts of what is left by damping."""
 
 MOST_DAMPING: Final = 1e3
-"""Of damping, in the same parts."""
+"""Largest damping D, in the same parts as the first one."""
 
 SLOW, PATIENCE = 0.1, 100
 """After so many increments in a row with more than this part of the most damping there is no rest;
 those that come to rest had 28 at most on 2,000 rough surfaces."""
 
 DEEPEST, DEEPER = 1.0 / 120.0, 1.0 / 300.0
-"""By how much more a phalanx may be in rock after an increment, in parts of its tile's length: of a
-finger that comes through the air, and of one on the rock, which goes past its path with more."""
+"""Most additional depth of a phalanx in rock after an increment, in parts of its tile's length: of
+a finger that comes through the air, and of one on the rock, which goes past its path with more."""
 
 LIFTED: Final = 1.0 / 240.0
 """How far, in parts of its length, a tile goes from where it was pulled off to catch again."""

@@ -1,8 +1,8 @@
-"""Where a finger is on rock that it is laid on from the base.
+"""Pose of a finger that is laid on rock from its base.
 
 A finger has three joints, so three conditions fix it. Bottom-up, each phalanx turns until its face
-meets the rock; with all three on the rock this is the paper's closing (Section 5.1). How a finger
-comes to other states `hand_models.finger.closing` finds.
+meets the rock; with all three on the rock this is the paper's closing (Section 5.1).
+`hand_models.finger.closing` finds how a finger comes to other states.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What its tendon loads a finger with that rests on all its phalanges.
+"""Loads that the tendon puts on a finger that rests on all its phalanges.
 
 The equations of `hand_models.finger.model` with every joint free: the distal one's holds the distal
 normal load alone, the middle one's that and its own, and so on, so that they are solved from the
@@ -64,7 +64,7 @@ def tendon_loads(
 
 
 def stays(loads: Loads, surface: Surface, tension: float) -> bool:
-    """Whether no contact of a finger breaks at a tension."""
+    """Return True if no contact of a finger breaks at a tension."""
     for t, n in zip(*loads, strict=True):
         normal = n.real + n.imag * tension
         if normal >= 0.0:

@@ -1,4 +1,4 @@
-"""What touches and holds in an increment of fingers that close: a complementarity problem.
+"""Find what touches and holds in an increment of closing fingers: a complementarity problem.
 
 Of a contact state, which phalanges are on the rock or held by their spines, which joints stand at
 their limits and which spines are caught, the linearised torques give the turns of the joints and
@@ -40,10 +40,10 @@ from hand_models.tile import pull_strength
 __all__ = ["RESTS", "ROUNDING", "Linearised", "contact_states", "forces_on"]
 
 RESTS: Final = 1e-10
-"""Of an increment at the end of the path, and of a joint at its limit [rad]."""
+"""Turn that counts as none: in an increment at the end of the path, or past a limit [rad]."""
 
 GIVES: Final = 1.0 / 4800.0
-"""By how much gaps may grow before their spines hold, in parts of a tile's length."""
+"""Growth of gaps before their spines hold, in parts of a tile's length."""
 
 STEADY: Final = 1e-3
 """Turn at one tension up to which joints are in balance, so that what pulls spines off is no error
@@ -54,33 +54,30 @@ NEARS: Final = 1.0 / 2400.0
 which others move as well: one after the other, so that the least gaps are those of the path."""
 
 SWITCHES: Final = 20
-"""Of contacts and stops, at an increment."""
+"""Most switches of contacts and stops at an increment."""
 
 LONGEST: Final = 4
-"""Of the circles of contact states that are told [switches]."""
+"""Length of the longest circle of contact states that is detected [switches]."""
 
 DIGITS: Final = 3 ** np.arange(4 * JOINTS)
-"""Of the codes of a contact state, each of which is one of three."""
+"""Place values of the codes of a contact state, each of which is one of three."""
 
 SLOWER: Final = 4.0
 """How much damping takes off the forces of contacts that come back to the rock."""
 
 STIFF: Final = 10.0
-"""Of damping with which joints are slow, in parts of the torque of the proximal joint at the
+"""Damping with which joints are slow, in parts of the torque of the proximal joint at the
 closing tension over a turn of one radian."""
 
 SOFT: Final = 1e-11
-"""Of contacts, so that those that coincide have forces [m/N]."""
+"""Compliance of contacts, so that those that coincide have forces [m/N]."""
 
 ROUNDING: Final = 1e-9
-"""Of forces [N] and torques [N·m]."""
+"""Rounding of forces [N] and torques [N·m]."""
 
 
 class Forces(NamedTuple):
-    """What acts on fingers, and how it changes: torques [N·m], their slopes in f, and −∂/∂q.
-
-    And the shears of their tiles [N].
-    """
+    """Torques on fingers [N·m], their slopes in f and their −∂/∂q, and the tiles' shears [N]."""
 
     torque: Array
     slope: Array

@@ -91,7 +91,7 @@ class Cling(NamedTuple):
     h: Array
 
     def lasts(self, tension: float) -> bool:
-        """Whether the nail gets to where it hooks at a tension, and some A keeps it there."""
+        """Return True if the nail gets to its hook at a tension, and some A keeps it there."""
         if self.force[0] + self.force[1] * tension < 0.0:
             return False
         slope, left = self.H[:, 1], self.h - self.H[:, 0] * tension
@@ -148,7 +148,7 @@ class Fingernail:
         return Face(ROOT, self.length, 0.0)
 
     def stuck(self, section: Section | None, pin: Vector2) -> bool:
-        """Whether rock is in the way of the nail before it turns; arguments as of `hook`."""
+        """Return True if rock is in the nail's way before it turns; arguments as of `hook`."""
         if section is None:
             return False
         return section.face_clearance(complex(*pin), 1.0, self._face) <= 0.0

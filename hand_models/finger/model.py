@@ -165,12 +165,12 @@ class FingerModel:
 
     @property
     def reach(self) -> float:
-        """How far from its first joint a finger may touch anything [m]."""
+        """Largest distance from its first joint at which a finger may touch anything [m]."""
         return len(self.pulley_radii) * self.joint_spacing + self.tile_height
 
     @property
     def tile_range(self) -> tuple[float, float]:
-        """Where along a phalanx its tile's face begins and ends [m]."""
+        """Begin and end of a tile's face along its phalanx [m]."""
         half = self.tile_length / 2.0
         return self.tile_centre - half, self.tile_centre + half
 
@@ -259,7 +259,7 @@ class SettledFinger:
 
     @cached_property
     def touching(self) -> tuple[bool, ...]:
-        """Whether each phalanx has rock under its tile."""
+        """True for each phalanx that has rock under its tile."""
         return tuple(contact.kind in ("face", "edge") for contact in self.contacts)
 
     @cached_property

@@ -48,7 +48,7 @@ Rows = TypeVar("Rows", bound=tuple[Any, ...])
 """A tuple of arrays with a row for each finger."""
 
 OFF, ON, HELD = range(3)
-"""Where a phalanx may be: off the rock, on it, or held by its spines at the least gap."""
+"""Places of a phalanx: off the rock, on it, or held by its spines at the least gap."""
 
 CAUGHT, PULLED, LOST = range(3)
 """States of a tile's spines: all that reach the rock hold; some were pulled off; some were, and the
@@ -58,17 +58,17 @@ FIRST_STRIDE, MOST_STRIDE, LEAST_STRIDE = 0.06, 0.3, 1e-4
 """How far joints turn in an increment [rad]: through the air, at most, and after it was too far."""
 
 CATCHING: Final = 0.25
-"""How much of the path it is that spines across gaps are drawn in, in parts of the closing tension.
+"""Part of the path in which spines across gaps are drawn in, relative to the closing tension.
 """
 
 TINY: Final = 1e-7
-"""By which joints are turned for derivatives [rad]."""
+"""Turn of a joint for derivatives [rad]."""
 
 POSES: Final = np.concatenate([np.zeros((1, JOINTS)), TINY * np.eye(JOINTS)])
 """Turns of the joints at which a finger is looked at: itself, and with each joint turned."""
 
 LATER: Final = np.triu(np.ones((JOINTS, JOINTS)))
-"""Which phalanges turn a joint, (i, j): its own and those beyond."""
+"""1 at (i, j) where phalanx j turns joint i: its own and those beyond."""
 
 EYE: Final = np.eye(JOINTS)
 
@@ -95,7 +95,7 @@ class OpenFinger(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What moves n fingers; SI units.
+    """Torques, drags and limits that move n fingers; SI units.
 
     Attributes
     ----------
@@ -104,11 +104,11 @@ class Drive(NamedTuple):
     closing : ndarray, shape (n,)
         Tension at the end.
     depth : ndarray, shape (n, 3)
-        How far tiles are pressed in.
+        Depth to which tiles are pressed in.
     limits : ndarray, shape (n, 5)
         `Surface.straight_law` and μ of the surfaces.
     torque : ndarray, shape (n,)
-        About the proximal joint at the closing tension.
+        Torque about the proximal joint at the closing tension.
     stiffness, preload, lower, upper : ndarray, shape (n, 3)
         Of the joints.
     """
@@ -149,7 +149,7 @@ class Drive(NamedTuple):
 
     @property
     def end(self) -> Array:
-        """How far along fingers are at the ends of their paths; see `State` [N]."""
+        """Place of the ends of the fingers' paths along them; see `State` [N]."""
         return (1.0 + CATCHING) * self.closing
 
 

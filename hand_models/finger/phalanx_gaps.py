@@ -1,4 +1,4 @@
-"""How near the phalanges of fingers are to rock, and where they would press on it.
+"""Gaps between the phalanges of fingers and rock, and the places where they would press on it.
 
 A phalanx is a bar of circular section about its *axis*: straight under the tile, lifted by so much
 that the tile's face is flat at its height, and from the tile's far end on down to the next joint.
@@ -49,14 +49,14 @@ POINTS: Final = 192
 slides over them as over the rock between."""
 
 FINENESS: Final = 4800.0
-"""Of the gap, in parts of the length of a tile."""
+"""Length of a tile over the fineness of the gap."""
 
 ROUNDINGS: Final = 2.4e6
 """Gaps that may be negative without being closed, in as many parts of it."""
 
 MOST_STEPS: Final = 20
 LEVEL: Final = 1e-12
-"""Of the search for a level: how many steps, and how exactly, in parts of a tile's length."""
+"""Steps of the search for a level, and its tolerance in parts of a tile's length."""
 
 TINY: Final = 1e-30
 
@@ -131,20 +131,20 @@ class NearPoints(NamedTuple):
 
 
 class PhalanxShape(NamedTuple):
-    """What of a phalanx meets rock, along it from its joint [m].
+    """Dimensions of a phalanx that meet rock, along it from its joint [m].
 
     Attributes
     ----------
     near, far : float
-        Where the tile's face begins and ends.
+        Begin and end of the tile's face.
     end : float
-        Of the phalanx: the next joint.
+        End of the phalanx: the next joint.
     lift : float
-        Of the axis under the tile, above the line of the joints.
+        Height of the axis under the tile, above the line of the joints.
     radius : float
-        Of the bar.
+        Radius of the bar.
     travel : float
-        How far spines reach from the tile.
+        Distance that spines reach from the tile.
     """
 
     near: float
@@ -163,22 +163,22 @@ class PhalanxShape(NamedTuple):
 
     @property
     def length(self) -> float:
-        """Of the tile [m]."""
+        """Length of the tile [m]."""
         return self.far - self.near
 
     @property
     def spacing(self) -> float:
-        """Of the points that rock is made of, at most [m]."""
+        """Largest spacing of the points that rock is made of [m]."""
         return self.length / POINTS
 
     @property
     def fine(self) -> float:
-        """How far the gap may be from the least distance, about [m]."""
+        """Largest difference of the gap from the least distance, about [m]."""
         return self.length / FINENESS
 
     @property
     def closes(self) -> float:
-        """By how much a gap may be negative without being closed [m]."""
+        """Largest depth of a negative gap that need not be closed [m]."""
         return self.length / ROUNDINGS
 
     def beside(self, near: NearPoints, joint: Complexes, u: Complexes, depth: Array) -> Beside:
@@ -259,7 +259,7 @@ class PhalanxShape(NamedTuple):
 
     @property
     def _root(self) -> float:
-        """Of the energy that sinks a bed to its level."""
+        """Root of the energy that sinks a bed to its level."""
         return self.fine * math.sqrt(self.length)
 
     def _level(self, depths: Array, near: NearPoints) -> Array:

@@ -19,7 +19,7 @@ from hand_models.sections import Face, SmoothSection
 __all__ = ["EDGE", "FACE", "FRAME", "KINDS", "NONE", "ClosedPhalanx", "SequentialClosure"]
 
 KINDS: Final = ("face", "edge", "frame", "none")
-"""What of a phalanx touches the rock, by code."""
+"""Part of a phalanx that touches the rock, by code."""
 
 FACE, EDGE, FRAME, NONE = range(len(KINDS))
 

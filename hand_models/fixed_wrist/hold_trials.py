@@ -1,4 +1,4 @@
-"""Where on a scan a hand can hold, and how much: many places, each with its hand closed there."""
+"""Find where on a scan a hand can hold, and how much: a hand is closed at each of many places."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Trial(NamedTuple):
 
 
 class FoundHold(NamedTuple):
-    """What a hand can hold at a place.
+    """Seat of a hand at a place, and what it can hold there.
 
     Attributes
     ----------
@@ -72,11 +72,11 @@ class FoundHold(NamedTuple):
         H in the rock's frame.
     rule : str
     backed_off : float
-        Of its seating; [m].
+        Distance that its seating backed off [m].
     support : ndarray, shape (5,)
-        How far it reaches in each of `WAYS`, with whatever else [N]; NaN if it holds nothing.
+        Reach in each of `WAYS`, with whatever else [N]; NaN if it holds nothing.
     pure : float
-        How far in the pull-off with every other component zero [N]; NaN if nowhere.
+        Reach in pull-off with every other component zero [N]; NaN if nowhere.
     worst, tenth, hundredth : ndarray, shape (5,), or None
         As of `Robustness`.
     """
@@ -176,7 +176,7 @@ def grid_of_trials(
 
 
 def _at_border(hand: SpinyHand, settled: SettledHand) -> bool:
-    """Whether a scan ends within a finger's reach, or has no rock at all for one."""
+    """Return True if a scan ends within a finger's reach, or has no rock at all for one."""
     if min(settled.rock_ends) < hand.finger.reach:
         return True
     off = (settled.postures.kinds == NONE).all(axis=1)
@@ -195,7 +195,7 @@ def try_holds(
     *,
     robust: bool = False,
 ) -> list[FoundHold | InvalidInputError]:
-    """Close hands at places, all at once, and tell what they hold.
+    """Close hands at places, all at once, and return what they hold.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from hand_models.tile import Surface
 __all__ = ["SEATS", "UP", "SeatRule", "approach_frame", "place"]
 
 UP: Final = (1.0, 0.0, 0.0)
-"""In a rock's frame: along the fingers of a hand that is seated at its origin."""
+"""Direction along the fingers of a hand that is seated at a rock's origin, in the rock's frame."""
 
 SeatRule = Literal["rest", "best"]
 

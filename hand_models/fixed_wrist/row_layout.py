@@ -43,7 +43,7 @@ KEPT: Final = 512
 
 
 _Name = tuple[str | None, str | None, str, str]
-"""Finger, phalanx and limit of a row, and what tells it from others of the same names."""
+"""Finger, phalanx and limit of a row, and what distinguishes it from others of these names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,6 +243,6 @@ def named_row(
     kind: Literal["limit", "hard"],
     more: str = "",
 ) -> Row:
-    """Return a row, labelled by its names and what tells it from others of the same ones."""
+    """Return a row, labelled by its names and what distinguishes it from others of these."""
     label = "/".join(part for part in (finger, phalanx, limit) if part is not None)
     return Row(finger, phalanx, limit, kind, label + more)

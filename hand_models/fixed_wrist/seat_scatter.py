@@ -43,7 +43,7 @@ AT_ONCE: Final = 64
 
 
 class Robustness(NamedTuple):
-    """How far a hand reaches in some directions over a scatter of its place.
+    """Reach of a hand in some directions over a scatter of its place.
 
     A place where the hand cannot be, or holds nothing, counts as a reach of zero.
 
@@ -54,11 +54,11 @@ class Robustness(NamedTuple):
     position, angle : float
         The scatter: to either side along each axis of H [m], and about each [rad].
     seed : int
-        Of the places.
+        Seed of the places.
     worst : ndarray, shape (k,)
         Deprecated: the same as ``hundredth``. It was the least of the places.
     tenth, hundredth : ndarray, shape (k,)
-        What it exceeds at nine in ten places, and at 99 in a hundred.
+        Reach that it exceeds at nine in ten places, and at 99 in a hundred.
     """
 
     draws: int
@@ -79,7 +79,7 @@ def robustness(
     seed: int = 0,
     scatter: tuple[float, float] | None = None,
 ) -> Robustness:
-    """Close a hand anew at places about its own, and tell how far it still reaches.
+    """Close a hand anew at places about its own, and return how far it still reaches.
 
     Parameters
     ----------

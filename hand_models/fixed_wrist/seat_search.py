@@ -56,7 +56,7 @@ NEARER: Final = ((-0.125, 0.0), (0.125, 0.0), (0.0, -0.25), (0.0, 0.25))
 
 
 class _Move(NamedTuple):
-    """How a hand leaves its seat: parts of the farthest stand-off, largest turn, largest tilts."""
+    """Move of a hand off its seat: parts of the farthest stand-off, largest turn, largest tilts."""
 
     off: float
     turn: float

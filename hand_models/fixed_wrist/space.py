@@ -48,13 +48,13 @@ EACH_TENDON: Final = np.eye(TENDONS)
 EACH_PALM_LOAD: Final = np.eye(2)
 
 SIDES: Final = (1.0, -1.0)
-"""Of a lateral reaction."""
+"""Signs of a lateral reaction."""
 
 WRENCH_PARTS: Final = 6 + len(HELD)
 """A wrench, and what of its force is held along each of `HELD`."""
 
 ROUNDING: Final = 1e-14
-"""What is left of forces that cancel [N per newton, N·m per newton]: a zero, and told as one."""
+"""Residual of forces that cancel [N per newton, N·m per newton]; it counts as zero."""
 
 HELD_ROWS: Final = np.hstack([HELD, np.zeros_like(HELD)])
 """D of every hand: the rows of `HELD` of a wrench."""
@@ -73,7 +73,7 @@ def _moments() -> Array:
 
 
 MOMENTS: Final = _moments()
-"""From (1, p) ⊗ F to a wrench and what of it is held along `HELD`."""
+"""Map from (1, p) ⊗ F to a wrench and what of it is held along `HELD`."""
 
 
 def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ __all__ = ["TensionLimit", "parallelepiped", "tension_limits"]
 
 
 class TensionLimit(NamedTuple):
-    """How far a tendon can be tightened before a tile of its finger lets go.
+    """Tension of a tendon at which a tile of its finger first lets go.
 
     Attributes
     ----------

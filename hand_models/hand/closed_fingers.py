@@ -54,7 +54,7 @@ TILE: Final = slice(LOADS.start, CODES.stop - 1)
 NUMBERS: Final = PLACES + 9
 
 NOWHERE: Final = [0.0] * (len(PHALANGES) * NUMBERS)
-"""In place of a finger of a hand that cannot be where it is."""
+"""Numbers that stand for a finger of a hand that cannot be where it is."""
 
 
 class ClosedFingers:

@@ -1,4 +1,4 @@
-"""Where a hand's fingers and tiles are before it closes, for a rotation of its outer fingers."""
+"""Frames of a hand's fingers and tiles before it closes, for a rotation of its outer fingers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a hand takes a hold: what is chosen before it closes."""
+"""Grasp of a hold: what is chosen before a hand closes."""
 
 from __future__ import annotations
 
@@ -26,14 +26,15 @@ OuterRotation = Annotated[
 
 
 class Grasp(Strict, frozen=True):
-    """How a hand takes a hold.
+    """Grasp of a hand on its hold: what is chosen before it closes.
 
     Attributes
     ----------
     outer_rotation : float
-        Of the outer fingers, in [0, π] [rad]; what is above by no more than `ROUNDED` is π.
+        Rotation of the outer fingers, in [0, π] [rad]; up to `ROUNDED` above π counts as π.
     closing_tension : float, optional
-        Of each tendon at the moment the tiles caught the rock [N]; the parameter file's default.
+        Tension of each tendon at the moment the tiles caught the rock [N]; by default that of the
+        parameter file.
     palm : bool
         Whether the palm may carry load.
     lateral : bool
@@ -62,5 +63,5 @@ class Grasp(Strict, frozen=True):
 
     @property
     def pinch(self) -> bool:
-        """Whether the outer fingers oppose the inner ones."""
+        """True if the outer fingers oppose the inner ones."""
         return self.outer_rotation >= math.pi - OPPOSED

@@ -141,7 +141,7 @@ class HandModel:
         return self._hash
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are the same hand: of equal numbers."""
+        """Return True if both are the same hand: of equal numbers."""
         return self is other or (isinstance(other, HandModel) and self.table == other.table)
 
     def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:

@@ -26,4 +26,4 @@ or its tip only, in the air between its springs and its tendon, there with all j
 held straight to cling with its nail."""
 
 CONTACTS: Final = (*KINDS, NAIL)
-"""What of a tile touches the rock, by code."""
+"""Part of a tile that touches the rock, by code."""

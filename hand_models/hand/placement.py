@@ -20,14 +20,14 @@ from hand_models.tile import Surface
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
 
 DIGITS: Final = 15
-"""Of lengths in metres, and of directions, that count."""
+"""Digits that count of lengths in metres, and of directions."""
 
 NOTHING: Final = Swept(0.0, 0.0, 0.0, 0.0, 0.0)
-"""In place of a hold that is not swept."""
+"""Shape that stands for a hold that is not swept."""
 
 
 class Placement(NamedTuple):
-    """What a hand is to close on, and how.
+    """Hold on which a hand is to close, with its surface, grasp and place.
 
     Attributes
     ----------
@@ -137,9 +137,9 @@ class PlacedHands:
 
     @cached_property
     def gaps(self) -> list[list[float]]:
-        """From the base tiles and the palm's tiles of each hand to the rock along z of H [m].
+        """Gaps from the base tiles and the palm's tiles of each hand to the rock, along z of H [m].
 
-        Infinite where there is none.
+        Infinite where there is no rock.
         """
         return [
             self._gaps_on(i) if shape is None else entry_distances(shape, seen[TILES], seen[INTO])

@@ -1,4 +1,4 @@
-"""Where a hand goes on a hold that was given no place.
+"""Find a seat for a hand on a hold for which no place is given.
 
 Axes of the hold are parallel to H's. The proximal tiles of the inner fingers touch at
 ``seated_contact`` (c₁) from their joints: of the hold's place (x, z) in H one number is given by
@@ -46,7 +46,7 @@ LEVEL: Final = 1e-3
 """How far a finger that lies flat may be out of the palm's plane [rad]."""
 
 SPACING: Final = 5e-4
-"""Of the points of outlines that are made of smooth rock [m]."""
+"""Spacing of the points of outlines that are made of smooth rock [m]."""
 
 LINES: Final = 5
 """Lines along the palm on which the highest rock under it is looked for."""
@@ -64,12 +64,12 @@ ABOUT: Final = np.array([-(2.0**-7), -(2.0**-11), 2.0**-11, 2.0**-7])
 """Others, about where a straight line between its ends is zero, in parts of the bracket."""
 
 NARROW: Final = 1e-8
-"""How wide a bracket is in the end [m]."""
+"""Width of a bracket in the end [m]."""
 
 
 @dataclass(frozen=True)
 class Seating:
-    """Where a hold is in the hand. Arrays are read-only.
+    """Pose of a hold in the hand, and how it was found. Arrays are read-only.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ def propose(
 
 
 def touches_seat(hand: HandModel, along: float) -> bool:
-    """Whether an inner finger's proximal tile touches where a seat meant it to."""
+    """Return True if an inner finger's proximal tile touches where a seat meant it to."""
     return abs(along - hand.seated_contact) < PLACED
 
 
@@ -271,7 +271,7 @@ def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seatin
     limits = model.joint_lower[0], model.joint_upper[0]
 
     def miss(places: Array) -> Array:
-        """By how much proximal contacts miss c₁; least in rock, most where there is none."""
+        """Return by how much proximal contacts miss c₁; least in rock, most without rock."""
         missed = np.full(len(places), math.nan)
         there = np.isfinite(places[:, 1])
         if not there.any():

@@ -28,7 +28,7 @@ KEPT: Final = 4
 
 
 class HandPostures(NamedTuple):
-    """How four fingers stand; the attributes of their contacts, shapes (4, 3).
+    """Postures of four fingers, and their contacts; arrays have shape (4, 3).
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ class SettledHand:
 
     @cached_property
     def closures(self) -> tuple[str, ...]:
-        """How each finger has ended, one of `CLOSURES`."""
+        """Closure of each finger, one of `CLOSURES`."""
         laid, hooked, wedged, curled, stopped, straight = CLOSURES
         if self.grasp.fingernail:
             return (straight,) * len(FINGERS)
@@ -234,7 +234,7 @@ class SettledHand:
 
     @cached_property
     def touching(self) -> Array:
-        """Which tiles have rock under them, bool of shape (n,)."""
+        """True for tiles that have rock under them, shape (n,)."""
         return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
 
     @cached_property
@@ -257,7 +257,7 @@ class SettledHand:
 
     @cached_property
     def drag_allowances(self) -> Array:
-        """By how much each tile may be dragged backwards beyond friction, shape (n,) [N].
+        """Force beyond friction by which each tile may be dragged backwards, shape (n,) [N].
 
         Shear strength times what its part of `limit_shares` is more than φ: zero from φ₀ on.
         """
@@ -265,28 +265,28 @@ class SettledHand:
 
     @cached_property
     def lateral_limits(self) -> Array:
-        """What the tiles of each finger hold sideways together, shape (4,) [N]."""
+        """Lateral force that the tiles of each finger hold together, shape (4,) [N]."""
         return self.surface.lateral_limit * self._whole_tiles
 
     @cached_property
     def _whole_tiles(self) -> Array:
-        """How many whole tiles the spines of each finger on rock make, Σ φ, shape (4,)."""
+        """Number of whole tiles that each finger's spines on rock make, Σ φ, shape (4,)."""
         sums = np.bincount(self.finger_of, weights=self.engagement, minlength=len(FINGERS))
         return np.asarray(sums, dtype=float)
 
     @cached_property
     def nails(self) -> Array:
-        """Which tiles are nails that hook, bool of shape (n,)."""
+        """True for tiles that are nails that hook, shape (n,)."""
         return np.array([tile.contact == NAIL for tile in self.tiles])
 
     @cached_property
     def holding(self) -> Array:
-        """Which tiles and nails are on rock that they hold, bool of shape (n,)."""
+        """True for tiles and nails that are on rock that they hold, shape (n,)."""
         return np.logical_or(self.touching, self.nails)
 
     @cached_property
     def rock_ends(self) -> tuple[float, ...]:
-        """How far from each finger's joint rock ends in its plane, infinite if it does not [m]."""
+        """Distance from each finger's joint to the rock's end in its plane, or infinity [m]."""
         border = self.hold.border
         if not len(border):
             return (math.inf,) * len(FINGERS)

@@ -37,7 +37,7 @@ from hand_models.sections import FingerPlane, cut_of
 __all__ = ["seated", "settle_hands"]
 
 CLEAR: Final = 1e-6
-"""By how much a hand that backs off is clear of rock [m]."""
+"""Clearance from rock of a hand that backs off [m]."""
 
 SEATED: Final = FINGERS.index("inner_left")
 """The finger whose proximal contact seats a hand."""
@@ -204,7 +204,7 @@ def _closed_by_more(
 ) -> list[int]:
     """Return which of some hands in the air have a finger that more tension brings to the rock.
 
-    Told by their paths to the tension that closes all joints up to their limits in the air, on
+    Their paths are followed to the tension that closes all joints to their limits in the air, on
     which fingers may come to the rock and pass it: those that have passed it come to no other.
     """
     hand = placed.hand

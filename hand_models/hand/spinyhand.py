@@ -34,7 +34,7 @@ REFUSED: Final = "refused"
 
 
 class NearbyClosure(NamedTuple):
-    """How a finger ends where the rock is a little elsewhere.
+    """Closures of a finger where the rock is a little elsewhere.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class NearbyClosure(NamedTuple):
         Ends other than where it is, of `hand_models.hand.CLOSURES`, and ``refused`` where the hand
         cannot be there.
     turn : float
-        The most by which any of its joints ends elsewhere [rad].
+        Largest change of the angle at which any of its joints ends [rad].
     """
 
     closures: tuple[str, ...]

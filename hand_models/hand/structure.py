@@ -1,4 +1,4 @@
-"""What the hand's structure bears, whatever its spines hold (Sections 2 and 3.2).
+"""Bound the load by what the hand's structure bears, whatever its spines hold (Sections 2, 3.2).
 
 Three figures are printed: a finger sustains 500 N of shear, produces 600 N at its tip, and a hand
 grips under loads of up to 50 kg. The last limits the whole force F that a hand *holds*, across the
@@ -25,7 +25,7 @@ from hand_models.parameters import ParameterTable
 __all__ = ["HELD", "Structure"]
 
 ELEVATION: Final = math.radians(40.7)
-"""Of the second ring of directions, at which the polyhedron is closest to the ball."""
+"""Elevation of the second ring of directions, at which the polyhedron is closest to the ball."""
 
 
 def _held() -> Array:
@@ -33,7 +33,7 @@ def _held() -> Array:
 
     Every corner lies where three caps about the directions meet: two of the ring across and one of
     the ring below, one and two, or two of the ring below and the pole. The farthest of these from
-    its three directions, and the angle between neighbours across, tell how much to lengthen.
+    its three directions, and the angle between neighbours across, give how much to lengthen.
     """
     turn = np.arange(8) * math.pi / 4.0
     half = turn + math.pi / 8.0

@@ -1,4 +1,4 @@
-"""In which order a hand closes as its tendons are tightened, from its springs (Section 3.2).
+"""Order in which a hand closes as its tendons are tightened, from its springs (Section 3.2).
 
 Each moving part of a finger holds against the tendon with a preload p and a spring K, and moves by
 x when the tendon's tension f at it, times its pulley's radius or ratio r, is more than both:
@@ -46,7 +46,7 @@ class ClosingStage(NamedTuple):
 
 
 class ClosingSequence(NamedTuple):
-    """How one finger closes.
+    """Stages in which one finger closes.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
-"""Where the tiles of closed hands are in H, along which axes they load the rock, and with what.
+"""Places of the tiles of closed hands in H, the axes along which they load the rock, and the loads.
 
-Of palms: which of their tiles are engaged, and what these bear together.
+For palms it finds which of their tiles are engaged, and what these bear together.
 """
 
 from __future__ import annotations

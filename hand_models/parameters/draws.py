@@ -1,7 +1,7 @@
 """Draws: sets of the hand's and the surfaces' numbers that all meet what is published.
 
 What the published data leave open is in ``draws.toml``: of each quantity that was fitted a list
-over the sets, and the ranges of what no fit can tell. One set makes one draw. Of everything that
+over the sets, and the ranges of what no fit can find. One set makes one draw. Of everything that
 has a range (the strength of a tile on each surface but the fitted sandpaper, and the seat) the
 draws have evenly spaced quantiles, u = (r + ½) / n with r = 0 … n − 1 the rank of the draw's term
 in an additive recurrence of low discrepancy,
@@ -35,7 +35,7 @@ from hand_models.parameters.tables import (
 __all__ = ["Draw", "bundled_draws", "draws_of", "even_quantiles", "own_draw"]
 
 LEAST_SETS: Final = 30
-"""Fewer sets tell too little of a 5 % quantile."""
+"""Least number of sets; fewer leave a 5 % quantile too uncertain."""
 
 FITTED: Final = "sandpaper-36"
 """The surface on which a set's tile was fitted; the strength on it is the set's own."""

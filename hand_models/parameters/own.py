@@ -28,7 +28,7 @@ from hand_models.parameters.tables import (
 __all__ = ["load_own_hand", "own_hand", "own_surfaces"]
 
 LARGEST: Final = {"m": 1.0, "rad": 2.0 * math.pi}
-"""By unit, what no number of a hand exceeds; larger ones are in millimetres or degrees."""
+"""Largest number of a hand, by unit; larger ones are in millimetres or degrees."""
 
 LARGEST_FACTOR: Final = 1e4
 """How many times the bundled number, or one, any other may be: beyond, arithmetic loses its

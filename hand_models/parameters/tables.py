@@ -36,7 +36,7 @@ __all__ = [
 Source = Literal["paper", "measured", "calibrated", "assumed"]
 
 Units = Mapping[str, Mapping[str, str]]
-"""By section and name."""
+"""Units by section and name."""
 
 ENTRY: Final = "{ value, unit, source, note (optional) }"
 """Form of an entry."""
@@ -47,7 +47,7 @@ VALID: Final[Mapping[str, str]] = {
     "source": f"one of {', '.join(get_args(Source))}",
     "note": "text",
 }
-"""What each part of an entry must be."""
+"""Valid values of each part of an entry."""
 
 LONGEST_QUOTE: Final = 200
 """Characters of a complaint about an entry: it may quote it."""
@@ -141,7 +141,7 @@ class ParameterTable:
 
     @property
     def units(self) -> dict[str, dict[str, str]]:
-        """By section and name."""
+        """Units by section and name."""
         return {
             section: {name: quantity.unit for name, quantity in quantities.items()}
             for section, quantities in self.sections.items()

@@ -1,4 +1,4 @@
-"""Cells without a height that a grid of heights has filled with one number, told by their cliffs.
+"""Find cells without a height that a grid has filled with one number, by their cliffs.
 
 Where a grid has no height, some write a zero. As triangles that is a floor at exactly one value of
 one coordinate, seen from the side from which the rock is, and joined to it by cliffs alone.
@@ -73,7 +73,7 @@ def filled_cells(triangles: Triangles) -> list[FilledCells]:
 
 
 def _seen_alike(vertices: Array, faces: Indices, axis: int, floor: NDArray[np.bool_]) -> bool:
-    """Whether a floor faces the way along an axis that all other triangles do together.
+    """Return True if a floor faces the way along an axis that all other triangles do together.
 
     In a closed surface it never does: its areas add up to nothing.
     """

@@ -51,7 +51,7 @@ class Hold(ABC):
 
     @property
     def oddities(self) -> tuple[str, ...]:
-        """What is odd about that data, which is used all the same; each begins with its field."""
+        """Oddities of that data, which is used all the same; each begins with its field."""
         return ()
 
     @property

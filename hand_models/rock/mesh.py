@@ -38,7 +38,7 @@ RAYS: Final = 5
 """Rays along each side of the palm that look which way triangles face."""
 
 EDGE: Final = 1e-9
-"""By how much, of a triangle's size, a ray may pass beside it and still meet it."""
+"""Tolerance of a ray that passes beside a triangle, relative to its size."""
 
 
 class Mesh(OutlinedHold):

@@ -47,7 +47,7 @@ FEWEST: Final = 5
 """Points that a smoothed piece has at least."""
 
 ROUNDING: Final = 1e-9
-"""Of how many steps a piece has."""
+"""Rounding of the number of steps of a piece."""
 
 
 @dataclass(frozen=True)

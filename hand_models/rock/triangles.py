@@ -35,7 +35,7 @@ COINCIDE: Final = 1e-8
 resolves, and above the rounding of coordinates of 10⁴ m."""
 
 SIDE: Final = 0.03
-"""Of a cell of triangles; what is found does not depend on it [m]."""
+"""Side of a cell of triangles; what is found does not depend on it [m]."""
 
 
 def edges_of(faces: Indices) -> Indices:
@@ -216,7 +216,7 @@ def cut(
     """
     vertices, faces = triangles
     normal = np.cross(s_axis, t_axis)
-    # each vertex by itself, so that triangles that share it are told the same
+    # each vertex by itself, so that triangles that share it get the same result
     beyond = np.empty((3, len(faces)), dtype=bool)
     heights = np.empty((3, len(faces)))
     for i in range(3):

@@ -18,7 +18,7 @@ from hand_models.sections.section import Complexes, Flags
 __all__ = ["Boundary", "Window", "stretch_minima"]
 
 SLACK: Final = 1e-9
-"""By how much, against rounding, more segments than the nearest are looked at [m]."""
+"""Margin in which segments beside the nearest are looked at as well, for rounding [m]."""
 
 
 class Window(NamedTuple):

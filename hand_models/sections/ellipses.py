@@ -49,7 +49,7 @@ POLISHES: Final = 3
 """Steps of Newton's method on the crossings."""
 
 ROUNDING: Final = 1e-13
-"""Of what is zero at a crossing, in parts of its terms."""
+"""Rounding of what is zero at a crossing, in parts of its terms."""
 
 
 ROUGH: Final = 256

@@ -1,4 +1,4 @@
-"""Where faces that turn first meet a boundary of short segments, many at once.
+"""Find where turning faces first meet a boundary of short segments, many at once.
 
 A face that turns about a joint at the distance h above it meets such rock first either
 
@@ -32,10 +32,10 @@ FITTED: Final = 2e-3
 """How far on both sides of a contact the rock is fitted with a parabola to place it [m]."""
 
 ROUNDING: Final = 1e-12
-"""By how much an angle may fall short of a bound [rad]."""
+"""Tolerance of an angle that falls short of a bound [rad]."""
 
 SLACK: Final = 1e-12
-"""By how much, against rounding, more vertices than those on a face are looked at [m²]."""
+"""Margin in which vertices beside a face are looked at as well, for rounding [m²]."""
 
 PARTS: Final = np.linspace(0.0, 1.0, 17)[:, None]
 """Where along a face that cuts a boundary its distance from the rock is taken."""

@@ -23,10 +23,10 @@ NOTHING: Final = 1e-12
 """Their lengths [m]."""
 
 ROUNDING: Final = 1e-9
-"""Of how many parts a piece has."""
+"""Rounding of the number of parts of a piece."""
 
 SHARP: Final = math.radians(15.0)
-"""By how much an outline turns where it has a corner."""
+"""Least turn of an outline that is a corner [rad]."""
 
 
 class Outlines(NamedTuple):

@@ -63,7 +63,7 @@ class PolylineSection(Section):
 
     @cached_property
     def boundary(self) -> Boundary:
-        """Where places are near it; a line that only `highest` is asked of needs none."""
+        """Boundary of the line, made when first used; `highest` alone does not need it."""
         return Boundary(self.pieces)
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:

@@ -62,13 +62,13 @@ class SmoothSection(Section):
         return iter(())
 
     def clear(self, joint: complex, u: complex, face: Face) -> bool:
-        """Whether the face of a phalanx along u is clear of the rock."""
+        """Return True if the face of a phalanx along u is clear of the rock."""
         for _ in self.partings(joint, u, face):
             return True
         return self.face_clearance(joint, u, face) > 0.0
 
     def straight(self, point: complex) -> bool:
-        """Whether the rock beside a point is straight, so that a face may lie flat on it."""
+        """Return True if the rock beside a point is straight: a face may lie flat on it."""
         return False
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:

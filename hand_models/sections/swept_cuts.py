@@ -155,7 +155,7 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
     if less <= ROUND * more and shape.scale_y in (0.0, 1.0):
         core = Disc(centre, rho / more)
     else:
-        # distances to an ellipsoid's section are told in metres by its mean radius
+        # an ellipsoid's mean radius turns distances to its section into metres
         core = Ellipse(centre, (A, B), rho, size)
         core.skew = (more**2 - less**2) ** 2 <= SKEW * (more**2 + less**2) ** 2
     if not shape.sine:
@@ -265,7 +265,7 @@ class _Edge(SmoothSection):
         self._first, self._second, self.skew = first, second, core.skew
 
     def _bounded(self, normal: complex) -> bool:
-        """Whether a line of that normal, into the rock, can be beside it: no face crosses it."""
+        """Return True if a line of that normal, into the rock, can bound it: no face crosses it."""
         return (self._first.way * normal).real >= 0.0 and (self._second.way * normal).real >= 0.0
 
     def tangent(self, joint: complex, height: float) -> Tangent | None:

@@ -7,7 +7,7 @@ sets at random. It makes least
     (Σ r_i⁸)^(1/8) + 0.2 √(mean r_i²),
 
 with r the residuals of `GripperFit` in tolerances, so that the worst count most. All sets that are
-met on the way and whose misfit is at most one meet the data as well as anyone can tell. Of them
+met on the way and whose misfit is at most one meet the data as well as can be known. Of them
 those are kept that are farthest apart: what they leave of a number's plausible range is what the
 data leave of it, and what a plan does over all of them is how sure it is (``draws.toml``).
 
@@ -36,7 +36,7 @@ from hand_models.tile import Surface
 __all__ = ["Met", "as_draws", "global_search", "plot", "run"]
 
 STARTS: Final = 3
-"""Of the search, the recorded set among them."""
+"""Starts of the search, the recorded set among them."""
 
 EVALUATIONS: Final = 2400
 REFITS: Final = 1000
@@ -51,10 +51,10 @@ NEAR: Final = 0.06
 
 POWER: Final = 8
 EVEN: Final = 0.2
-"""Of the objective: how much the worst residual counts, and the weight of all alike."""
+"""Power of the residuals in the objective, and the weight of their root mean square."""
 
 BEYOND: Final = 100.0
-"""What a number beyond its range costs, by the square of how far, in ranges."""
+"""Cost of a number beyond its range, times the square of the excess in ranges."""
 
 SETS: Final = 30
 """That meet the data, to be kept."""
@@ -75,13 +75,13 @@ OF_HAND: Final = {
         **{f"contact_stiffness[{i}]": "N/m" for i in range(3)},
     },
 }
-"""What of the gripper's set the hand has, too: by section, the numbers and their units."""
+"""Numbers of the gripper's set that the hand has as well, by section, with their units."""
 
 VARIANTS: Final = (
     ("no friction of pressed tiles, T ≥ 0", "friction", 0.0),
     ("side view of Fig. 13 within 2 N", "pull-off at F_x = 40 N", CLOSER),
 )
-"""What is held at a value, or asked for within a share of its tolerance, in turn."""
+"""Numbers that are held, or data that are asked for more closely, one after the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +180,7 @@ def farthest_apart(sets: Array, count: int) -> list[int]:
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the gripper's numbers, keep what meets the data, and tell what each aim costs."""
+    """Search the gripper's numbers, keep what meets the data, and return what each aim costs."""
     fit = GripperFit(gripper_table(hand))
     n, looks = len(fit.numbers), TRIED * SETS
     total = STARTS * EVALUATIONS + len(VARIANTS) * REFITS + looks + 1

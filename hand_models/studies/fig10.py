@@ -44,7 +44,7 @@ REPEATS: Final = 5
 """Trials in each direction: "each point represents data of at least 5 measurements"."""
 
 SEED: Final = 10
-"""Of the trials."""
+"""Seed of the trials."""
 
 TRIALS: Final = 4000
 """Simulated tiles for means and scatter."""

@@ -34,10 +34,10 @@ from hand_models.tile import inner_half_planes
 __all__ = ["balance_matrix", "plot", "run"]
 
 KINDS: Final = ("shear", "normal")
-"""Of forces."""
+"""Kinds of forces."""
 
 POINTS: Final = 45
-"""Of the lines, from no load to the pull of the figure."""
+"""Points of the lines, from no load to the pull of the figure."""
 
 SIDEWAYS: Final = 24
 """Directions of (F_x, F_z) in which the shift of the base is looked at, too."""

@@ -46,7 +46,7 @@ from hand_models.wrench_spaces import hull
 __all__ = ["plot", "run"]
 
 DIRECTIONS: Final = 400
-"""Of loads that are pulled until a tile lets go."""
+"""Directions of loads that are pulled until a tile lets go."""
 
 PIECE_DIRECTIONS: Final = 48
 """Directions in which a list of linearised sets is made and tried."""
@@ -55,7 +55,7 @@ SUPPORTS: Final = 2000
 """Directions in which supports are compared, half of them with F_z < 0."""
 
 SUBDIVISIONS: Final = 4
-"""Of each face of the picture of the hull, for its colours."""
+"""Subdivisions of each face in the picture of the hull, for its colours."""
 
 GRID: Final = 81
 """Points of F_x, and of M_y, of the map of pull-off strengths."""
@@ -65,7 +65,7 @@ PULLED, LISTED = 300, 980
 """Steps of progress in all, and at the end of the pulls, and of the list of sets."""
 
 SYMMETRIC: Final = 1e-6
-"""Of its extents, by how much a hull may be off its mirror image."""
+"""Tolerance of a hull against its mirror image, relative to its extents."""
 
 NEAR_SIDE: Final = 0.25
 """Share by which the side view may be off the figure's."""

@@ -1,7 +1,7 @@
 """Fig. 14: which phalanx fails first over the wrench space, and the best planes of loading.
 
 The gripper on surfaces of two diameters is loaded along evenly spread directions with F_z ≤ 0 until
-a tile lets go: each tells which phalanx fails first there. A plane F_x : M_y = const. cuts the hull
+a tile lets go: each shows which phalanx fails first there. A plane F_x : M_y = const. cuts the hull
 of Fig. 9's procedure in a slice; the best planes are those whose slices hold the greatest force,
 √(F_x² + F_z²), and the greatest moment. A cable anchored a behind the palm loads the plane
 M_y = a F_x.
@@ -42,7 +42,7 @@ from hand_models.wrench_spaces import TOLERANCE
 __all__ = ["loading_planes", "plot", "run"]
 
 DIRECTIONS: Final = 600
-"""Of loads that are pulled until a tile lets go."""
+"""Directions of loads that are pulled until a tile lets go."""
 
 PLANES: Final = 181
 """Planes of loading that are looked at."""

@@ -43,20 +43,20 @@ TENSIONS: Final = 29
 RAYS: Final = 2000
 CUTS: Final = 12
 STARTS: Final = 4
-"""Of each hull, before its limits are looked for; and of each search for them."""
+"""Rays and cuts of each hull before its limits are sought; starts of each search for them."""
 
 FORCES: Final = ("shear", "normal")
 COLOURS: Final = ("tab:blue", "tab:red")
 VALUES: Final = ("shear", "pure_shear", "normal", "volume", "pressed_share")
 WHO: Final = ("shear_phalanges", "normal_phalanges")
-"""What is found at each tension, and whose contacts fail there: none where nothing holds."""
+"""Results at each tension, and phalanges whose contacts fail there: none where nothing holds."""
 
 CLOSE: Final = 0.1
 """Newtons to which the tension is found at which closing alone fails."""
 
 SLACK: Final = 0.02
-"""By what share of the largest limit a limit may wander where it is said to fall: hulls are found
-by local search."""
+"""Share of the largest limit by which a limit may wander where it is said to fall: hulls are
+found by local search."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:

@@ -45,7 +45,7 @@ MEASURES_SHOWN: Final[tuple[Measure, ...]] = ("shear", "normal")
 SURFACES: Final = ("A", "B")
 
 STEP: Final = 1e-3
-"""Of a radius, relative to itself, for derivatives of the contact forces."""
+"""Step of a radius, relative to itself, for derivatives of the contact forces."""
 
 UNMOVED: Final = 1e-6
 """Newtons per millimetre of radius below which a contact force does not depend on it."""
@@ -68,8 +68,8 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     for key, surfaces, n, measures in jobs:
         axes, data[key] = radius_axes(table, n), {}
         for name, conditions in surfaces.items():
-            tell = part(progress, done, done + n * n, total)
-            data[key][name] = sweep_map(table, *axes, conditions, measures, tell)
+            report = part(progress, done, done + n * n, total)
+            data[key][name] = sweep_map(table, *axes, conditions, measures, report)
             done += n * n
     data["in_use"] = {
         name: {

@@ -61,7 +61,7 @@ class TendonState:
 
 @dataclass(frozen=True)
 class FingerTendon:
-    """What the tendon of a finger runs over, phalanx by phalanx from the base.
+    """Pulleys, springs and friction of a finger's tendon, phalanx by phalanx from the base.
 
     Attributes
     ----------

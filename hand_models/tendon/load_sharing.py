@@ -39,7 +39,7 @@ FRICTIONLESS: Final = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class PalmSharing:
-    """How the tiles of a palm share its load from rest, per unit of palm travel.
+    """Shares of a palm's load that its tiles carry from rest, per unit of palm travel.
 
     Attributes
     ----------

@@ -27,14 +27,14 @@ from hand_models.tendon.finger_tendon import FRICTIONLESS, FingerTendon, TendonS
 __all__ = ["MotorScheme", "TendonRegimes", "TendonResponse"]
 
 MotorScheme = Literal["held", "tension"]
-"""What the motor does while the load changes: it stands still, or keeps its tension."""
+"""Motor while the load changes: it stands still (held), or keeps its tension."""
 
 CONSISTENT: Final = 1e-9
-"""By how many newtons a regime may seem to contradict itself, by rounding."""
+"""Tolerance of a regime's consistency, for rounding [N]."""
 
 
 class TendonResponse(NamedTuple):
-    """What a finger's tendon does, shapes (m, n); ``regime`` has shape (m,).
+    """Tensions and shears of a finger's tendon, shapes (m, n); ``regime`` has shape (m,).
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class TendonRegimes:
 
 
 class _Regime(NamedTuple):
-    """Which boundaries slip, and the tensions then: a + B_x pushed + B_q wound."""
+    """Boundaries that slip, and the tensions then: a + B_x pushed + B_q wound."""
 
     choice: tuple[int, ...]
     constant: Array

@@ -1,4 +1,4 @@
-"""What one spine tile holds: limit surface, half-planes, the spine array and its fits."""
+"""Strength of one spine tile: limit surface, half-planes, the spine array and its fits."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -25,13 +25,13 @@ STRIPS: Final = 256
 """Boxes side by side, to begin with; of rectangles the square root of it along each side."""
 
 PARTS: Final = 8
-"""Into so many a box is divided."""
+"""Number of boxes into which one is divided."""
 
 DIVISIONS: Final = 24
-"""Of boxes at most; what is still open after them is bounded all the same."""
+"""Most divisions of boxes; what is still open after them is bounded all the same."""
 
 MOST_BOXES: Final = 20_000
-"""At a time, as well."""
+"""Most boxes at a time, as well."""
 
 
 class DirectionBoxes(NamedTuple):

@@ -73,7 +73,7 @@ LEAST_LATERAL: Final = 1e-3
 
 
 class TileLaw(Protocol):
-    """What half-planes need of a law: numbers of `Surface`, and F and its parts, f_s and λ.
+    """Protocol of a law for half-planes: numbers of `Surface`, and F and its parts, f_s and λ.
 
     Neither part may rise with φ. Laws that are equal have equal hashes.
     """
@@ -126,7 +126,7 @@ class HalfPlane(NamedTuple):
 
 
 class BoundsGap(NamedTuple):
-    """How far half-planes are from the limit surface, for loads that pull off (T ≥ 0, N ≤ 0).
+    """Gap between half-planes and the limit surface, for loads that pull off (T ≥ 0, N ≤ 0).
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ __all__ = ["SpineArray", "Statistics", "spine_forces", "statistics"]
 
 
 class Statistics(NamedTuple):
-    """What simulated tiles hold, direction by direction.
+    """Strength of simulated tiles, direction by direction.
 
     Attributes
     ----------

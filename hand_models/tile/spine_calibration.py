@@ -1,4 +1,4 @@
-"""What is published of tiles' strengths, and fits of the planner's limit laws to the spine array.
+"""Published strengths of tiles, and fits of the planner's limit laws to the spine array.
 
 The tile strengths are those of Wang, Jiang, Cutkosky (IJRR 2017), Fig. 7. What asperities hold is
 not printed; ``parameters/spines.toml`` has what meets those of tiles with 20 spines or more.

@@ -1,4 +1,4 @@
-"""What one spine tile can hold: a limit surface over the direction of its load.
+"""Strength of one spine tile: a limit surface over the direction of its load.
 
 A tile loaded in the finger plane at the angle φ from pure shear toward pull-off lets go at (Eq. 21)
 
@@ -55,7 +55,7 @@ LEAST: Final = 1e-6
 
 @dataclass(frozen=True)
 class Surface:
-    """How much a tile holds on a kind of rock.
+    """Strength of a tile on a kind of rock.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Surface:
 
     @property
     def strongest_tile(self) -> float | None:
-        """What all spines of a tile hold before they break [N], where the surface asks for more."""
+        """Load that all spines of a tile bear [N], if the surface asks for more; else None."""
         most = _bound("tile_strength")
         return most if self.shear_limit > most else None
 
@@ -229,7 +229,7 @@ class Surface:
 
     @property
     def straight_law(self) -> tuple[float, float, float, float]:
-        """What f_s(φ) depends on, as `pull_strength` takes it: f_max, f_min, φ_max and p."""
+        """Numbers of f_s(φ), as `pull_strength` takes them: f_max, f_min, φ_max and p."""
         return self.shear_limit, self.pull_off_limit, self.pull_off_angle, self.pull_off_exponent
 
     def sideways_share(self, angle: ArrayLike) -> Array:

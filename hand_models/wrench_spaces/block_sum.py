@@ -56,7 +56,7 @@ def coupled_columns(used: NDArray[np.bool_]) -> list[Indices]:
 
 
 class Sizes(NamedTuple):
-    """How many vertices and half-spaces are gone through for a set's, known beforehand.
+    """Numbers of candidate vertices and half-spaces of a set, known beforehand.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class BlockSum:
 
     @property
     def sizes(self) -> Sizes:
-        """How many vertices and half-spaces are gone through for the sum's."""
+        """Numbers of candidate vertices and half-spaces of the sum."""
         parts, r = [s for s in self._summands if s.dimension], len(self.axes[1])
         candidates = math.prod(len(part.points) for part in parts)
         if self._whole is not None:
@@ -148,7 +148,7 @@ class BlockSum:
 
     @property
     def rounding(self) -> float:
-        """How far rounding may move points in the coordinates of `axes`: more in a thin set."""
+        """Distance that rounding may move points in coordinates of `axes`: more in a thin set."""
         reach = self.axes[1]
         return max(TOLERANCE, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
 

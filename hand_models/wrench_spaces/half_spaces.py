@@ -18,7 +18,7 @@ MOMENT_ARM: Final = 0.1
 """Makes newton-metres commensurate with newtons: about the size of a hand [m]."""
 
 SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
-"""From a wrench to a scaled wrench [N]: moments over a length, all six components in newtons."""
+"""Factors of a scaled wrench [N]: moments over a length, so that all six are in newtons."""
 
 FLATNESS: Final = 1e-9
 """A set is flat in a direction in which it reaches less than this times its longest reach."""

@@ -26,7 +26,7 @@ SLIVER: Final = 1e-6
 """Least singular value of a facet's edges, relative to the largest, at which they span a plane."""
 
 BEYOND: Final = 1e-6
-"""By how much a row must clear a bounding box to be left out at once."""
+"""Distance by which a row must clear a bounding box to be left out at once."""
 
 CHUNK: Final = 2_000_000
 """Numbers of a table that is worked through part by part."""
@@ -120,7 +120,7 @@ def _corners(A: Array, b: Array) -> Array:
 def _meeting(A: Array, b: Array, loosened: Array) -> tuple[Indices, Indices]:
     """Return the pairs of rows whose lines cross on what the others leave of the first, or nearly.
 
-    So n² numbers tell which crossings may be corners, and not n³.
+    So n² numbers, and not n³, decide which crossings may be corners.
     """
     first, second = np.triu_indices(len(b), 1)
     # along the line of row i, b_i A_i + t (−A_i1, A_i0), row j asks for slope_ij t ≤ room_ij

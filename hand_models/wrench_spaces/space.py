@@ -188,7 +188,7 @@ class WrenchSpace:
 
     @property
     def listed(self) -> bool:
-        """Whether rows couple few enough others for their loads' polytopes to be listed."""
+        """True if rows couple few enough others for their loads' polytopes to be listed."""
         return self._most_rows <= MOST_ROWS
 
     @property
@@ -217,7 +217,7 @@ class WrenchSpace:
 
     @property
     def dimension(self) -> int:
-        """Of the set's affine hull, from 0 to 6."""
+        """Dimension of the set's affine hull, from 0 to 6."""
         _ = self._cuts  # an empty set has none
         return len(self._sum.axes[1])
 
@@ -237,7 +237,7 @@ class WrenchSpace:
         return cuts
 
     def _obeys(self, y: Array) -> bool:
-        """Whether loads of the sum of the blocks also keep to the wrench rows."""
+        """Return True if loads of the sum of the blocks also keep to the wrench rows."""
         return bool((self.D @ self.wrench(y) <= self._held * (1.0 + TOLERANCE)).all())
 
     @property
@@ -269,13 +269,13 @@ class WrenchSpace:
 
     @property
     def _facets(self) -> Facets:
-        """In the coordinates of `BlockSum.axes`, about `BlockSum.base`."""
+        """Facets in the coordinates of `BlockSum.axes`, about `BlockSum.base`."""
         return self._clipped[1] if len(self._cuts) else self._sum.facets
 
     def sizes(self) -> Sizes:
         """Return how many vertices and half-spaces `vertices` and `half_spaces` go through.
 
-        Told before these are computed, at far less cost.
+        This comes before the set is computed, at far less cost.
 
         Raises
         ------
@@ -300,7 +300,7 @@ class WrenchSpace:
         EmptySetError
             If nothing is left at u = 1.
         LimitError
-            If the vertices to go through are too many, as `sizes`, or not to be told apart.
+            If the vertices to go through are too many, as `sizes`, or cannot be distinguished.
         """
         scaled = lifted(self._facets, *self._sum.axes, self._sum.base)
         return scaled._replace(
@@ -342,7 +342,7 @@ class WrenchSpace:
         return found
 
     def contains(self, wrench: ArrayLike, tolerance: float = 1e-6) -> bool:
-        """Whether a wrench is in the set at u = 1, or within ``tolerance`` of each of its faces.
+        """Return True if a wrench is in the set at u = 1, or within ``tolerance`` of each face.
 
         Parameters
         ----------
