@@ -1,8 +1,8 @@
-"""How far a compliant grasp can be loaded in a direction: successive linear programs.
+"""Largest load of a compliant grasp in a direction, by successive linear programs.
 
 The limiting wrench in a direction d (Section 5.5.2) is a maximum of d · w(ξ) over the poses of the
 wrist at which nothing lets go. About a pose everything is linear: a linear program over a small box
-gives the next pose, and the box grows or shrinks with how well the program foretold what happened.
+gives the next pose, and the box grows or shrinks with how well the program predicted the result.
 Near the maximum, which is most often a corner of as many limits as the pose has components, the
 poses converge quadratically. The set is not convex: the maximum is a local one.
 """
@@ -43,18 +43,18 @@ KEPT: Final = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Farthest:
-    """Where a grasp lets go in a direction.
+    """Pose and wrench at which a grasp lets go in a direction.
 
     Attributes
     ----------
     twist : ndarray, shape (d,)
         Pose of the wrist [m, rad].
     wrench : ndarray, shape (6,)
-        On the rock there [N, N·m].
+        Wrench on the rock there [N, N·m].
     reach : float
         d · w.
     limiting : Row or None
-        The limit that is nearest; None if hard rows alone end the way.
+        The limit that is nearest; None if only hard rows bound the search.
     """
 
     twist: Array

@@ -3,7 +3,7 @@
 A grid of poses is tried, those at which nothing lets go are kept, and the hull of their wrenches is
 the wrench space. As in the paper the search space is first reduced (`wrist_box`). The outermost
 poses are then pushed along rays from the middle until something lets go, so that the hull's corners
-lie on the boundary, and each tells which phalanx of which finger fails there.
+lie on the boundary, and each names the phalanx and the finger that fail there.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     per_axis : int
         Poses along each axis.
     progress : callable, optional
-        Told how many poses are done, of how many.
+        Called with the number of poses done and of all.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From a wrench to the pose of the wrist that gives it: least squares on exact stiffnesses (5.4.2).
+"""Pose of the wrist that gives a wrench, by least squares on exact stiffnesses (5.4.2).
 
     min |w − w_g(ξ)|² over ξ, forces in newtons and moments over a length,
 

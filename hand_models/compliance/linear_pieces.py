@@ -93,7 +93,7 @@ def pieces(
     most : int, optional
         Pieces at most.
     progress : callable, optional
-        Told how many directions have their exact limit, of how many.
+        Called with the number of directions that have their exact limit, and of all.
 
     Raises
     ------

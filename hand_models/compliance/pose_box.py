@@ -1,4 +1,4 @@
-"""Where the poses of a compliant grasp's wrist are searched: a box in axes of its own.
+"""Box in which the poses of a compliant grasp's wrist are searched, in axes of its own.
 
 The axes are those of the ellipsoid about the set linearised at rest, and the range along each is
 that set's, or grows and shrinks with sparse grids until it just covers the poses that hold (the

@@ -52,7 +52,7 @@ UNTURNED: Final = 1e-3
 
 
 FEW_DIGITS: Final = (6, 7)
-"""Digits that programs write unless they are told otherwise: C++ streams and ``%g``, and floats of
+"""Digits that programs write by default: C++ streams and ``%g``, and floats of
 32 bits."""
 
 SAME: Final = 0.9
@@ -171,9 +171,9 @@ def _finite(raw: RawScan) -> RawScan:
 def _check_numbers(points: Array, read: int, path: Path) -> None:
     if len(points) < FEWEST:
         more = read - len(points)
-        told = f", and {more} that are not finite" if more else ""
+        others = f", and {more} that are not finite" if more else ""
         raise InvalidInputError(
-            f"at least three points are needed, {path} has {len(points)}{told}", field="file"
+            f"at least three points are needed, {path} has {len(points)}{others}", field="file"
         )
     largest = float(np.abs(points).max())
     if largest > LARGEST:

@@ -155,7 +155,7 @@ def most_load(
 
 
 def _held(found: WristSolution) -> bool:
-    """Whether it is a plan within its limits."""
+    """Return whether a solution is a plan within its limits."""
     return found.exact and found.measure.utilisation <= 1.0 + SLACK
 
 
@@ -169,7 +169,7 @@ def _better(plan: WristSolution, other: WristSolution | None) -> WristSolution:
 
 
 def _as_good(found: WristSolution, plan: WristSolution) -> bool:
-    """Whether a plan uses no more than another, as near as such searches end."""
+    """Return whether a plan uses no more than another, to the accuracy of such searches."""
     return not plan.exact or found.measure.utilisation <= plan.measure.utilisation * (1.0 + ALIKE)
 
 

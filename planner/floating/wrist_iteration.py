@@ -1,4 +1,4 @@
-"""Where the wrists of floating hands go: sets linearised again and again, until they are exact.
+"""Find the poses of floating hands' wrists by linearising sets until they are exact.
 
 What a floating hand holds is curved in its wrist's twist ξ, so a plan made on one linearised set is
 some per cent off. Here the hands' sets are linearised about a point (ξ of every floating hand, the
@@ -92,7 +92,7 @@ STALLED: Final = 4
 
 @dataclass(frozen=True, eq=False)
 class WristSolution:
-    """How a search for a point ended.
+    """Result of a search for a point.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class WristSolution:
 
     @property
     def exact(self) -> bool:
-        """Whether the point is a plan."""
+        """True where the point is a plan."""
         return self.found != "nothing"
 
 

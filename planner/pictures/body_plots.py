@@ -25,7 +25,7 @@ BELOW: Final[dict[str, Any]] = {"loc": "upper center", "bbox_to_anchor": (0.5, -
 
 
 class _View(NamedTuple):
-    """A plane of B, its x up: what is across in it, as an axis of B, and how it is told."""
+    """A plane of B, its x up: what is across in it, as an axis of B, and its label."""
 
     title: str
     across: Array

@@ -69,7 +69,7 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     # inches, of which a row of a table needs a tenth
     needed = 0.105 * (rows + len(joints)) / (TOP - BOTTOM)
     figure = Figure(figsize=(SIZE[0], max(SIZE[1], needed)))
-    FigureCanvasAgg(figure)  # which tells how large texts are
+    FigureCanvasAgg(figure)  # which measures texts
     places = {"bottom": BOTTOM, "top": TOP}
     under = 0.0
     if plan.spread is not None and plan.spread.load_factor is not None:

@@ -1,4 +1,4 @@
-"""What is near what: the least distances, and with joints links in rock and in each other."""
+"""Least distances between parts of a scene; with joints, links in rock and in each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be in the way as shapes that `coal` measures, in B: capsules, hands, rock.
+"""Obstacles as shapes that `coal` measures, in B: capsules, hands, rock.
 
 A wall goes on without end; logs, edges and outlines are drawn out along y as far as the limbs get.
 """

@@ -1,9 +1,9 @@
-"""What is odd about the sizes of a question's numbers: another unit is likely.
+"""Find numbers of a question whose size is odd, so that another unit is likely.
 
-Each number is held against what is known of the robot: its own weight, what its hands hold, how far
-its limbs reach, and against the presets' strengths. What another unit of the field would explain is
-a finding of the kind ``unit``; a factor of a few is nobody's slip and stays without one. Gravity is
-that of the place: of the Earth, the Moon or a small body, but hardly 1 m/s².
+Each number is compared with what is known of the robot (its own weight, what its hands hold, how
+far its limbs reach) and with the presets' strengths. What another unit of the field would explain
+is a finding of the kind ``unit``; a factor of a few is no slip of units and gives no finding.
+Gravity is that of the place: of the Earth, the Moon or a small body, but hardly 1 m/s².
 """
 
 from __future__ import annotations
@@ -334,7 +334,7 @@ def _joints(question: Question) -> Iterator[Finding]:
     stance, own = question.stance, question.limits.joint_torque
     if stance.joints is None:
         return
-    robot, told = stance.robot, set()
+    robot, reported = stance.robot, set()
     usual = robot.mass * scene_number("usual", "standard_gravity") * robot.reach
     for limb, chain in robot.chains.items():
         given = own.get(limb) if isinstance(own, Mapping) else own
@@ -344,8 +344,8 @@ def _joints(question: Question) -> Iterator[Finding]:
         field = "stance.robot"
         if given is not None:
             field = "limits.joint_torque" + (f".{limb}" if isinstance(own, Mapping) else "")
-        if field not in told:
-            told.add(field)
+        if field not in reported:
+            reported.add(field)
             message = (
                 f"its strongest joint is to bear {most:.4g} N·m, and the robot's weight on "
                 f"the Earth at its reach turns with {usual:.3g} N·m: is it in N·m?"

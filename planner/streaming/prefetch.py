@@ -49,12 +49,12 @@ NOTHING: Final = np.zeros((0, 0))
 
 
 class Mixture(NamedTuple):
-    """What interpolations say of a wrench.
+    """Mixture of interpolations at a wrench.
 
     Attributes
     ----------
     weight : float
-        Theirs, at most 1; 0 where they say nothing.
+        Weight of the interpolations, at most 1; 0 where none covers the wrench.
     loads : ndarray, shape (hands, m)
         Their mixture [N].
     bound : float
@@ -70,7 +70,7 @@ class Mixture(NamedTuple):
 
 
 class Prefetch:
-    """The interpolations about a wrench, of which one call after another tells; of one thread.
+    """Interpolations about a wrench that changes from call to call; for one thread.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class Solved(NamedTuple):
 
 
 class LoadEffects(NamedTuple):
-    """What loads do: the hands' wrenches (hands, 6) on the rock in H, the largest utilisation."""
+    """Effects of loads: the hands' wrenches (hands, 6) on the rock in H, largest utilisation."""
 
     wrenches: Array
     utilisation: float

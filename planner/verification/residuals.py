@@ -46,7 +46,7 @@ COUNT: Final = len(FINGERS)
 
 
 class RecomputedNails(NamedTuple):
-    """What a plan's forces do to the k nails that hook.
+    """Recomputed state of the k nails that hook, under a plan's forces.
 
     Attributes
     ----------
