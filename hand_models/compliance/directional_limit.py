@@ -22,7 +22,7 @@ from hand_models.wrench_spaces import Row, WrenchSpace, linear_program
 __all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
 
 UNITS: Final = {"v": 1e-3, "w": 1e-2}
-"""By which displacements and turns of a wrist are measured [m, rad]."""
+"""Units of displacements and turns of a wrist [m, rad]."""
 
 FIRST_BOX: Final = 1.0
 LARGEST_BOX: Final = 4.0
@@ -31,14 +31,14 @@ SMALLEST_BOX: Final = 1e-9
 
 ROUNDS: Final = 50
 WEIGHTS: Final = (1e3, 1e4, 1e5)
-"""What a limit exceeded by the whole of its capacity counts, in units of d · w: the next if the
+"""Penalties of a limit exceeded by the whole of its capacity, in units of d · w: the next if the
 last left one exceeded."""
 
 CLOSE: Final = 1e-6
 """Promise of a linear program at which the poses have converged, relative to the objective."""
 
 KEPT: Final = 1e-5
-"""By what share of its capacity a limit may be exceeded at the pose found."""
+"""Share of its capacity by which a limit may be exceeded at the pose found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Farthest:
 
 
 def pose_units(columns: tuple[str, ...]) -> Array:
-    """Return by what each component of a pose is measured, from its name [m, rad]."""
+    """Return the unit of each component of a pose, from its name [m, rad]."""
     return np.array([UNITS[name.split("/")[1][0]] for name in columns])
 
 
@@ -129,7 +129,7 @@ def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, 
 
 
 def _climb(grasp: CompliantGrasp, d: Array, at: Array, weight: float) -> tuple[Array, Evaluation]:
-    """Follow linear programs from a pose until they promise nothing more."""
+    """Follow linear programs from a pose until they predict no further gain."""
     units = pose_units(grasp.columns)
     space = grasp.linearised(at)
     found = grasp.evaluate(at[None])
@@ -168,7 +168,7 @@ def _merit(found: Evaluation, d: Array, weight: float) -> float:
 def _step(
     space: WrenchSpace, d: Array, at: Array, box: float, weight: float
 ) -> tuple[Array, float]:
-    """Return the best step within a box by the linear model, and the merit that it foretells."""
+    """Return the best step within a box by the linear model, and the merit that it predicts."""
     units = pose_units(space.columns)
     # limits in shares of their capacities, hard rows in newtons; one slack exceeds them all
     A: Array = np.vstack([space.L / space.s[:, None], space.H])

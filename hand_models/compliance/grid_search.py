@@ -30,10 +30,10 @@ CHUNK: Final = 50_000
 """Poses that are evaluated at once."""
 
 GROWTHS: Final = 6
-"""How often a ray is lengthened at most until something lets go."""
+"""Largest number of times that a ray is lengthened until something lets go."""
 
 HALVINGS: Final = 30
-"""Of the rays' lengths."""
+"""Number of halvings of the rays' lengths."""
 
 EXTREMES: Final = 1024
 """Directions in which extreme wrenches are kept where a full hull would be too large."""
@@ -44,7 +44,7 @@ CLOSEST: Final = 2
 
 CLOSER_ROUNDS: Final = 3
 NEARER: Final = 0.4
-"""How often, and by what share nearer to the last each time, from so near on."""
+"""Number of rounds of such rays, and the factor by which each round is sent from nearer."""
 
 FEWEST: Final = 2
 """Poses per axis of a grid."""

@@ -33,7 +33,7 @@ TOLERANCE: Final = 1e-9
 """Largest residual of a converged pose, in newtons (moments over a length), over 1 N."""
 
 STEPS: Final = 40
-"""Of one way of taking the palm, at most."""
+"""Most steps with one way of taking the palm."""
 
 FINEST: Final = 1e-14
 """Relative change of pose or residual at which steps end."""

@@ -24,7 +24,7 @@ from hand_models.wrench_spaces import WrenchSpace
 __all__ = ["Piece", "PieceList", "pieces"]
 
 RAYS: Final = 1024
-"""Of the search that limiting poses are looked for from."""
+"""Number of rays of the search from which limiting poses are sought."""
 
 SHRINK: Final = 0.6
 WIDEST: Final = 0.5

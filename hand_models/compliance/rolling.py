@@ -44,7 +44,7 @@ FLATTEST: Final = 10.0
 """Radius from which on rock counts as flat [m]."""
 
 PROBE: Final = 0.5
-"""How far to both sides of a contact the rock's curve is looked at, in half tile lengths."""
+"""Distance to both sides of a contact at which the rock is looked at, in half tile lengths."""
 
 
 class MovedPosture(NamedTuple):

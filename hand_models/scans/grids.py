@@ -24,7 +24,7 @@ Cell = tuple[float, float]
 """Width along x and height along y of a cell of a grid, in the file's unit."""
 
 MAGIC: Final = (b"\x93NUMPY", b"PK")
-"""How an ``.npy`` and an ``.npz`` begin."""
+"""First bytes of an ``.npy`` and of an ``.npz``."""
 
 HEIGHTS: Final = ("elevation", "heights", "height", "z", "dem")
 """Names of heights in an ``.npz``, if it has more than one array of two dimensions."""

@@ -34,13 +34,13 @@ FLAT: Final = 1e-9
 """Width of points on a line, of their length."""
 
 GROWTH: Final = 1.15
-"""By how much squares grow at least until few enough points are left."""
+"""Least factor by which squares grow until few enough points are left."""
 
 SMALLEST: Final = 0.1
 """Size of the smallest rock that is scanned to be held, about a palm's length [m]."""
 
 WIDER: Final = 1.2
-"""By how much the next width of a hole that is tried is wider."""
+"""Ratio of the next width of a hole that is tried to the last."""
 
 
 def mesh_scan(

@@ -39,13 +39,13 @@ OTHERS: Final = {
         "make it GeoTIFF by `gdal_translate -of GTiff`",
     ),
 }
-"""What to do with files of other kinds."""
+"""Advice for files of other kinds, by their suffix."""
 
 FEWEST: Final = 3
 """Points of a triangle."""
 
 LARGEST: Final = 1e12
-"""Of a file's numbers; what is beyond that is lost in rounding."""
+"""Largest number of a file; what is beyond that is lost in rounding."""
 
 UNTURNED: Final = 1e-3
 """Turn of a scanner that is taken for none [rad]."""

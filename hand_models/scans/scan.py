@@ -39,7 +39,7 @@ UPS: Final[Mapping[Up, Array]] = {
     "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
     "-z": np.diag([1.0, -1.0, -1.0]),
 }
-"""By the axis of a file that points up, the rotation that turns it to z."""
+"""Rotation that turns the axis of a file that points up to z, by that axis."""
 
 UPRIGHT: Final = 0.7
 """Least |z| of a normal of rock that is taken to be ground, seen from above."""

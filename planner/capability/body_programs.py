@@ -34,7 +34,7 @@ from planner.solving import plan
 __all__ = ["BodyPrograms", "End", "Motion", "size_of"]
 
 MISSING: Final = "it was known what the stance can hold"
-"""What a deadline may come before."""
+"""Result that is missing if a deadline comes first, in words."""
 
 
 class Motion(NamedTuple):

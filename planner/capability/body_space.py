@@ -29,7 +29,7 @@ from planner.programs import WRENCH_UNIT, Reached
 __all__ = ["COMPONENTS", "OTHERS", "BodySection", "BodySpace", "End", "Others", "checked_axes"]
 
 COMPONENTS: Final = ("fx", "fy", "fz", "mx", "my", "mz")
-"""Of a body wrench."""
+"""Names of the components of a body wrench."""
 
 Others = Literal["needed", "zero", "free"]
 

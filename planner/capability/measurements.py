@@ -44,13 +44,13 @@ ACCURACIES: Final = "measurements"
 """Section of ``experiments.toml``."""
 
 ENDS: Final = (0.05, 0.95)
-"""Of the load factors."""
+"""Quantiles of the load factors that bound their interval."""
 
 ANGLES: Final = (0, 45, 90)
-"""At which the gripper is pulled, from shear to pull-off [°]."""
+"""Angles at which the gripper is pulled, from shear to pull-off [°]."""
 
 STEPS: Final = 11
-"""On the way to a pull."""
+"""Number of steps on the way to a pull."""
 
 
 def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:

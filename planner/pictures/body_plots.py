@@ -21,7 +21,7 @@ GRAVITY: Final = "tab:red"
 ASKED: Final = "black"
 
 BELOW: Final[dict[str, Any]] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.11), "ncols": 2}
-"""Where legends are: beside what is drawn."""
+"""Place of legends: beside what is drawn."""
 
 
 class _View(NamedTuple):
@@ -44,7 +44,7 @@ VIEWS: Final = (
         "toward its belly, along −z of B [m/s²]",
     ),
 )
-"""In which accelerations are drawn."""
+"""Views in which accelerations are drawn."""
 
 
 def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: str) -> None:

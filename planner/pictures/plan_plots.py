@@ -36,13 +36,13 @@ from planner.result import Plan
 __all__ = ["draw_plan", "plot_plan"]
 
 SIZE: Final = (14.0, 8.0)
-"""Of a picture [inch]."""
+"""Width and height of a picture [inch]."""
 
 BOTTOM: Final = 0.075
-"""Of the panels, over the picture's height."""
+"""Lower edge of the panels, over the picture's height."""
 
 TOP: Final = 0.875
-"""Of the panels, over the picture's height."""
+"""Upper edge of the panels, over the picture's height."""
 
 
 def plot_plan(plan: Plan, question: Question, path: Path) -> None:

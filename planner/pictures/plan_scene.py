@@ -41,7 +41,7 @@ LEANING: Final = 0.3
 """Horizontal part of a direction from which on it says where ahead is."""
 
 UP: Final = np.array([0.0, 0.0, 1.0])
-"""In W; and z of a hand."""
+"""Upward direction in W; and z of a hand."""
 
 
 class Surface(NamedTuple):

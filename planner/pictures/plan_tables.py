@@ -21,7 +21,7 @@ __all__ = ["draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
 PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
 
 FIRST: Final = 24
-"""So many lines at most say what leaves no balance."""
+"""Largest number of lines that say what leaves no balance."""
 
 ENDLESS: Final = 999.0
 """A utilisation that is written no more."""

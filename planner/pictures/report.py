@@ -29,7 +29,7 @@ IN_BAR: Final[dict[str, Any]] = {
     "weight": "bold",
     "fontsize": 9,
 }
-"""What is written in a bar, from its upper end."""
+"""Style of what is written in a bar, from its upper end."""
 
 ON_WHITE: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
 
@@ -77,7 +77,7 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
 
 
 def summary(result: RouteResult) -> dict[str, Any]:
-    """Return the climb in short: whether it goes, its crux, and what is odd about its stances."""
+    """Return a summary of the climb: its status, its crux, and what is odd about its stances."""
     crux = result.crux
     stage, plan = result.stages[crux], result.plans[crux]
     statuses = [p.status for p in result.plans]
@@ -161,7 +161,7 @@ def _row(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
 
 
 def _spread(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
-    """Return the spread of a stage in short, where it was asked for."""
+    """Return the spread of a stage as columns of the table, where it was asked for."""
     if "spread" not in stage.question.want:
         return {}
     spread = plan.spread
@@ -252,7 +252,7 @@ def _band(plans: Sequence[Plan | OutOfReach], name: str) -> Array:
 
 
 def _of_draws(plans: Sequence[Plan | OutOfReach]) -> str:
-    """Return what the bands are."""
+    """Return in words what the bands of the spread contain."""
     draws = max((plan.spread.draws for plan in plans if plan.spread is not None), default=0)
     return f"5 to 95 % of {draws} draws" if draws >= MANY else f"all of {draws} draws"
 

@@ -29,14 +29,14 @@ R = TypeVar("R")
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 ORPHANED: Final = 1.0
-"""How long a process may go on without the one that started it [s]."""
+"""Longest time that a process may go on without the one that started it [s]."""
 
 THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""What keeps a library of linear algebra to one thread, before it is loaded."""
+"""Variables that keep a library of linear algebra to one thread, set before it is loaded."""
 
 SWITCH: Final = 5e-4
-"""How long a lane keeps the interpreter from the others of its process [s]; Python's own is ten
-times as long, in which a short question would wait for a long one at each of its steps."""
+"""Time for which a lane keeps the interpreter from the others of its process [s]. Python's own is
+ten times as long: a short question would wait that long for a long one at each of its steps."""
 
 ROOM: Final = 2**14
 """Bytes that a pipe has room for, wherever."""

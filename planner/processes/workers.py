@@ -44,7 +44,7 @@ UNCAUGHT: Final = 1
 
 
 class Lost:
-    """Takes the place of a result that there is none of.
+    """Placeholder for a result that was lost.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Workers(Generic[T, R]):
         self._queue: deque[_Task[T]] = deque()
         self._knows: LRUCache[Hashable, Lane[T, R]] = LRUCache(KNOWN)
         self._unborn = ""
-        """Why."""
+        """Reason of the last failed start."""
 
     def __enter__(self) -> Self:
         self._start()
@@ -200,7 +200,7 @@ class Workers(Generic[T, R]):
                 self.hands[station.lanes[0]] = {}
 
     def _miss(self, why: str) -> None:
-        """Count a process that did not live to be ready."""
+        """Count a process that could not be started, or died before it was ready."""
         self.stillborn += 1
         self._unborn = why
         if self.stillborn == STARTS:
@@ -210,7 +210,7 @@ class Workers(Generic[T, R]):
         """Remove a process that has died, and return how it died."""
         how = f"a worker {self._remove(lane, dead=True)}"
         if not lane.ready:
-            # nothing of this house is at work before a process is, but the program's own beginning
+            # before a process is ready, only the program's own start-up runs in it
             hint = NO_GUARD if lane.station.process.exitcode == UNCAUGHT else ""
             self._miss(f"processes do not start: {how}{hint}")
         return how

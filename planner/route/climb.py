@@ -35,7 +35,7 @@ __all__ = ["Move", "OutOfReach", "Route", "RouteResult", "RouteStage", "in_route
 Phase = Literal["start", "shift", "lift", "place"]
 
 JointAngles = Array | Literal["solve"]
-"""Of a limb [rad], or that they are to be found."""
+"""Joint angles of a limb [rad]; ``solve`` if they are to be found."""
 
 LEAST_KNOWN: Final[tuple[LoadFactorStatus, ...]] = (
     "none",
@@ -45,7 +45,7 @@ LEAST_KNOWN: Final[tuple[LoadFactorStatus, ...]] = (
     "found",
     "unbounded",
 )
-"""What is known of load factors; of several stages the first that any has is known of the least."""
+"""Statuses of load factors. That of the least of several stages is the first that any stage has."""
 
 WORSE: Final = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
 """Statuses of stages, each worse than the one before."""
@@ -53,7 +53,7 @@ WORSE: Final = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """One limb to its next hold.
+    """Move of one limb to its next hold.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Move:
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A climb.
+    """A climb to be planned: a start stance and moves.
 
     Attributes
     ----------

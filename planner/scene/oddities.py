@@ -30,7 +30,8 @@ AGREED: Final = 0.3
 """Length of the mean of z of all H from which on it shows where a body's belly is."""
 
 BEHIND: Final = 0.05
-"""How far the body's origin may be on the rock's side of a palm that points out of its back [m]."""
+"""Largest distance of the body's origin on the rock's side of a palm that points out of its back
+[m]."""
 
 BEYOND: Final = 0.1
 """The same of palms that point out of its belly, of all hands: two logs on either side may be a
@@ -41,17 +42,17 @@ BELLY: Final = -0.7
 that hug a boulder point sideways."""
 
 IN_ROCK: Final = 0.05
-"""How deep the body may be in rock: its capsules, and rock far from a hand, are rough [m]."""
+"""Largest depth of the body in rock: its capsules, and rock far from a hand, are rough [m]."""
 
 DEEP: Final = 0.2
-"""How deep in a ball, a boulder or a log the body's origin cannot be [m]."""
+"""Depth in a ball, a boulder or a log at which the body's origin cannot be [m]."""
 
 DOWN: Final = -0.8
 """Cosine between a hand's fingers and up from which on they point down: 143°."""
 
 CROSSED: Final = 0.25
-"""By how much nearer to their shoulders two hands would be with their limbs exchanged, over the
-robot's reach."""
+"""Gain in distance of two hands to their shoulders with their limbs exchanged, over the robot's
+reach, from which on they count as crossed."""
 
 SAME_PLACE: Final = 1e-3
 """Distance of two hands that cannot be, if they are also turned alike [m]."""

@@ -51,7 +51,7 @@ class LoadEffects(NamedTuple):
 
 
 class SupportBound(NamedTuple):
-    """No plan has a body wrench w with direction · w > most."""
+    """Proof that no plan has a body wrench w with direction · w > most."""
 
     direction: Array
     most: float
