@@ -26,7 +26,7 @@ from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, TendonS
 __all__ = ["CompliantFinger", "FingerLoads"]
 
 STEP = 1e-30
-"""Of complex steps, whose error is its square."""
+"""Size of complex steps, whose error is its square."""
 
 
 class FingerLoads(NamedTuple):

@@ -1,8 +1,8 @@
-"""How far a compliant grasp can be loaded in a direction: successive linear programs.
+"""Largest load of a compliant grasp in a direction, by successive linear programs.
 
 The limiting wrench in a direction d (Section 5.5.2) is a maximum of d · w(ξ) over the poses of the
 wrist at which nothing lets go. About a pose everything is linear: a linear program over a small box
-gives the next pose, and the box grows or shrinks with how well the program foretold what happened.
+gives the next pose, and the box grows or shrinks with how well the program predicted the result.
 Near the maximum, which is most often a corner of as many limits as the pose has components, the
 poses converge quadratically. The set is not convex: the maximum is a local one.
 """
@@ -22,7 +22,7 @@ from hand_models.wrench_spaces import Row, WrenchSpace, linear_program
 __all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
 
 UNITS: Final = {"v": 1e-3, "w": 1e-2}
-"""By which displacements and turns of a wrist are measured [m, rad]."""
+"""Units of displacements and turns of a wrist [m, rad]."""
 
 FIRST_BOX: Final = 1.0
 LARGEST_BOX: Final = 4.0
@@ -31,30 +31,30 @@ SMALLEST_BOX: Final = 1e-9
 
 ROUNDS: Final = 50
 WEIGHTS: Final = (1e3, 1e4, 1e5)
-"""What a limit exceeded by the whole of its capacity counts, in units of d · w: the next if the
+"""Penalties of a limit exceeded by the whole of its capacity, in units of d · w: the next if the
 last left one exceeded."""
 
 CLOSE: Final = 1e-6
 """Promise of a linear program at which the poses have converged, relative to the objective."""
 
 KEPT: Final = 1e-5
-"""By what share of its capacity a limit may be exceeded at the pose found."""
+"""Share of its capacity by which a limit may be exceeded at the pose found."""
 
 
 @dataclass(frozen=True, eq=False)
 class Farthest:
-    """Where a grasp lets go in a direction.
+    """Pose and wrench at which a grasp lets go in a direction.
 
     Attributes
     ----------
     twist : ndarray, shape (d,)
         Pose of the wrist [m, rad].
     wrench : ndarray, shape (6,)
-        On the rock there [N, N·m].
+        Wrench on the rock there [N, N·m].
     reach : float
         d · w.
     limiting : Row or None
-        The limit that is nearest; None if hard rows alone end the way.
+        The limit that is nearest; None if only hard rows bound the search.
     """
 
     twist: Array
@@ -64,7 +64,7 @@ class Farthest:
 
 
 def pose_units(columns: tuple[str, ...]) -> Array:
-    """Return by what each component of a pose is measured, from its name [m, rad]."""
+    """Return the unit of each component of a pose, from its name [m, rad]."""
     return np.array([UNITS[name.split("/")[1][0]] for name in columns])
 
 
@@ -129,7 +129,7 @@ def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, 
 
 
 def _climb(grasp: CompliantGrasp, d: Array, at: Array, weight: float) -> tuple[Array, Evaluation]:
-    """Follow linear programs from a pose until they promise nothing more."""
+    """Follow linear programs from a pose until they predict no further gain."""
     units = pose_units(grasp.columns)
     space = grasp.linearised(at)
     found = grasp.evaluate(at[None])
@@ -168,7 +168,7 @@ def _merit(found: Evaluation, d: Array, weight: float) -> float:
 def _step(
     space: WrenchSpace, d: Array, at: Array, box: float, weight: float
 ) -> tuple[Array, float]:
-    """Return the best step within a box by the linear model, and the merit that it foretells."""
+    """Return the best step within a box by the linear model, and the merit that it predicts."""
     units = pose_units(space.columns)
     # limits in shares of their capacities, hard rows in newtons; one slack exceeds them all
     A: Array = np.vstack([space.L / space.s[:, None], space.H])

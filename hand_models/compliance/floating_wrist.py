@@ -46,7 +46,7 @@ KEPT: Final = 16
 """Poses whose loads are kept: some more than a search comes back to."""
 
 PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
-"""How a palm carries: not at all, by moving toward −x, into the rock, or both."""
+"""Ways in which a palm carries: not at all, by moving toward −x, into the rock, or both."""
 
 PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
     (False, False): "off",
@@ -54,7 +54,7 @@ PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
     (False, True): "presses",
     (True, True): "drags_and_presses",
 }
-"""By whether the palm drags, and whether it presses."""
+"""Palm modes by (palm drags, palm presses)."""
 
 
 @dataclass(eq=False)

@@ -36,7 +36,7 @@ ROUNDING: Final = 1e-9
 
 
 class GraspLoads(NamedTuple):
-    """What m poses of the wrist give.
+    """Loads of a grasp at m poses of its wrist.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class GraspLoads(NamedTuple):
 
 
 class LoadRows(NamedTuple):
-    """What loads e and wrenches must keep to.
+    """Limit rows and hard rows of a grasp's loads e and wrenches w.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Evaluation(NamedTuple):
 
     @property
     def holds(self) -> NDArray[np.bool_]:
-        """Whether nothing lets go, shape (m,)."""
+        """Return whether nothing lets go at each pose, shape (m,)."""
         return (self.utilisation <= 1.0) & (self.violation <= 0.0)
 
 

@@ -3,7 +3,7 @@
 A grid of poses is tried, those at which nothing lets go are kept, and the hull of their wrenches is
 the wrench space. As in the paper the search space is first reduced (`wrist_box`). The outermost
 poses are then pushed along rays from the middle until something lets go, so that the hull's corners
-lie on the boundary, and each tells which phalanx of which finger fails there.
+lie on the boundary, and each names the phalanx and the finger that fail there.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ CHUNK: Final = 50_000
 """Poses that are evaluated at once."""
 
 GROWTHS: Final = 6
-"""How often a ray is lengthened at most until something lets go."""
+"""Largest number of times that a ray is lengthened until something lets go."""
 
 HALVINGS: Final = 30
-"""Of the rays' lengths."""
+"""Number of halvings of the rays' lengths."""
 
 EXTREMES: Final = 1024
 """Directions in which extreme wrenches are kept where a full hull would be too large."""
@@ -44,7 +44,7 @@ CLOSEST: Final = 2
 
 CLOSER_ROUNDS: Final = 3
 NEARER: Final = 0.4
-"""How often, and by what share nearer to the last each time, from so near on."""
+"""Number of rounds of such rays, and the factor by which each round is sent from nearer."""
 
 FEWEST: Final = 2
 """Poses per axis of a grid."""
@@ -103,7 +103,7 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     per_axis : int
         Poses along each axis.
     progress : callable, optional
-        Told how many poses are done, of how many.
+        Called with the number of poses done and of all.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From a wrench to the pose of the wrist that gives it: least squares on exact stiffnesses (5.4.2).
+"""Pose of the wrist that gives a wrench, by least squares on exact stiffnesses (5.4.2).
 
     min |w − w_g(ξ)|² over ξ, forces in newtons and moments over a length,
 
@@ -33,7 +33,7 @@ TOLERANCE: Final = 1e-9
 """Largest residual of a converged pose, in newtons (moments over a length), over 1 N."""
 
 STEPS: Final = 40
-"""Of one way of taking the palm, at most."""
+"""Most steps with one way of taking the palm."""
 
 FINEST: Final = 1e-14
 """Relative change of pose or residual at which steps end."""

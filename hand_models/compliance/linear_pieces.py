@@ -24,7 +24,7 @@ from hand_models.wrench_spaces import WrenchSpace
 __all__ = ["Piece", "PieceList", "pieces"]
 
 RAYS: Final = 1024
-"""Of the search that limiting poses are looked for from."""
+"""Number of rays of the search from which limiting poses are sought."""
 
 SHRINK: Final = 0.6
 WIDEST: Final = 0.5
@@ -93,7 +93,7 @@ def pieces(
     most : int, optional
         Pieces at most.
     progress : callable, optional
-        Told how many directions have their exact limit, of how many.
+        Called with the number of directions that have their exact limit, and of all.
 
     Raises
     ------

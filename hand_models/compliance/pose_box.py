@@ -1,4 +1,4 @@
-"""Where the poses of a compliant grasp's wrist are searched: a box in axes of its own.
+"""Box in which the poses of a compliant grasp's wrist are searched, in axes of its own.
 
 The axes are those of the ellipsoid about the set linearised at rest, and the range along each is
 that set's, or grows and shrinks with sparse grids until it just covers the poses that hold (the
@@ -24,16 +24,15 @@ SPARSE: Final = {3: 13, 6: 5}
 """Poses per axis of the grids that find the range, by how many axes there are."""
 
 RESIZES: Final = 6
-"""How often the range is adapted at most."""
+"""Largest number of times that the range is adapted."""
 
 RECENTRINGS: Final = 6
-"""How often the set is linearised anew at most, until its middle holds."""
+"""Largest number of times that the set is linearised again, until its middle holds."""
 
 NEWTON_STEPS: Final = 50
 
 FARTHEST: Final = 20.0
-"""How far motions are looked at that no limit ends, such as those that load nothing, in
-`pose_units`."""
+"""Largest motion that is looked at where no limit ends it, as it loads nothing, in `pose_units`."""
 
 NEAR: Final = 1e-3
 """Newton decrement of a middle that is good enough where rounding keeps it from being better."""

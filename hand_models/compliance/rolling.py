@@ -1,4 +1,4 @@
-"""How a finger settles anew when its base moves a little: rolling on the rock where it touches.
+"""Settle a finger again when its base moves a little: it rolls on the rock where it touches.
 
 A settled finger's contacts are kept, and around each of them the rock is taken as the circle that
 fits it there (a straight line where it is flat or hollow). A phalanx whose face touches rolls on
@@ -17,7 +17,7 @@ toward z, phalanx i slips along the rock by
 positive toward the finger's base, with c⁰ its contact from the joint and s the arc length of the
 contact on the rock; its tile, anchored in the rock, makes up for that (Section 5.3).
 
-Everything here also takes complex numbers, so that derivatives are found by complex steps.
+All functions here also take complex numbers, so that derivatives are found by complex steps.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ FLATTEST: Final = 10.0
 """Radius from which on rock counts as flat [m]."""
 
 PROBE: Final = 0.5
-"""How far to both sides of a contact the rock's curve is looked at, in half tile lengths."""
+"""Distance to both sides of a contact at which the rock is looked at, in half tile lengths."""
 
 
 class MovedPosture(NamedTuple):

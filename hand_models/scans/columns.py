@@ -28,7 +28,7 @@ NAMES: Final = {
 DEGREES: Final = ("lat", "lon", "lng", "long", "latitude", "longitude")
 
 SAMPLE: Final = 1000
-"""Lines whose look tells how a table is written."""
+"""Number of lines that show how a table is written."""
 
 
 class _Style(NamedTuple):
@@ -113,7 +113,7 @@ def _cells(line: str, style: _Style) -> list[str]:
 
 
 def _numbers(cells: Sequence[str], style: _Style) -> bool:
-    """Whether the first cells are numbers, and three at least are."""
+    """Return whether the first cells are numbers, and at least three are."""
     try:
         found = [_number(cell, style) for cell in cells[: len(AXES)]]
     except ValueError:
@@ -204,13 +204,13 @@ def _read(
             pass  # slower, for what has empty cells
     found = np.empty((len(lines), len(columns)))
     for i, (number, line) in enumerate(zip(numbers, lines, strict=True)):
-        cells, told = _cells(line, style), f"line {number}, {line.strip()[:60]!r},"
+        cells, where = _cells(line, style), f"line {number}, {line.strip()[:60]!r},"
         if len(cells) <= max(columns):
             raise InvalidInputError(
-                f"{told} has {len(cells)} columns, {max(columns) + 1} are needed: {path}"
+                f"{where} has {len(cells)} columns, {max(columns) + 1} are needed: {path}"
             )
         try:
             found[i] = [_number(cells[column], style) for column in columns]
         except ValueError as error:
-            raise InvalidInputError(f"{told} is no point, {error}: {path}") from None
+            raise InvalidInputError(f"{where} is no point, {error}: {path}") from None
     return found

@@ -24,7 +24,7 @@ Cell = tuple[float, float]
 """Width along x and height along y of a cell of a grid, in the file's unit."""
 
 MAGIC: Final = (b"\x93NUMPY", b"PK")
-"""How an ``.npy`` and an ``.npz`` begin."""
+"""First bytes of an ``.npy`` and of an ``.npz``."""
 
 HEIGHTS: Final = ("elevation", "heights", "height", "z", "dem")
 """Names of heights in an ``.npz``, if it has more than one array of two dimensions."""
@@ -136,7 +136,7 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
 
 
 def _geo_cell(tags: Mapping[int, Any], keys: tuple[int, ...]) -> Cell | None:
-    """Return the cell of a GeoTIFF in its unit, None if it is in degrees or not told."""
+    """Return the cell of a GeoTIFF in its unit, None if it is in degrees or not given."""
     types = [keys[i + 3] for i in range(4, len(keys) - 3, 4) if keys[i] == MODEL_TYPE]
     if GEOGRAPHIC in types:
         return None

@@ -25,7 +25,7 @@ def keep_triangles(scan: Scan, hole: float) -> ScannedRock:
     scan : Scan
         With triangles.
     hole : float
-        Holes that are wider are told [m].
+        Width above which a hole is reported [m].
     """
     assert scan.faces is not None
     view = scan.direction()

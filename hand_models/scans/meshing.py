@@ -25,22 +25,22 @@ from hand_models.scans.scan import UNITS, Scan, Unit, axes_along, in_scan, start
 __all__ = ["Triangulated", "mesh_scan", "too_large", "too_small", "triangulated", "wider_holes"]
 
 STEPS: Final = 3
-"""Steps that are told: thinned, triangulated, parted from holes."""
+"""Number of steps that are reported: thinned, triangulated, parted from holes."""
 
 SAMPLE: Final = 20_000
-"""Points whose neighbours tell the spacing."""
+"""Number of points from whose neighbours the spacing is measured."""
 
 FLAT: Final = 1e-9
 """Width of points on a line, of their length."""
 
 GROWTH: Final = 1.15
-"""By how much squares grow at least until few enough points are left."""
+"""Least factor by which squares grow until few enough points are left."""
 
 SMALLEST: Final = 0.1
 """Size of the smallest rock that is scanned to be held, about a palm's length [m]."""
 
 WIDER: Final = 1.2
-"""By how much the next width of a hole that is tried is wider."""
+"""Ratio of the next width of a hole that is tried to the last."""
 
 
 def mesh_scan(
@@ -61,9 +61,9 @@ def mesh_scan(
         points than ``scan.toml`` says [m].
     hole : float, optional
         The widest hole that is bridged, by default as ``scan.toml`` says [m]. Of triangles that are
-        kept none is bridged, and wider ones are told.
+        kept none is bridged, and wider ones are reported.
     tell : callable, optional
-        Told how far the work is.
+        Called with the steps done and their number.
 
     Raises
     ------
@@ -166,23 +166,23 @@ def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputEr
     corners = made.gaps.triangles
     rise = float(np.median(np.ptp(corners[..., 2], axis=1)))
     what = "cells" if scan.heights else "points"
-    told = f"{what} are {1e3 * apart:.3g} mm apart"
+    message = f"{what} are {1e3 * apart:.3g} mm apart"
     open_ = f"and holes wider than {1e3 * hole:.3g} mm stay open: no triangle is left"
     if apart <= hole < rise:
-        told = f"{told} across the view and {1e3 * rise:.3g} mm along it: no triangle is left"
+        message = f"{message} across the view and {1e3 * rise:.3g} mm along it: no triangle is left"
         if scan.heights:
             cause = "is the cell in degrees, or in another unit than the heights?"
-            return InvalidInputError(f"{told}; {cause}", field="cell")
-        return InvalidInputError(f"{told}; was it seen from another side?", field="view")
+            return InvalidInputError(f"{message}; {cause}", field="cell")
+        return InvalidInputError(f"{message}; was it seen from another side?", field="view")
     if extent > table.scalar("scan", "largest"):
-        return InvalidInputError(f"{told}, {open_}; {too_large(extent)}", field="hole")
+        return InvalidInputError(f"{message}, {open_}; {too_large(extent)}", field="hole")
     for wider in wider_holes(hole):
         if made.gaps.open_(wider).mean() <= table.scalar("mesh", "left_holes"):
             return InvalidInputError(
-                f"{told}, {open_}; --hole {wider:g} bridges them", field="hole"
+                f"{message}, {open_}; --hole {wider:g} bridges them", field="hole"
             )
     return InvalidInputError(
-        f"{told}, {open_}; rock is to be scanned with points less than that apart", field="hole"
+        f"{message}, {open_}; rock is to be scanned with points less than that apart", field="hole"
     )
 
 

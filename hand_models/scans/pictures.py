@@ -30,8 +30,7 @@ NAMED: Final = 12
 """Holes whose width is written beside them."""
 
 APART: Final = np.array([0.11, 0.04])
-"""How far apart widths are that are written, sideways and upward, as part of the rock's longer
-side."""
+"""Distance of widths that are written, sideways and upward, as part of the rock's longer side."""
 
 COLOURS: Final = "viridis"
 

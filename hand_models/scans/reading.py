@@ -39,20 +39,20 @@ OTHERS: Final = {
         "make it GeoTIFF by `gdal_translate -of GTiff`",
     ),
 }
-"""What to do with files of other kinds."""
+"""Advice for files of other kinds, by their suffix."""
 
 FEWEST: Final = 3
 """Points of a triangle."""
 
 LARGEST: Final = 1e12
-"""Of a file's numbers; what is beyond that is lost in rounding."""
+"""Largest number of a file; what is beyond that is lost in rounding."""
 
 UNTURNED: Final = 1e-3
 """Turn of a scanner that is taken for none [rad]."""
 
 
 FEW_DIGITS: Final = (6, 7)
-"""Digits that programs write unless they are told otherwise: C++ streams and ``%g``, and floats of
+"""Digits that programs write by default: C++ streams and ``%g``, and floats of
 32 bits."""
 
 SAME: Final = 0.9
@@ -171,9 +171,9 @@ def _finite(raw: RawScan) -> RawScan:
 def _check_numbers(points: Array, read: int, path: Path) -> None:
     if len(points) < FEWEST:
         more = read - len(points)
-        told = f", and {more} that are not finite" if more else ""
+        others = f", and {more} that are not finite" if more else ""
         raise InvalidInputError(
-            f"at least three points are needed, {path} has {len(points)}{told}", field="file"
+            f"at least three points are needed, {path} has {len(points)}{others}", field="file"
         )
     largest = float(np.abs(points).max())
     if largest > LARGEST:

@@ -1,6 +1,6 @@
-"""What helps where a scan is left full of holes: each remedy is tried before it is advised.
+"""Remedies for a scan that is left full of holes: each is tried before it is advised.
 
-One is to drop points that stand alone: statistical outlier removal, as Open3D and PCL name it.
+One remedy drops points that stand alone: the statistical outlier removal of Open3D and PCL.
 """
 
 from __future__ import annotations

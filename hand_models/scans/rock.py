@@ -1,4 +1,4 @@
-"""What a scan becomes: triangles in a hold's frame, where that is, and what holes are left."""
+"""Scanned rock: triangles in a hold's frame, the pose of that frame, and the holes left."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Hole", "ScannedRock", "Step", "write_rock"]
 
 
 class Hole(NamedTuple):
-    """Where no point of the rock was seen.
+    """Part of the rock where no point was seen.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class Hole(NamedTuple):
 
 
 class Step(NamedTuple):
-    """Where neighbouring points are so far apart along the view that rock may hide between them.
+    """Jump between neighbouring points along the view, so large that rock may hide between them.
 
     Attributes
     ----------
     height : float
-        Along the view [m].
+        Height of the jump along the view [m].
     place : ndarray, shape (3,)
         The middle of its corners, in the rock's frame [m].
     """

@@ -39,7 +39,7 @@ UPS: Final[Mapping[Up, Array]] = {
     "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
     "-z": np.diag([1.0, -1.0, -1.0]),
 }
-"""By the axis of a file that points up, the rotation that turns it to z."""
+"""Rotation that turns the axis of a file that points up to z, by that axis."""
 
 UPRIGHT: Final = 0.7
 """Least |z| of a normal of rock that is taken to be ground, seen from above."""
@@ -59,14 +59,14 @@ def areas_of(points: Array, faces: Indices) -> Array:
 
 
 class RawScan(NamedTuple):
-    """What a file has.
+    """Content of a scan file.
 
     Attributes
     ----------
     points : ndarray, shape (n, 3)
         In the file's axes and unit; not finite where nothing was measured.
     scanner : Pose or None
-        Where the scanner was, if the file tells; if it was turned, the points are in its frame.
+        Where the scanner was, if the file says; if it was turned, the points are in its frame.
     heights : bool
         Whether z is a height over a grid, seen from above.
     faces : ndarray of int, shape (m, 3), or None
@@ -130,7 +130,7 @@ class Scan:
         Raises
         ------
         InvalidInputError
-            If it cannot be told from which side, or the viewpoint is assumed and so far away that
+            If it is unknown from which side, or the viewpoint is assumed and so far away that
             no scanner can have been there; the field is ``view``.
         """
         if self.view is not None:

@@ -34,19 +34,19 @@ from planner.solving import plan
 __all__ = ["BodyPrograms", "End", "Motion", "size_of"]
 
 MISSING: Final = "it was known what the stance can hold"
-"""What a deadline may come before."""
+"""Result that is missing if a deadline comes first, in words."""
 
 
 class Motion(NamedTuple):
-    """How the body's acceleration in W enters, k components: three linear, and three angular.
+    """Effect of the body's acceleration in W, k components: three linear, and three angular.
 
     Both the wrench that accelerates a robot whose joints stand still and its joints' torques are
-    affine in the acceleration, so that one column for each component says all.
+    affine in the acceleration, so that one column for each component describes it fully.
 
     Attributes
     ----------
     rest : StanceData
-        Of the body at rest.
+        Data of the body at rest.
     wrench : ndarray, shape (6, k)
         Body wrench for one unit of each component [kg, kg·m, kg·m²].
     torques : tuple of ndarray, shape (nl, k)
@@ -59,7 +59,7 @@ class Motion(NamedTuple):
 
 
 class End(NamedTuple):
-    """How far a stance goes in a direction.
+    """Farthest point that a stance reaches in a direction.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class End(NamedTuple):
 
 
 class BodyPrograms:
-    """What a question's stance can hold, direction by direction.
+    """Conic programs for what a question's stance can hold, direction by direction.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from planner.programs import WRENCH_UNIT, Reached
 __all__ = ["COMPONENTS", "OTHERS", "BodySection", "BodySpace", "End", "Others", "checked_axes"]
 
 COMPONENTS: Final = ("fx", "fy", "fz", "mx", "my", "mz")
-"""Of a body wrench."""
+"""Names of the components of a body wrench."""
 
 Others = Literal["needed", "zero", "free"]
 
@@ -38,7 +38,7 @@ OTHERS: Final[dict[str, str]] = {
     "zero": "the others zero",
     "free": "whatever the others",
 }
-"""What the other components of a body wrench may be, and how that is told."""
+"""Values that the other components of a body wrench may have, each with its label."""
 
 
 class BodySection(NamedTuple):
@@ -59,7 +59,7 @@ class BodySection(NamedTuple):
 
 
 class BodySpace(BodyPrograms):
-    """What a stance can hold: how far it goes, and sections of that.
+    """Body space of a stance: its largest wrench in a direction, and its sections.
 
     Parameters
     ----------
@@ -153,12 +153,12 @@ class BodySpace(BodyPrograms):
 
     @property
     def accelerates(self) -> bool:
-        """Whether accelerations can be told: not where a body wrench is given instead of a load."""
+        """True where accelerations are known: a load is given, not a body wrench."""
         return self.motion is not None
 
     @property
     def turns(self) -> bool:
-        """Whether angular accelerations can be told, too: with joints, and no com of a load."""
+        """True where angular accelerations are known, too: with joints, and no com of a load."""
         return self.motion is not None and self.motion.wrench.shape[1] == 6
 
     def acceleration(self, direction: ArrayLike) -> End | None:
@@ -178,7 +178,7 @@ class BodySpace(BodyPrograms):
         Raises
         ------
         InvalidInputError
-            If the direction is none, or accelerations cannot be told.
+            If the direction is none, or accelerations are not known.
         SolverError
             If a program is not solved.
         """

@@ -1,15 +1,15 @@
-"""Which measurement on a real hand would narrow the spread of load factors most.
+"""Rank measurements on a real hand by how much they narrow the spread of load factors.
 
-The draws of what is not known (`hand_models.parameters.draws`) stand for all hands that there may
-be. Each in turn is taken for the truth: a measurement that gives m* there and m_i in draw i, with
-the standard deviation σ, leaves draw i the weight
+The samples of unknown parameters (`hand_models.parameters.draws`) stand for all possible hands.
+Each sample in turn is taken for the truth: a measurement that gives m* there and m_i in sample i,
+with the standard deviation σ, leaves sample i the weight
 
     w_i = exp(−Σ (m_i − m*)² / (2 σ²)),
 
 summed over the numbers that one measurement gives. The narrower the weighted 5 to 95 % of the load
 factor, averaged over the truths, the better the measurement: its *width* is that over the width of
-all draws alike. Weights leave few draws, and few draws are less wide by chance: so a width is held
-against `chance`, the mean of the same with the measured numbers of other draws (all cyclic shifts).
+all samples alike. Weights leave few samples, and few samples are less wide by chance: so a width is
+compared with `chance`, its mean with the measured numbers of other samples (all cyclic shifts).
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ ACCURACIES: Final = "measurements"
 """Section of ``experiments.toml``."""
 
 ENDS: Final = (0.05, 0.95)
-"""Of the load factors."""
+"""Quantiles of the load factors that bound their interval."""
 
 ANGLES: Final = (0, 45, 90)
-"""At which the gripper is pulled, from shear to pull-off [°]."""
+"""Angles at which the gripper is pulled, from shear to pull-off [°]."""
 
 STEPS: Final = 11
-"""On the way to a pull."""
+"""Number of steps on the way to a pull."""
 
 
 def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
@@ -182,31 +182,31 @@ class MeasurementStudy:
                 factors[job] = np.array([np.nan if f is None else f for f in found])
             else:
                 values.append(measured(job, hand))
-        told = [_ranked(quantity, values, factors) for quantity in _accuracies()]
-        told.sort(key=lambda each: each["against_chance"])
+        rows = [_ranked(quantity, values, factors) for quantity in _accuracies()]
+        rows.sort(key=lambda each: each["against_chance"])
         data: dict[str, Any] = {
             "draws": len(draws),
             "stances": list(factors),
             "load_factors": factors,
-            "measurements": told,
-            "summary": _summary(told),
+            "measurements": rows,
+            "summary": _summary(rows),
         }
         title = "which measurement would narrow the spread of load factors most"
         return StudyResult("measure", title, data, ())
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
         """Draw how wide each measurement leaves the load factors."""
-        told = result.data["measurements"][::-1]
-        places = np.arange(len(told))
-        figure, (axes,) = panels(1, 1, (8.5, 0.38 * len(told) + 1.8), grid="x")
-        axes.barh(places, [each["width"] for each in told], color="tab:blue", label="measured")
-        chance = [each["chance"] for each in told]
+        rows = result.data["measurements"][::-1]
+        places = np.arange(len(rows))
+        figure, (axes,) = panels(1, 1, (8.5, 0.38 * len(rows) + 1.8), grid="x")
+        axes.barh(places, [each["width"] for each in rows], color="tab:blue", label="measured")
+        chance = [each["chance"] for each in rows]
         axes.plot(chance, places, "k|", markersize=14, label="with unrelated numbers, by chance")
         for name in result.data["stances"]:
-            at = [each["widths"].get(name) for each in told]
+            at = [each["widths"].get(name) for each in rows]
             axes.plot(at, places, ".", color="0.6", markersize=5)
         axes.plot([], [], ".", color="0.6", label="each stance")
-        axes.set_yticks(places, [each["name"].replace("_", " ") for each in told])
+        axes.set_yticks(places, [each["name"].replace("_", " ") for each in rows])
         axes.set(
             xlabel="5 to 95 % of the load factor, over that without a measurement [1]",
             ylabel="measurement",
@@ -254,13 +254,13 @@ def _ranked(
     }
 
 
-def _summary(told: list[dict[str, Any]]) -> list[str]:
+def _summary(rows: list[dict[str, Any]]) -> list[str]:
     """Return a line for each measurement, the best first."""
     return [
         "of the load factors' width from 5 to 95 % is left, the best first:",
         *(
             f"{each['width']:4.0%} (by chance {each['chance']:4.0%})  "
             f"{each['name'].replace('_', ' ')} ± {each['accuracy']:g} {each['unit']}"
-            for each in told
+            for each in rows
         ),
     ]

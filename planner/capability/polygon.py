@@ -32,7 +32,7 @@ MOST: Final = 160
 """Directions that are asked for at most."""
 
 ROUNDING: Final = 1e-6
-"""How far rounding may move points, relative to the longer side or to one unit if that is more."""
+"""Distance that rounding may move points, relative to the longer side, or to 1 if that is more."""
 
 TURN: Final = 1e-7
 """Least turn between two directions [rad]; nearer, where their half-planes meet is all rounding."""

@@ -1,4 +1,4 @@
-"""What a floating hand really holds: the search over poses of its wrist, and its limits by axis."""
+"""Survey of what a floating hand holds: a search over its wrist's poses, and limits by axis."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def survey(
     per_axis : int
         Poses along each of the six axes of the search.
     progress : callable, optional
-        Told how much is done, of how much.
+        Called with the work done and all of it.
 
     Raises
     ------
@@ -63,16 +63,16 @@ def survey(
     each = max(1, poses // (2 * len(directions)))
     total = poses + each * len(directions)
 
-    def tell(done: int) -> None:
+    def report(done: int) -> None:
         if progress is not None:
             progress(done, total)
 
-    found = search(wrist, per_axis, lambda done, _: tell(done))
+    found = search(wrist, per_axis, lambda done, _: report(done))
     ends = []
     for i, direction in enumerate(directions):
-        tell(poses + i * each)
+        report(poses + i * each)
         ends.append(_end(wrist, found, direction))
-    tell(total)
+    report(total)
     return Survey(found, tuple(ends))
 
 

@@ -31,7 +31,7 @@ __all__ = [
 
 
 class _Clock(NamedTuple):
-    """When the time is over, on the clock of `time.perf_counter`, and how long it was [s]."""
+    """End of the time, on the clock of `time.perf_counter`, and how long it was [s]."""
 
     end: float
     seconds: float
@@ -67,7 +67,7 @@ UNFINISHED: Final[dict[Unfinished, str]] = {
     "spread": "a plan was found in all draws of the numbers",
     "advice": "all changes were tried that might make it hold",
 }
-"""What was not there yet."""
+"""Results that were not there yet, in words."""
 
 
 class DeadlineError(CruxError):
@@ -97,7 +97,7 @@ class DeadlineError(CruxError):
 
 @contextmanager
 def within(seconds: float | None, *, started: float | None = None) -> Iterator[None]:
-    """Let what is done inside take so long at most; an earlier end outside stays.
+    """Limit the time of what is done inside; an earlier end outside stays.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the wrists of floating hands go."""
+"""Search for the poses of floating hands' wrists."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -25,17 +25,17 @@ from planner.programs import SLACK
 __all__ = ["PROGRAMS", "LargestFactor", "least_use", "most_load"]
 
 PROGRAMS: Final = 320
-"""How many programs a question may cost, so that four floating hands cost some ten seconds at most.
-Then the best found so far is the answer."""
+"""Most programs for a question, so that four floating hands take some ten seconds at most. Then the
+best found so far is the answer."""
 
 FIRST: Final = 70
-"""How many of them a search for a first plan may cost."""
+"""Most programs for a search for a first plan."""
 
 ALONG: Final = 190
-"""How many searches along the factor may cost."""
+"""Most programs for searches along the factor."""
 
 LAST: Final = 50
-"""How many a plan may cost to try its palms the other way."""
+"""Most programs for trying the palms of a plan the other way."""
 
 FACTORS: Final = 10
 """Most factors of the body wrench that are tried on one way."""
@@ -47,10 +47,10 @@ FRACTIONS: Final = (0.5, 0.1)
 """Factors from which the largest is sought where the whole body wrench has no plan."""
 
 BRACKET: Final = 2e-3
-"""How closely, relatively, the largest factor is bracketed where Newton's method does not end."""
+"""Relative width to which the largest factor is bracketed where Newton's method does not end."""
 
 ALIKE: Final = 1e-3
-"""How near, relatively, the utilisations of two plans are that count as the same."""
+"""Largest relative difference of the utilisations of two plans that count as the same."""
 
 LEAST: Final = 0.02
 """Least factor that is tried."""
@@ -155,7 +155,7 @@ def most_load(
 
 
 def _held(found: WristSolution) -> bool:
-    """Whether it is a plan within its limits."""
+    """Return whether a solution is a plan within its limits."""
     return found.exact and found.measure.utilisation <= 1.0 + SLACK
 
 
@@ -169,7 +169,7 @@ def _better(plan: WristSolution, other: WristSolution | None) -> WristSolution:
 
 
 def _as_good(found: WristSolution, plan: WristSolution) -> bool:
-    """Whether a plan uses no more than another, as near as such searches end."""
+    """Return whether a plan uses no more than another, to the accuracy of such searches."""
     return not plan.exact or found.measure.utilisation <= plan.measure.utilisation * (1.0 + ALIKE)
 
 

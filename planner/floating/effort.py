@@ -37,14 +37,14 @@ NEAR: Final = 2e-4
 which is not worth a way of several units."""
 
 PROGRAMS: Final = 110
-"""How many programs the search may cost."""
+"""Most programs for the search."""
 
 FARTHEST: Final = 4.0
-"""How far from rest effort is sought, in `TWIST_UNIT`: farther, where loads of one step from rest
-are no longer sure, less of it would be no gain."""
+"""Largest distance from rest at which effort is sought, in `TWIST_UNIT`: farther, where loads of
+one step from rest are no longer sure, less of it would be no gain."""
 
 OVER: Final = 0.25 * SLACK
-"""How far the utilisation of a plan may be above the cap."""
+"""Largest excess of the utilisation of a plan over the cap."""
 
 
 class LeastEffort(Goal):

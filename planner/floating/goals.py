@@ -1,8 +1,8 @@
-"""What a search for the wrists of floating hands makes least.
+"""Goals that a search for the wrists of floating hands minimises.
 
-The search itself (`planner.floating.wrist_iteration`) knows sets, ranges and steps. A goal tells it
+The search itself (`planner.floating.wrist_iteration`) knows sets, ranges and steps. A goal says
 which program is solved on the sets, whose multipliers prove the outcome; with which one it steps,
-at first and near the end; and what a point is worth by the model.
+at first and near the end; and which value the model gives a point.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ RANK: Final = 1e-8
 
 
 class Goal(ABC):
-    """What is to be least.
+    """Quantity that a search minimises.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Goal(ABC):
         return 0.0
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
-        """Whether a point is a plan: nothing missing, nothing broken, nothing in excess."""
+        """Return whether a point is a plan: nothing missing, nothing broken, nothing in excess."""
         return measure.exact(hands)
 
     def wrong(self, measure: ExactMeasure) -> float:

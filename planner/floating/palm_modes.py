@@ -1,4 +1,4 @@
-"""How the palms of floating hands carry.
+"""Choose how the palms of floating hands carry load.
 
 A palm drags the rock where it moves toward −x and presses where it moves into it, so that each of a
 hand's palm modes is a set of its own. They meet where the palm just does not move. A good choice

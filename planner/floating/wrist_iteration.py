@@ -1,4 +1,4 @@
-"""Where the wrists of floating hands go: sets linearised again and again, until they are exact.
+"""Find the poses of floating hands' wrists by linearising sets until they are exact.
 
 What a floating hand holds is curved in its wrist's twist ξ, so a plan made on one linearised set is
 some per cent off. Here the hands' sets are linearised about a point (ξ of every floating hand, the
@@ -55,11 +55,11 @@ WIDEST: Final = 30.0
 
 
 WIDEN: Final = 2.5
-"""By how much a range widens where a step reaches its end."""
+"""Factor by which a range widens where a step reaches its end."""
 
 
 SHRINK: Final = 0.3
-"""By how much a range narrows where steps do not lower the merit."""
+"""Factor by which a range narrows where steps do not lower the merit."""
 
 
 KINK: Final = 1e-3
@@ -75,11 +75,11 @@ BESIDE: Final = 1e-5
 
 
 GIVEN: Final = 1e-3
-"""How much of the goal's value those may cost, relative."""
+"""Largest increase of the goal's value that repairs may cost, relative."""
 
 
 CLOSE: Final = 4e-6
-"""How far, relatively, a point may be from the best of the sets about it."""
+"""Largest relative gap of a point to the best of the sets about it."""
 
 
 UNSOLVED: Final = Outcome(False, "none", 0, math.nan)
@@ -92,7 +92,7 @@ STALLED: Final = 4
 
 @dataclass(frozen=True, eq=False)
 class WristSolution:
-    """How a search for a point ended.
+    """Result of a search for a point.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class WristSolution:
 
     @property
     def exact(self) -> bool:
-        """Whether the point is a plan."""
+        """True where the point is a plan."""
         return self.found != "nothing"
 
 

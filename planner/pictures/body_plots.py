@@ -21,11 +21,11 @@ GRAVITY: Final = "tab:red"
 ASKED: Final = "black"
 
 BELOW: Final[dict[str, Any]] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.11), "ncols": 2}
-"""Where legends are: beside what is drawn."""
+"""Place of legends: beside what is drawn."""
 
 
 class _View(NamedTuple):
-    """A plane of B, its x up: what is across in it, as an axis of B, and how it is told."""
+    """A plane of B, its x up: what is across in it, as an axis of B, and its label."""
 
     title: str
     across: Array
@@ -44,7 +44,7 @@ VIEWS: Final = (
         "toward its belly, along −z of B [m/s²]",
     ),
 )
-"""In which accelerations are drawn."""
+"""Views in which accelerations are drawn."""
 
 
 def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: str) -> None:

@@ -46,10 +46,10 @@ ARROW: Final = 32.0
 """Length of the largest tile force in a picture [mm]."""
 
 MARGINS: Final = np.array([[62.0, 34.0], [30.0, 40.0]])
-"""Beside the fingers, before and behind, along and across them [mm]."""
+"""Margins beside the fingers, before and behind, along and across them [mm]."""
 
 SHADES: Final = 15
-"""Of the rock's depth, each of 1 mm at least."""
+"""Largest number of shades of the rock's depth, each of 1 mm at least."""
 
 FLAT: Final = 1e-6
 """A set narrower than this along an axis is drawn as a line [N] or [N·m]."""

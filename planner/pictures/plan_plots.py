@@ -36,13 +36,13 @@ from planner.result import Plan
 __all__ = ["draw_plan", "plot_plan"]
 
 SIZE: Final = (14.0, 8.0)
-"""Of a picture [inch]."""
+"""Width and height of a picture [inch]."""
 
 BOTTOM: Final = 0.075
-"""Of the panels, over the picture's height."""
+"""Lower edge of the panels, over the picture's height."""
 
 TOP: Final = 0.875
-"""Of the panels, over the picture's height."""
+"""Upper edge of the panels, over the picture's height."""
 
 
 def plot_plan(plan: Plan, question: Question, path: Path) -> None:
@@ -69,7 +69,7 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     # inches, of which a row of a table needs a tenth
     needed = 0.105 * (rows + len(joints)) / (TOP - BOTTOM)
     figure = Figure(figsize=(SIZE[0], max(SIZE[1], needed)))
-    FigureCanvasAgg(figure)  # which tells how large texts are
+    FigureCanvasAgg(figure)  # which measures texts
     places = {"bottom": BOTTOM, "top": TOP}
     under = 0.0
     if plan.spread is not None and plan.spread.load_factor is not None:

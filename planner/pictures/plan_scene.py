@@ -1,6 +1,6 @@
-"""What there is to see of a plan, as plain data in W: surfaces, lines, dots, arrows and labels.
+"""Visible parts of a plan, as plain data in W: surfaces, lines, dots, arrows and labels.
 
-Each has a kind, by which what draws it gives it its style. Nothing here knows what draws it.
+Each has a kind, from which the renderer chooses its style. Nothing here knows the renderer.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ LEANING: Final = 0.3
 """Horizontal part of a direction from which on it says where ahead is."""
 
 UP: Final = np.array([0.0, 0.0, 1.0])
-"""In W; and z of a hand."""
+"""Upward direction in W; and z of a hand."""
 
 
 class Surface(NamedTuple):

@@ -21,7 +21,7 @@ __all__ = ["draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
 PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
 
 FIRST: Final = 24
-"""So many lines at most say what leaves no balance."""
+"""Largest number of lines that say what leaves no balance."""
 
 ENDLESS: Final = 999.0
 """A utilisation that is written no more."""
@@ -112,9 +112,9 @@ def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if value > 1.0 else "black"
-            told = f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
-            told = told if value < ENDLESS else f"{ENDLESS:.0f}+"
-            axes.text(first[1] + j, first[0] + i, told, color=colour, **style)
+            text = f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
+            text = text if value < ENDLESS else f"{ENDLESS:.0f}+"
+            axes.text(first[1] + j, first[0] + i, text, color=colour, **style)
 
 
 def draw_shortfall(axes: Any, plan: Plan) -> None:
@@ -181,8 +181,8 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
         lines.append(f"{limb.replace('_', ' ')}:")
         for words, owners in found.items():
             of = ", ".join(owner for owner in owners if owner)
-            told = f"{words} ({of})" if of else words
-            lines += textwrap.wrap(told, 64, initial_indent="    ", subsequent_indent="        ")
+            text = f"{words} ({of})" if of else words
+            lines += textwrap.wrap(text, 64, initial_indent="    ", subsequent_indent="        ")
     if len(lines) > FIRST:
         lines[FIRST:] = ["…"]
     return lines

@@ -22,20 +22,20 @@ __all__ = ["COLOURS", "UTILISATION", "View", "draw_scene", "silhouette"]
 COLOURS: Final = LinearSegmentedColormap.from_list(
     "load", ["#1a9850", "#e6a117", "#d73027"]
 ).with_extremes(over="#7b1fa2")
-"""Of a utilisation; beyond 1 another one."""
+"""Colours of a utilisation; another one beyond 1."""
 
 UTILISATION: Final = Normalize(0.0, 1.0)
 
 GREYS: Final = (0.6, 0.92)
-"""Of rock along the light, and across it."""
+"""Greys of rock along the light, and across it."""
 
 LIGHT: Final = np.array([-0.5, -0.3, 0.8])
-"""Where light comes from, in W."""
+"""Direction from which light comes, in W."""
 
 LIMB: Final = "#4a6a8a"
 
 BODY: Final = (*to_rgb(LIMB), 0.16)
-"""Of the body, through which hands and rock are seen."""
+"""Colour of the body, through which hands and rock are seen."""
 
 LOAD: Final = "tab:blue"
 
@@ -44,7 +44,7 @@ OUTLINES: Final[dict[str, dict[str, Any]]] = {
     "link": {"facecolor": BODY, "edgecolor": "none", "linewidth": 0.5, "zorder": 4},
     "body": {"facecolor": BODY, "edgecolor": LIMB, "linewidth": 0.5, "zorder": 4},
 }
-"""Of convex surfaces, by their kind."""
+"""Styles of convex surfaces, by their kind."""
 
 LINES: Final[dict[str, dict[str, Any]]] = {
     "finger": {"color": "0.2", "linewidth": 1.5, "zorder": 3},
@@ -58,13 +58,13 @@ DOTS: Final[dict[str, dict[str, Any]]] = {
     "origin": {"color": "black", "marker": "+", "ms": 10, "zorder": 6},
 }
 STEPS_ASIDE: Final = 10
-"""Of these, at most, to each side."""
+"""Most steps of a note to each side."""
 
 STEPS_UP: Final = 8
-"""Of these, at most, up and down."""
+"""Most steps of a note up and down."""
 
 PADDING: Final = 1.0
-"""Around a note [printer's points]."""
+"""Space around a note [printer's points]."""
 
 MOVES: Final = np.array(
     [
@@ -76,7 +76,7 @@ MOVES: Final = np.array(
 """Moves of a note that are tried, shape (n, 2), in steps."""
 
 FARNESS: Final = np.hypot(*MOVES.T)
-"""Of these moves, shape (n,), in steps."""
+"""Lengths of these moves, shape (n,), in steps."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What is left of a climb on disk: a table, a picture and a summary."""
+"""Write a climb to disk: a table, a picture and a summary."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ IN_BAR: Final[dict[str, Any]] = {
     "weight": "bold",
     "fontsize": 9,
 }
-"""What is written in a bar, from its upper end."""
+"""Style of what is written in a bar, from its upper end."""
 
 ON_WHITE: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
 
@@ -77,7 +77,7 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
 
 
 def summary(result: RouteResult) -> dict[str, Any]:
-    """Return the climb in short: whether it goes, its crux, and what is odd about its stances."""
+    """Return a summary of the climb: its status, its crux, and what is odd about its stances."""
     crux = result.crux
     stage, plan = result.stages[crux], result.plans[crux]
     statuses = [p.status for p in result.plans]
@@ -112,8 +112,8 @@ def _spoken(moves: Sequence[int]) -> str:
             runs[-1].append(number)
         else:
             runs.append([number])
-    told = [f"{run[0]} to {run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
-    named = ["move" + "s" * (len(numbers) > 1) + " " + ", ".join(told)] if told else []
+    ranges = [f"{run[0]} to {run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
+    named = ["move" + "s" * (len(numbers) > 1) + " " + ", ".join(ranges)] if ranges else []
     return ", ".join(["start"] * (0 in moves) + named)
 
 
@@ -161,18 +161,18 @@ def _row(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
 
 
 def _spread(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
-    """Return the spread of a stage in short, where it was asked for."""
+    """Return the spread of a stage as columns of the table, where it was asked for."""
     if "spread" not in stage.question.want:
         return {}
-    told = plan.spread
-    used, factor = (None, None) if told is None else (told.utilisation, told.load_factor)
+    spread = plan.spread
+    used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
     return {
         "utilisation_low": used and used.low,
         "utilisation_high": used and used.high,
         "load_factor_low": factor and factor.low,
         "load_factor_high": factor and factor.high,
-        "draws": told and told.draws,
-        "holds": told and told.holds,
+        "draws": spread and spread.draws,
+        "holds": spread and spread.holds,
     }
 
 
@@ -228,9 +228,9 @@ def draw_route(result: RouteResult) -> Figure:
     lower.axhline(1.0, color="tab:red")
     for i in np.flatnonzero(np.isnan(factor)):
         answer = result.plans[i]
-        told = "unbounded" if answer.load_factor_unbounded else "none"
-        told = "not finished" if answer.load_factor_status == "not_finished" else told
-        lower.text(i, 0.05, told, rotation=90, ha="center", va="bottom", fontsize=8, color="0.4")
+        text = "unbounded" if answer.load_factor_unbounded else "none"
+        text = "not finished" if answer.load_factor_status == "not_finished" else text
+        lower.text(i, 0.05, text, rotation=90, ha="center", va="bottom", fontsize=8, color="0.4")
     lower.set(ylabel="load factor [1]", xlabel="stance")
     lower.set_ylim(0.0, 1.1 * float(np.nanmax([*factor, *bands[1][1], 1.0])))
     labels = [
@@ -247,12 +247,12 @@ def draw_route(result: RouteResult) -> Figure:
 
 def _band(plans: Sequence[Plan | OutOfReach], name: str) -> Array:
     """Return the ends of a spread at every stage, shape (2, n); NaN where there is none."""
-    told = [None if plan.spread is None else getattr(plan.spread, name) for plan in plans]
-    return np.array([(np.nan, np.nan) if s is None else (s.low, s.high) for s in told]).T
+    values = [None if plan.spread is None else getattr(plan.spread, name) for plan in plans]
+    return np.array([(np.nan, np.nan) if s is None else (s.low, s.high) for s in values]).T
 
 
 def _of_draws(plans: Sequence[Plan | OutOfReach]) -> str:
-    """Return what the bands are."""
+    """Return in words what the bands of the spread contain."""
     draws = max((plan.spread.draws for plan in plans if plan.spread is not None), default=0)
     return f"5 to 95 % of {draws} draws" if draws >= MANY else f"all of {draws} draws"
 

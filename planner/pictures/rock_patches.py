@@ -28,7 +28,7 @@ COARSE: Final = 0.02
 
 
 HERE: Final = np.zeros((1, 3))
-"""Of a hand alone, its own place in H."""
+"""Place in H of a hand that is alone."""
 
 
 def rock_patch(settled: SettledHand, beside: Array = HERE) -> Array:

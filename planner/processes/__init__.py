@@ -1,4 +1,4 @@
-"""Work in processes of its own."""
+"""Worker processes and the work that they are given."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

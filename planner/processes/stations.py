@@ -29,14 +29,14 @@ R = TypeVar("R")
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 ORPHANED: Final = 1.0
-"""How long a process may go on without the one that started it [s]."""
+"""Longest time that a process may go on without the one that started it [s]."""
 
 THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""What keeps a library of linear algebra to one thread, before it is loaded."""
+"""Variables that keep a library of linear algebra to one thread, set before it is loaded."""
 
 SWITCH: Final = 5e-4
-"""How long a lane keeps the interpreter from the others of its process [s]; Python's own is ten
-times as long, in which a short question would wait for a long one at each of its steps."""
+"""Time for which a lane keeps the interpreter from the others of its process [s]. Python's own is
+ten times as long: a short question would wait that long for a long one at each of its steps."""
 
 ROOM: Final = 2**14
 """Bytes that a pipe has room for, wherever."""
@@ -80,7 +80,7 @@ class Lane(Generic[T, R]):
         self._sender: threading.Thread | None = None
 
     def give(self, question: T) -> None:
-        """Send a question; of a process that has died, `take` tells.
+        """Send a question; if the process has died, `take` raises.
 
         One that the pipe may have no room for is sent in the background: its process may be at work
         on another, or stand still, and take nothing.
@@ -171,13 +171,13 @@ class Station(Generic[T, R]):
             # the process has the other ends alone, so that its death ends the pipes
             other.close()
         self.lanes = tuple(Lane(self, i, pipe) for i, (pipe, _) in enumerate(ends))
-        # by a pipe, of which a death is told: it may be large
+        # by a pipe, which reports a death: it may be large
         with suppress(OSError):
             ends[0][0].send(make)
 
     @property
     def ready(self) -> bool:
-        """Whether it has said that it can work."""
+        """True where the process has reported that it can work."""
         return all(lane.ready for lane in self.lanes)
 
     def kill(self, *, dead: bool = False) -> str:
@@ -186,7 +186,7 @@ class Station(Generic[T, R]):
         Parameters
         ----------
         dead : bool, optional
-            Whether it has ended by itself, as its pipes tell a moment earlier than the system.
+            Whether it has ended by itself, as its pipes show a moment earlier than the system.
         """
         self.process.join(PATIENCE if dead else 0.0)
         status = self.process.exitcode
@@ -202,7 +202,7 @@ class Station(Generic[T, R]):
 
 
 def resident(pid: int | None) -> int | None:
-    """Return a process's resident memory [bytes]; None where the system does not tell it so."""
+    """Return a process's resident memory [bytes]; None where the system does not report it."""
     try:
         with open(f"/proc/{pid}/statm") as file:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")

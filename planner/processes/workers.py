@@ -44,7 +44,7 @@ UNCAUGHT: Final = 1
 
 
 class Lost:
-    """Takes the place of a result that there is none of.
+    """Placeholder for a result that was lost.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Workers(Generic[T, R]):
         self._queue: deque[_Task[T]] = deque()
         self._knows: LRUCache[Hashable, Lane[T, R]] = LRUCache(KNOWN)
         self._unborn = ""
-        """Why."""
+        """Reason of the last failed start."""
 
     def __enter__(self) -> Self:
         self._start()
@@ -109,7 +109,7 @@ class Workers(Generic[T, R]):
     def __exit__(self, *_: object) -> None:
         self._queue.clear()
         for lane in list(self.hands):
-            self._dismiss(lane)
+            self._remove(lane)
 
     def wait(self) -> None:
         """Wait until all processes that have been started are ready, or have died."""
@@ -166,7 +166,7 @@ class Workers(Generic[T, R]):
             done = lane.take()
         except EOFError:
             tasks = list(self.hands[lane].values())
-            how = self._bury(lane)
+            how = self._remove_dead(lane)
             lost = [task for task in tasks[:1] if task.tried]
             again = [task._replace(tried=True) for task in tasks[:1] if not task.tried]
             self._queue.extendleft(reversed([*again, *tasks[1:]]))
@@ -200,22 +200,22 @@ class Workers(Generic[T, R]):
                 self.hands[station.lanes[0]] = {}
 
     def _miss(self, why: str) -> None:
-        """Count a process that did not live to be ready."""
+        """Count a process that could not be started, or died before it was ready."""
         self.stillborn += 1
         self._unborn = why
         if self.stillborn == STARTS:
             log.warning(why)
 
-    def _bury(self, lane: Lane[T, R]) -> str:
-        """Dismiss a process that has died, and return how it did."""
-        how = f"a worker {self._dismiss(lane, dead=True)}"
+    def _remove_dead(self, lane: Lane[T, R]) -> str:
+        """Remove a process that has died, and return how it died."""
+        how = f"a worker {self._remove(lane, dead=True)}"
         if not lane.ready:
-            # nothing of this house is at work before a process is, but the program's own beginning
+            # before a process is ready, only the program's own start-up runs in it
             hint = NO_GUARD if lane.station.process.exitcode == UNCAUGHT else ""
             self._miss(f"processes do not start: {how}{hint}")
         return how
 
-    def _dismiss(self, lane: Lane[T, R], *, dead: bool = False) -> str:
+    def _remove(self, lane: Lane[T, R], *, dead: bool = False) -> str:
         del self.hands[lane]
         for about in [about for about, one in self._knows.items() if one is lane]:
             del self._knows[about]

@@ -35,7 +35,7 @@ __all__ = ["Move", "OutOfReach", "Route", "RouteResult", "RouteStage", "in_route
 Phase = Literal["start", "shift", "lift", "place"]
 
 JointAngles = Array | Literal["solve"]
-"""Of a limb [rad], or that they are to be found."""
+"""Joint angles of a limb [rad]; ``solve`` if they are to be found."""
 
 LEAST_KNOWN: Final[tuple[LoadFactorStatus, ...]] = (
     "none",
@@ -45,7 +45,7 @@ LEAST_KNOWN: Final[tuple[LoadFactorStatus, ...]] = (
     "found",
     "unbounded",
 )
-"""What is known of load factors; of several stages the first that any has is known of the least."""
+"""Statuses of load factors. That of the least of several stages is the first that any stage has."""
 
 WORSE: Final = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
 """Statuses of stages, each worse than the one before."""
@@ -53,7 +53,7 @@ WORSE: Final = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """One limb to its next hold.
+    """Move of one limb to its next hold.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Move:
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """A climb.
+    """A climb to be planned: a start stance and moves.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class RouteStage:
         The one that moves.
     question : Question
     paths : dict of str
-        Where the route tells ``hands[i]`` and ``body`` of its stance.
+        Where the route gives ``hands[i]`` and ``body`` of its stance.
     """
 
     index: int
@@ -173,12 +173,12 @@ class RouteResult:
 
     @property
     def status(self) -> str:
-        """Of the stage that is worst off; ``optimal`` where every one is."""
+        """Status of the stage that is worst off; ``optimal`` where every stage is."""
         return max((p.status for p in self.plans), key=WORSE.index)
 
     @property
     def feasible(self) -> bool:
-        """Whether every stage is ``optimal``."""
+        """True where every stage is ``optimal``."""
         return self.status == "optimal"
 
     @property
@@ -194,12 +194,12 @@ class RouteResult:
 
     @property
     def load_factor_unbounded(self) -> bool:
-        """Whether there is no end to the load factor of any stage."""
+        """True where the load factor of every stage is unbounded."""
         return all(p.load_factor_unbounded for p in self.plans)
 
     @property
     def load_factor_status(self) -> LoadFactorStatus:
-        """Whether the least of all stages is there, and why not."""
+        """Status of the least load factor of all stages: found, or why not."""
         found = {p.load_factor_status for p in self.plans}
         return next(status for status in LEAST_KNOWN if status in found)
 
@@ -232,15 +232,15 @@ def stages(route: Route) -> Iterator[RouteStage]:
                 field=f"limits.per_hand.{limb}",
             )
     body = route.start.body
-    told = {hand.limb: f"stance.hands[{i}]" for i, hand in enumerate(route.start.hands)}
-    body_told = "stance.body"
+    fields = {hand.limb: f"stance.hands[{i}]" for i, hand in enumerate(route.start.hands)}
+    body_field = "stance.body"
     joints = _joints_of(route.start)
-    joints_told = {limb: f"stance.joints.{limb}" for limb in route.start.given_joints}
+    joint_fields = {limb: f"stance.joints.{limb}" for limb in route.start.given_joints}
     index = 0
 
     def stage(move: int, phase: Phase, limb: str | None, held: Sequence[HandOnHold]) -> RouteStage:
-        paths = {f"hands[{i}]": told[hand.limb] for i, hand in enumerate(held)}
-        paths |= {"body": body_told} | {f"joints.{limb}": at for limb, at in joints_told.items()}
+        paths = {f"hands[{i}]": fields[hand.limb] for i, hand in enumerate(held)}
+        paths |= {"body": body_field} | {f"joints.{limb}": at for limb, at in joint_fields.items()}
         on_rock = {hand.limb for hand in held}
         try:
             angles = None if joints is None else _on_rock(joints, on_rock)
@@ -278,18 +278,18 @@ def stages(route: Route) -> Iterator[RouteStage]:
                 field=f"moves[{number - 1}].joints",
             )
         known_limbs(given, route.start.robot, f"moves[{number - 1}].joints")
-        joints_told |= {each: f"moves[{number - 1}].joints.{each}" for each in given}
+        joint_fields |= {each: f"moves[{number - 1}].joints.{each}" for each in given}
         if joints is not None:
             if move.body is not None:
                 joints |= dict.fromkeys(hands, SOLVE)
             joints |= {each: angles for each, angles in given.items() if each != limb}
         if move.body is not None:
-            body, body_told = move.body, f"moves[{number - 1}].body"
+            body, body_field = move.body, f"moves[{number - 1}].body"
             index += 1
             yield stage(number, "shift", limb, list(hands.values()))
         index += 1
         yield stage(number, "lift", limb, [hand for hand in hands.values() if hand.limb != limb])
-        hands[limb], told[limb] = move.hand, f"moves[{number - 1}]"
+        hands[limb], fields[limb] = move.hand, f"moves[{number - 1}]"
         if joints is not None:
             joints[limb] = given.get(limb, SOLVE)
         index += 1
@@ -317,7 +317,7 @@ def _on_rock(
 
 
 def in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInputError:
-    """Return the error of a stage's question with its field as the route tells it."""
+    """Return the error of a stage's question with its field as the route names it."""
     place = (error.field or "").removeprefix("stance.")
     for part, path in paths.items():
         rest = place.removeprefix(part)

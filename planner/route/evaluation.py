@@ -76,7 +76,7 @@ def _answers(todo: Sequence[RouteStage], workers: int) -> Iterator[tuple[int, An
 
 
 def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:
-    """Return what plans a stage, in each process."""
+    """Return the function that plans a stage by its index; called in each process."""
     return lambda index: _plan_stage(todo[index])
 
 

@@ -1,4 +1,4 @@
-"""What is near what: the least distances, and with joints links in rock and in each other."""
+"""Least distances between parts of a scene; with joints, links in rock and in each other."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from planner.scene.solids import Solid, capsule_solids, distance_between, hand_s
 __all__ = ["body_clearance", "clearance", "link_findings"]
 
 TOUCHING: Final = 0.02
-"""How deep links may be in rock or in each other before that is odd: capsules are rough [m]."""
+"""Largest depth of links in rock or in each other that is not odd: capsules are rough [m]."""
 
 BODY: Final = "body"
-"""What messages and distances call what no joint moves."""
+"""Name, in messages and distances, of what no joint moves."""
 
 NO_JOINTS: Final = "links: the joints are not known; give stance.joints, or 'solve'"
 """Why no link is measured."""

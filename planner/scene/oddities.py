@@ -1,6 +1,6 @@
-"""What is odd about a stance without a look at its joints, and may not be meant.
+"""Find what is odd about a stance, apart from its joints, and may not be meant.
 
-All is judged in the body's frame, so that it does not hang on how the world's lies; only gravity
+All is judged in the body's frame, so that it does not depend on the world's frame; only gravity
 that points up is about W, whose z is up by the contract. A hand that points out of the body's back
 is turned around itself, if the body is on the rock's side of its palm; or the body is, if the palm
 has the body behind it. Where a robot's file does not say which way its back is, it is away from
@@ -27,10 +27,11 @@ BACK: Final = 0.5
 """Cosine between z of H and the body's back from which on a hand points out of that: 60°."""
 
 AGREED: Final = 0.3
-"""Length of the mean of z of all H from which on it tells where a body's belly is."""
+"""Length of the mean of z of all H from which on it shows where a body's belly is."""
 
 BEHIND: Final = 0.05
-"""How far the body's origin may be on the rock's side of a palm that points out of its back [m]."""
+"""Largest distance of the body's origin on the rock's side of a palm that points out of its back
+[m]."""
 
 BEYOND: Final = 0.1
 """The same of palms that point out of its belly, of all hands: two logs on either side may be a
@@ -41,17 +42,17 @@ BELLY: Final = -0.7
 that hug a boulder point sideways."""
 
 IN_ROCK: Final = 0.05
-"""How deep the body may be in rock: its capsules, and rock far from a hand, are rough [m]."""
+"""Largest depth of the body in rock: its capsules, and rock far from a hand, are rough [m]."""
 
 DEEP: Final = 0.2
-"""How deep in a ball, a boulder or a log the body's origin cannot be [m]."""
+"""Depth in a ball, a boulder or a log at which the body's origin cannot be [m]."""
 
 DOWN: Final = -0.8
 """Cosine between a hand's fingers and up from which on they point down: 143°."""
 
 CROSSED: Final = 0.25
-"""By how much nearer to their shoulders two hands would be with their limbs exchanged, over the
-robot's reach."""
+"""Gain in distance of two hands to their shoulders with their limbs exchanged, over the robot's
+reach, from which on they count as crossed."""
 
 SAME_PLACE: Final = 1e-3
 """Distance of two hands that cannot be, if they are also turned alike [m]."""
@@ -89,7 +90,7 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
 
 
 def _back(scene: Scene) -> Array:
-    """Return the direction out of the body's back in B; zero where nothing tells of it."""
+    """Return the direction out of the body's back in B; zero where it is not known."""
     known = scene.stance.robot.back
     if known is not None:
         return known
@@ -169,8 +170,8 @@ def _in_rock(
 def _depths(scene: Scene, hands: Sequence[int]) -> list[float]:
     """Return how deep the body is in the rock of hands [m].
 
-    Rock that is not smooth is slow to ask, and tells the way along z, not the nearest: of such only
-    how deep B's origin is.
+    Rock that is not smooth is slow to query, and gives the depth along z, not the least: of such
+    only how deep B's origin is.
     """
     points, radii = _body_points(*scene.stance.robot.body_capsules)
     smooth = [i for i in hands if scene.swept[i] is not None]

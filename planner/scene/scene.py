@@ -17,7 +17,7 @@ __all__ = ["Scene", "scene_of", "smooth_depths"]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Where everything is, as seen from the body. Arrays are of the hands, in their order.
+    """Poses of hands and rock, as seen from the body. Arrays are of the hands, in their order.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Scene:
 
     @property
     def limbs(self) -> tuple[str, ...]:
-        """Of the hands."""
+        """Limbs of the hands."""
         return tuple(hand.limb for hand in self.hands)
 
     @property

@@ -1,4 +1,4 @@
-"""What can be in the way as shapes that `coal` measures, in B: capsules, hands, rock.
+"""Obstacles as shapes that `coal` measures, in B: capsules, hands, rock.
 
 A wall goes on without end; logs, edges and outlines are drawn out along y as far as the limbs get.
 """
@@ -20,7 +20,7 @@ from planner.scene.scene import Scene
 __all__ = ["Solid", "capsule_solids", "distance_between", "hand_solids", "rock_solids"]
 
 FAR: Final = 4.0
-"""How far rock goes that is drawn out, or along faces of an edge, from its crest [m]."""
+"""Length of rock that is drawn out, or along faces of an edge, from its crest [m]."""
 
 KEPT: Final[BoundedStore[Hold, Any]] = BoundedStore("rock as shapes", 64)
 """Shapes of holds that were asked for last."""
@@ -33,7 +33,7 @@ REQUEST: Final = coal.DistanceRequest(True)
 
 
 class Solid(NamedTuple):
-    """Something in its place.
+    """Solid with its place.
 
     Attributes
     ----------

@@ -1,9 +1,9 @@
-"""What is odd about the sizes of a question's numbers: another unit is likely.
+"""Find numbers of a question whose size is odd, so that another unit is likely.
 
-Each number is held against what is known of the robot: its own weight, what its hands hold, how far
-its limbs reach, and against the presets' strengths. What another unit of the field would explain is
-a finding of the kind ``unit``; a factor of a few is nobody's slip and stays without one. Gravity is
-that of the place: of the Earth, the Moon or a small body, but hardly 1 m/s².
+Each number is compared with what is known of the robot (its own weight, what its hands hold, how
+far its limbs reach) and with the presets' strengths. What another unit of the field would explain
+is a finding of the kind ``unit``; a factor of a few is no slip of units and gives no finding.
+Gravity is that of the place: of the Earth, the Moon or a small body, but hardly 1 m/s².
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ THOUSANDTH: Final = 1.0 / 300.0
 """Part of what is usual up to which a number is taken for one in thousands, such as kN or t."""
 
 THOUSANDS: Final = 100.0
-"""How many times what is usual a number is taken for one in thousandths, such as g or N·mm."""
+"""Multiple of what is usual from which on a number is taken for one in thousandths, such as g or
+N·mm."""
 
 ABOUT: Final = 2.5
 """Factor that a body wrench in kN may be off the robot's weight: it may carry and accelerate."""
@@ -42,40 +43,41 @@ UPRIGHT: Final = 0.94
 """Cosine between a body wrench's force and up from which on it holds the robot's weight: 20°."""
 
 ONE_G: Final = 0.02
-"""How far the size of gravity may be from 1 to be one in g [m/s²]."""
+"""Largest distance of the size of gravity from 1 to be one in g [m/s²]."""
 
 WIDE: Final = 20.0
-"""How many times the limbs' reach a hold may be wide, or the lever of a moment long."""
+"""Largest width of a hold, or lever of a moment, in multiples of the limbs' reach."""
 
 FAR_OUT: Final = 2.0
-"""How many times the limbs' reach a centre of mass may be from the body's origin."""
+"""Largest distance of a centre of mass from the body's origin, in multiples of the limbs' reach."""
 
 HEAVY: Final = 5.0
-"""How many times the robot's weight a payload may be: 10 kg in g are far more."""
+"""Largest payload, in multiples of the robot's weight: 10 kg in g are far more."""
 
 LONG: Final = 100.0
-"""How many palms a limb may be long."""
+"""Largest length of a limb, in palms."""
 
 SHORT: Final = 0.2
-"""How many at least."""
+"""Least length of a limb, in palms."""
 
 LIGHT: Final = 0.2
-"""How much of one hand the links of a robot weigh at least."""
+"""Least weight of the links of a robot, as part of that of one hand."""
 
 STRONG: Final = 4.0
-"""How many times the strongest preset a tile may hold: a hand's pull-off is five times it."""
+"""Largest strength of a tile, in multiples of the strongest preset's: a hand's pull-off is five
+times it."""
 
 WEAK: Final = 0.01
-"""What part of the weakest preset a tile holds at least."""
+"""Least strength of a tile, as part of the weakest preset's."""
 
 MIGHTY: Final = 50.0
-"""How many times what the robot's weight turns at its limbs' reach a joint may bear."""
+"""Largest torque of a joint, in multiples of the robot's weight times its limbs' reach."""
 
 FEEBLE: Final = 1e-3
-"""What part of that the strongest joint of a limb bears at least."""
+"""Least torque of the strongest joint of a limb, as part of the same."""
 
 NONE: Final = 0.01
-"""What part of what tendons hold a tension is at least, unless it is none."""
+"""Least tension above zero, as part of what tendons hold."""
 
 
 def unit_findings(question: Question) -> tuple[Finding, ...]:
@@ -334,7 +336,7 @@ def _joints(question: Question) -> Iterator[Finding]:
     stance, own = question.stance, question.limits.joint_torque
     if stance.joints is None:
         return
-    robot, told = stance.robot, set()
+    robot, reported = stance.robot, set()
     usual = robot.mass * scene_number("usual", "standard_gravity") * robot.reach
     for limb, chain in robot.chains.items():
         given = own.get(limb) if isinstance(own, Mapping) else own
@@ -344,8 +346,8 @@ def _joints(question: Question) -> Iterator[Finding]:
         field = "stance.robot"
         if given is not None:
             field = "limits.joint_torque" + (f".{limb}" if isinstance(own, Mapping) else "")
-        if field not in told:
-            told.add(field)
+        if field not in reported:
+            reported.add(field)
             message = (
                 f"its strongest joint is to bear {most:.4g} N·m, and the robot's weight on "
                 f"the Earth at its reach turns with {usual:.3g} N·m: is it in N·m?"

@@ -1,12 +1,12 @@
-"""What one solved program proves for every body wrench: an affine bound of the least utilisation.
+"""Affine bound of the least utilisation that one solved program proves for every body wrench.
 
 With multipliers λ ≥ 0 of the limit rows, Σ λ = 1, μ ≥ 0 of the hard rows and ν of the balance,
 every plan z of a body wrench W has
 
     u ≥ λ·(L z + l0) + μ·(H z − h) + ν·(G z + g − W) = λ·l0 − μ·h + ν·(g − W) + r·z,
 
-r = Lᵀλ + Hᵀμ + Gᵀν. A solver's multipliers leave an r that is small; they are repaired so that it
-is zero but for rounding, and what is left of it is paid for, with no load above `UNLIMITED`. So the
+r = Lᵀλ + Hᵀμ + Gᵀν. A solver's multipliers leave a small r; they are repaired so that it is zero
+but for rounding. The bound is lowered by what is left of it, with no load above `UNLIMITED`. So the
 bound holds exactly, and for every W, not only that of the program.
 """
 

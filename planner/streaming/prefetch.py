@@ -37,7 +37,7 @@ DRIFTED: Final = 0.5
 """Part of its radius from the centre beyond which the next interpolation is solved."""
 
 AHEAD: Final = 0.5
-"""How much farther that one's centre is, as part of the way from the last centre."""
+"""Distance of the next centre beyond the wrench, as part of the way from the last centre."""
 
 FADE: Final = 0.1
 """Way over which a new interpolation takes over, as part of the radius."""
@@ -49,12 +49,12 @@ NOTHING: Final = np.zeros((0, 0))
 
 
 class Mixture(NamedTuple):
-    """What interpolations say of a wrench.
+    """Mixture of interpolations at a wrench.
 
     Attributes
     ----------
     weight : float
-        Theirs, at most 1; 0 where they say nothing.
+        Weight of the interpolations, at most 1; 0 where none covers the wrench.
     loads : ndarray, shape (hands, m)
         Their mixture [N].
     bound : float
@@ -70,7 +70,7 @@ class Mixture(NamedTuple):
 
 
 class Prefetch:
-    """The interpolations about a wrench, of which one call after another tells; of one thread.
+    """Interpolations about a wrench that changes from call to call; for one thread.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Prefetch:
         """τ, and the way over which it grows, in radii."""
         self.newest = self._found([stance.first])
         self._missed: Array | None = stance.first if self.newest is None else None
-        """Where the wrench was when an interpolation was asked for that is not there."""
+        """Wrench at which an interpolation was asked for that is not there."""
 
     def close(self) -> ThreadPoolExecutor | None:
         """Ask for no more interpolations; return the thread, for the caller to end."""
@@ -185,5 +185,5 @@ class Prefetch:
 
 
 def _weight(distance: float) -> float:
-    """Return φ."""
+    """Return the weight φ of an interpolation at a distance Σ |t| from its centre."""
     return min(max((1.0 - distance) / SHELL, 0.0), 1.0)

@@ -9,8 +9,8 @@ plan, too:
 
 of the interpolations, with their weight ω, and of the plan y* that is solved for w alone, wherever
 that weight is not 1. s falls from 1 to 0 where the utilisation comes near the cap: there, and
-beyond, an interpolation cannot tell whether a plan is ``optimal``. All weights change continuously
-with the wrench, so set-points do.
+beyond, an interpolation does not show whether a plan is ``optimal``. All weights change
+continuously with the wrench, so set-points do.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class WrenchStream:
 
     @property
     def limbs(self) -> tuple[str, ...]:
-        """Of the hands, in the order of all arrays."""
+        """Limbs of the hands, in the order of all arrays."""
         return self._stance.limbs
 
     @property

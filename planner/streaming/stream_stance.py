@@ -44,14 +44,14 @@ class Solved(NamedTuple):
 
 
 class LoadEffects(NamedTuple):
-    """What loads do: the hands' wrenches (hands, 6) on the rock in H, the largest utilisation."""
+    """Effects of loads: the hands' wrenches (hands, 6) on the rock in H, largest utilisation."""
 
     wrenches: Array
     utilisation: float
 
 
 class SupportBound(NamedTuple):
-    """No plan has a body wrench w with direction · w > most."""
+    """Proof that no plan has a body wrench w with direction · w > most."""
 
     direction: Array
     most: float

@@ -1,4 +1,4 @@
-"""The independent check that every plan passes before it leaves."""
+"""Independent check of every plan before it is returned."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

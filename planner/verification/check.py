@@ -1,4 +1,4 @@
-"""The check that every plan passes before it leaves: from its numbers back to the rock.
+"""Check of every plan before it is returned: from its numbers back to the rock.
 
 Nothing here is shared with the way the plan was found. The plan's own forces must balance every
 joint and tendon (`joint_balance`), which says nothing of the affine maps of Eq. 14, and motors,
@@ -157,7 +157,7 @@ class Check:
         body_wrench: Array,
         effort: float | None = None,
     ) -> list[str]:
-        """Return what is wrong with a plan, each in a sentence; nothing if it may leave.
+        """Return what is wrong with a plan, each in a sentence; nothing if it may be returned.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
 """The check of a floating hand: from where its wrist goes back to the rock, law by law.
 
 Nothing here is shared with the way the plan was found, which settles every finger in closed form
-and knows the tendon by its regimes. The postures that the plan tells are held against the chain of
+and knows the tendon by its regimes. The postures in the plan are compared with the chain of
 phalanges and the rock; slips are measured along the rock between a tile's contacts before and
 after, and where its bed of springs bears between them is integrated; stick and slip of the tendon
 are solved as one complementarity problem (`FingerTendon.held`), the normals by the balance of the

@@ -1,6 +1,6 @@
 """The balance of joints and tendons with forces on the rock (Eqs. 4–8), for the check of plans.
 
-What a plan tells is put into the balance. About joint i, of angle q_i to the phalanx before it, the
+A plan's numbers are put into the balance. About joint i, of angle q_i to the phalanx before it, the
 forces F_j on the rock of its own phalanx and those beyond turn as much as what the tendon leaves of
 its spring,
 
@@ -163,7 +163,7 @@ class JointBalance(Limits):
             self.stop_fingers, self.stop_joints = sides.nonzero()
             self._sides = sides[self.stop_fingers, self.stop_joints]
 
-        # two tensions tell all, as shears, normals and balances are affine in them
+        # two tensions suffice, as shears, normals and balances are affine in them
         ends = self.fingers(np.repeat([[0.0], [1.0]], len(self._pull), axis=1))
         try:
             normals, left = self.solved(ends)

@@ -30,8 +30,8 @@ WEIGHT: Final = 1e-9
 PLACED: Final = (0.01, 0.05)
 """Largest distance [m] and angle [rad] of a hand from its pose by its joints."""
 
-TOLD: Final = 1e-5
-"""Largest error of what a plan says of that, of joints that were found [m, rad]."""
+REPORTED_POSE: Final = 1e-5
+"""Largest error of the reported distance and angle, of joints that were found [m, rad]."""
 
 BEYOND: Final = 1e-6
 """Largest excess of an angle over its joint's limit [rad, or m]."""
@@ -156,7 +156,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
     """Check that joints put the hands where the stance has them, within the joints' limits."""
     stance = question.stance
     most_off, most_turned = PLACED
-    solved, told_angles = stance.solved_limbs, stance.given_joints
+    solved, given_angles = stance.solved_limbs, stance.given_joints
     body = stance.body.inverse()
     for place in stance.hands:
         pose, there = body @ place.pose, own.hands[place.limb]
@@ -166,10 +166,13 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
                 there.rotation.T @ pose.rotation
             ).magnitude()
         )
-        told_off, told_turned = where.off.get(place.limb, (0.0, 0.0))
+        reported_off, reported_turned = where.off.get(place.limb, (0.0, 0.0))
         near = off <= most_off and turned <= most_turned
-        told = abs(off - told_off) <= TOLD and abs(turned - told_turned) <= TOLD
-        if not (near and (told or place.limb not in solved)):
+        agrees = (
+            abs(off - reported_off) <= REPORTED_POSE
+            and abs(turned - reported_turned) <= REPORTED_POSE
+        )
+        if not (near and (agrees or place.limb not in solved)):
             found.append(
                 f"{place.limb}: its joints put the hand {off:.3g} m and {turned:.3g} rad from its "
                 "pose"
@@ -180,7 +183,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
         if not float(beyond.max()) <= BEYOND:
             found.append(f"{limb}: a joint is {beyond.max():.3g} rad beyond its limit")
         if limb not in solved:
-            given = told_angles.get(limb, np.clip(0.0, chain.lower, chain.upper))
+            given = given_angles.get(limb, np.clip(0.0, chain.lower, chain.upper))
             if not np.array_equal(given, angles):
                 found.append(f"{limb}: its joints are not at the angles that were given")
 

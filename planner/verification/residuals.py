@@ -46,7 +46,7 @@ COUNT: Final = len(FINGERS)
 
 
 class RecomputedNails(NamedTuple):
-    """What a plan's forces do to the k nails that hook.
+    """Recomputed state of the k nails that hook, under a plan's forces.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ class Names(NamedTuple):
         return f"{self.limbs[h]}: {what} of {tile.finger}"
 
     def limb_of(self, hands: Indices) -> Callable[[int], str]:
-        """Return what names the limbs of hands."""
+        """Return the function that names the limb of each hand."""
         return lambda i: self.limb(int(hands[i]))
 
     def finger(self, what: str, finger: int) -> str:
@@ -219,5 +219,5 @@ class Names(NamedTuple):
         return f"{self.limbs[h]}: {what} of {FINGERS[i]}"
 
     def of_fingers(self, what: str, fingers: Indices) -> Callable[[int], str]:
-        """Return what names something of fingers."""
+        """Return the function that names something of each finger."""
         return lambda i: self.finger(what, int(fingers[i]))

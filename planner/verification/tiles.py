@@ -28,7 +28,7 @@ from planner.verification.residuals import (
 __all__ = ["LimitCurves", "TileLimits"]
 
 SMALL: Final = 1e-300
-"""In place of a load that is zero, where something is divided by it [N]."""
+"""Load in place of zero, where something is divided by it [N]."""
 
 SIDES: Final = np.array([1.0, -1.0])
 """Signs of a lateral load."""
