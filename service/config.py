@@ -1,4 +1,4 @@
-"""Where `service.serving` was before: an import of old keeps working."""
+"""Keep imports from the former place of `service.serving` working."""
 
 from service.serving import zenoh_config
 

@@ -1,4 +1,4 @@
-"""Where `service.wire` was before: an import of old keeps working."""
+"""Keep imports from the former place of `service.wire` working."""
 
 from service.wire import NoServiceError, ServiceError, ServiceTimeout
 

@@ -1,4 +1,4 @@
-"""Where `service.processes` was before: an import of old keeps working."""
+"""Keep imports from the former place of `service.processes` working."""
 
 from service.processes import Planners, plan_many
 

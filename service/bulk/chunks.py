@@ -30,7 +30,7 @@ SETTINGS: Final = 4
 """Settings whose models and files a process keeps."""
 
 PACKAGES: Final = (DISTRIBUTION, "numpy", "scipy", "clarabel")
-"""On whose versions the last digits of answers hang."""
+"""Packages on whose versions the last digits of answers depend."""
 
 NOTHING: Final = msgspec.Raw(b"null")
 
@@ -38,7 +38,7 @@ Answerer = Callable[[bytes], Answer]
 
 
 class Setting(NamedTuple):
-    """What all questions of some bulk work have alike.
+    """Settings that all questions of some bulk work share.
 
     Attributes
     ----------
@@ -47,17 +47,17 @@ class Setting(NamedTuple):
     hand : ParameterTable or None
         Entries in which hands are not the bundled one; a request's own go on top.
     folder : Path or None
-        That names of mesh files in requests are relative to; with None they name none.
+        Names of mesh files in requests are relative to it; with None requests name none.
     form : Format
-        Of questions and answers.
+        Format of questions and answers.
     explain : bool or None
         Whether what keeps a stance from a plan is explained; None: as each request says.
     brief : bool
-        Whether no more is asked for than a table tells.
+        Whether only what a table shows is asked for.
     versions : dict of str to str or None, or None
-        Of `PACKAGES`, where it is asked; None where it is answered by the same installation.
+        Versions of `PACKAGES` at the asking process; None where the same installation answers.
     kind : str
-        Of all questions: `service.wire.PLAN` or `ROUTE`.
+        Kind of all questions: `service.wire.PLAN` or `ROUTE`.
     make : callable or None
         Called once in each process; returns what answers questions that are of neither kind.
     """
@@ -106,7 +106,7 @@ _answerers: BoundedStore[bytes, Answerer] = BoundedStore("bulk settings", SETTIN
 
 
 def _answerer(pickled: bytes) -> Answerer:
-    """Return what answers a question; here the planner is imported, in each process."""
+    """Return the function that answers a question; each process imports the planner here."""
     from service.answering import MeshFiles, handle, robots_of
 
     setting: Setting = pickle.loads(pickled)
@@ -163,7 +163,7 @@ def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanReque
 
 
 class About(NamedTuple):
-    """What must be prepared for a question, by digest.
+    """Digests of what must be prepared for a question.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ FACTOR: Final = "found, at_least; or why there is none: unbounded, none, not_ask
 """Meaning of the column about what is known of a load factor."""
 
 BETWEEN: Final = "; "
-"""What stands between the parts of a text that has several."""
+"""Separator of the parts of a text that has several."""
 
 
 class Column(NamedTuple):
@@ -56,7 +56,7 @@ class Column(NamedTuple):
 
 
 class Row(msgspec.Struct):
-    """What a table tells of an answer: its values, and what it came to, chosen or not."""
+    """Row of a table for one answer: the chosen values, and always its status and error."""
 
     values: list[Any]
     status: str | None = None
@@ -177,9 +177,9 @@ def row_of(payload: bytes, columns: Sequence[Column]) -> Row:
     """Return a reply in JSON, brief or whole, or an error as a row of columns but ``index``."""
     reply = msgspec.json.decode(payload)
     error = reply.get("error")
-    told = _readable(reply)
+    values = _readable(reply)
     return Row(
-        [_at(told, column.path or column.name) for column in columns if column.name != INDEX],
+        [_at(values, column.path or column.name) for column in columns if column.name != INDEX],
         reply.get("status"),
         None if error is None else msgspec.convert(error, ErrorDetail),
     )
@@ -204,14 +204,14 @@ def _readable(reply: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _at(told: Any, path: str) -> Any:
+def _at(value: Any, path: str) -> Any:
     """Return what is at the end of a path; None where a part of it is missing."""
     for step in path.split("."):
         try:
-            told = told[int(step) if isinstance(told, list) else step]
+            value = value[int(step) if isinstance(value, list) else step]
         except (LookupError, TypeError):
             return None
-    return told
+    return value
 
 
 def _spoken(limit: dict[str, str | None]) -> str:

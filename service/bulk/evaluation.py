@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Question", "answered", "evaluate"]
 
 PACE: Final = 0.5
-"""How long a chunk is to take [s]: long beside what it costs to send, short beside any wait."""
+"""Aimed duration of a chunk [s]: long against the cost of sending it, short against any wait."""
 
 WINDOW: Final = 2
 """Chunks for each process that are made of questions that came together."""
@@ -30,7 +30,7 @@ AHEAD: Final = 3
 """Such windows that may be ahead of the question whose answer is due."""
 
 BYTES: Final = 2**22
-"""Of a chunk, but for one of a single question; of those ahead, for each process and window."""
+"""Most bytes of a chunk of several questions, and of those ahead for each process and window."""
 
 Question = bytes | PlanRequest | RouteRequest | Answer
 
@@ -76,7 +76,7 @@ def evaluate(
     explain : bool, optional
         Whether what keeps stances from plans is explained; by default as each request says.
     brief : bool, optional
-        Whether plans are answered with no more than a table tells: of what requests want only the
+        Whether plans are answered with only what a table shows: of what requests want only the
         load factor, and no hand in all detail unless it is explained.
     kind : str, optional
         Of the questions: ``plan`` or ``route``.

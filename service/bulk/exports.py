@@ -24,7 +24,7 @@ Exporter = Callable[[Path, Sequence[Column], Iterable[list[Any]]], None]
 
 
 def exporter_at(path: Path) -> Exporter | None:
-    """Return what writes the kind of table that a path's ending names; None where it names none.
+    """Return the writer of the kind of table that a path's ending names; None where it names none.
 
     Raises
     ------

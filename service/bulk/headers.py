@@ -1,4 +1,4 @@
-"""The first line of a table's rows: what they are of, so that no other work goes on with them."""
+"""Header of a table's rows: the work that they belong to, so that no other work resumes them."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ __all__ = ["HEADER", "RESUME", "Header", "digest_of", "new_header"]
 RESUME: Final = "--resume"
 
 HEADER: Final = b'{"crux":'
-"""How the lines of a table begin."""
+"""First bytes of the lines of a table."""
 
 DIGESTS: Final = ("hand", "robot", "stance")
-"""Names of what a header has a digest of."""
+"""Names of inputs of which a header has only a digest."""
 
 
 class Header(msgspec.Struct):
-    """Say what the rows of a table are of.
+    """First line of a table: the work that its rows belong to.
 
-    ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``: what else
-    the work is of, by name; of `DIGESTS` a `digest_of` it.
+    ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``: other
+    inputs of the work, by name; of those in `DIGESTS` a `digest_of`.
     """
 
     crux: str | None

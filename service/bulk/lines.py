@@ -20,7 +20,7 @@ class Asked(Protocol):
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of questions."""
 
     def __iter__(self) -> Iterator[bytes]:
         """Yield what each is known by when its answer is found again."""
@@ -40,7 +40,7 @@ class Lines:
     Attributes
     ----------
     count : int
-        How many there are.
+        Number of lines.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Where chunks are answered: here, in processes of this machine, or on Dask."""
+"""Answer chunks in this process, in processes of this machine, or on Dask."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ PATIENCE: Final = 15.0
 """How long to wait for a scheduler, for its first worker, or for a result to come over [s]."""
 
 LOOK: Final = 1.0
-"""How often it is looked whether the scheduler is still there, while nothing comes [s]."""
+"""Interval of checks that the scheduler is still there, while no result comes [s]."""
 
 ALONE: Final = 5
-"""How often there is no worker, when it is looked, until that is told."""
+"""Checks in a row that find no worker, before a warning is logged."""
 
 ALLOWED: Final = 3
 """Deaths of workers after which Dask tries a chunk no more, as it is by default
@@ -223,7 +223,7 @@ class DaskPool:
 
         if not self._own:
             return nullcontext(self._on)
-        # what it loses is told in the answers, or in one line
+        # what it loses is reported in the answers, or in one line
         for name in logging.root.manager.loggerDict:
             if name.split(".")[0] == "distributed":
                 logging.getLogger(name).setLevel(logging.CRITICAL)

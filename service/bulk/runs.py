@@ -38,7 +38,7 @@ OLD_MANIFESTS: Final = ("{}.manifest.json", "{}/_manifest.json")
 
 
 class _Outcome(NamedTuple):
-    """What the tally takes of an answer; the time is in s."""
+    """Outcome of an answer for the tally; the time is in s."""
 
     status: str | None
     error: ErrorDetail | None
@@ -153,7 +153,7 @@ def _append(line: bytes, out: FileIO) -> None:
 
 
 class _Reply(msgspec.Struct):
-    """What the tally needs to know of a reply."""
+    """Fields of a reply that the tally needs."""
 
     id: str | None = None
     status: str | None = None

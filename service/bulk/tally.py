@@ -1,4 +1,4 @@
-"""What the answers of bulk work come to, counted as they come."""
+"""Count the answers of bulk work as they come, by status and by kind of error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Tally"]
 
 
 NAMED: Final = 5
-"""Questions that are bad input, of which it is told where they are, after the first."""
+"""Most questions with bad input whose places are kept, after the first."""
 
 
 class Tally:

@@ -1,4 +1,4 @@
-"""Hands tried at many places of one rock: bulk work, of which a question is a batch of trials."""
+"""Try hands at many places of one rock: bulk work, of which a question is a batch of trials."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TOGETHER: Final = 128
 do the batches that they are in, whatever else is in these."""
 
 FORM: Final = Format.MSGPACK
-"""Of errors."""
+"""Format of errors."""
 
 PICKLED: Final = "application/python-serialized-object"
 """Zenoh's name of how trials and what comes of them travel."""
@@ -39,7 +39,7 @@ Found = Generator[tuple[int, "FoundHold | InvalidInputError"], None, None]
 
 
 class HoldTrials:
-    """Where hands are tried on a rock, while it is entered.
+    """Trials of hands on a rock, while it is entered.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def _outcomes(answer: Answer, count: int) -> list[Any]:
 def _trying(
     rock: Mesh, surface: str, numbers: ParameterTable, seat: Literal["rest", "best"]
 ) -> Callable[[bytes], Answer]:
-    """Return what tries a batch of places; called once in each process."""
+    """Return the function that tries a batch of places; called once in each process."""
     from hand_models.fixed_wrist import try_holds
     from hand_models.hand import spiny_hand
     from hand_models.tile import Surface

@@ -1,4 +1,4 @@
-"""What SIGINT and SIGTERM do to a command: it ends in one line, and its processes with it."""
+"""End a command on SIGINT or SIGTERM, with one line on standard error, and end its processes."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ GRACE: Final = 5.0
 """How long a command that is interrupted may take to keep what is done, and to end [s]."""
 
 STATUS: Final = 1
-"""Of a command that is interrupted."""
+"""Exit status of a command that is interrupted."""
 
 IMPORTING: Final = "<frozen importlib._bootstrap>"
-"""Whose frames are below a module that is being imported."""
+"""File name of the frames below a module that is being imported."""
 
 SHOW_CURSOR: Final = "\x1b[?25h"
 
 
 class Interrupted(BaseException):
-    """SIGINT or SIGTERM has come; what is kept of the work, if that is to be told."""
+    """SIGINT or SIGTERM has come; the argument says what is kept of the work, if it is reported."""
 
 
 @contextmanager
@@ -42,7 +42,7 @@ def interruptible() -> Iterator[None]:
     try:
         yield
     except Interrupted as error:
-        _tell(str(error))
+        _report(str(error))
         sys.exit(STATUS)
     finally:
         for number in SIGNALS:
@@ -77,7 +77,7 @@ def _end(number: int = 0, frame: FrameType | None = None) -> None:
         kill_children()
         if os.isatty(2):
             os.write(2, SHOW_CURSOR.encode())
-        _tell("")
+        _report("")
     finally:
         os._exit(STATUS)
 
@@ -90,13 +90,13 @@ def kill_children() -> None:
         process.kill()
 
 
-_told: list[str] = []
+_reported: list[str] = []
 
 
-def _tell(kept: str) -> None:
+def _report(kept: str) -> None:
     """Say once on standard error that the command was interrupted, and what is kept."""
-    if not _told:
-        _told.append(kept)
+    if not _reported:
+        _reported.append(kept)
         os.write(2, f"crux: {': '.join(filter(None, ('interrupted', kept)))}\n".encode())
 
 

@@ -1,6 +1,6 @@
 """Many plan requests at once: replies in their order, errors in their places, as objects.
 
-They are bulk work like any other; for as many as are no list, or for a cluster, use that itself.
+They are bulk work like any other; for more than a list holds, or a cluster, use `service.bulk`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Planners", "plan_many", "worth"]
 
 FORM: Final = Format.MSGPACK
-"""In which requests and replies travel."""
+"""Format in which requests and replies travel."""
 
 WORTH_A_PROCESS: Final = 500
 """Requests below this many are planned faster here than in processes that must first start."""
@@ -43,7 +43,7 @@ class Planners:
     hand : ParameterTable, optional
         Entries in which hands are not the bundled one; a request's own go on top.
     folder : Path, optional
-        That names of mesh files in requests are relative to; each process reads a file once. By
+        Names of mesh files in requests are relative to it; each process reads a file once. By
         default requests name none.
 
     Raises
@@ -150,7 +150,7 @@ def worth(count: int, workers: int | None = None) -> int:
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Let the garbage collector rest: it would go through all replies again and again."""
+    """Pause the garbage collector: it would go through all replies again and again."""
     was = gc.isenabled()
     gc.disable()
     try:

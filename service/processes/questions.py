@@ -1,4 +1,4 @@
-"""What processes that answer do: a query's bytes in, the bytes of its answer out."""
+"""Answer queries in worker processes: a query's bytes in, the bytes of its answer out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LATER: Final = (
     "scipy.stats",
     "trimesh",
 )
-"""What one plan may do without and so loads only when it is needed; a service has it at once."""
+"""Modules that a single plan loads only when it needs them; a service imports them at its start."""
 
 
 class Job(NamedTuple):
@@ -57,7 +57,7 @@ class Job(NamedTuple):
 
 
 def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Answer]:
-    """Return what answers; here the planner is imported, in each process.
+    """Return the function that answers; here the planner is imported, in each process.
 
     Parameters
     ----------

@@ -197,10 +197,10 @@ class CruxClient:
         LimitError
             If the request has too many bytes.
         """
-        told = self._ask(PLAN, request)
-        if Format.is_labelled(str(told.encoding), BriefPlanReply):
-            return _read(told, BriefPlanReply)
-        return _read(told, PlanReply)
+        received = self._ask(PLAN, request)
+        if Format.is_labelled(str(received.encoding), BriefPlanReply):
+            return _read(received, BriefPlanReply)
+        return _read(received, PlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Return one hand's wrench space; raises what `plan` raises."""
@@ -275,8 +275,8 @@ class CruxClient:
         return error
 
 
-def _read(told: zenoh.Sample | zenoh.ReplyError, kind: type[R]) -> R:
+def _read(received: zenoh.Sample | zenoh.ReplyError, kind: type[R]) -> R:
     try:
-        return Format.named(str(told.encoding)).decode(told.payload.to_bytes(), kind)
+        return Format.named(str(received.encoding)).decode(received.payload.to_bytes(), kind)
     except (MalformedError, msgspec.ValidationError) as error:
         raise ServiceError("internal", f"a reply that is no {kind.__name__}: {error}") from None

@@ -49,7 +49,7 @@ MODES: Final = ("peer", "client", "router")
 LOOPBACK: Final = "127.0.0.1"
 
 ROUTER_PORT: Final = 7447
-"""On which zenoh's routers listen by default."""
+"""Port on which zenoh's routers listen by default."""
 
 PORTS: Final = {"tcp": socket.SOCK_STREAM, "tls": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}
 """Protocols with ports, and how one is probed."""
@@ -58,10 +58,10 @@ RETRIES: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase
 """How often it is tried to connect to who is waited for."""
 
 EXAMPLE: Final = "tcp/127.0.0.1:7447"
-"""Of an endpoint."""
+"""Example of an endpoint."""
 
 SHOWN: Final = 60
-"""Characters of what was given that are repeated."""
+"""Most characters of an input that a message repeats."""
 
 LARGEST_MESSAGE: Final = LARGEST_REQUEST + 2**20
 """Bytes of a message that is taken in: a request, what it is sent with, and some to spare. Zenoh's
@@ -96,7 +96,7 @@ OWN: Final[dict[str, object]] = {
 """Settings that are not zenoh's own, where a file does not say otherwise."""
 
 DESCRIPTORS: Final = "/dev/fd"
-"""Has the numbers of this process's open files."""
+"""Folder with the numbers of this process's open files."""
 
 NO_LINGER: Final = struct.pack("ii", 0, 0)
 
@@ -253,7 +253,7 @@ def closed(config: zenoh.Config) -> None:
     """Make a configuration that names no endpoint listen for programs on this machine alone.
 
     These find it by multicast as ever, which does not leave the machine either. Ports that are left
-    to the system are chosen here, so that they can be told.
+    to the system are chosen here, so that they can be shown.
     """
     unsaid = config.get_json("listen/endpoints") == zenoh.Config().get_json("listen/endpoints")
     mode = msgspec.json.decode(config.get_json("mode"))
@@ -313,7 +313,7 @@ def _read(file: Path | None) -> zenoh.Config:
         if not source:
             return zenoh.Config()
     try:
-        # what zenoh says of a file does not tell whether it is there
+        # zenoh's error does not say whether the file is there
         Path(source).open("rb").close()
         return zenoh.Config.from_file(source)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A service's processes: started, told from each other, replaced."""
+"""Start the processes of a service, give each a purpose, and replace them."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ HANGS: Final = 30.0
 """The same of the process that has the streams: with it, they are lost [s]."""
 
 RESTING: Final = 1.0
-"""How long no process is started after one that could not be, or did not live to be ready; doubled
-each time [s]."""
+"""Pause after a process that did not start or died before it was ready, until another is started;
+doubled each time [s]."""
 
 LONGEST_REST: Final = 30.0
-"""The longest such time [s]."""
+"""Longest such pause [s]."""
 
 GROWN: Final = 700 * 2**20
 """Resident memory of a process that is replaced when it has nothing to do [bytes]."""
 
 STREAMS_LANES: Final = 2
-"""Of the process that has the streams: one for set-points, one for what else is short."""
+"""Lanes of the process that has the streams: one for set-points, one for what else is short."""
 
 SET_POINTS_LANE: Final = 0
 
@@ -42,7 +42,7 @@ Purpose = Literal["questions", "streams", "spare"]
 
 
 class Crew:
-    """Processes that answer questions, one that has the streams, and one to take a place at once.
+    """Processes that answer questions, one that has the streams, and a spare for an empty place.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Crew:
 
     @property
     def up(self) -> bool:
-        """Whether questions of all kinds can be answered."""
+        """True if questions of all kinds can be answered."""
         return bool(self._ready("streams") and self._ready("questions"))
 
     def _all(self, purpose: Purpose) -> list[Station[Job, Answer]]:
@@ -97,9 +97,9 @@ class Crew:
         return [each for each in self._all(purpose) if each.ready]
 
     def hire(self) -> None:
-        """Fill places that are empty: with the one that is ready for that, or a new process.
+        """Fill empty places with the spare process, or with new ones.
 
-        Where the system refuses one, none is started for a while.
+        Where the system refuses a process, none is started for a while.
         """
         wanted: list[Purpose] = [] if self._all("streams") else ["streams"]
         wanted += ["questions"] * (self.workers - len(self._all("questions")))
@@ -116,7 +116,7 @@ class Crew:
             log.warning("no process can be started, again in %g s: %s", rest, error)
 
     def put(self, station: Station[Job, Answer], purpose: Purpose) -> None:
-        """Let a process be for something from now on."""
+        """Give a process its purpose from now on."""
         self._purposes[station] = purpose
         lanes: dict[Purpose, int] = {"streams": STREAMS_LANES, "questions": 1, "spare": 0}
         self.work |= dict.fromkeys(station.lanes[: lanes[purpose]])
@@ -142,11 +142,11 @@ class Crew:
         return rest
 
     def has_streams(self, lane: Lane[Job, Answer]) -> bool:
-        """Whether a lane is of the process that has the streams."""
+        """Return whether a lane is of the process that has the streams."""
         return self._purposes.get(lane.station) == "streams"
 
     def is_for_set_points(self, lane: Lane[Job, Answer]) -> bool:
-        """Whether a lane is kept for set-points."""
+        """Return whether a lane is kept for set-points."""
         return self.has_streams(lane) and lane.number == SET_POINTS_LANE
 
     def idle(self) -> list[Lane[Job, Answer]]:
@@ -154,12 +154,12 @@ class Crew:
         return [
             lane
             for lane, asked in self.work.items()
-            # of one that has just died, its pipe tells next
+            # a process that has just died is reported by its pipe next
             if asked is None and lane.ready and lane.station.process.is_alive()
         ]
 
     def takes_dear(self) -> bool:
-        """Whether a question that may take long leaves a process that is ready to the others."""
+        """Return whether a question that may take long leaves a ready process to the others."""
         asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
         dear = sum(each is not None and each.dear for each in asked)
         return dear < (1 if self.workers == 1 else len(self._ready("questions")) - 1)
@@ -172,7 +172,7 @@ class Crew:
         return late, question.deadline + HANGS if self.has_streams(lane) else late
 
     def has_grown(self, lane: Lane[Job, Answer]) -> bool:
-        """Whether a lane's process is seen to have so much memory that a new one is better."""
+        """Return whether a lane's process uses so much memory that it is to be replaced."""
         size = None if self.has_streams(lane) else resident(lane.station.process.pid)
         return size is not None and size > GROWN
 
@@ -184,9 +184,9 @@ class Crew:
         Returns
         -------
         how : str
-            It ended.
+            How it ended.
         left : list of Question
-            That it had, and nobody has replied to.
+            Questions that it had, and nobody has replied to.
         """
         asked = [self.work.pop(lane, None) for lane in station.lanes]
         self._starting.pop(station, None)

@@ -1,4 +1,4 @@
-"""Which question is answered when, and by which process: one thread, which never waits for any.
+"""Decide when and by which process a question is answered: one thread, which waits for none.
 
 Questions wait by their kind: set-points; those about known stances, which are short; others; and
 those that may take long, which leave one process to the others. In each queue, who has had least of
@@ -44,16 +44,16 @@ STOPS: Final = 2.0
 """How long the end of the service waits for questions in work [s]."""
 
 QUIET: Final = 0.2
-"""How long no question may have come at the end: those on their way are to be told [s]."""
+"""Time without a new question before the service ends [s]: those on their way get a reply."""
 
-TOLD_IN: Final = 1.0
-"""How long another thread waits to be told what the service does [s]."""
+STATE_TIMEOUT: Final = 1.0
+"""Timeout of another thread that asks what the service does [s]."""
 
 AWAKE: Final = 0.1
-"""How often who waits for the start is awake [s]."""
+"""Interval at which the wait for the start wakes up [s]."""
 
 AT_ONCE: Final = 32
-"""Of what has come, how much is taken in before processes are looked at again."""
+"""Most events that are taken in before processes are looked at again."""
 
 
 class Dispatcher:
@@ -73,7 +73,7 @@ class Dispatcher:
     Attributes
     ----------
     watch : Watch
-        Is told what happens.
+        Records what happens.
     """
 
     def __init__(
@@ -119,18 +119,18 @@ class Dispatcher:
         """Take a query at a key; returns at once, whatever the thread."""
         self._post(partial(self._admit, query, key, time.perf_counter()))
 
-    def look(self, told: Callable[[], Answer], query: zenoh.Query, key: str) -> None:
+    def look(self, make_answer: Callable[[], Answer], query: zenoh.Query, key: str) -> None:
         """Take an operator's query; returns at once."""
         client = client_of(query)
         known = client if client in self._names.linked else Sender.OPERATORS
-        self._replies.later(known, partial(reply_to, query, key, told))
+        self._replies.later(known, partial(reply_to, query, key, make_answer))
 
     def linked(self, client: str) -> None:
         """Say that a session has a link to the service's own."""
         self._post(partial(self._names.linked.add, client))
 
     def proven(self, client: str, proof: bytes) -> None:
-        """Hand in the digest that the session of a name has told itself."""
+        """Hand in the digest that the session of a name has sent itself."""
         self._post(partial(self._prove, client, proof))
 
     def gone(self, client: str, *, token: bool = False) -> None:
@@ -173,7 +173,7 @@ class Dispatcher:
         self._crew.end()
 
     def _guarded(self, step: Callable[[], None]) -> None:
-        """Do something of which a fault ends nothing else."""
+        """Do a step; log its exception, so that it ends nothing else."""
         try:
             step()
         except Exception:
@@ -188,7 +188,7 @@ class Dispatcher:
         for pipe in ready:
             if (
                 pipe is not self._woken
-                # not of a process that another lane has told of meanwhile
+                # not of a process whose end another lane has reported meanwhile
                 and (lane := pipes[cast(Connection, pipe)]).station in self._crew.stations
             ):
                 self._take_back(lane)
@@ -221,8 +221,8 @@ class Dispatcher:
         times = [self._waiting.first_deadline()]
         for lane, asked in self._crew.work.items():
             if asked is not None:
-                told, ends = self._crew.ends(lane)
-                times.append(ends if asked.replied else told)
+                late, ends = self._crew.ends(lane)
+                times.append(ends if asked.replied else late)
         ending = self._stops_at
         held = now + self._waiting.held()
         own = [self._crew.rests_until, held] if ending is None else [ending, self._quiet_from]
@@ -255,7 +255,7 @@ class Dispatcher:
         self._put(self._costs.kind(question), question)
 
     def _put(self, kind: Kind, question: Question) -> None:
-        """Let a question wait, or the one be told to come again that has no room then."""
+        """Let a question wait; refuse the one that then has no room as busy."""
         if refused := self._waiting.put(kind, question):
             self._replies.busy(refused, len(self._waiting) / self._crew.workers)
 
@@ -308,7 +308,7 @@ class Dispatcher:
             rest = "nothing else was lost with it"
             if self._crew.has_streams(lane):
                 rest = "the streams are lost with it; declare them again"
-            how, left = self._dismiss(lane.station)
+            how, left = self._end_process(lane.station)
             for question in left:
                 self._shares.ended_process(question.place, time.perf_counter() - question.begun)
                 lost = LostError(f"the process that worked on it {how}; {rest}")
@@ -331,7 +331,7 @@ class Dispatcher:
         elif not asked.replied:
             self._replies.reply(asked, done)
         if self._crew.has_grown(lane):
-            self._dismiss(lane.station, "had grown too large")
+            self._end_process(lane.station, "had grown too large")
 
     def _end_overdue(self) -> None:
         """End questions whose time is over, and processes that do not stop at it."""
@@ -349,9 +349,9 @@ class Dispatcher:
                 self._replies.refuse(asked, DeadlineError(asked.seconds, missing))
             if ends[1] <= now:
                 self._shares.ended_process(asked.place, now - asked.begun)
-                self._dismiss(lane.station, "did not stop at a deadline")
+                self._end_process(lane.station, "did not stop at a deadline")
 
-    def _dismiss(
+    def _end_process(
         self, station: Station[Job, Answer], why: str | None = None
     ) -> tuple[str, list[Question]]:
         """End a process, which another replaces; as `Crew.dismiss`."""
@@ -366,7 +366,7 @@ class Dispatcher:
         found: SimpleQueue[State] = SimpleQueue()
         self._post(lambda: found.put(self._state()))
         try:
-            return found.get(timeout=TOLD_IN)
+            return found.get(timeout=STATE_TIMEOUT)
         except Empty:
             return State([], {})
 

@@ -1,4 +1,4 @@
-"""What sends replies: threads in which a client that takes none keeps nobody else waiting.
+"""Send replies in threads, so that a client that takes none keeps nobody else waiting.
 
 Zenoh's reply waits for a client whose link is full, for 5 s, after which the link is closed. So the
 replies to one client go one after another, and those to others go meanwhile.
@@ -30,16 +30,16 @@ SENDERS: Final = 32
 """Clients that can be waited for at a time."""
 
 UNNAMED: Final = 8
-"""Clients as which those are replied to whom nothing tells apart."""
+"""Reply queues that clients without a known name share."""
 
 FIRST_GUESS: Final = 0.05
 """How long questions take, before any has been answered [s]."""
 
 AVERAGED: Final = 20
-"""About how many questions the mean time is of."""
+"""About how many questions the mean time is averaged over."""
 
 COME_AGAIN: Final = (0.05, 10.0)
-"""Least and longest time after which a client is told to come again [s]."""
+"""Least and longest time after which a refused client is asked to come again [s]."""
 
 MAILS: Final = 1.0
 """How long the end waits for replies that are on their way [s]; clients that do not read keep some
@@ -47,7 +47,7 @@ from leaving."""
 
 
 class Sender(StrEnum):
-    """Stands for a client where what is sent is for none that is known."""
+    """Queues of what is sent to no known client."""
 
     OPERATORS = "operators"
     """Who asks how the service is, without a link to it."""
@@ -101,10 +101,10 @@ class Mail:
             return None
 
 
-def reply_to(query: zenoh.Query, key: str, told: Callable[[], Answer]) -> None:
+def reply_to(query: zenoh.Query, key: str, make_answer: Callable[[], Answer]) -> None:
     """Reply to a query, and let it go."""
     with query:
-        answer = told()
+        answer = make_answer()
         if answer.good:
             query.reply(key, answer.payload, encoding=answer.encoding)
         else:
@@ -112,7 +112,7 @@ def reply_to(query: zenoh.Query, key: str, told: Callable[[], Answer]) -> None:
 
 
 class Replies:
-    """Replies to questions, each of which gets one, and what a watch is told of them.
+    """Reply to each question once, and report every reply to a watch.
 
     Parameters
     ----------
@@ -135,14 +135,14 @@ class Replies:
         self.reply(question, answer if status is None else answer._replace(status=status))
 
     def busy(self, question: Question, ahead: float) -> None:
-        """Tell a question to come again that has no room; ``ahead``: for each process so many."""
+        """Refuse a question that has no room, for now; ``ahead``: questions for each process."""
         low, high = COME_AGAIN
         again = round(min(max(self._mean * ahead, low), high), 3)
         busy = f"the service has too many questions; ask again in {again:g} s"
         self.refuse(question, BusyError(busy, again))
 
     def ending(self, question: Question) -> None:
-        """Tell a question that the service is ending."""
+        """Refuse a question because the service is ending."""
         self.refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
 
     def reply(self, question: Question, answer: Answer) -> None:

@@ -1,9 +1,9 @@
-"""Who asks: a name that a query carries is anybody's, so it is believed as far as it is known.
+"""Identify clients: anybody can send any name, so a name counts only as far as it is known.
 
-A query does not tell by which link it came. Zenoh tells which sessions are linked, and which one
+A query does not say by which link it came. Zenoh reports which sessions are linked, and which one
 replies to a query. So a client may prove its name: its queries carry a secret as their attachment,
 and it replies at ``crux/<robot>/clients/<name>`` with the secret's digest. Whoever sends another's
-name without the secret, or a name that nobody has, has one place with all others who do.
+name without the secret, or a name that nobody has, shares one place with all others who do.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cachetools import LRUCache, TTLCache
 __all__ = ["SHARED", "Names", "digest"]
 
 SHARED: Final = ""
-"""The place of those whom nothing tells apart."""
+"""The place of all clients that cannot be distinguished."""
 
 KEPT: Final = 4096
 """Names whose digests are remembered, those that were asked about last."""
@@ -30,12 +30,12 @@ PAUSE: Final = 1.0
 
 
 def digest(secret: bytes) -> bytes:
-    """Return what a client tells of its secret."""
+    """Return the digest that a client sends of its secret."""
     return hashlib.sha256(secret).digest()
 
 
 class Names:
-    """What is known of the sessions that ask. For one thread.
+    """Links and proofs that are known of the sessions that ask. For one thread.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Names:
         return name if name in self.linked else SHARED
 
     def is_to_prove(self, name: str, secret: bytes) -> bool:
-        """Whether the session of a name is to be asked for its digest now."""
+        """Return whether the session of a name is to be asked for its digest now."""
         if not name or not secret or digest(secret) in self._proofs.get(name, ()):
             return False
         if name in self._asked:
@@ -66,13 +66,13 @@ class Names:
         return True
 
     def proven(self, name: str, proof: bytes) -> None:
-        """Take a digest that the session of a name has told."""
+        """Take a digest that the session of a name has sent."""
         proofs = self._proofs.setdefault(name, set())
         if len(proofs) < PROOFS:
             proofs.add(proof)
 
     def has_proof(self, name: str) -> bool:
-        """Whether the session of a name has told a digest."""
+        """Return whether the session of a name has sent a digest."""
         return name in self._proofs
 
     def gone(self, name: str) -> None:

@@ -1,4 +1,4 @@
-"""A query that a service has taken, and what of it is read before its turn comes."""
+"""Query that a service has taken, and the fields that are read before its turn comes."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from service.wire import (
 __all__ = ["LARGE", "Question", "client_of", "take"]
 
 READ: Final = 2**20
-"""Bytes of a payload that is looked into before its turn; what is larger is a process's to read."""
+"""Most bytes of a payload that is read before its turn; a process reads larger ones."""
 
 LARGE: Final = 2**18
-"""Bytes beyond which one is large: it may take long, and its bytes count while it waits."""
+"""Bytes beyond which a payload is large: it may take long, and its bytes count while it waits."""
 
 DEAR: Final = ("robust", "spread", "advice")
 """Extras that take many plans."""
 
 ATTACHED: Final = 2**12
-"""Bytes of a query's attachment, which is held as long as the query."""
+"""Most bytes of a query's attachment, which is held as long as the query."""
 
 SMALL: Final = 2**12
-"""Bytes of a field that is read of it; what is longer is left to a process, too."""
+"""Most bytes of a field that is read before its turn; a process reads longer ones, too."""
 
 
 class _Head(msgspec.Struct):
-    """Of a request's fields those that decide when it is answered."""
+    """Fields of a request that decide when it is answered."""
 
     id: msgspec.Raw = msgspec.Raw()
     deadline: msgspec.Raw = msgspec.Raw()
@@ -133,7 +133,7 @@ class Question:
 
 
 def client_of(query: zenoh.Query) -> str:
-    """Return the identifier of who asks; empty where that is not told."""
+    """Return the identifier of who asks; empty where the query has none."""
     source = query.source_info
     return "" if source is None else str(source.source_id.zid)
 
@@ -215,5 +215,5 @@ def _value(field: msgspec.Raw, form: Format) -> Any:
     try:
         return form.decode(data, Any)
     except (MalformedError, msgspec.ValidationError):
-        # of a number that is none, its process tells
+        # its process reports a field that cannot be read
         return None

@@ -33,7 +33,7 @@ MEMORY: Final = 2 * 2**30
 """Bytes that a process may have by default, where the system can keep it to them."""
 
 FEWEST: Final = 2
-"""Processes by default even where there is one core: what takes long leaves one to others."""
+"""Fewest processes by default, even on one core: what takes long leaves one to others."""
 
 
 class PlanService:
@@ -64,7 +64,7 @@ class PlanService:
     robot : str
         Its name.
     keys : tuple of str
-        That it answers at.
+        Keys that it answers at.
     operators : tuple of str
         Keys of what an operator asks for: its health, and its counts.
 
@@ -128,8 +128,8 @@ class PlanService:
         for key in self.keys:
             self._declare(key, self._dispatcher.ask)
         health, metrics = self.operators
-        for key, told in ((health, self._watch.health), (metrics, self._watch.metrics)):
-            self._declare(key, partial(self._dispatcher.look, told))
+        for key, make_answer in ((health, self._watch.health), (metrics, self._watch.metrics)):
+            self._declare(key, partial(self._dispatcher.look, make_answer))
         # clients in this process need no link
         self._dispatcher.linked(str(self._session.info.zid()))
         links, info = Callback(self._transport, indirect=False), self._session.info
@@ -181,14 +181,14 @@ class PlanService:
     def _inquire(self, name: str) -> None:
         """Ask the session of a name for the digest of its secret; only its own reply counts."""
 
-        def told(reply: zenoh.Reply) -> None:
+        def received(reply: zenoh.Reply) -> None:
             replier = reply.replier_id
             if reply.ok is not None and replier is not None and str(replier.zid) == name:
                 self._dispatcher.proven(name, reply.ok.payload.to_bytes())
 
         self._session.get(
             self._client_key(name),
-            Callback(told, indirect=False),
+            Callback(received, indirect=False),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             congestion_control=zenoh.CongestionControl.DROP,

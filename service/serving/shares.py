@@ -1,8 +1,8 @@
-"""How much of the processes' time each place has had, and whose turn it is by that.
+"""Share the processes' time among places: time that each has had, and so whose turn it is.
 
-A place is one client, or all those whom nothing tells apart. The one that has had least is next.
-Who comes back after a while begins with as much as the one whose turn it is: time that nobody asked
-for is not saved up.
+A place is one client, or all clients that cannot be distinguished. The one that has had least is
+next. A place that comes back after a while begins with as much as the one whose turn it is: time
+that nobody asked for is not saved up.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ACTIVE: Final = 10.0
 
 @dataclass
 class _Place:
-    """What is remembered of a place: times in s, on the clock of `time.perf_counter`.
+    """Record of a place: times in s, on the clock of `time.perf_counter`.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ class Shares:
         return max(min(known.held_until, max(others, default=-math.inf) + ACTIVE) - now, 0.0)
 
     def is_dear(self, place: str) -> bool:
-        """Whether a place's questions cost much."""
+        """Return whether a place's questions cost much."""
         known = self._places.get(place)
         if known is None or not known.costs:
             return False

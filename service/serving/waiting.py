@@ -1,9 +1,9 @@
 """Questions that wait: in queues by their kind, in which each client has its turn.
 
-In which queue a question waits is decided by what questions about its stance, and of its client,
-have cost so far. That is only an expectation, and never decides whether one is answered. It goes by
-the median of the last costs, in processor time: neither one costly question nor a loaded machine
-decides it, and who asks for less has the shorter way again.
+The past cost of questions about its stance, and of its client, decides in which queue a question
+waits. That is only an expectation, and never decides whether one is answered. It is the median of
+the last costs, in processor time: neither one costly question nor a loaded machine decides it, and
+a client that asks for less gets to the faster queue again.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from service.wire import PLAN, SET_POINTS
 __all__ = ["Costs", "Kind", "Waiting"]
 
 EACH: Final = 32
-"""Questions of one client that wait in a queue; further ones are told to come again."""
+"""Questions of one client that wait in a queue; further ones are refused as busy."""
 
 ALL: Final = 256
 """Questions of all clients that wait in a queue; beyond it the place that has most loses its last
@@ -45,25 +45,25 @@ SHORT: Final = 0.05
 """A question about a known stance that costs no more may use the lane that nothing delays [s]."""
 
 SOON: Final = 0.3
-"""So may a stance cost when it was new [s]: the lane's process has to make it known there, too."""
+"""Largest cost of such a stance when it was new [s]: that lane's process has to prepare it, too."""
 
 
 class Kind(Enum):
     """Queues, and what their questions are."""
 
     SET_POINTS = "set_points"
-    """To streams."""
+    """Set-points of streams."""
     DECLARED = "declared"
     """Streams that a process has found to be possible."""
     SHORT = "short"
-    """About stances that are known."""
+    """Questions about stances that are known."""
     OTHER = "other"
     DEAR = "dear"
-    """That may take long."""
+    """Questions that may take long."""
 
 
 class _Stance:
-    """Which processes know a stance, and what it cost where it was new and since [s]."""
+    """Processes that know a stance, and its costs where it was new and since [s]."""
 
     def __init__(self) -> None:
         self.known_to: WeakSet[object] = WeakSet()
@@ -72,7 +72,7 @@ class _Stance:
 
 
 class Costs:
-    """What has been seen of stances, by their hashes.
+    """Observed costs of stances, by their hashes.
 
     Parameters
     ----------
@@ -102,19 +102,19 @@ class Costs:
         return Kind.DEAR if dear else Kind.OTHER
 
     def is_short(self, stance: int | None) -> bool:
-        """Whether a question about a stance is sure to be answered soon."""
+        """Return whether a question about a stance is sure to be answered soon."""
         seen = self._stances.get(stance)
         if seen is None or not seen.again:
             return False
         return statistics.median(seen.again) <= SHORT and statistics.median_low(seen.new) <= SOON
 
     def _is_cheap(self, stance: int | None) -> bool:
-        """Whether questions about a stance have cost little so far."""
+        """Return whether questions about a stance have cost little so far."""
         seen = self._stances.get(stance)
         return seen is not None and statistics.median(seen.again or seen.new) <= DEAR
 
     def knows(self, process: object, stance: int | None) -> bool:
-        """Whether a process knows a stance."""
+        """Return whether a process knows a stance."""
         seen = self._stances.get(stance)
         return seen is not None and process in seen.known_to
 
@@ -146,7 +146,7 @@ class Waiting:
         return {kind.value: len(queue) for kind, queue in self._queues.items()}
 
     def _fits(self, question: Question) -> bool:
-        """Whether there is room for a large question: what is small is no matter of bytes."""
+        """Return whether there is room for a question; bytes are limited only for large ones."""
         size = len(question.payload)
         if size <= LARGE:
             return True

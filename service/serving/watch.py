@@ -1,4 +1,4 @@
-"""What an operator sees of a service: a line a question, its health, and counts for Prometheus."""
+"""Show a service to its operator: a line a question, its health, and counts for Prometheus."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = ["State", "Watch"]
 log = logging.getLogger(__name__)
 
 BUCKETS: Final = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""Upper ends of what times are counted in [s]."""
+"""Upper ends of the buckets in which times are counted [s]."""
 
 LOOPBACK: Final = "127.0.0.1"
 
@@ -38,7 +38,7 @@ FAILURES: Final = frozenset({"failed", "internal", "lost", "deadline"})
 
 
 class State(NamedTuple):
-    """What a service does at this moment.
+    """State of a service at this moment.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class State(NamedTuple):
 
 
 class Watch:
-    """Counts and tells what happens in a service; of its dispatcher's thread.
+    """Count and log what happens in a service; for its dispatcher's thread.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class Watch:
 
 
 class _Now(Collector):
-    """What is only so at the moment when it is asked for."""
+    """Metrics that are read at the moment when they are asked for."""
 
     def __init__(self, state: Callable[[], State], started: float) -> None:
         self._state, self._started = state, started

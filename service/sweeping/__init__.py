@@ -1,4 +1,4 @@
-"""What a plan comes to where fields of its request vary: points, answers, table, border, pictures.
+"""Plan while fields of a request vary: points, answers, table, border, pictures.
 
 request, variations → Design (points, and the question at each) → rows → Sweep
 """

@@ -1,4 +1,4 @@
-"""Where a stance stops holding over one variable: between two points, and found to a tolerance."""
+"""Find where a stance stops holding over one variable: between two points, to a tolerance."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from service.sweeping.rows import Row
 __all__ = ["TOLERANCE", "Border", "Held", "borders", "held"]
 
 TOLERANCE: Final = 1e-3
-"""Of a border, over the range that varies."""
+"""Tolerance of a border, over the range that varies."""
 
 
 class Border(msgspec.Struct, frozen=True):
-    """Two values next to each other, of which real plans tell that one holds and one does not.
+    """Two values next to each other, of which one holds and one does not, as real plans show.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Border(msgspec.Struct, frozen=True):
 
     @property
     def words(self) -> str:
-        """The border in one sentence; the value told is on the side that holds."""
+        """The border in one sentence; the value shown is on the side that holds."""
         towards = "up to" if self.fails > self.holds else "from"
         unit = "" if self.unit is None else f" {self.unit}"
         whole = self.tolerance >= 1.0 and self.holds.is_integer() and self.fails.is_integer()

@@ -1,4 +1,4 @@
-"""Which questions a sweep asks: the points where it varies a request, and the request at each."""
+"""Build the questions of a sweep: points where a request varies, and the request at each."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Design:
 
     @property
     def count(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return len(self.points)
 
     def __iter__(self) -> Iterator[bytes]:
@@ -174,7 +174,7 @@ class Design:
         return float(self._paths.document["limits"]["utilisation"])
 
     def _check_values(self, robots: Robots | None) -> None:
-        """Refuse values that no request can have: of a range its ends tell, of words the names."""
+        """Refuse values that no request can have; check a range by its ends, and words as names."""
         from service.answering import question, robots_of
 
         first = tuple(each.values[0] for each in self.variations)

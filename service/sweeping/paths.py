@@ -184,8 +184,8 @@ class Paths:
                 f"{words} has no value in the request, of which an entry could vary: give it there",
                 field=path,
             )
-        told = f"is {value!r} in the request" if _meant(places, value) else "is a number or a word"
-        raise InvalidInputError(f"{words} {told}, without entries", field=path)
+        found = f"is {value!r} in the request" if _meant(places, value) else "is a number or a word"
+        raise InvalidInputError(f"{words} {found}, without entries", field=path)
 
     def _own_unit(self, steps: Steps) -> tuple[str, ...]:
         """Return the unit that an entry of a hand names itself."""

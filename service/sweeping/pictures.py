@@ -23,7 +23,7 @@ from service.sweeping.variation import Value, word_of
 __all__ = ["plot_sweep"]
 
 PANELS: Final = 6
-"""Of one figure: values of a third variable, evenly chosen."""
+"""Most panels of a figure: values of a third variable, evenly chosen."""
 
 COLUMNS: Final = 3
 
@@ -34,11 +34,11 @@ SCALE: Final = "RdBu_r"
 """Colours: blue where it holds, white at the cap, red beyond."""
 
 LEAST, LESS_RED, MOST = 0.5, 1.5, 2.0
-"""Of the scale, over the cap: it goes at least from the first to the second, and at most to the
+"""Ends of the colour scale, over the cap: at least from the first to the second, and at most to the
 last; what is beyond is as red as that."""
 
 MARKED: Final = 600
-"""So many points of a map at most have a dot each."""
+"""Most points of a map that has a dot at each."""
 
 LIMIT: Final[dict[str, Any]] = {"color": "tab:red", "linestyle": "--", "linewidth": 1.0}
 STOP: Final[dict[str, Any]] = {"color": "0.3", "linestyle": ":", "linewidth": 1.2}
@@ -49,7 +49,7 @@ Columns = dict[str, Any]
 
 
 class Look(NamedTuple):
-    """How points of a state are drawn: marker, colour, words; and cells without a utilisation."""
+    """Look of the points of a state: marker, colour, words; and of cells without a utilisation."""
 
     marker: str
     colour: str
@@ -144,7 +144,7 @@ class Side:
 
     @property
     def edges(self) -> Array:
-        """Where the cells of the values begin and end: halfway to the next."""
+        """Ends of the values' cells along the axis: halfway to the next value."""
         if len(self.places) == 1:
             return np.array([self.places[0] - 0.5, self.places[0] + 0.5])
         middle = 0.5 * (self.places[1:] + self.places[:-1])

@@ -29,7 +29,7 @@ STATUSES: Final = ("optimal", "overloaded", "infeasible", "failed", "error")
 
 
 class Sweep(NamedTuple):
-    """What plans come to where fields of a request vary.
+    """Results of plans while fields of a request vary.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Sweep(NamedTuple):
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many points there are of each status."""
+        """Number of points of each status."""
         found = Counter(row.status for row in self.rows)
         return {status: found[status] for status in STATUSES}
 
@@ -130,7 +130,7 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Sweep:
-    """Return what plans come to where fields of a request vary.
+    """Return the results of plans while fields of a request vary.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def sweep(
     ------
     InvalidInputError
         If a path means nothing in the request, or a value cannot be. What is wrong at some points
-        only is told in their rows.
+        only is reported in their rows.
     LimitError
         If there are too many points.
     """
@@ -172,10 +172,10 @@ def sweep(
     ]
     asked = with_robot(with_hand(request, hand), robot)
     design = Design.of(asked, chosen, samples, seed, robots_of(robot))
-    tell, total = progress or (lambda *_: None), len(design.points)
-    tell(0, total)
+    report, total = progress or (lambda *_: None), len(design.points)
+    report(0, total)
     rows = []
     for row in rows_at(design, design.points, asking(total, workers, robot, on)):
         rows.append(row)
-        tell(len(rows), total)
+        report(len(rows), total)
     return with_borders(design, rows, robot, tolerance)

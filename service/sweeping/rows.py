@@ -1,4 +1,4 @@
-"""What each point of a sweep comes to: a row of a table, which grows as CSV and goes on."""
+"""Result of each point of a sweep: a row of a table, kept as a line that a sweep resumes from."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ COLUMNS: Final = (
     *(Column(part, "text", "", f"{part} of the limit that is used most") for part in LIMIT),
     Column("error", "text", "", "why there is no plan"),
 )
-"""After what varies."""
+"""Columns after those of what varies."""
 
 
 class Row(msgspec.Struct, frozen=True):
-    """What one point of a sweep comes to; but for its point and cap as in a reply.
+    """Result of one point of a sweep; as in a reply, but for its point and cap.
 
     Attributes
     ----------
@@ -80,17 +80,17 @@ class Row(msgspec.Struct, frozen=True):
 
     @property
     def holds(self) -> bool:
-        """Whether there is a plan within its limits."""
+        """True if there is a plan within its limits."""
         return self.status == "optimal"
 
     @property
     def state(self) -> State:
-        """As it is drawn; an error where the planner failed, too."""
+        """State as it is drawn; an error where the planner failed, too."""
         return STATES.get(self.status, "error")
 
     @property
     def answered(self) -> bool:
-        """Whether there is an answer, if only that the request at this point cannot be."""
+        """True if there is an answer, if only that the request at this point is invalid."""
         if self.error is not None:
             return self.error.kind in REQUEST_KINDS
         return self.state != "error"
@@ -102,7 +102,7 @@ class Row(msgspec.Struct, frozen=True):
 
     @property
     def complaint(self) -> str | None:
-        """What is wrong, in one line."""
+        """Error in one line; None where there is none."""
         if self.error is None:
             return "the planner failed" if self.state == "error" else None
         field = "" if self.error.field is None else f"{self.error.field}: "
@@ -110,7 +110,7 @@ class Row(msgspec.Struct, frozen=True):
 
     @property
     def cells(self) -> list[Any]:
-        """What the table has of it."""
+        """Cells of the point in the table."""
         point = [
             word_of(each) if each is None or isinstance(each, bool) else each for each in self.point
         ]

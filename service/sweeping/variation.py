@@ -1,4 +1,4 @@
-"""What varies: a field of a request by its path, and the values that it takes."""
+"""Vary a field of a request: its path, and the values that it takes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hand_models.base import InvalidInputError
 __all__ = ["Value", "Variation", "word_of"]
 
 Value = float | bool | str | None
-"""Of a field: a number, a word, or what JSON has besides."""
+"""Value of a field: a number, a word, or what JSON has besides."""
 
 WORDS: Final[dict[str, Value]] = {"true": True, "false": False, "null": None}
 
@@ -24,7 +24,7 @@ LIKE_A_RANGE: Final = re.compile(r"-?[\d.]+ *(-|–|\.\.|to) *-?[\d.]+")
 """Two numbers that are parted by something else than colons."""
 
 MOST_VALUES: Final = 10_000
-"""Of one range."""
+"""Most values of one range."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Variation:
 
     @property
     def numbers(self) -> bool:
-        """Whether all values are numbers."""
+        """True if all values are numbers."""
         return all(type(value) in (int, float) for value in self.values)
 
     def text(self, *, sampled: bool = False) -> str:
