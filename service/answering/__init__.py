@@ -1,4 +1,4 @@
-"""Answering: bytes of requests to bytes of replies."""
+"""Answer requests: bytes in, bytes of replies out."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""A plan request with an advice taken: what its plan gives is what the advice promised."""
+"""Apply an advice to a plan request; the new request's plan gives what the advice promised."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from service.requests import PlanRequest
 __all__ = ["advised", "rewritten"]
 
 ABSENT: Final = object()
-"""The value of a field that is not there."""
+"""Value of a field that is absent."""
 
 ROUNDED: Final = 1e-9
-"""By how much a number may be another and yet is taken as the same, relative where it is above 1:
-that of a pose which was moved there and back."""
+"""Tolerance for equal numbers, relative for numbers above 1: the rounding of a pose that was moved
+there and back."""
 
 LISTS: Final = (list, tuple)
 
 ORIENTATION: Final = "orientation"
-"""Fields whose four numbers are normalised when they are read."""
+"""Name of the fields whose four numbers are normalised when they are read."""
 
 
 def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
-    """Return a request with the changes of an advice about it, which asks for no advice itself.
+    """Return a request with the changes of an advice about it; it asks for no advice itself.
 
     Parameters
     ----------
     request : PlanRequest
     advice : Advice
-        From the reply to it.
+        Advice from the reply to the request.
     """
     want = [each for each in request.want if each != "advice"]
     message = msgspec.to_builtins(replace(request, want=want))
     given = message["stance"]["hands"]
     hands: dict[int, Any] = dict(enumerate(map(deepcopy, given)))
-    # a hand that is a copy comes before what else is told of it, one that is let go after all
+    # first copy hands, then change their fields, and last remove the hands that let go
     for path, value in sorted(advice.changes.items(), key=lambda change: change[0].count(".")):
         hand = HAND_PATH.fullmatch(path)
         if hand is None:
@@ -51,7 +51,7 @@ def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
             _put(hands[int(hand[1])], hand[2], value)
         elif value is not None:
             like = HAND_PATH.fullmatch(value)
-            assert like is not None  # by what an advice is
+            assert like is not None  # an advice has no other values
             hands[int(hand[1])] = deepcopy(given[int(like[1])])
     gone = {path for path, value in advice.changes.items() if value is None}
     message["stance"]["hands"] = [
@@ -61,28 +61,28 @@ def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
 
 
 def rewritten(text: bytes, before: PlanRequest, after: PlanRequest) -> bytes:
-    """Return a request's text with what is different in another request, and all else as it was.
+    """Return a request's text with another request's changes, and all else unchanged.
 
-    Fields keep their order, and numbers that do not change the digits they were written with.
+    Fields keep their order, and unchanged numbers keep their digits.
 
     Parameters
     ----------
     text : bytes
         JSON.
     before, after : PlanRequest
-        The request that the text is, and the one that is wanted.
+        Request of the text, and the one that is wanted.
     """
     found = _rewritten(msgspec.Raw(text), msgspec.to_builtins(before), msgspec.to_builtins(after))
     return msgspec.json.encode(found)
 
 
 def _rewritten(text: msgspec.Raw, before: Any, after: Any) -> Any:
-    """Return a part of a message: as it was written where it stays, else with what is new in it."""
+    """Return a part of a message: its text if it is unchanged, otherwise with the changes."""
     if before == after or (isinstance(after, float) and _is_rounded(before, after)):
         return text
     if isinstance(before, dict) and isinstance(after, dict):
         given = msgspec.json.decode(text, type=dict[str, msgspec.Raw])
-        # what is in neither was written though it is the default
+        # a field in neither was written with its default value
         stays: dict[str, Any] = {
             name: part for name, part in given.items() if name in after or name not in before
         }
@@ -100,18 +100,18 @@ def _rewritten(text: msgspec.Raw, before: Any, after: Any) -> Any:
 
 
 def _is_rounded(before: Any, after: float) -> bool:
-    """Return whether a number differs from another by rounding alone."""
+    """Return True if two numbers differ by rounding alone."""
     return isinstance(before, float) and abs(after - before) <= ROUNDED * max(1.0, abs(before))
 
 
 def _is_turned_by_nothing(before: Sequence[float], after: Sequence[float]) -> bool:
-    """Return whether two quaternions are the same rotation, but for rounding."""
+    """Return True if two quaternions are the same rotation up to rounding."""
     was, now = (np.array(each) / math.hypot(*each) for each in (before, after))
     return bool(min(abs(was - now).max(), abs(was + now).max()) <= ROUNDED)
 
 
 def _most_like(before: Sequence[Any], one: Any, place: int) -> int:
-    """Return which entry of a list one of another was made of: of objects, the most alike."""
+    """Return the index of the entry that a new entry was made of: the most similar object."""
     if not isinstance(one, dict):
         return min(place, len(before) - 1)
 
@@ -123,7 +123,7 @@ def _most_like(before: Sequence[Any], one: Any, place: int) -> int:
 
 
 def _put(part: dict[str, Any], path: str, value: Any) -> None:
-    """Set a field of a message, or take it away."""
+    """Set a field of a message, or remove it."""
     *way, last = path.split(".")
     for name in way:
         inner = part.get(name)

@@ -33,11 +33,11 @@ __all__ = [
 T = TypeVar("T")
 
 LONGEST: Final = 120
-"""Bytes of a reason beside set-points, which have to be small whatever the reason."""
+"""Most bytes of a reason with set-points, whose reply has to be small."""
 
 
 class Planned(NamedTuple):
-    """A plan request as the planner understands it, its plan, and what goes back."""
+    """Planner's question of a request, its plan, and the reply."""
 
     question: Question
     plan: Plan
@@ -53,7 +53,7 @@ class Planned(NamedTuple):
         *,
         model: bool,
     ) -> Planned:
-        """Return a plan with a reply that tells so much of it; ``model`` as for `plan_reply`."""
+        """Return a plan with a reply of this detail; ``model`` as for `plan_reply`."""
         reply: replies.PlanReply | replies.BriefPlanReply
         if detail == "full":
             reply = plan_reply(answer, identifier, model=model)
@@ -64,7 +64,7 @@ class Planned(NamedTuple):
         return cls(question, answer, reply)
 
     def in_detail(self, detail: Detail, *, model: bool = False) -> Planned:
-        """Return the plan with a reply that tells so much of it."""
+        """Return the plan with a reply of this detail."""
         return Planned.of(self.question, self.plan, self.reply.id, detail, model=model)
 
 
@@ -75,9 +75,9 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
     ----------
     answer : Plan
     identifier : str or None
-        The request's, echoed.
+        The request's ``id``.
     model : bool
-        Whether tiles carry their load laws and hands their wrench spaces.
+        True if tiles have their load laws and hands their wrench spaces.
     """
     hands, proof = answer.hands, answer.certificate
     return replies.PlanReply(
@@ -141,9 +141,9 @@ def brief_plan_reply(
     ----------
     answer : Plan
     identifier : str or None
-        The request's, echoed.
+        The request's ``id``.
     hands : bool
-        Whether it tells what the hands carry, too.
+        True if the reply also has the loads of the hands.
     """
     points = None if answer.hands is None else [_set_points(h, hands) for h in answer.hands]
     reply = replies.BriefPlanReply(
@@ -169,7 +169,7 @@ def brief_plan_reply(
 
 
 def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
-    """Return what a hand is to do, and also what it carries if ``whole``."""
+    """Return the set-points of a hand, with its loads if ``whole``."""
     torque, current, angle = hand.drives.tolist()
     points = replies.HandSetPoints(
         limb=hand.limb, tensions=hand.tensions.tolist(), winch_angle=angle
@@ -182,13 +182,13 @@ def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
 
 
 def cut_reason(reason: str) -> str:
-    """Return a sentence, or its beginning where it is long."""
+    """Return a sentence; only the beginning of a long one."""
     short = reason.encode()[:LONGEST].decode(errors="ignore")
     return reason if short == reason else f"{short[:-3]}…"
 
 
 def finite(value: float | None) -> float | None:
-    """Return a number as it travels; None where it is infinite, or there is none."""
+    """Return a number for a reply; None if it is infinite or there is none."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 
@@ -203,7 +203,7 @@ def _listed_by_limb(arrays: Mapping[str, Array] | None) -> dict[str, replies.Vec
 
 
 def _hand_reply(part: HandPlan, model: bool) -> replies.Hand:
-    """Return a hand of a plan as a reply has it, with its wrench space if ``model``."""
+    """Return the reply's hand of a plan's hand, with its wrench space if ``model``."""
     return replies.Hand(
         limb=part.limb,
         wrench=part.wrench.tolist(),
@@ -217,7 +217,7 @@ def _hand_reply(part: HandPlan, model: bool) -> replies.Hand:
 
 
 def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
-    """Return how a wrist is; none for one that is fixed."""
+    """Return the state of a wrist; None stands for a fixed one."""
     if wrist is None:
         return replies.Wrist(mode="fixed")
     return replies.Wrist(

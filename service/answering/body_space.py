@@ -1,4 +1,4 @@
-"""Body spaces: what a stance can hold, from a request to a reply."""
+"""Answer body-space requests: all wrenches that a stance can hold."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NOT_AT_REST: Final = "no accelerations: the body cannot be held at rest"
 
 
 class Explored(NamedTuple):
-    """A body space, the plane of it that was asked for, and the reply."""
+    """Body space, the section of it that was asked for, and the reply."""
 
     space: BodySpace
     section: BodySection

@@ -1,4 +1,4 @@
-"""Answer the bytes of a query by the bytes of its answer, whatever the bytes are."""
+"""Answer a query: bytes in, bytes out, also for bytes that are no valid request."""
 
 from __future__ import annotations
 
@@ -74,12 +74,12 @@ def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlan
 
 
 def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
-    """Answer a plan request, and keep what the reply leaves out; as `plan`."""
+    """Answer a plan request as `plan` does, and keep the question and the plan."""
     detail = request.detail or "full"
     if detail != "full":
-        # what is not told is not found
-        told = ["load_factor"] if detail == "hands" else []
-        wanted = [want for want in request.want if want in told]
+        # compute only what the reply contains
+        included = ["load_factor"] if detail == "hands" else []
+        wanted = [want for want in request.want if want in included]
         request = replace(request, want=wanted, draws=[])
     asked = question(request, robots)
     answer = planner.plan(asked)
@@ -87,17 +87,17 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
 
 
 def with_advice(answer: Planned) -> Planned:
-    """Return an answer with advice, if its reply is whole and there is none yet."""
+    """Return an answer with advice, if its reply is whole and has none yet."""
     if not isinstance(answer.reply, PlanReply) or answer.plan.advice is not None:
         return answer
     found = planner.with_advice(answer.question, answer.plan)
-    told = plan_reply(found, answer.reply.id, model=False)
+    advised = plan_reply(found, answer.reply.id, model=False)
     reply = replace(
         answer.reply,
-        advice=told.advice,
-        warnings=told.warnings,
-        unfinished=told.unfinished,
-        time=told.time,
+        advice=advised.advice,
+        warnings=advised.warnings,
+        unfinished=advised.unfinished,
+        time=advised.time,
     )
     return Planned(answer.question, found, reply)
 
@@ -119,7 +119,7 @@ def _climb(asked: RouteRequest, robots: Robots, _: Streams) -> Reply:
 
 
 class _Service(NamedTuple):
-    """A kind of request, and what answers it, given the request, the robots and the streams."""
+    """Kind of request, and the function of request, robots and streams that answers it."""
 
     request: type[Request]
     answer: Callable[[Any, Robots, Streams], Reply | Planned]
@@ -132,10 +132,10 @@ SERVICES: Final[dict[str, _Service]] = {
     STREAM: _Service(StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)),
     SET_POINTS: _Service(SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)),
 }
-"""What is asked over zenoh, by the last part of the key."""
+"""Services over zenoh, by the last part of the key."""
 
 BULK: Final = SERVICES | {ROUTE: _Service(RouteRequest, _climb)}
-"""What is asked in bulk work, too."""
+"""Services of bulk work, which also has routes."""
 
 
 def handle(
@@ -155,7 +155,7 @@ def handle(
     Parameters
     ----------
     key : str
-        Ends in the name of one of `SERVICES`, or of `BULK`.
+        Key that ends in the name of one of `SERVICES`, or of `BULK`.
     payload : bytes
     encoding : str, optional
         Zenoh's name of it; the answer's is of the same format.
@@ -171,7 +171,7 @@ def handle(
     files : MeshFiles, optional
         Those that a plan request may name; none by default.
     revised : callable, optional
-        Returns what is answered in place of a request that has been understood.
+        Returns the request to answer in place of a request that has been decoded.
 
     Returns
     -------
@@ -200,21 +200,21 @@ def handle(
             deadline.check("an answer was begun")
             found = service.answer(request, robots, streams)
         try:
-            reply, told = fitted(request, found, form)
+            reply, data = fitted(request, found, form)
         except LimitError:
             if isinstance(found, StreamReply):
-                # nobody knows of it
+                # the client does not get its identifier
                 streams.release(found.stream)
             raise
         status: str = getattr(reply, "status", "done")
-        return Answer(told, form.label(reply), True, status)
+        return Answer(data, form.label(reply), True, status)
     except InvalidInputError as error:
         named = error.kind if error.kind in REQUEST_KINDS else InvalidInputError.kind
         return failed(error, named)
     except DeadlineError as error:
         return failed(error)
     except MemoryError:
-        # of a process, not of a question: who runs the process has to know
+        # memory is a problem of the process, not of the question: its owner has to know
         raise
     except Exception as error:
         log.exception("the request at %s failed", key)

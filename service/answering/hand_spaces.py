@@ -1,4 +1,4 @@
-"""Wrench spaces: what one hand of a stance can carry, from a request to a reply."""
+"""Answer wrench-space requests: all wrenches that one hand of a stance can carry."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ V = TypeVar("V")
 
 KNOWN: Final = "the hand's wrench space was known"
 REACH: Final = "it was known how far the hand's set reaches"
-"""What a deadline may come before."""
+"""Step that an exceeded deadline prevents, for its message."""
 
 MOST: Final = 30_000
-"""Of vertices and of half-spaces, how many candidates are gone through for one set: less than a
-second's work, and some megabytes of reply."""
+"""Most candidates for the vertices or the half-spaces of one set: less than a second's work, and
+some megabytes of reply."""
 
 LESS: Final = 'take fewer half_planes of its surface, or "lateral": false in its grasp'
 
 MOST_ROWS: Final = 600
-"""Rows of a hand that is closed anew at the places of its scatter: 16 half-planes have 535."""
+"""Most rows of a hand that is closed anew at each sampled place: 16 half-planes have 535."""
 
 SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
 """Names of both directions along each axis, in the order of `BOTH_WAYS`."""
@@ -97,7 +97,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
 
 
 def _contacts(settled: SettledHand) -> list[replies.Contact]:
-    """Return where each tile meets the rock."""
+    """Return the contact of each tile with the rock."""
     places = zip(settled.tiles, settled.positions.tolist(), settled.axes.tolist(), strict=True)
     return [
         replies.Contact(
@@ -122,7 +122,7 @@ def _stop(settled: SettledHand, tile: Tile) -> str | None:
 
 
 def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
-    """Return how each finger has closed, and how else it would."""
+    """Return the closure of each finger, and those for rock a little elsewhere."""
     return [
         replies.ClosingSequence(
             finger=closing.finger,
@@ -159,22 +159,22 @@ def _by_side(reaches: Array) -> dict[str, float | None]:
 def _add_views(
     reply: WrenchSpaceReply, space: WrenchSpace, want: Sequence[SpaceWant] | None
 ) -> None:
-    """Add what a set at utilisation 1 looks like, as far as something is left of it.
+    """Add vertices, half-spaces and capability of a set at utilisation 1, unless it is empty.
 
     Parameters
     ----------
     reply : WrenchSpaceReply
     space : WrenchSpace
     want : sequence of SpaceWant, optional
-        Vertices and half-spaces that are not among them are left out. By default both are told
-        where `MOST` allows.
+        Vertices and half-spaces that are not among them are left out. By default both are
+        included if `MOST` allows.
 
     Raises
     ------
     InvalidInputError
         If something is wanted twice.
     LimitError
-        If what is wanted would take more than `MOST`.
+        If a wanted view would take more than `MOST`.
     SolverError
         If a view could not be computed.
     """
@@ -189,7 +189,7 @@ def _add_views(
         )
 
     def view(name: SpaceWant, candidates: Callable[[], int], found: Callable[[], V]) -> V | None:
-        """Return a view if it is told; what costs too much is refused, or left out."""
+        """Return a view if it is wanted; one that costs too much is refused, or left out."""
         if want is not None and name not in want:
             return None
         try:

@@ -1,4 +1,4 @@
-"""Mesh files that requests name, read where the request is, so that what travels is whole."""
+"""Read mesh files that requests name, so that requests contain whole meshes."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ K = TypeVar("K", bound=Hold)
 R = TypeVar("R", bound=Request)
 
 KEPT: Final = 8
-"""Files whose triangles are kept, those asked for last."""
+"""Number of files whose triangles are cached, those used last."""
 
 
 class MeshFiles:
-    """Mesh files, each read once as long as it does not change.
+    """Mesh files; each is read once, and again if it has changed.
 
     Parameters
     ----------
     folder : Path
-        That their names are relative to.
+        Folder that their names are relative to.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -65,9 +65,9 @@ class MeshFiles:
         ----------
         request : PlanRequest
         given : PlanRequest
-            What it was made of, with its files.
+            Request that it was made of, with its files.
         folder : Path
-            That their names are to be relative to, unless they are absolute.
+            Folder for relative names; absolute names stay.
         """
         replace = msgspec.structs.replace
 
@@ -106,7 +106,7 @@ class MeshFiles:
 
     def _mesh(self, path: Path) -> Mesh:
         changed = None
-        with suppress(OSError):  # of what is no file, reading tells
+        with suppress(OSError):  # reading reports a missing file
             changed = path.stat().st_mtime_ns
 
         def read() -> Mesh:

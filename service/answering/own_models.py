@@ -1,4 +1,4 @@
-"""A hand and a robot of the caller's own, on their way into questions.
+"""Put a hand and a robot of the caller's own into questions.
 
 Entries of a hand travel as ``{section: {entry: {value, unit, source, note}}}``. Whoever is nearer
 to the question has the last word on an entry: the command line over a stance's file, a request over
@@ -50,13 +50,13 @@ R = TypeVar(
 )
 
 Builder = Callable[[ParameterTable | None], Robot]
-"""Builds a robot from all numbers of its hands."""
+"""Function that builds a robot from all numbers of its hands."""
 
 Robots = Mapping[str, Builder]
-"""Robots that stances may be for, by name; the first is that of stances which name none."""
+"""Robots of stances, by name; the first is the default."""
 
 ROBOTS: Final[Robots] = {DEFAULT_ROBOT: robosimian}
-"""The robots that are bundled."""
+"""Bundled robots."""
 
 
 def read_hand(path: Path) -> ParameterTable:
@@ -104,23 +104,23 @@ def with_hand(request: R, own: ParameterTable | None) -> R:
 
 
 def over_default(request: R, default: ParameterTable | None) -> R:
-    """Return a request in which what it leaves open of its hand is the service's default."""
+    """Return a request whose missing entries of the hand are the service's defaults."""
     if default is None:
         return request
     return _asking_for(request, _entries(default), request.stance.hand or {})
 
 
 def _entries(own: ParameterTable) -> dict[str, dict[str, Any]]:
-    """Return entries as they travel."""
+    """Return entries as they are in a request."""
     entries: dict[str, dict[str, Any]] = msgspec.to_builtins(own.sections)
     return entries
 
 
 def _asking_for(request: R, low: Mapping[str, Any], high: Mapping[str, Any]) -> R:
-    """Return a request with two hands' entries, the second's in place of the first's."""
+    """Return a request with the entries of two hands; the second's replace the first's."""
     hand = {**low, **high}
     for section in low.keys() & high.keys():
-        # what is no section is left for its refusal
+        # an entry that is no section is refused later
         if isinstance(high[section], Mapping) and isinstance(low[section], Mapping):
             hand[section] = {**low[section], **high[section]}
     stance = msgspec.structs.replace(request.stance, hand=hand)
@@ -146,7 +146,7 @@ def robots_of(file: RobotFile | None) -> Robots:
 
 
 def builder_of(name: str | None, robots: Robots) -> Builder:
-    """Return what builds the robot of that name, or the first.
+    """Return the builder of the robot of that name; by default the first.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Questions and climbs of requests, in the planner's own terms, and the replies to climbs."""
+"""Convert requests to the planner's questions and climbs, and climbs to replies."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = ["climb", "question", "route"]
 
 
 def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
-    """Return what a plan request asks.
+    """Return the planner's question of a plan request.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Replies of no more bytes than the caller takes: of less detail, or an error that has sizes."""
+"""Fit replies into the bytes that the caller allows: less detail, or an error with sizes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from service.wire import Format
 __all__ = ["fitted"]
 
 DETAILS: Final[tuple[Detail, ...]] = ("full", "hands", "set_points")
-"""From the most to the least."""
+"""Details of a reply, from the most to the least."""
 
 WANTED: Final = ("spread", "advice", "robust", "clearance", "prices", "vertices", "half_spaces")
-"""Fields of replies that a ``want`` of the same name brings."""
+"""Fields of replies that are included for a ``want`` of the same name."""
 
 ALONG: Final = "along"
-"""A field that a request's ``directions`` bring."""
+"""Field that is included for a request's ``directions``."""
 
 
 def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Reply, bytes]:
@@ -36,13 +36,13 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
     ----------
     request : Request
     found : Reply or Planned
-        The answer as the request asks for it.
+        Answer in full, as requested.
     form : Format
 
     Raises
     ------
     LimitError
-        If it does not fit; the message has the sizes of what may be asked for instead.
+        If it does not fit; the message has the sizes of smaller replies.
     """
     reply = found.reply if isinstance(found, Planned) else found
     payload = form.encode(reply)
@@ -66,7 +66,7 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
 
 
 def _with_less_detail(found: Reply | Planned, given: Detail) -> Iterator[tuple[Detail, Reply]]:
-    """Yield the replies of less detail than is given, from the most to the least."""
+    """Yield the replies of less detail, from the most to the least."""
     if isinstance(found, Planned):
         for detail in DETAILS[DETAILS.index(given) + 1 :]:
             yield detail, found.in_detail(detail).reply
@@ -75,9 +75,9 @@ def _with_less_detail(found: Reply | Planned, given: Detail) -> Iterator[tuple[D
 
 
 def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
-    """Yield the reply without each of what was asked for in addition, and without all of it.
+    """Yield the reply without each of the extras that were asked for, and without all of them.
 
-    ``bare``: the reply without the model, or itself where there is none in it.
+    ``bare``: the reply without the model, or the same reply if it has no model.
     """
     blank: dict[str, Any] = {
         field.name: None if field.default is NODEFAULT else field.default
@@ -95,13 +95,13 @@ def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
 
 
 def _too_large(size: int, most: int, sizes: dict[str, int]) -> LimitError:
-    told = f"the reply takes {size} bytes, and no more than {most} are allowed"
+    message = f"the reply takes {size} bytes, and no more than {most} are allowed"
     if sizes:
         others = ", ".join(f"{taken} {words}" for words, taken in sizes.items())
-        told += f"; it takes {others}"
+        message += f"; it takes {others}"
     if not any(taken <= most for taken in sizes.values()):
-        told += f"; allow {_next(min([size, *sizes.values()]))}"
-    return LimitError(told, field="max_reply_bytes")
+        message += f"; allow {_next(min([size, *sizes.values()]))}"
+    return LimitError(message, field="max_reply_bytes")
 
 
 def _next(size: int) -> int:

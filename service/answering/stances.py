@@ -1,4 +1,4 @@
-"""Stances of requests: hands on their holds, in the planner's own terms."""
+"""Convert stances of requests to the planner's: hands on their holds."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ from service.answering.own_models import ROBOTS, Robots, builder_of
 __all__ = ["Rocks", "array_of", "hands_on_rocks", "joints_of", "poses_of", "stance", "with_rocks"]
 
 VERTICAL: Final = (0.0, 0.0, 1.0)
-"""Up in W."""
+"""Direction up, in W."""
 
 MOST_HALF_PLANES: Final = 256
-"""Of all hands of a stance: 64 each of four, some 7500 rows in a plan's program."""
+"""Most half-planes of all hands of a stance: four with 64 have some 7500 rows in a program."""
 
 FLOATING: Final = 4
-"""How many times over a floating hand's half-planes count: its plan is found in several rounds."""
+"""Factor of a floating hand's half-planes: its plan is found in several rounds."""
 
 MOST_POINTS: Final = 40_000
-"""Of the outlines of all hands of a stance, of some 0.1 ms each."""
+"""Most points of the outlines of all hands of a stance, some 0.1 ms each."""
 
 MOST_TURNED: Final = 4.0 * math.pi
-"""Largest angle of a wrist that is taken for one [rad]: beyond two turns, it is in degrees."""
+"""Largest valid angle of a wrist [rad]: beyond two turns, it is likely to be in degrees."""
 
 KEPT: Final = 8
-"""Meshes that are kept, those asked for last: on the same object hands are found settled."""
+"""Number of cached meshes, those used last; hands settled on a mesh are cached with it."""
 
 MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests", KEPT)
-"""By all that they are built of."""
+"""Cache of meshes, by everything that they are built of."""
 
 Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
-"""A stance's rocks by name, and each one's frame in W if that is given."""
+"""Rocks of a stance by name, each with its frame in W if that is given."""
 
 
 def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
@@ -96,10 +96,10 @@ def hands_on_rocks(
     ----------
     messages : sequence of requests.Hand
     kind : SpinyHand
-        The robot's.
+        Hand of the robot.
     rocks : Rocks
     path : str
-        Where the hands are in the message.
+        Path of the hands in the message.
 
     Raises
     ------
@@ -138,11 +138,11 @@ def _hand(
     ----------
     message : requests.Hand
     at : str
-        Its path.
+        Path of the hand.
     poses : mapping of str to Pose
-        Those that are given, by their paths.
+        Given poses, by their paths.
     numbers : ParameterTable
-        Of the robot's hands.
+        Parameters of the robot's hands.
     rocks : Rocks
     """
     surface = _surface(message.surface)
@@ -181,7 +181,7 @@ def _hand(
 def _placed_hold(
     message: requests.Hand, pose: Pose | None, numbers: ParameterTable, rocks: Rocks
 ) -> tuple[rock.Hold, Pose | None]:
-    """Return what a hand holds, and its frame in W: the pose that is given, or its rock's own."""
+    """Return the hold of a hand, and its frame in W: the given pose, or that of its rock."""
     hold, anywhere = message.hold, message.place is not None
     if not isinstance(hold, requests.RockReference):
         return _hold(hold, numbers, anywhere), pose
@@ -226,7 +226,7 @@ def array_of(values: Sequence[float] | None) -> Array | None:
 
 
 def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
-    """Return where on a rock a hand is seated, in the rock's frame."""
+    """Return the pose on a rock at which a hand is seated, in the rock's frame."""
     up = place.up
     if abs(place.wrist_angle) > MOST_TURNED:
         raise InvalidInputError(
@@ -244,7 +244,7 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
 
 
 def _surface(message: str | requests.Surface) -> Surface:
-    """Return the surface that a preset's name or a caller's own numbers say."""
+    """Return the surface of a preset's name or of a caller's own numbers."""
     try:
         if isinstance(message, str):
             return Surface.named(message)
@@ -287,7 +287,7 @@ def _rocks(message: requests.Stance, numbers: ParameterTable) -> Rocks:
 
 
 def _hold(message: requests.Rock, numbers: ParameterTable, anywhere: bool) -> rock.Hold:
-    """Return the hold of a message; ``anywhere``: whether its frame may begin off the rock."""
+    """Return the hold of a message; ``anywhere``: true if its frame may begin off the rock."""
     match message:
         case requests.Plane():
             return rock.Plane()

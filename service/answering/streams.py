@@ -1,4 +1,4 @@
-"""The wrench streams of a service: declared, asked, and let go."""
+"""Keep the wrench streams of a service: declare, ask and release them."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from service.wire import Format
 __all__ = ["KEPT", "STREAMS", "Streams", "brief_set_points", "opened", "set_points_reply"]
 
 FIRST: Final = "the plans about the first body wrench were there"
-"""What a deadline may come before."""
+"""Step that an exceeded deadline prevents, for its message."""
 
 KEPT: Final = 16
-"""Streams that a service keeps; then, of the client that has most, the one that was asked for
-longest ago goes."""
+"""Most streams of a service; beyond it, the client with most streams loses the one that was used
+longest ago."""
 
 
 class _Kept(NamedTuple):
-    """A stream, and the client that has declared it."""
+    """Stream, and the client that has declared it."""
 
     stream: WrenchStream
     owner: str
@@ -72,9 +72,9 @@ class Streams:
     Parameters
     ----------
     owner : str, optional
-        The client that declares.
+        Client that declares the streams.
     among : Streams, optional
-        Of which these are those that a client sees: all, but what it declares is its own.
+        Streams to share: the client can use all of them, and owns those that it declares.
     """
 
     def __init__(self, owner: str = "", among: Streams | None = None) -> None:
@@ -109,7 +109,7 @@ class Streams:
                 hands=[HandColumns(limb=limb, columns=columns) for limb, columns in named],
                 took=time.perf_counter() - start,
             )
-            # what cannot be told would take a place that nobody knows of
+            # a stream whose reply cannot be encoded would be kept without a client
             Format.MSGPACK.encode(reply)
         except BaseException:
             stream.close()
@@ -122,7 +122,7 @@ class Streams:
         return reply
 
     def _taken_out(self) -> WrenchStream:
-        """Take out the oldest stream of the client that has most."""
+        """Remove and return the oldest stream of the client that has most."""
         counts = Counter(each.owner for each in self._kept.values())
         most = max(counts.values())
         oldest = next(name for name, each in self._kept.items() if counts[each.owner] == most)
@@ -157,14 +157,14 @@ class Streams:
         return reply
 
     def release(self, identifier: str) -> None:
-        """Let a stream go."""
+        """Release a stream."""
         with self._lock:
             kept = self._kept.pop(identifier, None)
         if kept is not None:
             kept.stream.close()
 
     def close(self) -> None:
-        """Let all streams go."""
+        """Release all streams."""
         with self._lock:
             gone = list(self._kept.values())
             self._kept.clear()
@@ -179,7 +179,7 @@ def set_points_reply(
     start: float,
     detail: Detail = "full",
 ) -> SetPointsReply:
-    """Return set-points as they travel.
+    """Return set-points as a reply.
 
     Parameters
     ----------
@@ -187,9 +187,9 @@ def set_points_reply(
     stream : WrenchStream
     points : SetPoints
     start : float
-        When the question came, on the clock of `time.perf_counter`.
+        Time of arrival of the question, on the clock of `time.perf_counter`.
     detail : {'set_points', 'hands', 'full'}, optional
-        With the first, hands have their tensions alone; the other two are the same.
+        With ``set_points``, hands have their tensions alone; the other two are the same.
     """
     reply = SetPointsReply(
         stream=identifier,
@@ -207,7 +207,7 @@ def set_points_reply(
 
 
 def _hands(stream: WrenchStream, points: SetPoints) -> list[HandSetPoints] | None:
-    """Return what each hand is to do; None where there is no plan."""
+    """Return the set-points of each hand; None if there is no plan."""
     tensions, wrenches = points.tensions, points.wrenches
     angle, torque, current = points.winch_angle, points.motor_torque, points.motor_current
     if tensions is None or wrenches is None or angle is None or torque is None or current is None:
@@ -226,7 +226,7 @@ def _hands(stream: WrenchStream, points: SetPoints) -> list[HandSetPoints] | Non
 
 
 def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
-    """Return set-points with the hands' tensions and winches alone, and a reason that is cut."""
+    """Return set-points with the hands' tensions and winches alone, and a short reason."""
     return replace(
         whole,
         reason=cut_reason(whole.reason) if whole.reason else whole.reason,
@@ -237,4 +237,4 @@ def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
 
 
 STREAMS: Final = Streams()
-"""Those of this process that belong to no service."""
+"""Streams of this process that belong to no service."""

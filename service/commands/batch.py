@@ -23,7 +23,7 @@ from service.commands import options
 __all__ = ["answer_rest", "batch", "complain", "exit_status", "new_run", "writing_answers"]
 
 WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables.DONE)
-"""Exit statuses: that of a batch is the worst of its requests'."""
+"""Exit statuses, worst first: a batch has the worst of its requests'."""
 
 
 @click.command()
@@ -149,13 +149,13 @@ def new_run(
     columns : callable
         Returns the columns of a table.
     own : Own
-        What a table is of.
+        Hand and robot that a table is about.
     explained : bool
-        Whether a table is of explained plans.
+        True if a table is of explained plans.
     resume : bool
-        Whether what the file answers is kept.
+        True if answers that the file already has are kept.
     shown : bool, optional
-        Whether replies go to standard output where there is no file.
+        True if replies go to standard output where there is no file.
     """
     with writing_answers(file):
         if file is None or bulk.exporter_at(file) is None:
@@ -185,20 +185,20 @@ def answer_rest(
     file : Path or None
         Where the answers go.
     title : str
-        What is done.
+        Description of the work.
     noun : str
-        What the questions are.
+        Plural name of the questions.
 
     Raises
     ------
     Interrupted, CruxError
-        That say what is kept.
+        The message says which answers are kept.
     """
     begun, before = perf_counter(), sink.tally.count
     due: deque[bytes] = deque()
 
     def ask() -> Iterator[bulk.Question]:
-        # now there is somewhere to work: until then what was there has stayed
+        # the answers start here: until now an earlier file was kept
         open_sink()
         for question in islice(asked.questions(), before, None):
             due.append(question.payload if isinstance(question, wire.Answer) else question)
@@ -221,18 +221,18 @@ def answer_rest(
 
     try:
         with ExitStack() as stack:
-            tell = stack.enter_context(tables.progress(title, counted=True))
+            report = stack.enter_context(tables.progress(title, counted=True))
             stack.enter_context(writing_answers(file))
             found = stack.enter_context(closing(answers(ask())))
             if before == asked.count:
                 open_sink()
-            tell(before, asked.count, "")
+            report(before, asked.count, "")
             for answer in found if before < asked.count else ():
                 sink.write(due.popleft(), answer.payload, answer.seconds)
                 done = sink.tally.count
                 rate = (done - before) / (perf_counter() - begun)
                 words = ", ".join(filter(None, (f"{rate:.0f}/s", sink.tally.errors)))
-                tell(done, asked.count, words)
+                report(done, asked.count, words)
     except processes.Interrupted:
         raise processes.Interrupted(kept()) from None
     except InvalidInputError:
@@ -253,7 +253,7 @@ def _check_output(file: Path, requests: str, resume: bool, is_table: bool) -> No
         if file.is_file() and os.path.samestat(file.stat(), given):
             raise InvalidInputError(f"{file}: the requests are there", field="-o")
     except OSError:
-        # reading or writing tells
+        # reading or writing reports it
         return
 
 
@@ -278,7 +278,7 @@ def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
     where : callable
         Says which question has an index.
     noun : str
-        What the questions are.
+        Plural name of the questions.
     """
     if tally.first_bad is not None:
         index, error = tally.first_bad

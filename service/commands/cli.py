@@ -28,11 +28,11 @@ BAD_INPUT: Final = 2
 FAILED: Final = 1
 
 VERBOSITY: Final = "crux.verbosity"
-"""In a context's ``meta``; `service.tables.verbosity` reads it."""
+"""Key in a context's ``meta``; `service.tables.verbosity` reads it."""
 
 
 class Entry(NamedTuple):
-    """Where a command is, and what it does in a few words: the beginning of its own help."""
+    """Module of a command, and the first words of its help."""
 
     module: str
     words: str
@@ -113,7 +113,7 @@ def _say_more_or_less(command: click.Command) -> click.Command:
 
 
 class Commands(click.Group):
-    """The commands, which are loaded one by one."""
+    """Group of the commands; each is loaded when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted(COMMANDS)
@@ -128,16 +128,16 @@ class Commands(click.Group):
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command, and say how long it took if more is to be said."""
+        """Run a command, and print how long it took with ``--verbose``."""
         start, used = time.perf_counter(), time.process_time()
         try:
             return super().invoke(ctx)
         finally:
-            # a service says what its log does; nobody may be there to read more
+            # a service writes to its log only; nobody may read standard error
             if ctx.meta.get(VERBOSITY, 0) > 0 and ctx.invoked_subcommand != "serve":
                 took, used = time.perf_counter() - start, time.process_time() - used
-                told = f"took {took:.2f} s, {used:.2f} s of this process's time"
-                click.echo(f"{NAME}: {told}", err=True)
+                times = f"took {took:.2f} s, {used:.2f} s of this process's time"
+                click.echo(f"{NAME}: {times}", err=True)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write what each command does, without loading it."""
@@ -153,7 +153,7 @@ class Commands(click.Group):
     def shell_complete(
         self, ctx: click.Context, incomplete: str
     ) -> list[click.shell_completion.CompletionItem]:
-        """Return commands and options that begin so, without loading the commands."""
+        """Return commands and options with this beginning, without loading the commands."""
         from click.shell_completion import CompletionItem
 
         names = [name for name in self.list_commands(ctx) if name.startswith(incomplete)]
@@ -185,7 +185,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _status_of(error: Exception) -> int:
-    """Return the exit status of an error that is meant; others are raised again."""
+    """Return the exit status of a `CruxError`; raise any other error again."""
     from hand_models.base import CruxError, InvalidInputError
     from service.wire import REQUEST_KINDS
 
@@ -206,7 +206,7 @@ def _complain(message: str, status: int) -> int:
 
 
 def _hint(error: click.ClickException) -> str:
-    """Say whose help tells how a command is used, if that went wrong."""
+    """Return which command's help to read after a usage error; empty after any other error."""
     if not isinstance(error, click.UsageError):
         return ""
     name = NAME if error.ctx is None else error.ctx.command_path

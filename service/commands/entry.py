@@ -1,6 +1,6 @@
-"""Where the process of a ``crux`` command begins.
+"""Start the process of a ``crux`` command.
 
-Apart from the commands, with little to import, so that signals are answered while they are.
+This module imports little, so that signals are handled while the commands are imported.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ def main() -> None:
 def _open_what_is_closed() -> None:
     """Give standard streams that were closed (``>&-``) something to read or write all the same.
 
-    What is opened later would take their places.
+    Otherwise a file that is opened later would take their descriptors.
     """
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         if getattr(sys, name) is None:
-            # the first that is free, which is this one
+            # the system opens the first free descriptor, which is this one
             os.open(os.devnull, os.O_RDWR)
             setattr(sys, name, os.fdopen(number, mode))

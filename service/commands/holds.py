@@ -1,4 +1,4 @@
-"""Holds on a scan: a hand tried all over a rock, and what it holds where."""
+"""Propose holds on a scan: close a hand at a grid of places, and compare what it can hold."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ if TYPE_CHECKING:
 __all__ = ["holds"]
 
 SHOWN: Final = 10
-"""Holds that are printed."""
+"""Number of holds that are printed."""
 
 LEAST: Final = 0.1
-"""What a hand holds that holds something [N]."""
+"""Least force that counts as holding something [N]."""
 
 REASONS: Final = 3
-"""Reasons that are printed why hands cannot be at places."""
+"""Number of printed reasons for which hands cannot be at places."""
 
 OUTPUT: Final = ".json"
 
 MOST: Final = 100_000
-"""Places that are tried: about four hours of one core, forty times that with the seat best."""
+"""Most places that are tried: some four hours of one core, forty times that with seat best."""
 
 PLANS: Final = 15
-"""As which a trial counts where it is asked whether processes are worth it."""
+"""Plans that take as long as one trial; decides whether workers are worth it."""
 
 DEAR: Final = 40
-"""Trials as which one counts whose seat is searched for."""
+"""Trials that take as long as one with a search for the seat."""
 
 DEGREE: Final = 180.0 / math.pi
 
 UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
-"""Of the file."""
+"""Units in the file."""
 
 
 @click.command()
@@ -138,7 +138,7 @@ def holds(
     numbers = parameters.hand_table() if hand is None else parameters.own_hand(hand)
     mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
     radius = 0.5 * numbers.scalar("palm", "length")
-    with tables.progress("laying the grid") as tell:
+    with tables.progress("laying the grid") as report:
         trials = fixed_wrist.grid_of_trials(
             mesh,
             spacing,
@@ -146,7 +146,7 @@ def holds(
             tuple(dict.fromkeys(rotations)),
             radius=radius,
             most=MOST,
-            tell=tell,
+            tell=report,
         )
     if not trials:
         raise InvalidInputError(
@@ -154,7 +154,7 @@ def holds(
             "smaller than the grid?",
             field="--spacing",
         )
-    # before the work is done
+    # fail before the work is done
     with tables.writing(output, "--output"):
         TemporaryFile(dir=output.parent).close()
 
@@ -175,7 +175,7 @@ def holds(
             raise
         broken = error
     for k, each in scattered.items():
-        # a process that was lost leaves a hold as it was found
+        # after a lost worker the hold keeps its first result
         outcomes[best[k]] = outcomes[best[k]] if isinstance(each, InvalidInputError) else each
     found = [(trials[i], each) for i, each in _sorted(outcomes)]
     refused = Counter(
@@ -206,8 +206,8 @@ def holds(
     if picture is not None:
         _draw(mesh, trials, found, picture, rock.name)
     if as_json:
-        told = {name: value for name, value in result.items() if name != "refusals"}
-        tables.say({**told, "holds": len(found), "file": str(output)})
+        summary = {name: value for name, value in result.items() if name != "refusals"}
+        tables.say({**summary, "holds": len(found), "file": str(output)})
     else:
         _print(trials, found, refused, mesh.oddities, output, tables.console())
 
@@ -218,18 +218,18 @@ def _keep(
     tried: Generator[tuple[int, Outcome], None, None],
     outcomes: dict[int, Outcome],
 ) -> None:
-    """Keep what comes of each place at once, in case that the rest is broken off."""
+    """Store the outcome of each place at once, so that an interruption loses none of them."""
     if not trials:
         return
-    with tables.progress(title) as tell, closing(tried) as found:
-        tell(0, len(trials))
+    with tables.progress(title) as report, closing(tried) as found:
+        report(0, len(trials))
         for i, each in found:
             outcomes[i] = each
-            tell(len(outcomes), len(trials))
+            report(len(outcomes), len(trials))
 
 
 def _sorted(outcomes: Mapping[int, Outcome]) -> list[tuple[int, fixed_wrist.FoundHold]]:
-    """Return the indices of trials whose hands hold something, the largest pull-off first."""
+    """Return indices and holds of trials that hold something, the largest pull-off first."""
     pairs = [
         (i, each)
         for i, each in sorted(outcomes.items())
@@ -239,7 +239,7 @@ def _sorted(outcomes: Mapping[int, Outcome]) -> list[tuple[int, fixed_wrist.Foun
 
 
 def _reason(error: InvalidInputError) -> str:
-    """Return why a hand cannot be, without its numbers."""
+    """Return why a hand cannot be at a place, without the numbers."""
     words = str(error).split(":")[-1] if error.field is None else error.message
     return " ".join("…" if any(map(str.isdigit, word)) else word for word in words.split())
 
@@ -247,7 +247,7 @@ def _reason(error: InvalidInputError) -> str:
 def _refusals(
     trials: Sequence[fixed_wrist.Trial], outcomes: Mapping[int, Outcome]
 ) -> list[dict[str, Any]]:
-    """Return the points where hands cannot be, and in how many trials there for which reason."""
+    """Return the points where hands cannot be, with the number of trials for each reason."""
     found: dict[tuple[float, float, float], Counter[str]] = {}
     for i, each in sorted(outcomes.items()):
         if isinstance(each, InvalidInputError):
@@ -256,7 +256,7 @@ def _refusals(
 
 
 def _entry(trial: fixed_wrist.Trial, found: fixed_wrist.FoundHold) -> dict[str, Any]:
-    """Return a hold as JSON has it."""
+    """Return a hold as JSON values."""
     from hand_models import fixed_wrist
 
     def by_way(values: np.ndarray | None) -> dict[str, float | None] | None:

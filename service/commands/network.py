@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 __all__ = ["demo", "query", "schema", "serve"]
 
 LEVELS: Final = {-1: logging.ERROR, 0: logging.WARNING, 1: logging.INFO}
-"""Of what is logged, by what is to be said: with more, a line a question."""
+"""Log level by verbosity; with 1 there is one line for each question."""
 
 PATIENCE: Final = 120.0
-"""How long the demo waits for its own service, however busy the machine [s]."""
+"""Timeout of the demo for its own service, also on a busy machine [s]."""
 
 ZENOH_THREADS: Final = (
     "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
 )
-"""By default, where ``ZENOH_RUNTIME`` does not say otherwise."""
+"""Default of the environment variable ``ZENOH_RUNTIME``."""
 
 DEMO_STANCE: Final = "wall-300-joints"
 
@@ -96,7 +96,7 @@ def serve(
     and gives the keys its name.
     """
     stop = _StopSignal()
-    # a client that does not read stops one of these for as long as zenoh waits for it
+    # a client that does not read blocks one of these threads while zenoh waits for it
     os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)
 
     handler = serving.LogThread()
@@ -132,10 +132,10 @@ def serve(
 
 
 class _StopSignal:
-    """SIGTERM or Ctrl-C, from now on: at first they end this process and those that it started.
+    """Handler of SIGTERM and Ctrl-C; at first they end this process and its child processes.
 
-    A signal may well arrive in a thread of zenoh's or of a solver's, and does not wake the main
-    thread then; what does is the byte that its handler writes to a pipe.
+    A signal may arrive in a thread of zenoh or of a solver, and then does not wake the main
+    thread. The byte that the handler writes to a pipe wakes it.
     """
 
     NUMBERS = (signal.SIGINT, signal.SIGTERM)
@@ -148,12 +148,12 @@ class _StopSignal:
             signal.signal(number, _leave)
 
     def waits_for(self) -> None:
-        """From now on there are questions that are to be told of the end."""
+        """Let signals end `wait`, not the process, so that open questions are answered first."""
         for number in self.NUMBERS:
             signal.signal(number, lambda *_: None)
 
     def wait(self) -> None:
-        """Wait for the first; a second one kills."""
+        """Wait for the first signal; a second one kills the process."""
         os.read(self._arrived, 1)
         for number in self.NUMBERS:
             signal.signal(number, signal.SIG_DFL)
@@ -161,7 +161,7 @@ class _StopSignal:
 
 def _leave(*_: object) -> None:
     try:
-        # one may be in the middle of being started
+        # a child process may just be starting
         processes.kill_children()
     finally:
         os._exit(0)

@@ -53,17 +53,17 @@ PICTURES: Final = (".png", ".pdf", ".svg")
 TABLES: Final = (".csv", ".parquet", ".json", ".jsonl")
 HAND_FILE: Final = ".toml"
 EXTRAS: Final[tuple[planner.Want, ...]] = ("load_factor", "prices")
-"""What the command line asks for besides the plan."""
+"""Extras that the command line asks for besides the plan."""
 
 LONGEST: Final = 1e6
-"""Of what may be waited for [s]; the longest deadline of a request."""
+"""Longest wait [s]; also the longest deadline of a request."""
 
 
 # Types of values ----------------------------------------------------------------------------------
 
 
 class FiniteRange(click.FloatRange):
-    """A range of numbers, of which nan is none."""
+    """Range of numbers, without nan."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -76,12 +76,12 @@ class FiniteRange(click.FloatRange):
 
 
 class OutputFile(click.Path):
-    """A file that is written, refused before any work is done if that cannot be.
+    """Output file; refused before any work is done if it cannot be written.
 
     Parameters
     ----------
     *endings : str
-        Those that are valid.
+        Valid file endings.
     """
 
     def __init__(self, *endings: str) -> None:
@@ -101,7 +101,7 @@ class OutputFile(click.Path):
 
 
 class InputFile(click.Path):
-    """A file that is read as something of `service.answering` while options are.
+    """Input file that a function of `service.answering` reads while options are parsed.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def asked_for(
 
 
 class Own(NamedTuple):
-    """Numbers of a hand and a robot of the caller's own; None for those that are bundled."""
+    """Numbers of the caller's own hand and robot; None for the bundled ones."""
 
     hand: ParameterTable | None
     robot: planner.RobotFile | None
@@ -167,13 +167,13 @@ class Own(NamedTuple):
 
 
 class Workers(NamedTuple):
-    """Where many questions are answered."""
+    """Place where many questions are answered: this process, local workers or Dask."""
 
     workers: int | None
     dask: str | None
 
     def place(self, plans: int) -> tuple[str, int | None]:
-        """Return where questions worth so many plans are answered, and by how many processes."""
+        """Return where work of so many plans is done, and the number of workers."""
         if self.dask is not None:
             return (bulk.LOCAL if self.dask == "local" else self.dask), self.workers
         count = processes.worth(plans, self.workers)
@@ -181,14 +181,14 @@ class Workers(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """What is asked besides a plan: the spread over draws, and no explanation."""
+    """Options of a plan: the spread over samples, and no explanation."""
 
     spread: bool
     draws: list[requests.Draw] | None
     unexplained: bool
 
     def of(self, request: R) -> R:
-        """Return a request that asks for it."""
+        """Return a request with these options."""
         more: dict[str, Any] = {"draws": self.draws} if self.draws else {}
         if self.spread or self.draws:
             more["want"] = list(dict.fromkeys([*request.want, "spread"]))
@@ -200,9 +200,9 @@ class Wanted(NamedTuple):
 def with_extras(
     request: requests.PlanRequest, *further: planner.Want, whole: bool = True
 ) -> requests.PlanRequest:
-    """Return a request that wants what the command line shows besides the plan, and more, too.
+    """Return a request that also wants the command line's extras and the ``further`` ones.
 
-    ``whole``: whether a person reads the reply, who gets all of it.
+    ``whole``: true for a reply in full detail, as a person reads it.
     """
     want = dict.fromkeys([*request.want, *EXTRAS, *further])
     more = {"detail": "full", "max_reply_bytes": None} if whole else {}
@@ -212,7 +212,7 @@ def with_extras(
 def _read_hand(
     _: click.Context, __: click.Parameter, paths: tuple[Path, ...]
 ) -> ParameterTable | None:
-    """Return the numbers of the one file of a hand that may be given."""
+    """Return the numbers of a hand's file; at most one may be given."""
     if not paths:
         return None
     if len(paths) > 1:
@@ -228,7 +228,7 @@ def _read_hand(
 def _limb_and_hand(
     context: click.Context, option: click.Parameter, given: tuple[str, ...]
 ) -> tuple[str, ParameterTable | None]:
-    """Tell the limb, which the contract calls a hand, from the file of one."""
+    """Return the limb, which the contract calls a hand, and the numbers of a hand's file."""
     files = tuple(Path(value) for value in given if value.endswith(HAND_FILE))
     limbs = [value for value in given if not value.endswith(HAND_FILE)]
     if len(limbs) != 1 or len(files) > 1:
@@ -239,7 +239,7 @@ def _limb_and_hand(
 
 
 def _check_dask(_: click.Context, __: click.Parameter, address: str | None) -> str | None:
-    """Refuse what is no address of a scheduler."""
+    """Refuse anything but an address of a scheduler."""
     if address not in (None, "local"):
         try:
             bulk.check_address(address)
@@ -252,7 +252,7 @@ def _check_dask(_: click.Context, __: click.Parameter, address: str | None) -> s
 
 
 def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
-    """Refuse a folder that is named as a table or a picture is."""
+    """Refuse a folder with the file ending of a table or a picture."""
     if path.suffix.lower() in (*TABLES, *PICTURES) and not path.is_dir():
         raise click.BadParameter(f"{path}: names a folder, into which several files go")
     return path
@@ -261,19 +261,19 @@ def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
 def beginning_so(
     names: Iterable[str], *, files: bool = False
 ) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
-    """Return what completes one of these names in a shell, or the path of a file if that may be."""
+    """Return a shell completion of these names, and with ``files`` also of paths."""
 
     def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
         found = [CompletionItem(name) for name in names if name.startswith(begun)]
-        # last, click's function for bash would forget the names for it
+        # if the file came last, click's function for bash would drop the names
         return [CompletionItem(begun, type="file"), *found] if files else found
 
     return complete
 
 
 def _limbs(context: click.Context, _: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Complete the limbs that hold on in the stance, as far as it is given and can be read."""
-    # what stands before an option that lacks its value is not yet told apart
+    """Complete the limbs whose hands hold in the stance, if it is given and can be read."""
+    # click has not yet parsed arguments before an option that lacks its value
     given = [context.params.get("stance"), *context.args]
     return beginning_so(stances.limbs_of(next(filter(None, given), None)), files=True)(
         context, _, begun

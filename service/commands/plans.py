@@ -18,10 +18,10 @@ from service.commands import options, stances
 __all__ = ["plan"]
 
 OVER: Final = ("overloaded", "infeasible")
-"""Statuses of what does not hold."""
+"""Statuses of stances that do not hold."""
 
 ADVICE_SECONDS: Final = 30.0
-"""For advice that nobody asked for, where a request has no deadline."""
+"""Timeout of advice that nobody asked for, if a request has no deadline [s]."""
 
 
 @click.command()
@@ -72,7 +72,7 @@ def plan(
     brief = not as_json and tables.verbosity() < 0
     advised = "advice" in request.want
     if not as_json:
-        # which a person reads later than the plan
+        # a person reads the advice later than the plan
         request = msgspec.structs.replace(request, want=[w for w in request.want if w != "advice"])
     begun = perf_counter()
     with tables.waiting(f"planning {stance}", request):
@@ -85,7 +85,7 @@ def plan(
     if not as_json:
         _print(answer, bare, brief)
         if advised or (not brief and answer.reply.status in OVER):
-            # --advice is looked for as long as it takes
+            # with --advice the search has no timeout of its own
             seconds = None if advised else ADVICE_SECONDS
             started = None if request.deadline is None else begun
             with planner.deadline.within(request.deadline or seconds, started=started):
@@ -105,7 +105,7 @@ def plan(
 
 
 def _print(answer: answering.Planned, without_palm: replies.PlanReply | None, brief: bool) -> None:
-    """Print a plan for a person, to be read at once."""
+    """Print a plan for a person at once, before any advice."""
     assert isinstance(answer.reply, replies.PlanReply)  # as a person is given
     tables.print_plan(answer.reply, tables.console(), without_palm=without_palm, brief=brief)
     tables.tell_solver(answer.reply)
@@ -113,7 +113,7 @@ def _print(answer: answering.Planned, without_palm: replies.PlanReply | None, br
 
 
 def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
-    """Look for what would make a stance hold, or hold more, and print that."""
+    """Search for advice that makes a stance hold, or hold more, and print it."""
     better = "hold" if answer.reply.status in OVER else "be better"
     with tables.working(f"looking for what would {better}"):
         found = answering.with_advice(answer)
@@ -127,12 +127,12 @@ def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
 
 
 def _print_files(files: list[Path], reply: replies.PlanReply) -> None:
-    """Print which advice is in which file."""
+    """Print the advice of each file."""
     out = tables.console()
     holding = reply.status == "optimal"
     for file, advice in zip(files, reply.advice or (), strict=False):
-        told = tables.words_of(advice, holding=holding)
-        out.print(f"{file}: {told}", soft_wrap=True)
+        words = tables.words_of(advice, holding=holding)
+        out.print(f"{file}: {words}", soft_wrap=True)
 
 
 def _write_advice(
@@ -141,10 +141,10 @@ def _write_advice(
     folder: Path,
     given: stances.Given[requests.PlanRequest],
 ) -> list[Path]:
-    """Write each advice as a request whose plan gives what it promises, and none of another.
+    """Write each advice as a request of its own, whose plan gives what it promises.
 
-    All but what it changes stays as it was ``given``, and scans in their files. Returns their
-    paths.
+    All other fields stay as they were ``given``, and scans stay in their files. Return the paths
+    of the requests.
     """
     if given.files is not None:
         request = given.files.named(request, given.request, folder)
@@ -165,7 +165,7 @@ def _write_advice(
 def _without_palms(
     request: requests.PlanRequest, robots: answering.Robots
 ) -> replies.PlanReply | None:
-    """Return how much could be carried if no palm did; None if the time is over before."""
+    """Return the reply of the plan without palms; None if the deadline ends before."""
     replace = msgspec.structs.replace
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
     stance = replace(request.stance, hands=hands)

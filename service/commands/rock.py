@@ -1,4 +1,4 @@
-"""A scan on the command line: read, meshed, written, and told as a table."""
+"""Read, mesh and write a scan on the command line, and print it as a table."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ OUTPUT: Final = ".ply"
 NUMBERS: Final = parameters.scan_table()
 
 STEEP: Final = 0.9
-"""Vertical part of a view from which on the rock is ground, or a roof."""
+"""Vertical component of the view above which the rock is ground or a roof."""
 
 NAMED: Final = 5
-"""Holes whose width is told, and steps whose height is."""
+"""Number of holes whose width is printed, and of steps whose height is."""
 
 PLACE: Final = 6
 ORIENTATION: Final = 7
-"""Digits after the point of a printed pose [m]; what is 10 m away is off by some micrometres."""
+"""Decimals of a printed pose; a point at 10 m is then off by some micrometres."""
 
 BULK: Final = (1.0, 99.0)
-"""Percentiles between which the points are of rock, if a few stray ones reach farther."""
+"""Percentiles that bound the rock if a few stray points reach farther."""
 
 
 def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float, ...] | None:
@@ -156,11 +156,11 @@ def rock(
         raise InvalidInputError("is of outliers, which --std-ratio drops", field="neighbours")
     if output.exists() and file.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself", field="--output")
-    with tables.progress(f"meshing {file.name}") as tell:
+    with tables.progress(f"meshing {file.name}") as report:
         scan = scans.read_scan(file, **reading)
         if std_ratio is not None:
             scan = scans.drop_outliers(scan, std_ratio, neighbours=neighbours)
-        made = scans.mesh_scan(scan, spacing=spacing, hole=hole, tell=tell)
+        made = scans.mesh_scan(scan, spacing=spacing, hole=hole, tell=report)
         with tables.writing(output, "--output"):
             scans.write_rock(made, output)
         if picture is not None:
@@ -170,8 +170,8 @@ def rock(
     source = click.get_current_context().get_parameter_source("up")
     assumed = source is not ParameterSource.COMMANDLINE
     if as_json:
-        told = {"up": reading["up"], "up_assumed": assumed, "view_assumed": _assumed(scan)}
-        tables.say(_summary(made) | told | {"warnings": warnings, "file": str(output)})
+        assumptions = {"up": reading["up"], "up_assumed": assumed, "view_assumed": _assumed(scan)}
+        tables.say(_summary(made) | assumptions | {"warnings": warnings, "file": str(output)})
         return
     closed = scan.faces is not None and scan.shown() is None
     if assumed and not closed and abs(float(made.pose.rotation[2, 2])) >= STEEP:
@@ -184,12 +184,12 @@ def rock(
 
 
 def _assumed(scan: scans.Scan) -> bool:
-    """Whether nothing tells from where the rock was seen, nor do its triangles."""
+    """Return True if the view is assumed: neither the scan nor its triangles give it."""
     return scan.assumed and scan.view is None and (scan.faces is None or scan.shown() is None)
 
 
 def _summary(made: scans.ScannedRock) -> dict[str, Any]:
-    """Return what came out as JSON has it; the pose is in the form of a request's."""
+    """Return the result as JSON values; the pose has the form of a request's."""
     return {
         "read": made.read,
         "dropped": made.dropped,
@@ -221,7 +221,7 @@ def _warnings(
     spacing: float | None,
     reading: Mapping[str, Any],
 ) -> list[str]:
-    """Return what may not be meant, and its cause where that can be told."""
+    """Return warnings of what may not be meant, with the cause if it is known."""
     found = []
     if made.turned:
         found.append(
@@ -247,7 +247,7 @@ def _warnings(
 
 
 def _far_away(pose: Pose) -> Iterator[str]:
-    """Yield what to do about a pose that no request may have, as in map coordinates."""
+    """Yield advice about a pose that no request may have, as in map coordinates."""
     import numpy as np
 
     farthest = NUMBERS.scalar("scan", "farthest")
@@ -264,7 +264,7 @@ def _far_away(pose: Pose) -> Iterator[str]:
 
 
 def _advice(scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: float | None) -> str:
-    """Return what was tried and helps against many holes, in words."""
+    """Return in words which option leaves fewer holes, by trial, or that none does."""
     if made.kept:
         return ": fill them where the triangles were made"
     found = scans.remedy(scan, made, hole, spacing=spacing)
@@ -281,7 +281,7 @@ def _advice(scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: flo
 
 
 def _why_large(made: scans.ScannedRock) -> str:
-    """Return why rock may be larger than a hold may be, in words."""
+    """Return in words why the rock may be larger than a hold may be."""
     import numpy as np
 
     size, largest = float(made.extent.max()), NUMBERS.scalar("scan", "largest")

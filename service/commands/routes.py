@@ -28,15 +28,15 @@ LISTED: Final = " or ".join(ENDINGS)
 STATUSES: Final = tables.EXIT_STATUS | {"unreachable": tables.OVERLOADED}
 
 PLANS: Final = 50
-"""As which a route counts where it is asked whether processes are worth it."""
+"""Plans that take as long as one route; decides whether workers are worth it."""
 
 LONGEST: Final = 256
-"""Of an ``id``."""
+"""Most characters of an ``id``."""
 
 CRUX: Final = ("crux_phase", "crux_limb")
 
 SHOWN: Final = 100
-"""Routes that a person is shown."""
+"""Number of routes that a person is shown."""
 
 
 @click.command()
@@ -102,13 +102,13 @@ def _one(
     own: options.Own,
     as_json: bool,
 ) -> int:
-    """Evaluate a route in all detail."""
+    """Evaluate one route, and write its report."""
     climb = answering.route(request, own.robots)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     tables.write_alone(folder / "route", folder)
-    with tables.progress(f"planning {climb.name}") as tell:
-        result = planner.evaluate(climb, workers, tell)
+    with tables.progress(f"planning {climb.name}") as report:
+        result = planner.evaluate(climb, workers, report)
     with tables.filling_folder():
         files = planner.write_report(result, folder)
     if as_json:
@@ -121,7 +121,7 @@ def _one(
 
 
 class _Routes:
-    """The files of routes, each read when it is its turn; their meshes are put into them.
+    """Files of routes; each is read when its turn comes, with its meshes put in.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class _Routes:
     Attributes
     ----------
     names : list of str
-        Of each route.
+        Name of each route.
     count : int
 
     Raises
@@ -152,7 +152,7 @@ class _Routes:
         )
 
     def questions(self) -> Iterator[bytes | wire.Answer]:
-        """Yield routes, or what is wrong with their files."""
+        """Yield routes, or the errors of their files."""
         for name in self.names:
             known = name[-LONGEST:]
             try:
@@ -184,7 +184,7 @@ def _many(
     own: options.Own,
     as_json: bool,
 ) -> int:
-    """Evaluate any number of routes, and keep what they come to."""
+    """Evaluate any number of routes, and keep their results."""
     if any(os.path.abspath(name) == os.path.abspath(file) for name in routes.names):
         raise InvalidInputError(f"{file}: is one of the routes", field="-o")
     tables.write_alone(file)
@@ -208,15 +208,15 @@ def _many(
     elapsed = perf_counter() - begun
     complain(sink.tally, routes.names.__getitem__, "routes")
     if as_json:
-        told = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
-        tables.say({"v": 1, "routes": routes.count, **told, "file": str(file)})
+        counts = {"statuses": dict(sink.tally.statuses), "errors": dict(sink.tally.kinds)}
+        tables.say({"v": 1, "routes": routes.count, **counts, "file": str(file)})
     else:
         _print(file, routes, before, elapsed)
     return exit_status(sink.tally, STATUSES)
 
 
 def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
-    """Print what each route came to, and where that is."""
+    """Print the result of each route, and the file of the results."""
     from service.tables import name
 
     out = tables.console()
@@ -239,7 +239,7 @@ def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
 
 
 def _rows(file: Path) -> Iterator[dict[str, Any]]:
-    """Yield what a file tells of each route, whatever form it has."""
+    """Yield each route's row of a file of any form."""
     if file.suffix.lower() == PARQUET:
         from pyarrow import parquet
 

@@ -56,8 +56,8 @@ def wrench_space(
     found = None
     if per_axis is not None:
         wrist = planner.floating_wrist(answering.stance(request.stance, robots), limb)
-        with tables.progress(f"{per_axis}^6 poses of {limb}") as tell:
-            found = planner.survey(wrist, per_axis, tell)
+        with tables.progress(f"{per_axis}^6 poses of {limb}") as report:
+            found = planner.survey(wrist, per_axis, report)
     if picture is not None:
         drawn = answering.stance(request.stance, robots)
         settled, space = planner.hand_space(drawn, limb)

@@ -1,6 +1,6 @@
-"""Where the command line finds a stance or a route: a file, standard input, or a bundled one.
+"""Read the stance or the route of a command: a file, standard input, or a bundled one.
 
-Files that its holds name are read here, so that what travels is whole.
+Files that its holds name are read here, so that the request is complete.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from service import answering, requests, wire
 __all__ = ["Given", "bundled", "limbs_of", "read_request", "read_route", "read_with_text"]
 
 LIMBS: Final = ("front_right", "rear_right", "rear_left", "front_left")
-"""Of the bundled robot."""
+"""Limbs of the bundled robot."""
 
 R = TypeVar("R", bound=requests.Request)
 
@@ -32,7 +32,7 @@ class Given(NamedTuple, Generic[R]):
     ----------
     text : bytes
     request : Request
-        What the text says, scans in the files that it names.
+        Content of the text, with the scans of the files that it names.
     files : MeshFiles or None
         Those files; None where they are bundled, and so may be gone.
     """
@@ -65,7 +65,7 @@ def read_request(source: str) -> requests.PlanRequest:
 
 
 def read_with_text(source: str) -> tuple[requests.PlanRequest, Given[requests.PlanRequest]]:
-    """Return what `read_request` does, and how it was written."""
+    """Return the plan request as `read_request` does, with its text."""
     return _read(source, requests.PlanRequest, "STANCE", "stance")
 
 
@@ -75,7 +75,7 @@ def read_route(source: str) -> requests.RouteRequest:
 
 
 def limbs_of(source: str | None) -> tuple[str, ...]:
-    """Return the limbs that hold on in a stance; the bundled robot's where that cannot be told."""
+    """Return the limbs whose hands hold in a stance; the bundled robot's if it cannot be read."""
     path = (
         _folder(requests.PlanRequest) / f"{source}.json"
         if source in bundled()
@@ -89,7 +89,7 @@ def limbs_of(source: str | None) -> tuple[str, ...]:
 
 
 def _text(path: Path) -> bytes:
-    """Return what a file has, without the mark that some editors put before it."""
+    """Return the content of a file, without a byte order mark."""
     return path.read_bytes().removeprefix(BOM_UTF8)
 
 
@@ -118,7 +118,7 @@ def _read(source: str, kind: type[R], field: str, noun: str) -> tuple[R, Given[R
 
 
 def _decoded(text: bytes, kind: type[R], folder: Path) -> tuple[R, Given[R]]:
-    """Return a request with its scans, and how it was written; its files are in a folder."""
+    """Return a request with its scans and its text; its files are relative to a folder."""
     files = answering.MeshFiles(folder)
     request = wire.decode_request(text, kind)
     return files.whole(request), Given(text, request, files)

@@ -19,10 +19,10 @@ from service.commands import options, stances
 __all__ = ["stream"]
 
 WORST_FIRST: Final = (tables.BAD_INPUT, tables.FAILED, tables.OVERLOADED, tables.DONE)
-"""Exit statuses: that of a stream is the worst of its lines'."""
+"""Exit statuses, worst first: a stream has the worst of its lines'."""
 
 WIDTH: Final = 100
-"""Columns that a line has at most."""
+"""Most characters of a line."""
 
 HANDS_A_LINE: Final = 4
 """Hands whose tensions fit in one line."""
@@ -109,13 +109,13 @@ def _body_wrench(line: bytes) -> requests.Wrench:
 
 
 def _refused(error: InvalidInputError, number: int) -> replies.ErrorReply:
-    """Return what is said in place of a line's set-points."""
+    """Return the error reply in place of a line's set-points."""
     field = f"line {number}" if error.field is None else f"line {number}: {error.field}"
     return replies.ErrorReply(error=replies.ErrorDetail(error.kind, field, error.message))
 
 
 def _say_columns(stream: planner.WrenchStream) -> None:
-    """Write the header, and on standard error what the lines have in common."""
+    """Write the header; write the centre and the hands' order on standard error."""
     from hand_models.hand import FINGERS
 
     radius = stream.interpolates
@@ -132,7 +132,7 @@ def _say_columns(stream: planner.WrenchStream) -> None:
 
 
 def _say_cells(head: str, cells: Sequence[str]) -> None:
-    """Write what is told of each hand after what is told of all, in as few lines as fit."""
+    """Write the cells of the hands after the head, in as few lines as fit."""
     for k in range(0, len(cells), HANDS_A_LINE):
         row = "".join(f" {cell:<15}" for cell in cells[k : k + HANDS_A_LINE])
         click.echo(f"{head if k == 0 else ' ' * len(head)}{row}".rstrip())

@@ -1,4 +1,4 @@
-"""Studies on the command line: what a sweep is asked, and claims as a table for a person."""
+"""Run studies on the command line, and print their claims as a table."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ NAMES: Final = (
     SWEEP,
     MEASURE,
 )
-"""Of all studies; here, so that completion need not load them."""
+"""Names of all studies; repeated here so that completion need not load them."""
 
 SURFACES: Final = ("sandpaper-36", "concrete-fine", "concrete-coarse", "rock")
-"""Of the bundled surfaces; likewise."""
+"""Names of the bundled surfaces; repeated here for the same reason."""
 
 AXIS: Final = "SECTION.NAME[i]=LOW:HIGH:N"
 
 
 def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
-    """Return a study by its name, or a sweep of what the options ask for.
+    """Return a study by its name, or the sweep that the options describe.
 
     Raises
     ------
@@ -136,8 +136,8 @@ def study(
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     tables.write_alone(folder / "result.json", folder)
-    with tables.filling_folder(), tables.progress(name, line=line) as tell:
-        result, files = studies.run_study(chosen, folder, tell, numbers)
+    with tables.filling_folder(), tables.progress(name, line=line) as report:
+        result, files = studies.run_study(chosen, folder, report, numbers)
     if as_json:
         tables.say(studies.as_json(result) | {"files": [str(path) for path in files]})
     else:
@@ -145,7 +145,7 @@ def study(
 
 
 def _print_study(result: experiments.StudyResult, files: Sequence[Path], out: Console) -> None:
-    """Print what was claimed, what came out, and where the files are."""
+    """Print the claims, the results and the paths of the files."""
     out.print(f"{result.name}: {result.title}", style="bold")
     for line in result.data.get("summary", ()):
         out.print(line)
@@ -158,7 +158,7 @@ def _print_study(result: experiments.StudyResult, files: Sequence[Path], out: Co
 
 
 def _print_claims(result: experiments.StudyResult, out: Console) -> None:
-    """Print which claims hold."""
+    """Print the claims, and whether each holds."""
     columns = (
         tables.text("", _verdict),
         tables.text("claim"),
@@ -175,7 +175,7 @@ def _print_claims(result: experiments.StudyResult, out: Console) -> None:
 
 
 def _verdict(claim: experiments.Claim) -> str:
-    """Return whether a claim holds, in a word."""
+    """Return the word for a claim that holds, or does not."""
     if not claim.holds:
         return "missed"
     return "fitted" if claim.role == "calibration" else "holds"

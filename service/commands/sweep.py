@@ -126,7 +126,7 @@ def sweep(
 
 
 def _status(result: sweeping.Sweep) -> int:
-    """Return the exit status, and tell what it is about where that is not told yet."""
+    """Return the exit status, and print the first error if no point can be answered."""
     if not all(row.answered for row in result.rows):
         return tables.FAILED
     if all(row.error is not None for row in result.rows):

@@ -1,4 +1,4 @@
-"""Replies: everything that the service says, lenient."""
+"""Replies of the service; readers accept unknown fields."""
 
 import lazy_loader
 

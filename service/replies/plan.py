@@ -1,4 +1,4 @@
-"""Replies to who carries what: plans, whole and brief, climbs, and set-points of a stream."""
+"""Define replies with plans: whole and brief ones, climbs, and set-points of a stream."""
 
 from __future__ import annotations
 
@@ -81,12 +81,12 @@ class PlanReply(StanceReply, kw_only=True):
     joints bear, ``joint_torque_limit`` [N·m]. ``effort_prices``: what one more unit of a limit
     would take off the effort, where the objective is ``min_effort``. ``certificate`` is null where
     there is a plan within the limits, and where the request says ``"explain": false``.
-    ``unfinished``: what a deadline has left out, and a warning tells: ``least_utilisation`` (that
+    ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (that
     no plan uses less is not proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
     ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``, ``advice``. ``robust`` comes
     with ``"want": ["robust"]``, but not for a body wrench of zero; ``spread``, ``clearance`` and
-    ``advice`` with ``"want"`` of their names; the last tells what holds first, the smallest change
-    first of that, and of the rest that of most gain for its size. ``findings``: what is odd about
+    ``advice`` with ``"want"`` of their names; changes that let the stance hold come first, the
+    smallest first; then the others, by their gain for their size. ``findings``: what is odd about
     the stance, each with its ``field`` in the request and what was measured; ``warnings`` has their
     messages, too.
     """

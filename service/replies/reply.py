@@ -1,4 +1,4 @@
-"""Parts that replies share, the reply to a request that failed, and the state for an operator.
+"""Define the shared parts of replies, the error reply, and the state for an operator.
 
 Replies are lenient, so that they may gain fields. Poses and vectors as in the requests; forces and
 moments are on the rock and in H unless said otherwise. A value that does not exist is null; what

@@ -1,4 +1,4 @@
-"""Replies to what one hand can carry, and to what a stance can hold."""
+"""Define the replies about wrench spaces of hands and body spaces of stances."""
 
 from __future__ import annotations
 
@@ -123,8 +123,8 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
     """The wrenches that one hand can carry, at utilisation 1: if none, ``capability`` is null.
 
     ``vertices`` and ``half_spaces`` are null where they were not asked for, or where they were left
-    out, as ``warnings`` tell. ``dimension`` is null where nothing is left, or where even that would
-    cost too much.
+    out; ``warnings`` then say so. ``dimension`` is null where nothing is left, or where even that
+    would cost too much.
     """
 
     robot: str

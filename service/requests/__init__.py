@@ -1,4 +1,4 @@
-"""Requests: everything that a caller may ask, strict."""
+"""Requests to the service; unknown fields are refused."""
 
 import lazy_loader
 

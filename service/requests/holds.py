@@ -1,4 +1,4 @@
-"""Holds: rock of every shape that a request may name, and its surface."""
+"""Define the holds of requests: rock of every shape, and its surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The questions: who carries what in a stance, what it can bear, set-points, and a whole climb.
+"""Define the requests for plans, wrench and body spaces, set-points and climbs.
 
 Fields that the contract knows but this version does not are declared, so that they are refused by
 name (`service.wire.codec`) and not as unknown.

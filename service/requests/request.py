@@ -1,4 +1,4 @@
-"""Parts of all requests: strict structs, names, and numbers within bounds.
+"""Define the parts of all requests: strict structs, names, and numbers within bounds.
 
 Bounds are far beyond any climbing robot; they keep arithmetic finite.
 """
@@ -44,13 +44,13 @@ FourTensions = tuple[PreloadEntry, PreloadEntry, PreloadEntry, PreloadEntry]
 Tensions = Annotated[FourTensions, Meta(description="of a hand's tendons [N]")]
 Identifier = Annotated[str, Meta(max_length=256, description="echoed in the reply")]
 DEFAULT_DEADLINE: Final = 10.0
-"""Of a question to a service that names none, from its arrival [s]."""
+"""Default deadline of a question to a service, from its arrival [s]."""
 
 LONGEST_DEADLINE: Final = 600.0
-"""[s]"""
+"""Longest deadline [s]."""
 
 LEAST_REPLY_BYTES: Final = 1000
-"""Into which every error fits, its texts cut where they must be, and set-points in MessagePack."""
+"""Least limit on a reply's bytes: errors with cut texts and set-points in MessagePack fit."""
 
 ReplyBytes = Annotated[int, Meta(ge=LEAST_REPLY_BYTES, le=2**31)]
 Duration = Annotated[float, Meta(gt=0.0, le=LONGEST_DEADLINE, description="[s]")]

@@ -1,4 +1,4 @@
-"""A stance: where the body and the hands are, and how these take their holds."""
+"""Define the stance of a request: poses of body and hands, and how hands take their holds."""
 
 from __future__ import annotations
 

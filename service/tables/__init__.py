@@ -1,4 +1,4 @@
-"""What came out, as tables for a person."""
+"""Results as tables for a person."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What a stance can hold, as tables for a person."""
+"""Print the body space of a stance as tables for a person."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from service.tables.layout import in_colour, name, number, print_rows, print_war
 __all__ = ["print_body_space"]
 
 FINEST: Final = 1e-3
-"""A gap below this is told as this [N]."""
+"""Smallest gap that is printed; a smaller one is printed as this [N]."""
 
 LETS_GO: Final = text(
     "first to let go",
@@ -30,7 +30,7 @@ LETS_GO: Final = text(
 
 
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:
-    """Print what a stance can hold."""
+    """Print the body space of a stance."""
     used = "" if reply.utilisation is None else f"   utilisation {reply.utilisation:.3f}"
     known = f"{used}   {1e3 * reply.time.total:.0f} ms"
     out.print(Text.assemble(in_colour(reply.status, reply.status.upper()), known))
@@ -51,7 +51,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
 
 
 def _print_section(section: replies.BodySection, out: Console) -> None:
-    """Print how large the part of a plane is that is held."""
+    """Print the size of a plane's part that is held."""
     plane = f"plane of {' and '.join(section.axes)}, {OTHERS[section.others]}"
     if not section.inner or section.gap is None:
         out.print(f"{plane}: nothing is held")

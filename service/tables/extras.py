@@ -1,4 +1,4 @@
-"""What a plan may have beside itself, for a person: advice, and how sure it is."""
+"""Print the extras of a plan for a person: advice, spread and robustness."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ __all__ = [
 ]
 
 MOST_DIGITS: Final = 3
-"""After the point, however small the spread."""
+"""Most decimals of a number, however small the spread."""
 
 CORRELATED: Final = 10
-"""Draws of which it is said on what they hang most: of a few, chance makes a correlation."""
+"""Fewest samples for which the largest sensitivity is printed: fewer correlate by chance."""
 
 MOST: Final = 3
-"""Changes shown; the best first."""
+"""Number of changes shown, the best first."""
 
 
 def words_of(advice: Advice, *, holding: bool = False) -> str:
-    """Return what one change would do, of a stance that is ``holding`` already, or is not."""
+    """Return in words what one change would do; ``holding``: the stance already holds."""
     what = "would be better" if holding else "would hold" if advice.holds else "would help"
     return f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}"
 
 
 def print_advice(reply: PlanReply, out: Console) -> None:
-    """Print what would make a plan's stance hold, or be better, where that was looked for."""
+    """Print the advice of a plan, or that none of the changes that were tried would help."""
     holding = reply.status == "optimal"
     for advice in islice(reply.advice or (), MOST):
         out.print(words_of(advice, holding=holding))
@@ -59,7 +59,7 @@ def within(value: float, spread: Quantiles | None) -> str:
 
 
 def spread_sentence(spread: Spread) -> str:
-    """Say in how many draws a stance holds, on what that hangs most, and what was left out."""
+    """Return in how many samples a stance holds, its largest sensitivity, and what was left out."""
     said = f"holds in {spread.holds} of {spread.draws} draws"
     if spread.cap < 1.0:
         said += f" within a utilisation of {spread.cap:g}"
@@ -75,7 +75,7 @@ def spread_sentence(spread: Spread) -> str:
 
 
 def robust_sentence(robust: RobustLoadFactor) -> str:
-    """Say what is left of the load factor where the hands are a little elsewhere."""
+    """Return the load factor for places of the hands near the given ones, in a sentence."""
     low, high = robust.tenth_interval
     said = f"nine in ten above {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
     said += f"99 in 100 above {robust.hundredth:.3f}"

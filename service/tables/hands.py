@@ -1,4 +1,4 @@
-"""What one hand carries: on its hold, where it is not quite put, and a floating one's search."""
+"""Print what one hand carries: on its hold, near it, and in a search with a floating wrist."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from service.tables.layout import in_order, name, number, print_rows, text, unit
 __all__ = ["print_failures", "print_robust", "print_survey", "print_wrench_space", "survey_json"]
 
 NEARLY: Final = 0.02
-"""Turns of joints that are told where the rock is a little elsewhere; less is not much [rad]."""
+"""Smallest turn of a joint that is printed for rock a little elsewhere [rad]."""
 
 TENSION_LIMITS: Final = (
     name("finger"),
@@ -35,21 +35,21 @@ CARRIES: Final[Mapping[str, str]] = {
     "presses": "presses on the rock",
     "drags_and_presses": "drags and presses on the rock",
 }
-"""What a palm does in each of its modes."""
+"""Words for each mode of a palm."""
 
 DRAGGED: Final = "a tile dragged backwards"
-"""What ends the way where no limit does: a part that can only push or only pull is about to do the
-other, which is a tile nearly always."""
+"""Words for an end without a limit: a part that can only push or only pull would have to do the
+other; it is nearly always a tile."""
 
 WHOLE: Final = "finger"
-"""Column of a finger's limits that are no tile's."""
+"""Column for limits of a finger as a whole, not of one of its tiles."""
 
 ORDER: Final = (WHOLE, "base", *PHALANGES, NAIL)
-"""Of the columns of a finger's parts."""
+"""Order of the columns of a finger's parts."""
 
 
 def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
-    """Print what one hand can carry."""
+    """Print the wrench space of one hand."""
     seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
     out.print(Text.assemble((reply.limb, "bold"), f" of {reply.robot}"))
     off = 1e3 * reply.seating.backed_off
@@ -78,7 +78,7 @@ def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
 
 
 def print_robust(robust: replies.RobustCapability, out: Console) -> None:
-    """Print what is left of each component where the hand is a little elsewhere."""
+    """Print the capability in each component for places of the hand near the given one."""
     title = (
         f"what is left of that at {robust.draws} places "
         f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad"
@@ -91,7 +91,7 @@ def print_robust(robust: replies.RobustCapability, out: Console) -> None:
 def _print_ends(
     reaches: Mapping[str, Mapping[str, float | None]], title: str, out: Console
 ) -> None:
-    """Print the least and the most of each component, from how far sets reach either way."""
+    """Print the least and the most of each component, from the reach both ways along its axis."""
     heads = [f"{what}{end}" for what in reaches for end in ("least", "most")]
     rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in AXES]
     for row, axis in zip(rows, AXES, strict=True):
@@ -102,7 +102,7 @@ def _print_ends(
 
 
 def _print_floating(palm: str, error: float, out: Console) -> None:
-    """Say what the set of a floating hand stands for, and what it does not."""
+    """Print what the wrench space of a floating hand covers, and what it does not."""
     out.print(
         f"floating wrist: this set is linearised at rest, for a palm that {CARRIES[palm]}. At its "
         f"farthest wrenches the exact model differs by up to {error:.1f} N (moments over 0.1 m). "
@@ -111,7 +111,7 @@ def _print_floating(palm: str, error: float, out: Console) -> None:
 
 
 def _print_capability(capability: Mapping[str, replies.AxisCapability], out: Console) -> None:
-    """Print the least and the most of each component, and those of it alone if there are any."""
+    """Print the least and the most of each component, and of each alone if there are any."""
     with_pure = any(end.pure is not None for end in capability.values())
     reaches: dict[str, Mapping[str, float | None]] = {
         "": {way: end.extent for way, end in capability.items()}
@@ -128,7 +128,7 @@ def _print_capability(capability: Mapping[str, replies.AxisCapability], out: Con
 
 
 def _print_closing(reply: replies.WrenchSpaceReply, out: Console) -> None:
-    """Print what of each finger touches, and when it stopped moving."""
+    """Print which tiles of each finger touch, and when the finger stopped moving."""
     kinds = {(contact.finger, contact.phalanx): contact.contact for contact in reply.contacts}
 
     rows = []
@@ -146,7 +146,7 @@ def _print_closing(reply: replies.WrenchSpaceReply, out: Console) -> None:
 
 
 def _nearby_sentence(closing: replies.ClosingSequence) -> str:
-    """Say how else a finger would end."""
+    """Return in a sentence which closures a finger has on rock a little elsewhere."""
     ends = f", or {', '.join(closing.nearby)}" if closing.nearby else ""
     return (
         f"{closing.finger} is {closing.closure} here; with the rock 0.1 mm elsewhere its joints "
@@ -155,7 +155,7 @@ def _nearby_sentence(closing: replies.ClosingSequence) -> str:
 
 
 def survey_json(survey: Survey) -> dict[str, Any]:
-    """Return the search as JSON has it: extreme wrenches, poses, and what lets go at each."""
+    """Return the search as JSON values: extreme wrenches, poses, and what lets go at each."""
     found = survey.found
     return {
         "tried": found.tried,
@@ -217,7 +217,7 @@ def _print_survey_ends(survey: Survey, out: Console) -> None:
 
 
 def print_failures(limiting: Sequence[Row | None], out: Console) -> None:
-    """Print how often each tile of each finger lets go first, and what is no finger's."""
+    """Print how often each tile of each finger, or another part, lets go first."""
     counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
     parts = [part for part in ORDER if any(finger and what == part for finger, what in counts)]
     rows = []
@@ -233,7 +233,7 @@ def print_failures(limiting: Sequence[Row | None], out: Console) -> None:
 
 
 def _place(row: Row) -> tuple[str | None, str]:
-    """Return finger and part of a limit; for what is no finger's, the limit in words."""
+    """Return finger and part of a limit; if it is of no finger, the limit in words."""
     if row.finger is None:
         return None, row.limit.replace("_", " ")
     return row.finger, row.phalanx or WHOLE

@@ -1,4 +1,4 @@
-"""How tables look, in 80 columns: rows of structs under a title, each column with its unit."""
+"""Lay out tables in 80 columns: rows of structs under a title, each column with its unit."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ COLOURS: Final = {
     "infeasible": "red",
     "failed": "red",
 }
-"""Of a plan's status, where the terminal has them and ``NO_COLOR`` is not set."""
+"""Colour of a plan's status, if the terminal has colours and ``NO_COLOR`` is not set."""
 
 NARROWEST: Final = 80
-"""Letters of a line for which tables are made; a narrower terminal breaks it itself."""
+"""Narrowest width of a table [characters]; a narrower terminal wraps its lines."""
 
 LONG: Final = 1e4
-"""From here on a number is written as a whole one, from a tenth of it on with one decimal."""
+"""Smallest number without decimals; from a tenth of it on, a number has one decimal."""
 
 UNBOUNDED: Final = 1000
-"""Width in which any table fits [letters]."""
+"""Width in which any table fits [characters]."""
 
 
 def console(stderr: bool = False) -> Console:
@@ -68,7 +68,7 @@ def print_warnings(warnings: Iterable[str], out: Console) -> None:
 
 
 def short(value: float, digits: int) -> str:
-    """Return a number with as many digits after its point, up to so many, as leave it short."""
+    """Return a number with at most so many decimals, fewer if it is large."""
     while digits and abs(value) >= LONG / 10.0**digits:
         digits -= 1
     return f"{value:z.{digits}f}"
@@ -80,16 +80,16 @@ class Column(NamedTuple):
     Attributes
     ----------
     head : str
-        What it shows, with the unit.
+        Head of the column, with the unit.
     value : str or callable, optional
-        Where a row has that: attributes, keys and indices with dots between them, or what computes
-        it; by default the attribute that is named as the head.
+        Path of the value in a row (attributes, keys and indices with dots between them), or a
+        function of the row; by default the attribute of the head's name.
     form : str or callable
-        Of numbers, as `format` takes it, or what writes them.
+        Format of numbers, as `format` takes it, or a function that returns their text.
     scale : float, optional
-        What numbers are multiplied with for their unit.
+        Factor of the numbers, for their unit.
     kind : {'name', 'number', 'text'}
-        Names and numbers, which stand right, are never broken as texts are.
+        Names are not wrapped, numbers are aligned right, texts are wrapped.
     """
 
     head: str
@@ -99,7 +99,7 @@ class Column(NamedTuple):
     kind: Literal["name", "number", "text"] = "name"
 
     def cell(self, row: Any) -> str | Text:
-        """Return what it shows of a row; ``-`` where there is nothing."""
+        """Return the text of a row's cell; ``-`` if there is no value."""
         from rich.text import Text
 
         found = self.value(row) if callable(self.value) else self._found(row)
@@ -109,7 +109,7 @@ class Column(NamedTuple):
         return self.form(found) if callable(self.form) else format(found, self.form)
 
     def _found(self, row: Any) -> Any:
-        """Return what is at the end of the path; None where a part of it is."""
+        """Return the value at the end of the path; None if a part of it is None."""
         assert not callable(self.value)
         for step in (self.head if self.value is None else self.value).split("."):
             if isinstance(row, Mapping):
@@ -154,13 +154,14 @@ def print_rows(
     title : str, optional
         Printed above it, in bold.
     groups : bool, optional
-        Whether rows with the same first cell stand apart from others.
+        True if a gap separates rows with different first cells.
     style : callable, optional
         Returns the style of a row.
     heads : bool, optional
-        Whether the columns' heads are shown.
+        True if the columns' heads are shown.
     padding : int, optional
-        Spaces at either side of a cell; at one where all but texts is wider than the console.
+        Spaces at either side of a cell; at one side if a table without texts is wider than the
+        console.
     """
     from rich import box
     from rich.table import Table

@@ -1,4 +1,4 @@
-"""A lock on what a command writes: two runs on one output would mix their answers."""
+"""Lock the output of a command: two runs on one output would mix their answers."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from service.tables.terminal import remark, writing
 __all__ = ["write_alone"]
 
 HELD: Final = (errno.EACCES, errno.EAGAIN)
-"""What the system says where another process has the lock."""
+"""Error numbers of the system if another process has the lock."""
 
 NO_LOCKS: Final = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
-"""What it says where the file system has no locks."""
+"""Error numbers of the system if the file system has no locks."""
 
 
 def write_alone(file: Path, output: Path | None = None) -> None:
-    """Keep other runs from an output until the command that is running ends, or its process does.
+    """Lock an output against other runs until the running command or its process ends.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def _alone_at(file: Path, output: Path) -> Iterator[None]:
 
 
 def _locked(path: Path, output: Path) -> int | None:
-    """Return the descriptor of a lock file that is locked; None where there are no locks."""
+    """Lock a file and return its descriptor; None if the file system has no locks."""
     try:
         import fcntl
     except ImportError:
@@ -79,7 +79,7 @@ def _locked(path: Path, output: Path) -> int | None:
                 raise
             remark(f"{path}: the file system has no locks; no other run may write {output} now")
             return None
-        # who had it before may have removed the file since it was opened
+        # the previous owner may have removed the file since it was opened
         if path.exists() and os.path.samestat(os.fstat(lock), path.stat()):
             os.ftruncate(lock, 0)
             os.write(lock, f"{os.getpid()}\n".encode())

@@ -29,10 +29,10 @@ from service.tables.layout import (
 __all__ = ["print_plan", "print_route"]
 
 MOST_PRICES: Final = 8
-"""Prices shown; the dearest first."""
+"""Number of shadow prices shown, the largest first."""
 
 JOINTS_A_LINE: Final = 7
-"""Joint torques of a limb in one line of a table."""
+"""Number of a limb's joint torques in one line of a table."""
 
 HANDS: Final = (
     name("hand", "limb"),
@@ -80,7 +80,7 @@ def print_plan(
     without_palm: replies.PlanReply | None = None,
     brief: bool = False,
 ) -> None:
-    """Print a plan, but for the advice.
+    """Print a plan without its advice.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def print_plan(
     without_palm : PlanReply, optional
         The same question's answer with every palm left out.
     brief : bool, optional
-        Whether its status and reason are all.
+        True if only status and reason are printed.
     """
     spread = reply.spread if isinstance(reply.spread, planner.Spread) else None
     known = [f"   {part}" for part in _first_line(reply, spread)]
@@ -127,7 +127,7 @@ def print_plan(
 
 
 def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iterator[str]:
-    """Yield what is most to be known of a plan; intervals of it in place of lesser things."""
+    """Yield the main numbers of a plan; intervals take the place of less important ones."""
     used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
     if reply.utilisation is not None:
         yield f"utilisation {within(reply.utilisation, used)}"
@@ -142,7 +142,7 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
 
 
 def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out: Console) -> None:
-    """Print what is missing, what could be held instead, and what is in the way."""
+    """Print the missing wrench, the nearest one that is held, and the limits in the way."""
     if proof.shortfall is not None and proof.nearest is not None:
         where = "at any utilisation"
         if proof.utilisation is not None:
@@ -167,19 +167,19 @@ def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out:
 
 
 def _sufficient_sentence(names: Sequence[planner.LimitName]) -> str:
-    """Say which limits, taken away alone, would do."""
+    """Return in a sentence which limits, taken away alone, would let the stance be held."""
     if not names:
         return "no single one of them, taken away alone, would do"
     which = "this one" if len(names) == 1 else "any one of these"
-    told = ", ".join(
+    limits = ", ".join(
         f"{limb} {limit}" + (f" ({', '.join(owners)})" if owners else "")
         for (limb, limit), owners in _alike(names).items()
     )
-    return f"{which}, taken away alone, would let it be held: {told}"
+    return f"{which}, taken away alone, would let it be held: {limits}"
 
 
 def _alike(names: Iterable[planner.LimitName]) -> dict[tuple[str, str], list[str]]:
-    """Return limits by limb and kind, in their order, with what of the limb each is of."""
+    """Return limits by limb and kind, in their order, with the parts of the limb that have them."""
     alike: dict[tuple[str, str], list[str]] = {}
     for each in names:
         parts = (each.phalanx, each.finger, each.joint)
@@ -190,7 +190,7 @@ def _alike(names: Iterable[planner.LimitName]) -> dict[tuple[str, str], list[str
 
 
 def _path_sentence(path: planner.TensionPath) -> str:
-    """Say what the way from the present tensions is like."""
+    """Return in a sentence how the path from the present tensions is."""
     used = path.utilisation_at_present
     there = "no balance" if used is None else f"utilisation {used:.3f}"
     way = "safe" if path.safe else "not safe"
@@ -206,7 +206,7 @@ def _load_factor(reply: replies.PlanReply) -> str:
 
 
 def _print_hands(hands: Sequence[replies.Hand], out: Console) -> None:
-    """Print what each hand carries, where floating ones go, and what each finger does."""
+    """Print the load of each hand, the twist of floating wrists, and the tendons of each finger."""
     print_rows(hands, HANDS, out, "wrench on the rock, in H [N, N·m], and the palm's part")
     floating = [hand for hand in hands if hand.wrist.twist is not None]
     if floating:
@@ -226,15 +226,15 @@ def _worst(finger: Any) -> Any:
 def _print_joints(
     torques: Mapping[str, Sequence[float]], limits: Mapping[str, Sequence[float]], out: Console
 ) -> None:
-    """Print each limb's torques, in lines of so many as fit, with how much of its joints is used.
+    """Print each limb's joint torques, in lines that fit, with the utilisation of its joints.
 
-    The joint that uses most of its limit is marked.
+    The joint with the largest utilisation is marked.
     """
     most = max((len(row) for row in torques.values()), default=0)
     width = min(most, JOINTS_A_LINE)
     rows: list[list[str]] = []
     for limb, row in torques.items():
-        # a joint without a motor bears nothing of nothing
+        # a joint without a motor has no torque and a limit of zero
         pairs = zip(row, limits[limb], strict=True)
         used = [abs(torque) / (limit or math.inf) for torque, limit in pairs]
         worst = used.index(max(used))
@@ -249,12 +249,12 @@ def _print_joints(
     heads = [f"{'+' if most > width else ''}{i + 1}" for i in range(width)]
     columns = in_order(["limb"], [*heads, "of", "util"])
     title = "joint torques [N·m], from the body outward; * most of its limit"
-    # otherwise seven torques do not fit
+    # with padding, seven torques do not fit
     print_rows(rows, columns, out, title, padding=0)
 
 
 def _print_clearance(clearance: planner.Clearance, out: Console) -> None:
-    """Print the least distances, and what was not measured."""
+    """Print the least distances, and the parts that were not measured."""
     pairs = ("link_rock", "link_link", "hand_hand", "hand_body", "body_rock")
     near = {pair.replace("_", " "): getattr(clearance, pair) for pair in pairs}
     title = "least distances; below zero: how deep one is in the other"
@@ -279,8 +279,8 @@ def print_route(result: planner.RouteResult, files: Mapping[str, Path], out: Con
     print_rows(
         stages, columns, out, style=lambda row: "bold" if row[0].index == result.crux else ""
     )
-    told = planner.summary(result)
-    print_warnings(told["warnings"], out)
-    out.print(told["crux"]["sentence"])
+    summary = planner.summary(result)
+    print_warnings(summary["warnings"], out)
+    out.print(summary["crux"]["sentence"])
     for what, path in files.items():
         out.print(f"{what}: {path}", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""A sweep in words: how many points hold, and where over what varies they stop."""
+"""Print a sweep: the number of points that hold, and the border where they stop holding."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ __all__ = ["print_sweep"]
 T = TypeVar("T")
 
 LINES: Final = 24
-"""Of a table: what is more is left out evenly."""
+"""Most lines of a table; lines above it are left out evenly."""
 
 LARGEST: Final = 30
-"""Characters of a path at the head of a column."""
+"""Most characters of a path at the head of a column."""
 
 
 def print_sweep(sweep: Sweep, out: Console) -> None:
-    """Print a table of a sweep: of its points over one variable, of its border over two."""
+    """Print the table of a sweep: its points over one variable, its border over two."""
     design = sweep.design
     varying = design.varying
     numbers = [i for i in varying if design.variations[i].numbers]
@@ -45,7 +45,7 @@ def print_sweep(sweep: Sweep, out: Console) -> None:
 
 
 def _everywhere(sweep: Sweep, x: int) -> str:
-    """Say that there is no border: among the points with a plan or a proof that there is none."""
+    """Return in a sentence that all points with a plan or a proof hold, or none: no border."""
     rows = sorted((row for row in sweep.rows if row.state != "error"), key=_at(x))
     if not rows:
         return "no point has an answer"
@@ -57,12 +57,12 @@ def _everywhere(sweep: Sweep, x: int) -> str:
 
 
 def _at(place: int) -> Any:
-    """Return what a row is sorted by: its value of a variation."""
+    """Return the key by which a row is sorted: its value of a variation."""
     return lambda row: row.point[place]
 
 
 def _print_points(sweep: Sweep, x: int, out: Console) -> None:
-    """Print points in the order of a number, or as they are."""
+    """Print points in the order of a number, or in their own order."""
     rows = sorted(sweep.rows, key=_at(x)) if sweep.design.variations[x].numbers else sweep.rows
     columns = (
         name("value", lambda row: word_of(row.point[x])),
@@ -84,7 +84,7 @@ def _factor(row: Row) -> str | None:
 
 
 def _limit(row: Row) -> str | None:
-    """Return what limits a plan, or which error there is."""
+    """Return the limit of a plan, or the error of a point."""
     if row.error is not None or row.limiting is None:
         return None if row.error is None else row.error.kind
     limit = row.limiting
@@ -92,7 +92,7 @@ def _limit(row: Row) -> str | None:
 
 
 def _print_held(sweep: Sweep, x: int, y: int, out: Console) -> None:
-    """Print for each value of one variable where over the other it holds."""
+    """Print for each value of one variable the range of the other that holds."""
 
     def where(value: Any) -> str:
         rows = sorted((row for row in sweep.rows if row.point[y] == value), key=_at(x))
@@ -129,12 +129,12 @@ def _print_extremes(sweep: Sweep, out: Console) -> None:
 
 
 def _head(sweep: Sweep, place: int) -> str:
-    """Return a path and its unit in little room: its end, where it is long."""
+    """Return a path and its unit; only the end of a long path."""
     label = sweep.design.labels[place]
     return label if len(label) <= LARGEST else f"…{label[1 - LARGEST :]}"
 
 
 def _thinned(items: Sequence[T]) -> list[T]:
-    """Return so many items at most, evenly from the first to the last."""
+    """Return at most so many items, evenly spaced from the first to the last."""
     places = np.linspace(0, len(items) - 1, min(len(items), LINES))
     return [items[round(i)] for i in places]

@@ -1,4 +1,4 @@
-"""How commands tell what came out: results, pictures and progress, and their exit status."""
+"""Print results and progress of commands, draw pictures, and return exit statuses."""
 
 from __future__ import annotations
 
@@ -43,25 +43,25 @@ BAD_INPUT: Final = 2
 OVERLOADED: Final = 3
 
 EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": OVERLOADED}
-"""By a plan's status; any other is `FAILED`."""
+"""Exit status by a plan's status; any other is `FAILED`."""
 
 NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""What is no fault of the file's name."""
+"""Error numbers for which the file's name is not to blame."""
 
 
 VERBOSITY: Final = "crux.verbosity"
-"""In the context of a command: 1 where more is to be said, -1 where less."""
+"""Key in the context of a command: 1 for more output, -1 for less."""
 
 
 def verbosity() -> int:
-    """Return whether more (1) or less (-1) is to be said than by default (0)."""
+    """Return the verbosity: 1 for more output than by default (0), -1 for less."""
     context = click.get_current_context(silent=True)
     level: int = 0 if context is None else context.meta.get(VERBOSITY, 0)
     return level
 
 
 def remark(message: str) -> None:
-    """Write one line on standard error, unless less is to be said."""
+    """Write one line on standard error, unless verbosity is -1."""
     if verbosity() >= 0:
         note(message)
 
@@ -77,7 +77,7 @@ def say(result: object) -> None:
 
 
 def show(reply: replies.PlanReply | replies.BriefPlanReply, as_json: bool) -> int:
-    """Write a plan, and return its exit status; what is brief is not for a person."""
+    """Write a plan, and return its exit status; a brief reply is written as JSON."""
     from service.tables.extras import print_advice
     from service.tables.plans import print_plan
 
@@ -92,7 +92,7 @@ def show(reply: replies.PlanReply | replies.BriefPlanReply, as_json: bool) -> in
 
 
 def tell_solver(reply: replies.PlanReply) -> None:
-    """Say how a plan was found, where more is to be said."""
+    """Write how a plan was found, if verbosity is 1."""
     if verbosity() > 0:
         solver, time = reply.solver, reply.time
         note(
@@ -110,7 +110,7 @@ def draw_plan(answer: answering.Planned, picture: Path) -> None:
 
 @contextmanager
 def writing(path: Path, field: str = "--plot") -> Iterator[None]:
-    """Turn what goes wrong in writing a file into one line, about the option if that is wrong."""
+    """Turn an error in writing a file into one line that names the option if it is at fault."""
     try:
         yield
     except OSError as error:
@@ -121,7 +121,7 @@ def writing(path: Path, field: str = "--plot") -> Iterator[None]:
 
 @contextmanager
 def filling_folder() -> Iterator[None]:
-    """Turn what goes wrong in writing a folder into one line about it."""
+    """Turn an error in writing a folder into one line about it."""
     try:
         yield
     except OSError as error:
@@ -129,7 +129,7 @@ def filling_folder() -> Iterator[None]:
 
 
 def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError:
-    """Return the error of a file that cannot be written: bad input, but where the disk is full."""
+    """Return the error of a file that cannot be written: bad input, unless the disk is full."""
     message = f"cannot write {path}: {error.strerror or error}"
     if error.errno in NO_ROOM:
         return CruxError(message)
@@ -137,14 +137,14 @@ def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError
 
 
 class Progress(Protocol):
-    """Takes how much is done, of how much, and perhaps a few words on it."""
+    """Function that takes the work done, the total, and optionally a few words."""
 
     def __call__(self, done: int, total: int, words: str = "") -> None: ...
 
 
 @contextmanager
 def progress(title: str, *, line: str | None = None, counted: bool = False) -> Iterator[Progress]:
-    """Show a bar on standard error while the work lasts; yields what takes its progress.
+    """Show a bar on standard error while the work lasts; yield the function that updates it.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def progress(title: str, *, line: str | None = None, counted: bool = False) -> I
     line : str, optional
         Written at the first step, where no bar can be shown.
     counted : bool, optional
-        Whether counts, the time left and words are shown, too.
+        True if counts, the time left and words are also shown.
     """
     from rich import progress as bars
 
@@ -180,14 +180,14 @@ def progress(title: str, *, line: str | None = None, counted: bool = False) -> I
 
 
 def waiting(title: str, request: PlanRequest) -> AbstractContextManager[None]:
-    """Show what takes a while, as plans with floating wrists do."""
+    """Show that an answer takes a while, as plans with floating wrists do."""
     floats = any(hand.wrist == "floating" for hand in request.stance.hands)
     return working(title) if floats else nullcontext()
 
 
 @contextmanager
 def working(title: str) -> Iterator[None]:
-    """Show on a terminal's standard error what is done meanwhile, unless less is to be said."""
+    """Show on a terminal's standard error what is being done, unless verbosity is -1."""
     screen = console(stderr=True)
     shown = screen.is_terminal and verbosity() >= 0
     with screen.status(title) if shown else nullcontext():

@@ -1,4 +1,4 @@
-"""The wire: encodings, checks, errors, keys, schemas."""
+"""Wire format of messages: encodings, checks, errors, keys and schemas."""
 
 import lazy_loader
 

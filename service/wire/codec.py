@@ -35,16 +35,16 @@ __all__ = [
 T = TypeVar("T")
 
 LARGEST_REQUEST: Final = 2**26
-"""Bytes of a request; a stance takes a few thousand, a scan of 200,000 triangles about 10⁷."""
+"""Most bytes of a request; a stance takes a few thousand, a scan of 200,000 triangles about 10⁷."""
 
 LARGEST: Final[dict[type, int]] = {SetPointsRequest: 2**12, StreamRequest: 2**24}
-"""The same of requests that have no rock in them, and of those that are kept: sixteen of these have
-to find room in one process."""
+"""Most bytes of requests without rock, and of streams, which are kept: sixteen of them have to fit
+into one process."""
 
 ADVICE: Final[dict[type, str]] = {
     SetPointsRequest: "ask for one body wrench at a time, with a shorter id",
 }
-"""How to ask for less; by default how to send less rock."""
+"""Advice on smaller requests; by default, to send less rock."""
 
 LESS_ROCK: Final = (
     "let hands share a scan under stance.rocks, cut it to what is near them, or make its triangles "
@@ -52,13 +52,13 @@ LESS_ROCK: Final = (
 )
 
 LARGEST_ERROR: Final = 4096
-"""Bytes of an error reply."""
+"""Most bytes of an error reply."""
 
 PARTS: Final = {"id": 1540, "field": 600, "message": 1600}
-"""Bytes of its texts as they are written; an ``id`` that a request may have is never more."""
+"""Most encoded bytes of its texts; every ``id`` that a request may have fits."""
 
 BARE: Final = 200
-"""Bytes of an error reply beside these texts, at most."""
+"""Most bytes of an error reply without these texts."""
 
 ALIASES: Final = {
     "": "application/json",
@@ -68,19 +68,19 @@ ALIASES: Final = {
 
 
 LATER: Final = {"confidence": "leave it out: tile limits are nominal"}
-"""Fields that later versions will have, and what to tell who gives them."""
+"""Fields of later versions, with the advice for a request that has them."""
 
 LATER_VALUES: Final = {
     ("objective", "max_reliability"): f"valid are {' and '.join(get_args(Objective))}",
 }
-"""The same of values of fields."""
+"""Values of fields of later versions, with the advice for a request that has them."""
 
 BULK: Final = ("vertices", "faces")
 """Long lists of numbers of a mesh, which its model checks as arrays."""
 
 
 class Format(Enum):
-    """A way to write a message down; the value is its encoding."""
+    """Format of a message; the value is its encoding."""
 
     JSON = "application/json"
     MSGPACK = "application/msgpack"
@@ -125,9 +125,9 @@ class Format(Enum):
         Raises
         ------
         msgspec.ValidationError
-            If they are another message.
+            If the bytes are another message.
         MalformedError
-            If they are none.
+            If the bytes are no message.
         """
         if not payload:
             raise MalformedError(f"empty: nothing was sent, a {kind.__name__} is needed")
@@ -148,19 +148,19 @@ def _schema_name(kind: type[msgspec.Struct]) -> str:
 
 
 class Answer(NamedTuple):
-    """An answer to the caller: a reply, or an error.
+    """Answer to the caller: a reply, or an error.
 
     Attributes
     ----------
     payload : bytes
     encoding : str
-        Of the payload, with its schema.
+        Encoding of the payload, with its schema.
     good : bool
-        Whether it is a reply, and not an error.
+        True for a reply, false for an error.
     status : str
-        Of a reply that has one; the kind of an error.
+        Status of a reply that has one; the kind of an error.
     seconds : float
-        How long the work took [s].
+        Duration of the work [s].
     cost : float
         Processor time of it [s], which other programs on the machine do not change.
     """
@@ -186,7 +186,7 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
         request = form.decode(payload, kind)
     except msgspec.ValidationError as error:
         if form is Format.MSGPACK and "Expected `float`" in str(error):
-            # no bound is kept by what is not a number
+            # a number that is not finite breaks every bound
             with suppress(RecursionError):
                 _check(_plain(payload, form))
         field, message = validation_error(
@@ -213,7 +213,7 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
 
 
 def _check(value: object, path: str = "") -> None:
-    """Check a decoded request, or a part of it, for what its type does not ensure.
+    """Check a decoded request, or a part of it, beyond its types.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def _check(value: object, path: str = "") -> None:
 
 
 def most_bytes(kind: type) -> int:
-    """Return how many bytes a request of a kind may have; of more nothing is decoded."""
+    """Return the most bytes of a request of a kind; a larger one is not decoded."""
     return LARGEST.get(kind, LARGEST_REQUEST)
 
 
@@ -262,7 +262,7 @@ def check_size(size: int, kind: type) -> None:
 
 
 def _plain(payload: bytes, form: Format) -> Any:
-    """Return bytes as plain lists and dicts, or None where they go on as no message."""
+    """Return bytes as plain lists and dicts, or None for bytes that are no message."""
     try:
         return form.decode(payload, Any)
     except (MalformedError, msgspec.ValidationError):
@@ -278,9 +278,9 @@ class _Bounded(msgspec.Struct):
 
 
 def identifier(payload: bytes, form: Format, kind: type | None = None) -> str | None:
-    """Return a request's ``id``, whatever else is wrong with it; None where it cannot be read.
+    """Return a request's ``id``, also of an invalid request; None if it cannot be read.
 
-    Nor is it read where the payload is too large for the kind of request.
+    It is not read from a payload that is too large for the kind of request.
     """
     read = _part(payload, form, kind, _Named)
     return None if read is None else read.id
@@ -311,8 +311,8 @@ def encode_error(
 ) -> Answer:
     """Return an error reply as an answer.
 
-    Texts are cut where there would be more than `LARGEST_ERROR` bytes of it, or more than the
-    caller takes.
+    Texts are cut if the reply would have more than `LARGEST_ERROR` bytes, or more than the
+    caller allows.
 
     Parameters
     ----------
@@ -321,27 +321,27 @@ def encode_error(
     name : str, optional
         The request's ``id``.
     kind : str, optional
-        What the caller is told; by default the error's own.
+        Kind in the reply; by default the error's own.
     most : int, optional
         Bytes that it may take, at least `service.requests.LEAST_REPLY_BYTES`.
     """
-    told = error.kind if kind is None else kind
-    reply = _error_reply(error, form, name, told, PARTS)
+    status = error.kind if kind is None else kind
+    reply = _error_reply(error, form, name, status, PARTS)
     payload = form.encode(reply)
     if len(payload) > most:
         share = (most - BARE) / sum(PARTS.values())
         parts = {part: int(share * size) for part, size in PARTS.items()}
-        reply = _error_reply(error, form, name, told, parts)
+        reply = _error_reply(error, form, name, status, parts)
         payload = form.encode(reply)
-    return Answer(payload, form.label(reply), False, told)
+    return Answer(payload, form.label(reply), False, status)
 
 
 def _error_reply(
-    error: CruxError, form: Format, name: str | None, told: str, parts: Mapping[str, int]
+    error: CruxError, form: Format, name: str | None, status: str, parts: Mapping[str, int]
 ) -> ErrorReply:
-    """Return an error as a reply whose texts take so many bytes at most."""
+    """Return an error reply whose texts take at most so many bytes."""
     detail = ErrorDetail(
-        told,
+        status,
         None if error.field is None else _cut(error.field, parts["field"], form),
         _cut(error.message, parts["message"], form),
     )
@@ -351,7 +351,7 @@ def _error_reply(
 
 
 def _cut(text: str, most: int, form: Format) -> str:
-    """Return a text that takes so many bytes at most."""
+    """Return a text, cut to at most so many bytes."""
     whole = text.encode(errors="replace").decode()  # half a pair of UTF-16 cannot be written
     if len(form.encode(whole)) <= most:
         return whole

@@ -1,4 +1,4 @@
-"""Keys that an object has twice, of which a decoder would take the last without a word."""
+"""Refuse objects with a key twice; a decoder would silently take the last one."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from service.wire.errors import MalformedError
 __all__ = ["refuse_in_json", "refuse_in_msgpack"]
 
 LONG: Final = 2**16
-"""Bytes of a payload from which on its long lists of numbers are left out."""
+"""Size of a payload above which its long lists of numbers are skipped [bytes]."""
 
 BULK: Final = re.compile(rb":[ \t\n\r]*\[[-+0-9.eE,\[\] \t\n\r]{1000,}\](?=[ \t\n\r]*[,}])")
-"""A long list of numbers, or of lists of them, as an object's value."""
+"""Pattern of a long list of numbers, or of lists of them, as an object's value."""
 
 MAPS: Final = frozenset({*range(0x80, 0x90), 0xDE, 0xDF})
 LISTS: Final = frozenset({*range(0x90, 0xA0), 0xDC, 0xDD})
 LENGTHS: Final = {0xDC: 2, 0xDD: 4, 0xDE: 2, 0xDF: 4}
-"""First bytes of MessagePack's maps and lists; of long ones, in how many bytes their length is."""
+"""First bytes of MessagePack's maps and lists; for long ones, the bytes of their length."""
 
 
 def refuse_in_json(payload: bytes) -> None:
@@ -36,7 +36,7 @@ def refuse_in_json(payload: bytes) -> None:
     """
     short = BULK.sub(b":[]", payload) if len(payload) > LONG else payload
     found: list[_Repeated] = []
-    # numbers stay text: those of thousands of digits, too
+    # numbers stay text, also those of thousands of digits
     read = json.JSONDecoder(
         object_pairs_hook=partial(_object, found), parse_int=str, parse_float=str, strict=False
     ).decode
@@ -67,13 +67,13 @@ def refuse_in_msgpack(payload: bytes) -> None:
 
 
 class _Repeated(dict[str, Any]):
-    """An object that has a key twice."""
+    """Object that has a key twice."""
 
     key: str
 
 
 def _object(found: list[_Repeated], pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object of these keys and values; if it has a key twice, it is found."""
+    """Return an object of these keys and values; one with a key twice is added to ``found``."""
     whole = dict(pairs)
     if len(whole) < len(pairs):
         whole = _Repeated(whole)
@@ -102,7 +102,7 @@ def _refuse(document: Any, path: str) -> None:
 
 
 def _maps(value: bytes, found: list[_Repeated]) -> Any:
-    """Return a map with the maps in it, and a list whose first item is one; else nothing."""
+    """Return a map, or a list whose first item is a map, with the maps in it; None otherwise."""
     if value[0] in MAPS:
         parts = _parts(value, 2)
         pairs = zip(parts, parts, strict=True)
@@ -117,14 +117,14 @@ def _maps(value: bytes, found: list[_Repeated]) -> Any:
 
 
 def _parts(value: bytes, each: int) -> Iterator[bytes]:
-    """Yield what is in a list, or with two of ``each`` a map's keys and values in turn."""
+    """Yield the items of a list, or with ``each`` of 2 a map's keys and values in turn."""
     head, count = _header(value)
     as_list = b"\xdd" + (each * count).to_bytes(4, "big") + value[head:]
     return map(bytes, msgspec.msgpack.decode(as_list, type=list[msgspec.Raw]))
 
 
 def _header(value: bytes) -> tuple[int, int]:
-    """Return how many bytes come before the items of a map or a list, and how many items it has."""
+    """Return the bytes before the items of a map or a list, and the number of items."""
     size = LENGTHS.get(value[0])
     if size is None:
         return 1, value[0] & 0x0F

@@ -1,4 +1,4 @@
-"""Errors between a caller and the service."""
+"""Define the errors between a caller and the service."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ __all__ = [
 ]
 
 UNREACHABLE: Final = "unreachable"
-"""Kind of error where limbs do not reach their holds."""
+"""Kind of error for limbs that do not reach their holds."""
 
 REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", "limit", UNREACHABLE})
-"""Kinds of error that are the request's fault, so that asking again is of no use."""
+"""Kinds of error in the request; the same request would fail again."""
 
 
 class BusyError(CruxError):
@@ -31,7 +31,7 @@ class BusyError(CruxError):
     ----------
     message : str
     retry_after : float
-        When to ask again [s].
+        Time after which to ask again [s].
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class ServiceError(CruxError):
     message : str
     field : str, optional
     retry_after : float, optional
-        When to ask again, of a service that is busy [s].
+        Time after which to ask a busy service again [s].
 
     Attributes
     ----------

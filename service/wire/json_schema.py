@@ -1,4 +1,4 @@
-"""The JSON Schema of every message."""
+"""Build the JSON Schema of every message."""
 
 from __future__ import annotations
 
@@ -67,16 +67,16 @@ KEYS: Final[dict[str, tuple[type[msgspec.Struct] | None, tuple[type[msgspec.Stru
     SET_POINTS: (SetPointsRequest, (SetPointsReply,)),
     HEALTH: (None, (HealthReply,)),
 }
-"""What is asked at each key, if anything, and what may come back."""
+"""Request of each key, if it takes one, and the possible replies."""
 
 REPLIES: Final = "service.replies."
-"""Where parts of replies are, which may be named as parts of requests are."""
+"""Module prefix of parts of replies; a part of a request may have the same name."""
 
 
 def schema() -> dict[str, Any]:
     """Return one schema whose ``$defs`` hold every message; a valid document is one of them.
 
-    ``keys`` tells for each key the request, null where it takes none, and the reply.
+    ``keys`` has for each key the request, null if it takes none, and the reply.
     """
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
@@ -84,10 +84,10 @@ def schema() -> dict[str, Any]:
     names = {name: _plain_name(name, part["title"]) for name, part in parts.items()}
     assert len({*names.values()}) == len(parts)
     for part in parts.values():
-        # what later versions will have is not offered
+        # fields of later versions are left out
         for name in LATER.keys() & part.get("properties", {}).keys():
             del part["properties"][name]
-        # of a docstring that says more, its first sentence
+        # keep the first sentence of a docstring
         if "description" in part:
             part["description"] = part["description"].partition("\n\n")[0]
     return {
@@ -100,12 +100,12 @@ def schema() -> dict[str, Any]:
 
 
 def _plain_name(name: str, title: str) -> str:
-    """Return a part's name without its module and parameters; of two alike, the reply's ends so."""
+    """Return a part's name without module and parameters; a reply's part gets the suffix Reply."""
     return title.partition("[")[0] + ("Reply" if name.startswith(REPLIES) else "")
 
 
 def _renamed(part: Any, names: Mapping[str, str]) -> Any:
-    """Return a part of the schema whose references are by those names."""
+    """Return a part of the schema with its references renamed."""
     if isinstance(part, dict):
         return {
             key: f"#/$defs/{names[value.removeprefix('#/$defs/')]}"
@@ -119,9 +119,9 @@ def _renamed(part: Any, names: Mapping[str, str]) -> Any:
 def _exchange(
     request: type[msgspec.Struct] | None, replies: Sequence[type[msgspec.Struct]]
 ) -> dict[str, Any]:
-    told = [{"$ref": f"#/$defs/{reply.__name__}"} for reply in replies]
+    references = [{"$ref": f"#/$defs/{reply.__name__}"} for reply in replies]
     return {
         "request": None if request is None else {"$ref": f"#/$defs/{request.__name__}"},
-        "reply": told[0] if len(told) == 1 else {"anyOf": told},
+        "reply": references[0] if len(references) == 1 else {"anyOf": references},
         "error": {"$ref": f"#/$defs/{ErrorReply.__name__}"},
     }

@@ -1,4 +1,4 @@
-"""Keys of the service in zenoh's key space."""
+"""Define the keys of the service in zenoh's key space."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ BODY_SPACE: Final = "body_space"
 STREAM: Final = "stream"
 SET_POINTS: Final = "set_points"
 ALIVE: Final = "alive"
-"""The liveliness token, which is there while the service is."""
+"""Liveliness token, present while the service runs."""
 HEALTH: Final = "health"
 METRICS: Final = "metrics"
 CLIENTS: Final = "clients"
-"""Before the identifiers of sessions, in the liveliness tokens of clients."""
+"""Prefix of session identifiers in the liveliness tokens of clients."""
 
 ROUTE: Final = "route"
-"""A question of bulk work alone: it takes too long to be asked over zenoh."""
+"""Question of bulk work alone: it takes too long to be asked over zenoh."""
 
 DEFAULT_ROBOT: Final = "robosimian"
-"""Whose stance is meant where nothing names a robot."""
+"""Robot of a stance that names none."""
 
 
 def service_key(robot: str, name: str) -> str:

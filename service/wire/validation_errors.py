@@ -1,4 +1,4 @@
-"""Turn msgspec's complaint into the field to blame and what would be valid there, by its schema."""
+"""Turn an error of msgspec into the field to blame and its valid values, from the schema."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ __all__ = ["Place", "Step", "entered", "field_names", "places_at", "validation_e
 
 SYMBOL: Final = r"(?:kg|rad|[Nms·/²])+"
 UNITS: Final = re.compile(rf"\[({SYMBOL}(?:, {SYMBOL})*)\]")
-"""Where a description says its units: one, or two of a wrench, forces first."""
+"""Pattern of the units in a description: one, or two of a wrench, forces first."""
 
 Step = str | int | None
-"""Of a path; None for a key that the caller chose."""
+"""Step of a path; None for a key that the caller chose."""
 
 WHERE: Final = re.compile(r" - at (?:`key` in )?`\$([^`]*)`$")
 STEP: Final = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[\.\.\.\]")
-"""A field, an index, or what stands in msgspec's paths for a key that the caller chose."""
+"""Pattern of a step: a field, an index, or msgspec's mark for a key that the caller chose."""
 
 OF_FIELD: Final = re.compile(
     r"Object (?:missing required|contains (unknown)) field `(.*)`", re.DOTALL
@@ -49,34 +49,34 @@ LONG: Final = re.compile(r"\d+\.\d{6,}")
 Decoder = Callable[[Any], object]
 
 CIRCLE: Final = 360.0
-"""Size of a number up to which an angle that is out of range may be in degrees."""
+"""Largest size of an angle out of range that may be in degrees."""
 
 MANY: Final = 10.0
-"""Size of a number from which on a length that is out of range may be in mm."""
+"""Smallest size of a length out of range that may be in mm."""
 
 FARTHEST: Final = 1e4
-"""Farthest that a position may be from its frame's origin: beyond it are map coordinates [m]."""
+"""Largest distance of a position from its frame's origin; beyond it are map coordinates [m]."""
 
 LONGEST: Final = 400
-"""Characters of a message: it may quote the request."""
+"""Most characters of a message, which may quote the request."""
 
 
 def validation_error(
     error: msgspec.ValidationError, kind: type, document: Callable[[], Any], decode: Decoder
 ) -> tuple[str | None, str]:
-    """Return the field's dotted path, or None for the whole message, and one line about it.
+    """Return the field's dotted path, or None for the whole message, and one line of error message.
 
     Parameters
     ----------
     error : msgspec.ValidationError
-        From decoding a ``kind``.
+        Error from decoding a ``kind``.
     kind : type
-        Message that was expected.
+        Expected message.
     document : callable
-        Returns what was decoded, as plain lists and dicts, to look up keys that the caller chose;
-        None where those are not known.
+        Returns the decoded message as plain lists and dicts, to look up keys that the caller
+        chose; None if those are not known.
     decode : callable
-        Decodes such a document, or a part of it, as the first one was; raises what that raised.
+        Decodes such a document, or a part of it, as the message was; raises the same errors.
     """
     complaint, path = _parts(error)
     steps = _steps(path)
@@ -103,7 +103,7 @@ def validation_error(
         message = re.sub(r"`([^`]*)`", _plain, complaint)
         message = message[:1].lower() + message[1:]
         if OUT_OF_RANGE.search(complaint):
-            # a bound such as π is told as such, not with all digits of a double
+            # print a bound such as π with 6 digits, not with all digits of a double
             message = LONG.sub(lambda number: f"{float(number[0]):.6g}", message)
             unit = _unit_of(places)
             message += f", in {unit}" if unit else ""
@@ -116,7 +116,7 @@ def validation_error(
 
 
 def _parts(error: msgspec.ValidationError) -> tuple[str, str]:
-    """Return what msgspec complains of, and the path where."""
+    """Return msgspec's error message, and the path of the error."""
     text = str(error)
     found = WHERE.search(text)
     return (text, "") if found is None else (text[: found.start()], found[1])
@@ -133,7 +133,7 @@ def _clip(text: str) -> str:
 def _with_keys(
     path: str, steps: Sequence[Step], document: Callable[[], Any], decode: Decoder
 ) -> list[str | int] | None:
-    """Return the steps of a path with the keys that msgspec leaves open, if all can be told."""
+    """Return the steps of a path with the keys that msgspec leaves open, if all can be found."""
     known: list[str | int] = []
     for step in steps:
         try:
@@ -150,7 +150,7 @@ def _dotted(steps: Iterable[str | int]) -> str:
 def _tagged(
     types: list[inspect.Type], document: Any, steps: Iterable[str | int]
 ) -> list[inspect.Type]:
-    """Return those of the types that an object of a document names; all where it names none."""
+    """Return the types that an object of a document names by its tag; all if it names none."""
     try:
         given = _at(document, steps)
         named: list[inspect.Type] = [
@@ -178,7 +178,7 @@ def _key_to_blame(document: Any, place: Sequence[str | int], path: str, decode: 
     Raises
     ------
     LookupError
-        If none can be told.
+        If none can be found.
     """
     keys = list(_at(document, place))
 
@@ -214,7 +214,7 @@ def _unit_of(places: Iterable[Place]) -> str | None:
 
 
 def _given(document: Callable[[], Any], where: Iterable[str | int]) -> Any:
-    """Return what a document has at a place; None where that cannot be told."""
+    """Return the value of a document at a place; None if there is none."""
     try:
         return _at(document(), where)
     except (LookupError, TypeError, AttributeError, RecursionError):
@@ -222,7 +222,7 @@ def _given(document: Callable[[], Any], where: Iterable[str | int]) -> Any:
 
 
 def _got(document: Callable[[], Any], where: Iterable[str | int] | None, unit: str | None) -> str:
-    """Say which number was out of range, and in which other unit it is likely to be."""
+    """Return the number that is out of range, and the unit that it is likely to be in."""
     value = None if where is None else _given(document, where)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return ""
@@ -254,14 +254,14 @@ def _values(types: Iterable[inspect.Type]) -> list[str]:
 
 
 class Place(NamedTuple):
-    """A type that may stand at a place, without its metadata, and the units of its numbers."""
+    """Type that is possible at a place, without its metadata, and the units of its numbers."""
 
     kind: inspect.Type
     units: tuple[str, ...]
 
 
 def places_at(kind: type, steps: Iterable[Step]) -> list[Place]:
-    """Return what may stand at the end of a path into a message of a kind."""
+    """Return the types that are possible at the end of a path into a message of a kind."""
     places = list(_bare(_known(kind)))
     for step in steps:
         places = entered(places, step)
@@ -269,7 +269,7 @@ def places_at(kind: type, steps: Iterable[Step]) -> list[Place]:
 
 
 def entered(places: Iterable[Place], step: Step) -> list[Place]:
-    """Return what may stand one step further."""
+    """Return the types that are possible one step further."""
     found: list[Place] = []
     for place in places:
         parent = place.kind
@@ -290,7 +290,7 @@ def entered(places: Iterable[Place], step: Step) -> list[Place]:
 
 
 def field_names(types: Iterable[inspect.Type]) -> list[str]:
-    """Return the fields of the structs that may be meant, each once, but none not yet taken."""
+    """Return the fields of the possible structs, each once, without those of later versions."""
     names: list[str] = []
     for kind in types:
         if isinstance(kind, inspect.StructType):
@@ -305,7 +305,7 @@ def _comes_later(kind: inspect.Type) -> bool:
 
 @cache
 def _known(kind: Any) -> inspect.Type:
-    """Return what is known of a message, which takes milliseconds to find out."""
+    """Return msgspec's description of a type, cached because it takes milliseconds."""
     return inspect.type_info(kind)
 
 
@@ -322,6 +322,6 @@ def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[Place]:
 
 
 def _units_of(units: tuple[str, ...], entry: int, length: int) -> tuple[str, ...]:
-    """Return the units of one entry of a whole that has one unit, or two of equal halves."""
+    """Return the units of one entry of an array with one unit, or with two for equal halves."""
     which = entry * len(units) // length
     return units[which : which + 1]
