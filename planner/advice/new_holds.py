@@ -1,4 +1,4 @@
-"""Where a limb had better take hold that holds nothing, or something else: if rock is there.
+"""Search for new holds of limbs, free ones first, on condition that there is rock.
 
 The rock is like that under a hand of the stance, and lies in the hand alike. A rock that hands
 share stands in W once, so that no hold is like one on it. Places are on a plane through the hands,
@@ -159,13 +159,13 @@ class NewHold:
         )
 
     def _words(self, like: str, hold: _Hold) -> str:
-        told = ", ".join(f"{value:z.3f}" for value in hold.place)
+        at = ", ".join(f"{value:z.3f}" for value in hold.place)
         degrees = round(math.degrees(math.remainder(hold.turn, 2.0 * math.pi)))
         turned = f"{degrees}° about its palm's z from {like}" if degrees else f"as {like} is"
         if hold.grasp is not None:
             turned += f", with {fingers(hold.grasp)}"
         return (
-            f"put {self.limb} at [{told}] m in W, turned {turned}, on condition that there is rock "
+            f"put {self.limb} at [{at}] m in W, turned {turned}, on condition that there is rock "
             f"as under {like}"
         )
 

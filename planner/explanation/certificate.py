@@ -242,7 +242,7 @@ def _contradiction(system: HardRowSystem, limbs: Sequence[str]) -> tuple[Array, 
 def _multipliers(
     system: HardRowSystem, outcome: Outcome, *, capped: bool
 ) -> tuple[Array, Array] | None:
-    """Return a unit d and λ as the multipliers of a program without a plan tell them.
+    """Return a unit d and λ from the multipliers of a program without a plan.
 
     Where d is next to none, rows contradict each other whatever the body needs.
     """

@@ -180,7 +180,7 @@ class FarkasProgram:
         return Multipliers(gain, direction, np.maximum(x[2 * nb : 2 * nb + len(self.h)], 0.0))
 
     def _change(self, costs: Array, most: Array, parts: Array) -> None:
-        """Tell the solver what is different of costs, bounds from above, and right-hand sides."""
+        """Pass the costs, bounds from above and right-hand sides that differ to the solver."""
         solver = self._solver
         places = (costs != self._costs).nonzero()[0].astype(np.int32)
         if len(places):

@@ -8,7 +8,7 @@ there, and its length is one linear program,
 
     max s   with tensions  planned + s (present − planned)   in the balance    (`program.Reach`),
 
-whose multipliers tell what ends it.
+whose multipliers show what ends it.
 
 Hands with floating wrists stay as planned: their sets hold about that only.
 """

@@ -29,10 +29,10 @@ __all__ = [
 ]
 
 NOTABLE: Final = 0.3
-"""Components of what is missing are told from this part of the largest on."""
+"""Least component of a missing wrench that is named, relative to the largest."""
 
 FOREMOST: Final = 2
-"""So many of the constraints that leave no loads are told; the rest are counted."""
+"""Number of constraints in the way that are named; the rest are counted."""
 
 MANNERS: Final = {
     "shear": " in shear",
@@ -166,8 +166,8 @@ def _spoken_load(limit: str, load: float) -> str:
 def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
     """Say how much of a limit is used.
 
-    A tile's force is told with what the tile would hold in that direction, not with the distances
-    to its half-plane; the force that a hand holds likewise.
+    A tile's force is given with the force that the tile would hold in that direction, not with the
+    distances to its half-plane; the force of a hand likewise.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
         load, capacity = force, force * capacity / load
     carried, most = (_spoken_load(name.limit, value) for value in (load, capacity))
     if carried == most and not held:
-        # so near that only further digits tell
+        # so near that only further digits differ
         carried = f"{_spoken_load(name.limit, capacity)} and a little more"
     manner = MANNERS.get(name.limit, "")
     return f"{_spoken(name)} {_verb(name.limit, held)} {carried} of {most}{manner}"
@@ -284,12 +284,12 @@ def _missing(shortfall: Array) -> str:
 
 def blocking_sentence(names: Sequence[LimitName]) -> str:
     """Say what is in the way, the foremost first; a limb's name once in a row."""
-    told: list[str] = []
+    words: list[str] = []
     for i, name in enumerate(names[:FOREMOST]):
         sentence = f"{_spoken(name)} {_barrier(name.limit)}"
         again = i > 0 and names[i - 1].limb == name.limb
-        told.append(sentence.removeprefix(f"{name.limb}: ") if again else sentence)
-    more = len(names) - len(told)
+        words.append(sentence.removeprefix(f"{name.limb}: ") if again else sentence)
+    more = len(names) - len(words)
     if more:
-        told.append(f"and {more} more")
-    return ", ".join(told)
+        words.append(f"and {more} more")
+    return ", ".join(words)

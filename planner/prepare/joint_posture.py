@@ -1,4 +1,4 @@
-"""Where the joints of a stance are, what they bear without hands, and what the robot weighs there.
+"""Find the joint angles of a stance, and the joint torques and the weight of the robot there.
 
 Angles are given, or found by inverse kinematics from the hands' poses; hands may be a little off
 these. Limbs without a hand or an angle are at zero, or the limit nearest to it. Torques and the

@@ -79,7 +79,7 @@ class PreparedStance:
 
     @property
     def needs_hands(self) -> bool:
-        """Whether anything is asked of the hands."""
+        """True if the hands have a body wrench to give."""
         return bool(np.abs(self.hands.wrench[:6]).max() > NO_WRENCH)
 
     @property

@@ -1,4 +1,4 @@
-"""What all programs of a stance share: its rows, in CVXPY and as they are solved, and how.
+"""Base of all programs of a stance: its rows, in CVXPY and for the solver, and how it is solved.
 
 `StanceProgram.define` is the program, as mathematics; `StanceProgram.conic` is the same for the
 solver, block by block, which takes a fraction of the time. Where the solver comes to no end with
@@ -235,9 +235,9 @@ class StanceProgram(ABC):
         x = duals = None
         if status in PRESENT:
             x = np.concatenate([np.atleast_1d(variable.value) for variable in variables])
-        told = [row.dual_value for row in rows if row.size]
-        if status in (*PRESENT, *PROVEN) and all(each is not None for each in told):
-            duals = np.concatenate(told)
+        values = [row.dual_value for row in rows if row.size]
+        if status in (*PRESENT, *PROVEN) and all(each is not None for each in values):
+            duals = np.concatenate(values)
         if status == cp.USER_LIMIT and left is not None:
             status = OUT_OF_TIME
         value = math.nan if x is None else problem.value

@@ -171,9 +171,9 @@ class HandOnHold:
     def _check_seat(self) -> None:
         known_choice(self.seat, SEATS, "seat")
         posed = self.hold_pose is not None or self.hold_in_hand is not None
-        told = {"seat": self.seat == "best", "at": self.at is not None}
+        given = {"seat": self.seat == "best", "at": self.at is not None}
         for name, left_out in (("seat", "the seat"), ("at", "where it is seated")):
-            if told[name] and posed:
+            if given[name] and posed:
                 raise InvalidInputError(
                     "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, "
                     f"or {left_out}",

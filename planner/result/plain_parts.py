@@ -259,11 +259,11 @@ class RobustLoadFactor(Struct, frozen=True):
         Of the draws.
     worst : float
         Deprecated: the same as ``hundredth``. It was the least of the draws that had one, which
-        hangs on how many there are.
+        depends on how many there are.
     tenth : float
         What it exceeds in nine in ten draws.
     tenth_interval : list of float, length 2
-        What holds that in 95 %, for all that so many draws tell.
+        Interval that holds it with 95 % confidence, for this number of draws.
     hundredth : float
         What it exceeds in 99 of a hundred draws.
     hundredth_interval : list of float, length 2

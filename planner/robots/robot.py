@@ -43,14 +43,14 @@ digits."""
 
 
 class Statics(NamedTuple):
-    """What holds a robot up whose joints stand still.
+    """Body wrench and joint torques that hold up a robot whose joints stand still.
 
     Attributes
     ----------
     body_wrench : ndarray, shape (6,)
-        That the rock must exert on the robot, in B about B's origin [N, N·m].
+        Wrench that the rock must exert on the robot, in B about B's origin [N, N·m].
     joint_torque : dict of str to ndarray, shape (n,)
-        By limb: torque of its joints while its hand carries nothing [N·m].
+        Torques of a limb's joints while its hand carries nothing, by limb [N·m].
     """
 
     body_wrench: Array
@@ -294,7 +294,7 @@ class Robot:
 
     @property
     def limb_mass(self) -> float:
-        """What all limbs weigh with their hands [kg]."""
+        """Mass of all limbs with their hands [kg]."""
         return sum(mass for mass, _, _ in self._limb_weights.values())
 
     def com_at(self, angles: Angles) -> Array:

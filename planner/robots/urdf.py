@@ -54,7 +54,7 @@ EXPAND: Final = (
     "this is a xacro, which is not expanded; expand it: xacro ROBOT.urdf.xacro > ROBOT.urdf "
     "(from ROS, or from pip install xacro)"
 )
-"""What a file is told that still has instructions for xacro in it."""
+"""Error message for a file that still has instructions for xacro in it."""
 
 THIN: Final = 1e-6
 """Radius of gyration that is none for a link [m]: so far below zero its mass may put a moment."""
@@ -133,7 +133,7 @@ class JointElement:
 
     @property
     def slides(self) -> bool:
-        """Whether it moves along its axis instead of about it."""
+        """True if it moves along its axis instead of about it."""
         return self.type == "prismatic"
 
 
@@ -153,7 +153,7 @@ class Urdf:
     joints: Mapping[str, JointElement]
 
     def trail(self, link: str) -> list[str]:
-        """Return a link and those that it hangs on, up to the root; refuse a ring."""
+        """Return a link and its parents, up to the root; refuse a ring."""
         trail = [link]
         while trail[-1] in self.joints:
             parent = self.joints[trail[-1]].parent

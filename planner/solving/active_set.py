@@ -169,7 +169,7 @@ class Face:
         raise ApartError
 
     def keeps(self, least: Point, weight: float) -> bool:
-        """Whether the least point of the face is the optimum of another weight, too.
+        """Return whether the least point of the face is the optimum of another weight, too.
 
         It is where multipliers of the same rows, none below zero, make up for the larger gradient.
         """

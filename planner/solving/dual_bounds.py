@@ -1,4 +1,4 @@
-"""What the multipliers of a program prove: bounds from below of its least value."""
+"""Prove lower bounds of a program's least value by its multipliers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STATIONARY: Final = 1e-5
 
 
 def is_least(value: float, bound: float) -> bool:
-    """Whether a utilisation, or an effort, is as low as its bound, as far as it counts."""
+    """Return whether a utilisation, or an effort, is as low as its bound, within `OPTIMAL`."""
     return value - bound <= OPTIMAL * max(1.0, value)
 
 

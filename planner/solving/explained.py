@@ -1,4 +1,4 @@
-"""From what solving has come to, to the plan that is reported: explained, with its warnings."""
+"""Make the plan that is reported from a solution: explained, with its warnings."""
 
 from __future__ import annotations
 

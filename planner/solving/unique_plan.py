@@ -52,14 +52,14 @@ FREE: Final = 1e-6
 
 
 class LeastUtilisation(NamedTuple):
-    """What came of `programs.unique`, and of `programs.less_tension` from there.
+    """Result of `programs.unique`, and of `programs.less_tension` from there.
 
     Attributes
     ----------
     outcome : Outcome
-        Of the least utilisation.
+        Outcome of the program of least utilisation.
     bound : float
-        The least utilisation is not below; −∞ without a solution.
+        Lower bound of the least utilisation; −∞ without a solution.
     meant : Outcome or None
         The plan that is meant; None where it is not found, for the time or as the outcome has not
         its last digits.
@@ -74,7 +74,7 @@ class LeastUtilisation(NamedTuple):
 
     @property
     def proven(self) -> bool:
-        """Whether the utilisation is the least, as far as it counts."""
+        """True if the utilisation is the least, within the tolerance of `is_least`."""
         return self.outcome.solved and is_least(self.outcome.value, self.bound)
 
 
@@ -119,7 +119,7 @@ def least_utilisation(
 
 
 def _far_beyond(outcome: Outcome) -> bool:
-    """Whether what makes a plan unique may cost more utilisation than counts."""
+    """Return whether the term that makes a plan unique may cost more utilisation than counts."""
     return OPTIMAL * outcome.value < TIE * outcome.value**2
 
 
