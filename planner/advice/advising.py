@@ -24,13 +24,13 @@ MOST: Final = 10
 """Largest number of advices that are returned."""
 
 WORTH: Final = 0.01
-"""By how much an advice lowers the utilisation at least, relative."""
+"""Least relative decrease of the utilisation by an advice."""
 
 STRENGTH: Final = 14
 """Plans for stronger holds, at most."""
 
 SPARE: Final = 5
-"""The same where combinations are tried, too."""
+"""Plans for stronger holds where combinations are tried, too, at most."""
 
 MASS: Final = 5
 """Plans for a lighter body, at most."""

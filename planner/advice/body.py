@@ -38,16 +38,16 @@ ROUNDS: Final = 14
 """Plans of a search for the best shift, at most."""
 
 CLOSE: Final = 2e-3
-"""How far, relatively, the best utilisation found may be above the least there can be."""
+"""Relative gap of the best utilisation found to its lower bound at which the search ends."""
 
 LEAST: Final = 1e-3
 """Shift that counts as one [m]."""
 
 CLEAR: Final = 0.15
-"""How near B's origin may come to the plane of a palm, where it is not nearer already [m]."""
+"""Least distance of B's origin from the plane of a palm, where it is not nearer already [m]."""
 
 REACHED: Final = 1e-6
-"""How far beyond its reach a limb may be, relative."""
+"""Tolerance of a limb's reach, relative."""
 
 TANGENTS: Final = 30
 """Planes that stand for the limbs' reaches in one step, at most."""
@@ -61,7 +61,7 @@ TILT_UNIT: Final = 0.2
 AXES: Final = "xyz"
 
 STEPS: Final = 7
-"""Of a grid of shifts, along each axis."""
+"""Steps of a grid of shifts, along each axis."""
 
 
 def can_move(prepared: PreparedStance) -> bool:

@@ -39,7 +39,7 @@ __all__ = ["Choice", "CombinationSearch"]
 Mask = npt.NDArray[np.bool_]
 
 DIGITS: Final = 6
-"""Of what choices are worth: what rounding errors add decides nothing."""
+"""Digits of the worth of choices: rounding errors decide nothing."""
 
 ENOUGH: Final = 1.5
 """Part of what is needed beyond which a choice is no better."""
@@ -70,7 +70,7 @@ STARTS: Final = 8
 """Choices that are begun at besides what is near."""
 
 SEED: Final = 0
-"""Of these."""
+"""Seed of these random choices."""
 
 
 class _Variant(NamedTuple):

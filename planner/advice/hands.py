@@ -43,16 +43,16 @@ ALIKE: Final = 0.05
 """Turns of outer fingers that are the same grasp [rad]."""
 
 TURNS: Final = tuple((0.0, 0.0, math.radians(turn)) for turn in (30.0, -30.0, 60.0, -60.0))
-"""How far a hand is turned about z of its palm [m, m, rad]."""
+"""Turns of a hand about z of its palm [m, m, rad]."""
 
 AROUND: Final = tuple(
     (0.0, 0.0, math.radians(turn))
     for turn in (30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180)
 )
-"""The same all around."""
+"""Turns of a hand all around."""
 
 WAYS: Final = ((0.02, 0.0, 0.0), (-0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, -0.02, 0.0))
-"""How far it is moved along x and y of its palm [m, m, rad]."""
+"""Displacements of a hand along x and y of its palm [m, m, rad]."""
 
 WAY_UNIT: Final = 0.02
 """Way of a hand of size 1 [m]."""

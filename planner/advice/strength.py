@@ -14,7 +14,7 @@ from planner.question import HandOnHold
 __all__ = ["lighter", "stronger"]
 
 STRONGEST: Final = 4.0
-"""How many times as strong holds become at most."""
+"""Largest factor of a hold's strength."""
 
 STEP: Final = 0.01
 """Resolution of the factor by which holds are stronger."""

@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 PLANS: Final = 100
-"""That are made for the advice about a question."""
+"""Plans that are made for the advice about a question, at most."""
 
 WITHOUT: Final = ("mass", "strength")
 """Kinds that do not count as help, nor as part of a pair: the task becomes another."""
@@ -42,7 +42,7 @@ WORSE: Final = 1e-3
 """By how much what is odd may grow: metres, or without a unit."""
 
 TRIED: Final = "all changes were tried"
-"""What a deadline came before."""
+"""Words for the work that a deadline leaves unfinished."""
 
 
 class Trial(NamedTuple):

@@ -1,4 +1,4 @@
-"""The proof that a body wrench cannot be had: at any utilisation, or within a cap on it.
+"""Prove that no loads give a body wrench: at any utilisation, or within a cap on it.
 
 The limits at a cap are hard rows like any other, so both are one proof. Where a hand's own rows
 already contradict each other, or the wrench that it is given, the direction has no part for the

@@ -42,7 +42,7 @@ Number = TypeVar("Number", bound=np.generic)
 NOTHING, TOUCHING = 0, 1
 
 CONTACTS: Final = {"none": NOTHING, "face": TOUCHING, "edge": TOUCHING, "frame": 2, NAIL: 3}
-"""What of a tile touches the rock, by number: its face and its edge hold alike."""
+"""Codes of the contact states of a tile: its face and its edge hold alike."""
 
 NONE: Final = np.zeros(0, dtype=np.intp)
 """No rows."""

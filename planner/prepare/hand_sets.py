@@ -51,7 +51,7 @@ BALANCED: Final = 2e-8
 """Largest missing body wrench of a point that is exact, relative, per `WRENCH_UNIT`."""
 
 UNBROKEN: Final = 1e-8
-"""By how much hard rows of an exact point may be broken, in `stance_data.LOAD_UNIT`."""
+"""Tolerance of the hard rows of an exact point, in `stance_data.LOAD_UNIT`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +246,7 @@ class HandSets:
         return whole, part._replace(rest=np.zeros(len(part.rest)))
 
     def goal(self, factor: float) -> Array:
-        """Return what the balance is to give for so many times the body wrench, shape (nb,)."""
+        """Return the balance's right-hand side for a multiple of the body wrench, shape (nb,)."""
         if factor == 1.0:
             return self.wrench
         return np.concatenate([factor * self.wrench[:6], self.wrench[6:]])

@@ -23,10 +23,10 @@ from planner.robots import UnreachableError, carriers, held_up, solve_limbs
 __all__ = ["Posture", "posture"]
 
 OFF: Final = 0.01
-"""How far a hand's pose may be from where its joints put it [m]."""
+"""Largest distance of a hand's pose from where its joints put it [m]."""
 
 TURNED: Final = 0.05
-"""How far its axes may be turned from those [rad]."""
+"""Largest angle of a hand's axes from those that its joints give [rad]."""
 
 EXACT: Final = 5e-6
 """Up to so far [m], and so much turned [rad], joints that were found put a hand at its pose."""

@@ -63,10 +63,10 @@ STATUS: Final = {
 FAILED: Final = "solver_error"
 
 PRESENT: Final = ("optimal", "optimal_inaccurate")
-"""With a solution."""
+"""Statuses with a solution."""
 
 PROVEN: Final = ("infeasible", "infeasible_inaccurate")
-"""With multipliers that say why there is none."""
+"""Statuses with multipliers that prove that there is no solution."""
 
 UNBOUNDED: Final = ("unbounded", "unbounded_inaccurate")
 

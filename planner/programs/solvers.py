@@ -40,10 +40,10 @@ __all__ = [
 ]
 
 SLACK: Final = 1e-6
-"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
+"""Utilisation that the tie-break may give away above the least; also its tolerance at a cap."""
 
 SHARP_SLACK: Final = 1e-9
-"""The same where the least utilisation has all its digits."""
+"""Utilisation that it may give away where the least one has all its digits."""
 
 
 _PLANS = resources.files("planner.parameters").joinpath("plans.toml")

@@ -199,8 +199,8 @@ WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
 
 ROUNDING: Final = 1e-14
-"""What of a scaled entry is left of others that cancel: a zero. A solver is set up for where zeros
-are, and that must not hang on rounding."""
+"""Scaled entry that counts as zero, left where others cancel. A solver is set up for the places of
+zeros, which must not depend on rounding."""
 
 
 class HandData(NamedTuple):

@@ -52,7 +52,7 @@ SETTINGS: Final[dict[str, Any]] = {
 """One physical scaling instead of equilibration, and no refinement of solutions that are good."""
 
 SHARP: Final[dict[str, Any]] = {**SETTINGS, "tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11}
-"""Where a small term of the objective decides."""
+"""Settings for programs where a small term of the objective decides."""
 
 REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": True}
 """For a second try."""
@@ -68,7 +68,7 @@ VERTEX: Final[dict[str, Any]] = {
         "dual_feasibility_tolerance": 1e-10,
     },
 }
-"""Of linear programs, where every row needs its own digits: the dual simplex method."""
+"""Settings for linear programs whose rows all need their digits: the dual simplex method."""
 
 _cvxpy = threading.Lock()
 """CVXPY counts its variables for all threads, and loses count where two define at a time."""

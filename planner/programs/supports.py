@@ -23,7 +23,7 @@ OPTIONS: Final[dict[str, Any]] = {
 
 
 class SilentHighs(highspy.Highs):
-    """A solver that says nothing, not even its name when it begins.
+    """HiGHS without output, its banner included.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class SilentHighs(highspy.Highs):
             self.setOptionValue(name, value)
 
     def optimal(self) -> bool:
-        """Solve the program, and return whether it says that it has."""
+        """Solve the program, and return whether the solver reports an optimum."""
         self.run()
         return bool(self.getModelStatus() == highspy.HighsModelStatus.kOptimal)
 

@@ -32,7 +32,7 @@ class OwnObjective(Protocol):
 
 
 MOST_DRAWS: Final = 100
-"""Of a caller's own: each costs a plan and a load factor."""
+"""Largest number of a caller's own samples: each costs a plan and a load factor."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,8 +85,8 @@ class Price(LimitName, frozen=True, kw_only=True):
 
 
 LoadFactorStatus = Literal["found", "at_least", "unbounded", "none", "not_asked", "not_finished"]
-"""What is known of a load factor: it is there, or that it is no less; no multiple of the body
-wrench is too much, or none can be held; it was not asked for, or a deadline came before."""
+"""Status of a load factor: it is there, or that it is no less; no multiple of the body wrench is
+too much, or none can be held; it was not asked for, or a deadline came before."""
 
 
 class LoadFactor(NamedTuple):

@@ -19,7 +19,7 @@ MANY: Final = 20
 """Samples from which on 5 % are one or more; of fewer the extremes and the median are reported."""
 
 VARIES: Final = 1e-4
-"""How far numbers must differ, over the largest, to differ at all: less is the solver's."""
+"""Least difference of numbers that counts, over the largest: less is the solver's error."""
 
 FEWEST: Final = 3
 """Load factors of which a correlation says anything."""

@@ -30,7 +30,7 @@ PLACEHOLDER: Final = 1e3
 [N·m, N]."""
 
 ON_AXIS: Final = 1e-9
-"""How far from a joint's axis the next joint may be and still count as on it [m]."""
+"""Distance from a joint's axis up to which the next joint counts as on it [m]."""
 
 
 @dataclass(frozen=True, eq=False)

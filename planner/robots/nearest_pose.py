@@ -27,7 +27,7 @@ DAMPED: Final = 8
 """Steps that bring them nearer."""
 
 STARTS: Final = 8
-"""So many of them, the nearest, are followed to the end."""
+"""Number of these postures, the nearest, that are followed to the end."""
 
 FEW_STARTS: Final = 4
 """Number of starts from which a missing distance is sought, which is only reported."""
@@ -39,7 +39,7 @@ CONVERGED: Final = 1e-10
 """Change of what is least, after which a start has been followed to its end."""
 
 FIRST: Final = 300.0
-"""How much heavier what comes first counts than what comes second."""
+"""Weight of the quantity that is least first, over that of the second."""
 
 PLACED: Final = 1e-3
 """Distance up to which a hand counts as in its place [m]."""

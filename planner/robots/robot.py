@@ -35,11 +35,10 @@ __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
 
 
 Angles = Mapping[str, Array] | Mapping[str, Sequence[float]]
-"""Of limbs' joints, by limb [rad]."""
+"""Angles of limbs' joints, by limb [rad]."""
 
 BEYOND: Final = 1e-6
-"""How far an angle may be beyond its joint's limit [rad, or m]: what is left of it in seven
-digits."""
+"""Tolerance of an angle beyond its joint's limit [rad, or m]: the rounding of seven digits."""
 
 
 class Statics(NamedTuple):

@@ -26,7 +26,7 @@ from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 __all__ = ["STRONGEST", "Mount", "RobotDescription", "RobotFile", "section_table"]
 
 NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
-"""What a robot and a limb may be called: their names are part of keys."""
+"""Pattern of the names of a robot and of its limbs: they are part of keys."""
 
 TEXTS: Final = ("name", "urdf", "body")
 """Entries of the file that are plain text."""

@@ -36,7 +36,7 @@ WIDEST: Final = 100.0
 """Largest angle that is taken for one [rad]."""
 
 NEGATIVE: Final = 1e-9
-"""How far below zero rounding may put a principal moment, over the largest."""
+"""Tolerance of a principal moment below zero, over the largest, for rounding."""
 
 NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 """A number of XML: what Pinocchio reads otherwise, as `1_0`, would be a link without mass there."""
@@ -45,10 +45,10 @@ STEEPEST: Final = 1e3
 """Largest multiplier of a coupled joint that is taken for one."""
 
 UNITS: Final = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "value"): "kg"}
-"""Of attributes of elements."""
+"""Units of attributes of elements."""
 
 XACRO: Final = "/xacro"
-"""What the namespace of xacro ends with."""
+"""End of the namespace of xacro."""
 
 EXPAND: Final = (
     "this is a xacro, which is not expanded; expand it: xacro ROBOT.urdf.xacro > ROBOT.urdf "

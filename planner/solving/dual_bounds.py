@@ -20,13 +20,13 @@ __all__ = [
 ]
 
 OPTIMAL: Final = 1e-5
-"""How far, relatively, the utilisation may be above its proven lower bound."""
+"""Largest relative gap of the utilisation to its proven lower bound."""
 
 ROUNDED: Final = 1e-9
-"""What rounding may add to a bound, relative."""
+"""Relative rounding error of a bound."""
 
 STATIONARY: Final = 1e-5
-"""How far multipliers may be from stationary, and below zero, to count as a bound."""
+"""Tolerance of multipliers from stationary, and below zero, to count as a bound."""
 
 
 def is_least(value: float, bound: float) -> bool:

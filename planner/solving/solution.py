@@ -158,7 +158,7 @@ class Verified:
 
 
 Answer = Verified | Failed | Infeasible
-"""What a question comes to."""
+"""Outcome of a question."""
 
 
 def load_factor_of(

@@ -39,7 +39,7 @@ from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 __all__ = ["LeastUtilisation", "active_set_optimum", "least_utilisation"]
 
 SURE: Final = (1e-6, 1.0)
-"""How many times a row's multiplier may be less than its room for the row to be active at first."""
+"""Least ratios of a row's multiplier to its slack at which the row is active at first."""
 
 ROUNDS: Final = 12
 """Sets of active rows that are tried at most."""
@@ -48,7 +48,7 @@ LARGE: Final = 64
 """Loads of a stance up to which so many systems are worth it: fewer for more, by their cube."""
 
 FREE: Final = 1e-6
-"""How much more than one the multipliers of limits add up to where u is not free."""
+"""Excess over one of the sum of the limits' multipliers where u is not free."""
 
 
 class LeastUtilisation(NamedTuple):
@@ -186,7 +186,7 @@ def _meant(
     closing: Sequence[float],
     near: Outcome | None = None,
 ) -> LeastUtilisation:
-    """Return what is meant, from the exact least utilisation; ``near`` as of another wrench."""
+    """Return the plan that is meant, from the exact least one; ``near`` as of another wrench."""
     trade = tension_trade(exact.outcome.value, cap)
     spare = spare_hands(data, exact.outcome, trade)
     if spare:
