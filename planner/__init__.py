@@ -1,4 +1,4 @@
-"""Many hands, one body: who carries what.
+"""Plan the loads of many hands that hold one body.
 
 stance + question → WrenchSpace of every hand → conic program → solution → verified Plan.
 

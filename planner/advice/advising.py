@@ -1,4 +1,4 @@
-"""What would make a stance hold: changes of one thing, of more if none does, in their order."""
+"""Suggest changes that would make a stance hold: single ones, several together if none does."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from planner.result import Advice
 __all__ = ["advise"]
 
 MOST: Final = 10
-"""Advice that is told."""
+"""Largest number of advices that are returned."""
 
 WORTH: Final = 0.01
-"""By how much an advice lowers the utilisation at least, relative."""
+"""Least relative decrease of the utilisation by an advice."""
 
 STRENGTH: Final = 14
 """Plans for stronger holds, at most."""
 
 SPARE: Final = 5
-"""The same where combinations are tried, too."""
+"""Plans for stronger holds where combinations are tried, too, at most."""
 
 MASS: Final = 5
 """Plans for a lighter body, at most."""
@@ -39,7 +39,7 @@ MANY: Final = ("pair", "combination")
 """Kinds of several changes together."""
 
 WORST: Final = 5.0
-"""Utilisation below which a change is told that does not make the stance hold."""
+"""Utilisation below which a change is returned that does not make the stance hold."""
 
 NEAR: Final = 2.5
 """Utilisation up to which small changes of every hand are tried."""
@@ -65,14 +65,14 @@ def advise(
     whole : bool
         Whether there was time to try all.
     """
-    # what costs least effort is planned again for what is told
+    # changes that are returned are planned again for least effort, where that is the objective
     plain = question.bare()
     again = question.objective != plain.objective
     try:
         trials = Trials(plain, attempt, plans - MOST - 1 if again else plans)
     except DeadlineError:
         return (), False
-    whole, told = True, []
+    whole, advices = True, []
     try:
         _try_all(trials)
     except DeadlineError:
@@ -83,10 +83,10 @@ def advise(
             trial = trials.again(tried.question, question.objective) if again else tried.trial
             # what costs least effort may use more than it has to, or have no plan that passes
             if trial.utilisation < known.utilisation:
-                told.append(_told(trials, tried.change, trial))
+                advices.append(_advice(trials, tried.change, trial))
     except DeadlineError:
         whole = False
-    return tuple(told), whole
+    return tuple(advices), whole
 
 
 def _try_all(trials: Trials) -> None:
@@ -130,14 +130,14 @@ def _ranked(trials: Trials) -> list[Tried]:
         does = not holds and trials.holds(tried.utilisation)
         return not does, tried.change.size if does else -gain / max(tried.change.size, SLACK)
 
-    def told(tried: Tried) -> bool:
+    def worthwhile(tried: Tried) -> bool:
         # on its way to one that holds the search tries others
         found = not trials.helped or trials.holds(tried.utilisation)
         enough = tried.utilisation < min((1.0 - WORTH) * base, WORST)
         return enough and (found or tried.change.kind not in MANY)
 
     found, seen = [], set()
-    for tried in sorted(filter(told, trials.found), key=rank):
+    for tried in sorted(filter(worthwhile, trials.found), key=rank):
         change = tried.change
         alike = (
             change.kind,
@@ -150,8 +150,8 @@ def _ranked(trials: Trials) -> list[Tried]:
     return found
 
 
-def _told(trials: Trials, change: Change, trial: Trial) -> Advice:
-    """Return a change, and what came of it, as an advice."""
+def _advice(trials: Trials, change: Change, trial: Trial) -> Advice:
+    """Return a change and its trial as an advice."""
     holds, factor = trials.holds(trial.utilisation), trial.load_factor()
     return Advice(
         kind=change.kind,

@@ -1,4 +1,4 @@
-"""Where the body had better be: shifts of it while its hands stay, by cutting planes.
+"""Search for a better place of the body, its hands staying, by cutting planes.
 
 The hands stay in W, and a shift d of the body, in B's axes, carries its centre of mass along: what
 is needed of the hands is the same force f and, about the point where B's origin was, the moment
@@ -10,7 +10,7 @@ multipliers ν of the balance give a slope of it: u(d') ≥ u(d) + (f × ν_m)·
 a shift is a cut (Kelley 1960), and a small linear program over all cuts says where to look next,
 and how low u can still be. A tilt about the centre of mass leaves force and moment as they are: it
 changes how far the limbs reach, and what their joints bear. With joints, whose angles follow the
-body, the slope is that of the joints as they are; what is told is planned with joints of its own.
+body, the slope is that of the joints as they are; a shift that is returned is planned with its own.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ ROUNDS: Final = 14
 """Plans of a search for the best shift, at most."""
 
 CLOSE: Final = 2e-3
-"""How far, relatively, the best utilisation found may be above the least there can be."""
+"""Relative gap of the best utilisation found to its lower bound at which the search ends."""
 
 LEAST: Final = 1e-3
 """Shift that counts as one [m]."""
 
 CLEAR: Final = 0.15
-"""How near B's origin may come to the plane of a palm, where it is not nearer already [m]."""
+"""Least distance of B's origin from the plane of a palm, where it is not nearer already [m]."""
 
 REACHED: Final = 1e-6
-"""How far beyond its reach a limb may be, relative."""
+"""Tolerance of a limb's reach, relative."""
 
 TANGENTS: Final = 30
 """Planes that stand for the limbs' reaches in one step, at most."""
@@ -61,11 +61,11 @@ TILT_UNIT: Final = 0.2
 AXES: Final = "xyz"
 
 STEPS: Final = 7
-"""Of a grid of shifts, along each axis."""
+"""Steps of a grid of shifts, along each axis."""
 
 
 def can_move(prepared: PreparedStance) -> bool:
-    """Whether the body's place says what the hands are to give."""
+    """Return whether the load on the hands depends on the body's place."""
     question = prepared.question
     return question.body_wrench is None and float(np.abs(prepared.wrench[:3]).max()) > 0.0
 
@@ -311,9 +311,9 @@ class BodySearch:
 
     def _words(self, shift: Array, tilt: _Tilt) -> Iterator[str]:
         along = self.stance.body.rotation @ shift
-        told = ", ".join(f"{value:z.3f}" for value in along)
+        values = ", ".join(f"{value:z.3f}" for value in along)
         if shift.any():
-            yield f"shift the body by [{told}] m in W"
+            yield f"shift the body by [{values}] m in W"
         if tilt.angle:
             whom = "it" if shift.any() else "the body"
             yield (

@@ -21,7 +21,7 @@ HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
 """The path of a hand of a question, or of one of its fields."""
 
 BY_LIMB: Final = re.compile(r"(present|limits\.per_hand)\.(.+)")
-"""What a question says of hands beside its stance."""
+"""Fields of a question about hands outside its stance."""
 
 
 class Change(NamedTuple):

@@ -1,14 +1,15 @@
-"""Which changes of several hands and of the body together would make a stance hold.
+"""Search for changes of several hands and of the body that together make a stance hold.
 
 With the hands' sets at the utilisation that is asked for, a stance holds where its hands can give
 as much as is needed in all directions d of body wrenches (Farkas):
 
     Σ_h s_h(d) ≥ d·W,   s_h(d) = max { d·w : w of hand h }.
 
-A plan that does not hold tells a direction in which most is missing, by the multipliers of its
-balance. What a changed hand can give there is known before anything is planned, and so is what a
-shift of the body needs; so by the directions found so far one variant of each hand, and a shift, is
-chosen that may hold, and what their plan says is one direction more (as Benders' cuts, 1962).
+The multipliers of the balance of a plan that does not hold give a direction in which most is
+missing. What a changed hand can give in a direction is known without a plan, and so is what a shift
+of the body needs. So one variant of each hand, and a shift, are chosen that may hold by the
+directions found so far; if their plan does not hold, it gives one direction more (as Benders' cuts,
+1962).
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ __all__ = ["Choice", "CombinationSearch"]
 Mask = npt.NDArray[np.bool_]
 
 DIGITS: Final = 6
-"""Of what choices are worth: what rounding errors add decides nothing."""
+"""Digits of the worth of choices: rounding errors decide nothing."""
 
 ENOUGH: Final = 1.5
 """Part of what is needed beyond which a choice is no better."""
@@ -69,7 +70,7 @@ STARTS: Final = 8
 """Choices that are begun at besides what is near."""
 
 SEED: Final = 0
-"""Of these."""
+"""Seed of these random choices."""
 
 
 class _Variant(NamedTuple):
@@ -246,7 +247,7 @@ class CombinationSearch:
         return slot[np.argsort(-worth, kind="stable")[:FEW]]
 
     def learn(self, trial: Trial, shift: int) -> None:
-        """Keep the direction in which a plan tells that most is missing, if it does."""
+        """Keep the direction in which most is missing by a plan's multipliers, if there is one."""
         found = direction(trial)
         needs = 0.0 if found is None else float(found @ trial.prepared.wrench)
         if found is None or not needs > 0.0:

@@ -1,4 +1,4 @@
-"""What may be done about the hands of a stance, its rock staying where it is in W."""
+"""Propose changes of the hands of a stance, whose rock stays where it is in W."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ ALIKE: Final = 0.05
 """Turns of outer fingers that are the same grasp [rad]."""
 
 TURNS: Final = tuple((0.0, 0.0, math.radians(turn)) for turn in (30.0, -30.0, 60.0, -60.0))
-"""How far a hand is turned about z of its palm [m, m, rad]."""
+"""Turns of a hand about z of its palm [m, m, rad]."""
 
 AROUND: Final = tuple(
     (0.0, 0.0, math.radians(turn))
     for turn in (30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180)
 )
-"""The same all around."""
+"""Turns of a hand all around."""
 
 WAYS: Final = ((0.02, 0.0, 0.0), (-0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, -0.02, 0.0))
-"""How far it is moved along x and y of its palm [m, m, rad]."""
+"""Displacements of a hand along x and y of its palm [m, m, rad]."""
 
 WAY_UNIT: Final = 0.02
 """Way of a hand of size 1 [m]."""
@@ -67,7 +67,7 @@ HAND: Final = 2.0
 """Size of a hand more or less."""
 
 MOVED: Final = 1e-3
-"""Way of a hand that is told [m]."""
+"""Least displacement of a hand that is reported [m]."""
 
 
 def lettings(question: Question) -> Iterator[Change]:
@@ -171,16 +171,16 @@ def placed(
         changes = _moved(prepared, index, hand.pose @ motion)
         if changes is None:
             return
-        told = []
+        words = []
         if x or y:
-            told.append(
+            words.append(
                 f"move {hand.limb} by [{1e3 * x:z.0f}, {1e3 * y:z.0f}] mm along x and y of its H"
             )
         if turn:
-            whom = "it" if told else hand.limb
-            told.append(f"turn {whom} by {math.degrees(turn):.0f}° about z of its H")
+            whom = "it" if words else hand.limb
+            words.append(f"turn {whom} by {math.degrees(turn):.0f}° about z of its H")
         size = math.hypot(x, y) / WAY_UNIT + abs(turn) / TURN_UNIT
-        yield Change("place", (hand.limb,), " and ".join(told), changes, size)
+        yield Change("place", (hand.limb,), " and ".join(words), changes, size)
 
 
 def _moved(

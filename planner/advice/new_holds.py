@@ -1,4 +1,4 @@
-"""Where a limb had better take hold that holds nothing, or something else: if rock is there.
+"""Search for new holds of limbs, free ones first, on condition that there is rock.
 
 The rock is like that under a hand of the stance, and lies in the hand alike. A rock that hands
 share stands in W once, so that no hold is like one on it. Places are on a plane through the hands,
@@ -26,7 +26,7 @@ NORMAL: Final = 0.3
 """Least length of the mean of palms' axes for hands to have a plane."""
 
 IN_REACH: Final = 0.95
-"""Of a limb's reach, that a new hold may ask for."""
+"""Share of a limb's reach that a new hold may ask for."""
 
 APART: Final = 0.25
 """Least distance of a new hold from other hands [m]."""
@@ -35,13 +35,13 @@ GRID: Final = (0.0, -0.6, 0.6)
 """Places along either axis, in shares of what the limb reaches on the plane."""
 
 QUARTERS: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
-"""How a new hand is turned first from the one that it is like [rad]."""
+"""First turns of a new hand from the one that it is like [rad]."""
 
 AROUND: Final = tuple(math.radians(turn) for turn in range(-135, 181, 45))
 """All around [rad]."""
 
 BETWEEN: Final = math.pi / 4.0
-"""By how much more, after that [rad]."""
+"""Further turn, tried after that [rad]."""
 
 
 SAME: Final = 1e-6
@@ -159,13 +159,13 @@ class NewHold:
         )
 
     def _words(self, like: str, hold: _Hold) -> str:
-        told = ", ".join(f"{value:z.3f}" for value in hold.place)
+        at = ", ".join(f"{value:z.3f}" for value in hold.place)
         degrees = round(math.degrees(math.remainder(hold.turn, 2.0 * math.pi)))
         turned = f"{degrees}° about its palm's z from {like}" if degrees else f"as {like} is"
         if hold.grasp is not None:
             turned += f", with {fingers(hold.grasp)}"
         return (
-            f"put {self.limb} at [{told}] m in W, turned {turned}, on condition that there is rock "
+            f"put {self.limb} at [{at}] m in W, turned {turned}, on condition that there is rock "
             f"as under {like}"
         )
 

@@ -1,4 +1,4 @@
-"""How much stronger holds would have to be, and how much lighter the body."""
+"""Find how much stronger holds, or how much lighter a body, make a stance hold."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from planner.question import HandOnHold
 __all__ = ["lighter", "stronger"]
 
 STRONGEST: Final = 4.0
-"""How many times as strong holds become at most."""
+"""Largest factor of a hold's strength."""
 
 STEP: Final = 0.01
-"""To which that is told."""
+"""Resolution of the factor by which holds are stronger."""
 
 ROUNDS: Final = 4
 """Plans with which it is found, at most."""
@@ -26,10 +26,10 @@ UNIT: Final = math.log(1.1)
 """Logarithm of size 1."""
 
 LIGHTEST: Final = 1e-2
-"""Least share of the mass that is worth telling."""
+"""Least share of the mass that is reported."""
 
 WITHIN: Final = 1e-4
-"""By how much the mass that is told is less than the largest, relative."""
+"""Relative difference of the reported mass from the largest, which it stays below."""
 
 
 def stronger(trials: Trials, order: Sequence[int], most: int) -> None:

@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 PLANS: Final = 100
-"""That are made for the advice about a question."""
+"""Plans that are made for the advice about a question, at most."""
 
 WITHOUT: Final = ("mass", "strength")
 """Kinds that do not count as help, nor as part of a pair: the task becomes another."""
@@ -42,21 +42,21 @@ WORSE: Final = 1e-3
 """By how much what is odd may grow: metres, or without a unit."""
 
 TRIED: Final = "all changes were tried"
-"""What a deadline came before."""
+"""Words for the work that a deadline leaves unfinished."""
 
 
 class Trial(NamedTuple):
-    """What came of a stance that was tried.
+    """Result of a stance that was tried.
 
     Attributes
     ----------
     prepared : PreparedStance
     data : StanceData
-        Of its hands, about its plan.
+        Data of its hands, about its plan.
     outcome : Outcome
-        Of the program of least utilisation.
+        Outcome of the program of least utilisation.
     utilisation : float
-        The largest of the verified plan; infinite without one.
+        Utilisation of the verified plan; infinite without one.
     load_factor : callable
         Finds how many times the body wrench could be held.
     """
@@ -77,11 +77,11 @@ class Attempt(Protocol):
         idle: Sequence[LimitUse] | None = None,
         near: Any | None = None,
     ) -> Trial:
-        """Return what came of a stance."""
+        """Return the result of a stance."""
 
 
 class Tried(NamedTuple):
-    """A change, and what came of it."""
+    """Change of a question, with the result of its stance."""
 
     change: Change
     question: Question
@@ -89,7 +89,7 @@ class Tried(NamedTuple):
 
     @property
     def utilisation(self) -> float:
-        """The largest; infinite without a plan."""
+        """Utilisation of its plan; infinite without a plan."""
         return self.trial.utilisation
 
 
@@ -129,12 +129,12 @@ class Trials:
         self._odd = _odd(self.base.prepared)
 
     def holds(self, utilisation: float) -> bool:
-        """Whether that is within the cap that was asked for."""
+        """Return whether a utilisation is within the question's cap."""
         return utilisation <= self.question.limits.utilisation + SLACK
 
     @property
     def helped(self) -> bool:
-        """Whether some change makes it hold, not counting lighter bodies and stronger holds."""
+        """True if some change makes it hold, not counting lighter bodies and stronger holds."""
         return any(
             self.holds(each.utilisation) for each in self.found if each.change.kind not in WITHOUT
         )
@@ -155,7 +155,7 @@ class Trials:
         return None
 
     def possible(self, change: Change) -> bool:
-        """Whether a change can be planned with; no plan is made."""
+        """Return whether a change gives a stance that can be planned; no plan is made."""
         return any(self._prepared(question) for _, question in self._asked([change]))
 
     def _tried(self, change: Change, question: Question) -> Trial | None:

@@ -1,4 +1,4 @@
-"""Why, and why not: active limits, certificates, irreducible infeasible sets, sentences."""
+"""Explain answers: active limits, certificates, irreducible infeasible sets, sentences."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

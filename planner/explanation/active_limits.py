@@ -31,10 +31,10 @@ ALIKE: Final = 5
 """Decimals of multipliers by which limits are ranked; where these are alike, rows' order counts."""
 
 NO_WORTH: Final = (-math.inf, 0)
-"""Of limits that do not bind: less than any that does, and its place."""
+"""Rank of limits that do not bind: below any that binds, and a place."""
 
 UNITS: Final = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
-"""Of limits that are not in newtons."""
+"""Units of limits that are not in newtons."""
 
 
 def unit_of(limit: str) -> str:
@@ -48,7 +48,7 @@ def limit_name(limb: str, row: Row) -> LimitName:
 
 
 def joint_name(limb: str, joint: str, slides: bool) -> LimitName:
-    """Return the name of what a limb's joint bears; ``slides``: whether it is no turning one."""
+    """Return the name of the load of a limb's joint; ``slides``: whether the joint is prismatic."""
     return LimitName(limb, None, None, JOINT_FORCE if slides else JOINT_TORQUE, joint)
 
 
@@ -66,7 +66,7 @@ class LimitUse(NamedTuple):
 
 
 def close_to(utilisation: float) -> float:
-    """Return from which utilisation on a limit ties with those of which most is used."""
+    """Return the utilisation from which on a limit ties with the most used ones."""
     return utilisation - 2.0 * SLACK * max(1.0, utilisation)
 
 

@@ -1,4 +1,4 @@
-"""The proof that a body wrench cannot be had: at any utilisation, or within a cap on it.
+"""Prove that no loads give a body wrench: at any utilisation, or within a cap on it.
 
 The limits at a cap are hard rows like any other, so both are one proof. Where a hand's own rows
 already contradict each other, or the wrench that it is given, the direction has no part for the
@@ -242,7 +242,7 @@ def _contradiction(system: HardRowSystem, limbs: Sequence[str]) -> tuple[Array, 
 def _multipliers(
     system: HardRowSystem, outcome: Outcome, *, capped: bool
 ) -> tuple[Array, Array] | None:
-    """Return a unit d and λ as the multipliers of a program without a plan tell them.
+    """Return a unit d and λ from the multipliers of a program without a plan.
 
     Where d is next to none, rows contradict each other whatever the body needs.
     """

@@ -67,7 +67,7 @@ OPTIONS: Final[dict[str, float | str]] = {
     "primal_feasibility_tolerance": EXACT,
     "dual_feasibility_tolerance": EXACT,
 }
-"""Of HiGHS. To presolve would be to forget where it was; the rows have their physical scaling."""
+"""Options of HiGHS. Presolving would lose the basis; the rows have their physical scaling."""
 
 
 class Multipliers(NamedTuple):
@@ -180,7 +180,7 @@ class FarkasProgram:
         return Multipliers(gain, direction, np.maximum(x[2 * nb : 2 * nb + len(self.h)], 0.0))
 
     def _change(self, costs: Array, most: Array, parts: Array) -> None:
-        """Tell the solver what is different of costs, bounds from above, and right-hand sides."""
+        """Pass the costs, bounds from above and right-hand sides that differ to the solver."""
         solver = self._solver
         places = (costs != self._costs).nonzero()[0].astype(np.int32)
         if len(places):
@@ -284,7 +284,7 @@ class HardRowSystem:
         return gain / leak if leak > 0.0 else math.inf
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
-        """Return what multipliers weigh each constraint with, those that count alone."""
+        """Return the weights of constraints by their multipliers, those that count alone."""
         shares = np.append(multipliers, np.abs(direction[BODY:]))
         weights = np.bincount(self.owners, shares, len(self.constraints)).tolist()
         pairs = zip(self.constraints, weights, strict=True)

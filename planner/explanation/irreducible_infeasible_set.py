@@ -52,7 +52,7 @@ def balance_alone(system: HardRowSystem) -> bool:
 def irreducible_set(
     system: HardRowSystem, suspects: Collection[LimitName]
 ) -> tuple[LimitName, ...] | None:
-    """Return constraints that with the balance have no loads, and all of which it takes for that.
+    """Return constraints that have no loads with the balance, and none of which can be left out.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ there, and its length is one linear program,
 
     max s   with tensions  planned + s (present − planned)   in the balance    (`program.Reach`),
 
-whose multipliers tell what ends it.
+whose multipliers show what ends it.
 
 Hands with floating wrists stay as planned: their sets hold about that only.
 """
@@ -39,7 +39,7 @@ TENSIONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
 """Columns of a hand with a fixed wrist."""
 
 UNKNOWN: Final = "whether the straight way from the present tensions is safe was not found out"
-"""Of a way about which the solver gave no answer that passes the check."""
+"""Warning for a way for which the solver gave no answer that passes the check."""
 
 ENDS: Final = 1e-3
 """Multipliers below this part of the largest do not count as an end of the way."""
@@ -55,7 +55,7 @@ def tension_path(
     loads: Sequence[Array],
     idle: Sequence[LimitUse] = (),
 ) -> TensionPath | None:
-    """Return how safe the way is from a question's present tensions to a plan.
+    """Return the safety of the way from a question's present tensions to a plan.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def tension_path(
 
 
 def unsafe_sentence(path: TensionPath) -> str:
-    """Say how much of a way that is not safe is, in full per cent, and what ends that part."""
+    """Say how much of an unsafe way is safe, in full per cent, and what ends that part."""
     part = math.floor(100.0 * path.safe_part)
     much = f"only the last {part} %" if part > 0 else "no part"
     sentence = f"{much} of the straight way from the present tensions is safe"

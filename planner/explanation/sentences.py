@@ -29,10 +29,10 @@ __all__ = [
 ]
 
 NOTABLE: Final = 0.3
-"""Components of what is missing are told from this part of the largest on."""
+"""Least component of a missing wrench that is named, relative to the largest."""
 
 FOREMOST: Final = 2
-"""So many of the constraints that leave no loads are told; the rest are counted."""
+"""Number of constraints in the way that are named; the rest are counted."""
 
 MANNERS: Final = {
     "shear": " in shear",
@@ -45,7 +45,7 @@ MANNERS: Final = {
     "fingertip_force": " in pressing",
     FORCE_CAP: " allowed",
 }
-"""How a limit is loaded."""
+"""Words for the load of a limit."""
 
 BEARERS: Final = {
     "motor_torque": "motor",
@@ -53,7 +53,7 @@ BEARERS: Final = {
     "finger_shear": "tiles",
     "finger_lateral": "tiles",
 }
-"""What of a finger a limit is about; its tendon by default."""
+"""Part of a finger that a limit is about; its tendon by default."""
 
 WHOLES: Final = {
     HAND_LOAD: "the hand",
@@ -63,7 +63,7 @@ WHOLES: Final = {
     JOINT_FORCE: "its joints",
     "wrist_range": "the wrist",
 }
-"""What of a hand or its limb a limit is about; its palm by default."""
+"""Part of a hand or its limb that a limit is about; its palm by default."""
 
 AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
 """Components of a body wrench."""
@@ -78,7 +78,7 @@ VERBS: Final = {
     JOINT_TORQUE: ("bears", "bear"),
     JOINT_FORCE: ("bears", "bear"),
 }
-"""What is done to a limit: it does, it would do; `CARRIES` by default."""
+"""Verbs of a limit: it does, it would do; `CARRIES` by default."""
 
 CARRIES: Final = ("carries", "carry")
 
@@ -98,23 +98,23 @@ BARRIERS: Final = {
     PASSIVE_JOINT: "has no motor and bears no torque",
     HELD_WRENCH: "must exert the wrench that it is given",
 }
-"""What a hard row or a cap forbids, or a given wrench demands."""
+"""Words for what a hard row or a cap forbids, or a given wrench demands."""
 
 
 UNPROVEN: Final = (
     "the floating wrists are where their hands' stiffness jumps or the search ended: the loads are "
     "exact, but that no other pose uses less is not proven"
 )
-"""Of a plan that its search could not prove to be the least."""
+"""Warning for a plan that its search could not prove to be the least."""
 
 
 LEAST_FACTOR: Final = (
     "the load factor is a lower bound: beyond it no plan was found, nor proven away"
 )
-"""Of a load factor that a search ends which found no plan, not a limit."""
+"""Warning for a load factor whose search ended for want of a plan, not at a limit."""
 
 NO_FACTOR: Final = "no load factor was found; with floating wrists that is no proof of none"
-"""Of a question for it that ends without one."""
+"""Warning for a search that ends without a load factor."""
 
 
 def _bearer(name: LimitName) -> str:
@@ -166,8 +166,8 @@ def _spoken_load(limit: str, load: float) -> str:
 def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
     """Say how much of a limit is used.
 
-    A tile's force is told with what the tile would hold in that direction, not with the distances
-    to its half-plane; the force that a hand holds likewise.
+    A tile's force is given with the force that the tile would hold in that direction, not with the
+    distances to its half-plane; the force of a hand likewise.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
         load, capacity = force, force * capacity / load
     carried, most = (_spoken_load(name.limit, value) for value in (load, capacity))
     if carried == most and not held:
-        # so near that only further digits tell
+        # so near that only further digits differ
         carried = f"{_spoken_load(name.limit, capacity)} and a little more"
     manner = MANNERS.get(name.limit, "")
     return f"{_spoken(name)} {_verb(name.limit, held)} {carried} of {most}{manner}"
@@ -284,12 +284,12 @@ def _missing(shortfall: Array) -> str:
 
 def blocking_sentence(names: Sequence[LimitName]) -> str:
     """Say what is in the way, the foremost first; a limb's name once in a row."""
-    told: list[str] = []
+    words: list[str] = []
     for i, name in enumerate(names[:FOREMOST]):
         sentence = f"{_spoken(name)} {_barrier(name.limit)}"
         again = i > 0 and names[i - 1].limb == name.limb
-        told.append(sentence.removeprefix(f"{name.limb}: ") if again else sentence)
-    more = len(names) - len(told)
+        words.append(sentence.removeprefix(f"{name.limb}: ") if again else sentence)
+    more = len(names) - len(words)
     if more:
-        told.append(f"and {more} more")
-    return ", ".join(told)
+        words.append(f"and {more} more")
+    return ", ".join(words)

@@ -33,10 +33,10 @@ vertical wall 0.12 m changed the load factor of four hands by a sixth."""
 
 
 FAR: Final = 5e-3
-"""How far a wrist may go from rest before a warning [m]."""
+"""Largest displacement of a wrist from rest without a warning [m]."""
 
 TURNED: Final = 50e-3
-"""How far it may turn before a warning [rad]."""
+"""Largest turn of a wrist from rest without a warning [rad]."""
 
 BACKWARDS: Final = 1e-3
 """Shear away from the finger's base that counts [N]."""

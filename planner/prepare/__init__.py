@@ -1,4 +1,4 @@
-"""From a question to all hands' sets and the programs' data."""
+"""Prepare a question: all hands' sets and the programs' data."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

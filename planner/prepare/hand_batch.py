@@ -42,7 +42,7 @@ Number = TypeVar("Number", bound=np.generic)
 NOTHING, TOUCHING = 0, 1
 
 CONTACTS: Final = {"none": NOTHING, "face": TOUCHING, "edge": TOUCHING, "frame": 2, NAIL: 3}
-"""What of a tile touches the rock, by number: its face and its edge hold alike."""
+"""Codes of the contact states of a tile: its face and its edge hold alike."""
 
 NONE: Final = np.zeros(0, dtype=np.intp)
 """No rows."""
@@ -53,12 +53,12 @@ UNLIMITED: Final = (math.inf, math.inf)
 
 @dataclass(frozen=True, eq=False)
 class TileIndex:
-    """Which tile is whose, by how many each hand has.
+    """Index of the tiles of all hands, by how many each hand has.
 
     Attributes
     ----------
     hand, finger : ndarray of int, shape (T,)
-        Of each tile, the fingers counted through all hands.
+        Hand and finger of each tile, the fingers counted through all hands.
     first : ndarray of int, shape (H,)
         Each hand's first tile.
     first_of_finger : ndarray of int, shape (F,)
@@ -122,12 +122,12 @@ def tile_index_of(counts: Sequence[int]) -> TileIndex:
 
 
 class ContactPattern(NamedTuple):
-    """What the tiles of some hands touch.
+    """Contact states of the tiles of some hands.
 
     Attributes
     ----------
     contacts : ndarray of int, shape (T,)
-        `CONTACTS`.
+        Codes of `CONTACTS`.
     touches, framed : ndarray, shape (T,)
         One for tiles on rock, zero for others; the same of those whose frame rests beside them.
     away : ndarray of bool, shape (T,)
@@ -148,7 +148,7 @@ class ContactPattern(NamedTuple):
 
 
 def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
-    """Return what hands with these tiles touch."""
+    """Return the contact states of hands with these tiles."""
     places = tile_index_of(tuple(map(len, hands)))
     contacts = np.array([CONTACTS[tile.contact] for hand in hands for tile in hand])
     away = contacts != TOUCHING
@@ -167,7 +167,7 @@ def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
 
 @dataclass(frozen=True, eq=False)
 class HandBatch:
-    """What the settled hands of a stance say, in arrays of all of them.
+    """Settled hands of a stance, in arrays over all of them.
 
     Attributes
     ----------
@@ -175,16 +175,16 @@ class HandBatch:
     places : TileIndex
     touch : ContactPattern
     points : ndarray, shape (T + H, 3)
-        Where all tiles are, then all palms.
+        Places of all tiles, then of all palms.
     axes : ndarray, shape (T, 3, 3)
     engagement, lateral_shares : ndarray, shape (T,)
         As of `SettledHand`.
     angles : ndarray, shape (F, 3)
-        Of each phalanx [rad].
+        Angle of each phalanx [rad].
     bends : ndarray, shape (F, 3)
-        Of each joint, relative to the phalanx before it [rad].
+        Angle of each joint, relative to the phalanx before it [rad].
     palm_limits : ndarray, shape (H, 2)
-        Of each palm's shear and pressing; infinite where it touches nothing [N].
+        Limits of each palm's shear and pressing; infinite where it touches nothing [N].
     """
 
     hands: tuple[SettledHand, ...]
@@ -200,7 +200,7 @@ class HandBatch:
 
     @classmethod
     def of(cls, hands: Sequence[SettledHand]) -> HandBatch:
-        """Return what settled hands say."""
+        """Return the arrays of settled hands."""
         tiles = tuple([hand.tiles for hand in hands])
         positions = [hand.positions for hand in hands]
         angles = concatenated([hand.postures.angles for hand in hands])
@@ -230,18 +230,18 @@ class HandBatch:
 
     @property
     def closing_tensions(self) -> tuple[float, ...]:
-        """With which the hands were closed [N]."""
+        """Closing tension of each hand [N]."""
         return tuple([hand.closing_tension for hand in self.hands])
 
     @property
     def friction(self) -> Array:
-        """Of each tile's surface, shape (T,)."""
+        """Friction coefficient of each tile's surface, shape (T,)."""
         each = np.array([hand.surface.friction for hand in self.hands])
         return each[self.places.hand]
 
     @property
     def stops(self) -> NDArray[np.int8]:
-        """Which of its limits each joint stands at, codes of `STOPS`, shape (F, 3)."""
+        """Limit that each joint stands at, codes of `STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])
 
 

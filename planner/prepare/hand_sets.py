@@ -51,12 +51,12 @@ BALANCED: Final = 2e-8
 """Largest missing body wrench of a point that is exact, relative, per `WRENCH_UNIT`."""
 
 UNBROKEN: Final = 1e-8
-"""By how much hard rows of an exact point may be broken, in `stance_data.LOAD_UNIT`."""
+"""Tolerance of the hard rows of an exact point, in `stance_data.LOAD_UNIT`."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearisationPoint:
-    """Where the hands' sets are linearised.
+    """Point about which the hands' sets are linearised.
 
     Attributes
     ----------
@@ -74,16 +74,16 @@ class LinearisationPoint:
 
 
 class ExactMeasure(NamedTuple):
-    """What the model says of a point: exact, the sets about it being so there.
+    """Exact values of the model at a point, where the sets about it are exact.
 
     Attributes
     ----------
     utilisation : float
-        The largest.
+        Largest utilisation.
     missing : float
         Sum of the components of the body wrench that are missing, scaled.
     broken : float
-        By how much hard rows are broken at most, scaled; not below zero.
+        Largest violation of a hard row, scaled; not below zero.
     effort : float
         What `programs.effort` makes least: the sum of squared relative tensions and joint torques,
         and of fixed hands a little of what makes their other loads unique.
@@ -95,7 +95,7 @@ class ExactMeasure(NamedTuple):
     effort: float
 
     def exact(self, hands: HandSets) -> bool:
-        """Whether nothing is missing, and nothing broken."""
+        """Return whether the body wrench is balanced and no hard row is broken."""
         size = max(1.0, float(np.linalg.norm(hands.wrench)))
         return self.missing <= BALANCED * size and self.broken <= UNBROKEN
 
@@ -119,7 +119,7 @@ class Sets(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """Whether every phalanx still finds its rock."""
+        """True if every phalanx still finds its rock."""
         return all(
             np.isfinite(hand.L).all() and np.isfinite(hand.G).all() for hand in self.data.hands
         )
@@ -246,7 +246,7 @@ class HandSets:
         return whole, part._replace(rest=np.zeros(len(part.rest)))
 
     def goal(self, factor: float) -> Array:
-        """Return what the balance is to give for so many times the body wrench, shape (nb,)."""
+        """Return the balance's right-hand side for a multiple of the body wrench, shape (nb,)."""
         if factor == 1.0:
             return self.wrench
         return np.concatenate([factor * self.wrench[:6], self.wrench[6:]])
@@ -281,7 +281,7 @@ class HandSets:
         return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
 
     def near_rest(self, point: LinearisationPoint) -> bool:
-        """Whether no wrist is farther from rest than a small twist."""
+        """Return whether no wrist is farther from rest than a small twist."""
         return self.step(self.at_rest(point.palms), point.loads) <= FARTHEST
 
     def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:

@@ -1,4 +1,4 @@
-"""Where the joints of a stance are, what they bear without hands, and what the robot weighs there.
+"""Find the joint angles of a stance, and the joint torques and the weight of the robot there.
 
 Angles are given, or found by inverse kinematics from the hands' poses; hands may be a little off
 these. Limbs without a hand or an angle are at zero, or the limit nearest to it. Torques and the
@@ -23,10 +23,10 @@ from planner.robots import UnreachableError, carriers, held_up, solve_limbs
 __all__ = ["Posture", "posture"]
 
 OFF: Final = 0.01
-"""How far a hand's pose may be from where its joints put it [m]."""
+"""Largest distance of a hand's pose from where its joints put it [m]."""
 
 TURNED: Final = 0.05
-"""How far its axes may be turned from those [rad]."""
+"""Largest angle of a hand's axes from those that its joints give [rad]."""
 
 EXACT: Final = 5e-6
 """Up to so far [m], and so much turned [rad], joints that were found put a hand at its pose."""

@@ -25,7 +25,7 @@ from planner.question import Question
 __all__ = ["NO_WRENCH", "PreparedStance", "assemble", "checked_question", "prepare_stance"]
 
 FREE: Final = np.zeros((0, 6))
-"""What is given of a hand's wrench where nothing is given of any."""
+"""Given components of a hand's wrench where none are given."""
 
 NO_WRENCH: Final = 1e-9
 """Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
@@ -79,7 +79,7 @@ class PreparedStance:
 
     @property
     def needs_hands(self) -> bool:
-        """Whether anything is asked of the hands."""
+        """True if the hands have a body wrench to give."""
         return bool(np.abs(self.hands.wrench[:6]).max() > NO_WRENCH)
 
     @property

@@ -61,7 +61,7 @@ CHANGE_ROWS: Final = tuple(
 
 
 class JointLoads(NamedTuple):
-    """What a limb's joints bear: ``gravity + Jᵀ w`` for the hand's wrench w on the rock, in H.
+    """Loads of a limb's joints: ``gravity + Jᵀ w`` for the hand's wrench w on the rock, in H.
 
     Torques [N·m] are forces [N] of joints that slide.
 
@@ -72,9 +72,9 @@ class JointLoads(NamedTuple):
     gravity : ndarray, shape (n,)
         Torque at no wrench, from gravity and the body's acceleration [N·m].
     jacobian : ndarray, shape (6, n)
-        Of H, in H.
+        Jacobian of H, in H.
     limits : ndarray, shape (n,)
-        [N·m]; zero of a joint without a motor.
+        Torque limits [N·m]; zero of a joint without a motor.
     """
 
     names: tuple[str, ...]
@@ -96,12 +96,12 @@ class JointLoads(NamedTuple):
 
     @property
     def driven(self) -> JointLoads:
-        """Those with a motor."""
+        """Loads of the joints with a motor."""
         return self.of(self.limits > 0.0)
 
     @property
     def passive(self) -> JointLoads:
-        """Those without one."""
+        """Loads of the joints without a motor."""
         return self.of(self.limits == 0.0)
 
     def torques(self, wrench: Array) -> Array:
@@ -111,7 +111,7 @@ class JointLoads(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StanceConstraints:
-    """What a stance adds to the set of one hand.
+    """Constraints that a stance adds to the set of one hand.
 
     Attributes
     ----------

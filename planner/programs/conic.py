@@ -63,10 +63,10 @@ STATUS: Final = {
 FAILED: Final = "solver_error"
 
 PRESENT: Final = ("optimal", "optimal_inaccurate")
-"""With a solution."""
+"""Statuses with a solution."""
 
 PROVEN: Final = ("infeasible", "infeasible_inaccurate")
-"""With multipliers that say why there is none."""
+"""Statuses with multipliers that prove that there is no solution."""
 
 UNBOUNDED: Final = ("unbounded", "unbounded_inaccurate")
 
@@ -139,7 +139,7 @@ class ConicProgram(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """How a program ended.
+    """Solution of a conic program, or the proof that there is none.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class Solution(NamedTuple):
     x : ndarray or None
         None where there is no solution.
     multipliers : ndarray or None
-        Of the rows; where the program is infeasible, the proof of it. None without any.
+        Multipliers of the rows; where the program is infeasible, the proof of it. None without any.
     """
 
     status: str
@@ -312,7 +312,7 @@ SOLVERS: Final = Solvers(KEPT)
 
 
 class Pattern(NamedTuple):
-    """What a solver is set up for.
+    """Pattern of the programs that a solver is set up for.
 
     Attributes
     ----------
@@ -320,7 +320,7 @@ class Pattern(NamedTuple):
     quadratic : bool
         Whether P is not zero.
     places : tuple of bytes
-        Where A is not zero.
+        Places where A is not zero.
     """
 
     rows: int
@@ -358,7 +358,7 @@ def _read(raw: Any) -> Solution:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """How a program ended.
+    """Outcome of a program of a stance: its loads, or the proof that there are none.
 
     Attributes
     ----------
@@ -389,11 +389,11 @@ class Outcome:
 
 
 LATE: Final = Outcome(False, OUT_OF_TIME, 0, math.nan)
-"""Of a program that there was no time for."""
+"""Outcome of a program that there was no time for."""
 
 
 class Reached(NamedTuple):
-    """How `Reach` ended, and the t it came to, shape (k,), NaN if it was not solved."""
+    """Outcome of `Reach`, and the t that it reached, shape (k,), NaN if it was not solved."""
 
     outcome: Outcome
     t: Array

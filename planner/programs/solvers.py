@@ -40,10 +40,10 @@ __all__ = [
 ]
 
 SLACK: Final = 1e-6
-"""What the tie-break may give away of the least utilisation; also its tolerance at a cap."""
+"""Utilisation that the tie-break may give away above the least; also its tolerance at a cap."""
 
 SHARP_SLACK: Final = 1e-9
-"""The same where the least utilisation has all its digits."""
+"""Utilisation that it may give away where the least one has all its digits."""
 
 
 _PLANS = resources.files("planner.parameters").joinpath("plans.toml")
@@ -57,7 +57,7 @@ WEIGHT: Final = _TABLE.positive("tension", "weight")
 
 
 class TensionTrade(NamedTuple):
-    """How much of the least utilisation u* a plan may give away for less tension.
+    """Utilisation above the least, u*, that a plan may give away for less tension.
 
     Least utilisation alone pulls a tendon to its strength for a ten-thousandth of it. So a plan is
     meant that minimises
@@ -76,7 +76,7 @@ class TensionTrade(NamedTuple):
     most : float
         Largest utilisation of the plan.
     whole : float
-        What is given away at most, far from the cap.
+        Largest utilisation that is given away, far from the cap.
     """
 
     weight: float
@@ -187,7 +187,7 @@ def nearest_body(data: StanceData) -> Outcome:
 
 
 def holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
-    """Whether loads y balance, and keep to hard rows and to limits at a cap, within `SLACK`."""
+    """Return whether loads y balance, and keep hard rows and limits at a cap, within `SLACK`."""
     error = np.abs(body_wrench(data, loads) - data.wrench).max()
     balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
     return balances and beyond(data, loads, cap) <= SLACK

@@ -65,7 +65,7 @@ KEPT: Final = 256
 
 
 class ScaledRows(NamedTuple):
-    """What a hand's set gives the programs wherever the hand is. Arrays are read-only.
+    """Scaled rows of a hand's set, the same wherever the hand is. Arrays are read-only.
 
     Attributes
     ----------
@@ -119,16 +119,16 @@ class ScaledRows(NamedTuple):
 
 
 class _Roles(NamedTuple):
-    """What a set's columns and rows are to the programs, by their names.
+    """Scales and weights of a set's columns and rows in the programs, by their names.
 
     Attributes
     ----------
     unit : ndarray, shape (m,)
-        Of the columns.
+        Units of the columns.
     scale : float or ndarray, shape (m,)
         The same; a number where all are alike.
     weight : ndarray, shape (m,)
-        In the tie-break, of loads that no capacity measures.
+        Weights in the tie-break, of loads that no capacity measures.
     other : ndarray, shape (m,)
         Zero for tensions, `LIGHT` for the others.
     measured, measures : ndarray of int
@@ -136,7 +136,7 @@ class _Roles(NamedTuple):
     forces : ndarray
         Roots of the weights of those columns by that capacity [N].
     over : ndarray, shape (nh,), or None
-        What hard rows are divided by; None where it is `LOAD_UNIT`, as the columns' unit is.
+        Divisors of the hard rows; None where it is `LOAD_UNIT`, as the columns' unit is.
     efforts : slice or ndarray of int
         Limit rows whose utilisation counts as effort.
     """
@@ -190,7 +190,7 @@ def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Role
 
 
 def is_effort(row: Row) -> bool:
-    """Whether a limit row's utilisation counts as effort: a torque's with one of its two signs."""
+    """Return whether a limit row counts as effort: a tension's, or a torque's of positive sign."""
     of_joint = row.limit in (JOINT_TORQUE, JOINT_FORCE)
     return row.limit == TENDON_TENSION or (of_joint and row.label.endswith("+"))
 
@@ -199,8 +199,8 @@ WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
 
 ROUNDING: Final = 1e-14
-"""What of a scaled entry is left of others that cancel: a zero. A solver is set up for where zeros
-are, and that must not hang on rounding."""
+"""Scaled entry that counts as zero, left where others cancel. A solver is set up for the places of
+zeros, which must not depend on rounding."""
 
 
 class HandData(NamedTuple):
@@ -368,7 +368,7 @@ class StanceData:
 
     @property
     def offset(self) -> Array:
-        """What the loads' part of the balance is to give, W − Σ g, shape (nb,)."""
+        """Right-hand side of the loads' part of the balance, W − Σ g, shape (nb,)."""
         return np.asarray(self.wrench - sum(hand.g for hand in self.hands))
 
     def capped(self, utilisation: float) -> StanceData:

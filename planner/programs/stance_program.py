@@ -1,4 +1,4 @@
-"""What all programs of a stance share: its rows, in CVXPY and as they are solved, and how.
+"""Base of all programs of a stance: its rows, in CVXPY and for the solver, and how it is solved.
 
 `StanceProgram.define` is the program, as mathematics; `StanceProgram.conic` is the same for the
 solver, block by block, which takes a fraction of the time. Where the solver comes to no end with
@@ -52,7 +52,7 @@ SETTINGS: Final[dict[str, Any]] = {
 """One physical scaling instead of equilibration, and no refinement of solutions that are good."""
 
 SHARP: Final[dict[str, Any]] = {**SETTINGS, "tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11}
-"""Where a small term of the objective decides."""
+"""Settings for programs where a small term of the objective decides."""
 
 REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": True}
 """For a second try."""
@@ -68,7 +68,7 @@ VERTEX: Final[dict[str, Any]] = {
         "dual_feasibility_tolerance": 1e-10,
     },
 }
-"""Of linear programs, where every row needs its own digits: the dual simplex method."""
+"""Settings for linear programs whose rows all need their digits: the dual simplex method."""
 
 _cvxpy = threading.Lock()
 """CVXPY counts its variables for all threads, and loses count where two define at a time."""
@@ -235,9 +235,9 @@ class StanceProgram(ABC):
         x = duals = None
         if status in PRESENT:
             x = np.concatenate([np.atleast_1d(variable.value) for variable in variables])
-        told = [row.dual_value for row in rows if row.size]
-        if status in (*PRESENT, *PROVEN) and all(each is not None for each in told):
-            duals = np.concatenate(told)
+        values = [row.dual_value for row in rows if row.size]
+        if status in (*PRESENT, *PROVEN) and all(each is not None for each in values):
+            duals = np.concatenate(values)
         if status == cp.USER_LIMIT and left is not None:
             status = OUT_OF_TIME
         value = math.nan if x is None else problem.value

@@ -1,4 +1,4 @@
-"""How far a hand's wrenches go in a direction, as one linear program that is kept for many."""
+"""Support function of a hand's wrench space, by one linear program kept for many directions."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ OPTIONS: Final[dict[str, Any]] = {
     "parallel": "off",
     "solver": "simplex",
 }
-"""Of HiGHS. To presolve would be to forget where it was."""
+"""Options of HiGHS. Presolving would lose the basis of the program before."""
 
 
 class SilentHighs(highspy.Highs):
-    """A solver that says nothing, not even its name when it begins.
+    """HiGHS without output, its banner included.
 
     Parameters
     ----------
     options : dict of str to any
-        Of HiGHS.
+        Options of HiGHS.
     """
 
     def __init__(self, options: dict[str, Any]) -> None:
@@ -38,12 +38,12 @@ class SilentHighs(highspy.Highs):
             self.setOptionValue(name, value)
 
     def optimal(self) -> bool:
-        """Solve the program, and return whether it says that it has."""
+        """Solve the program, and return whether the solver reports an optimum."""
         self.run()
         return bool(self.getModelStatus() == highspy.HighsModelStatus.kOptimal)
 
     def enableCallbacks(self) -> None:
-        """Be silent instead: it is here that it would tell its name."""
+        """Silence the solver, which prints its banner in here otherwise."""
         self.silent()
 
     def load(self, A: Array, columns: tuple[Array, Array], rows: tuple[Array, Array]) -> None:

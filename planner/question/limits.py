@@ -28,17 +28,17 @@ __all__ = [
 Objective = Literal["max_margin", "min_effort"]
 
 OBJECTIVES: Final = get_args(Objective)
-"""What a plan may be the best in."""
+"""Names of objectives of a plan."""
 
 Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
 
 WANTS: Final = get_args(Want)
-"""What may be wanted beside a plan."""
+"""Names of the extras beside a plan."""
 
 Frame = Literal["hand", "body", "world"]
 
 FRAMES: Final = get_args(Frame)
-"""In which frames a force may be capped."""
+"""Frames in which a force may be capped."""
 
 LEAST: Final = 1e-3
 """Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""

@@ -32,7 +32,7 @@ class OwnObjective(Protocol):
 
 
 MOST_DRAWS: Final = 100
-"""Of a caller's own: each costs a plan and a load factor."""
+"""Largest number of a caller's own samples: each costs a plan and a load factor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +58,9 @@ class Question:
     deadline : float, optional
         How long the answer may take [s]; as long as it takes by default.
     draws : tuple of Draw, optional
-        Over which the ``spread`` is told; those of ``draws.toml`` by default.
+        Samples of the ``spread``; those of ``draws.toml`` by default.
     explain : bool
-        Whether it is proven and told what keeps an overloaded or infeasible stance from a plan.
+        Whether it is proven and reported what keeps an overloaded or infeasible stance from a plan.
         That a plan is the least, and that there is none, is always checked.
     body_range : BodyRange
         How far the ``advice`` may move the body.

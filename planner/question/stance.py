@@ -29,25 +29,25 @@ __all__ = [
 WristMode = Literal["fixed", "floating"]
 
 WRISTS: Final = get_args(WristMode)
-"""How a wrist may be."""
+"""Modes of a wrist."""
 
 SOLVE: Final = "solve"
-"""Of joints: find them from the hands' poses."""
+"""Value of ``joints`` that finds them from the hands' poses."""
 
 EARTH: Final = (0.0, 0.0, -9.81)
 """Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
 
 FARTHEST: Final = 1e9
-"""How far from its parent's origin a frame may be [m]; farther, its digits are all lost."""
+"""Largest distance of a frame from its parent's origin [m]; farther, its digits are all lost."""
 
 HEAVIEST: Final = 1e12
 """Largest component of a body wrench that is taken for one [N, N·m]."""
 
 TOO_FAR: Final = 10.0
-"""How many times its limb's reach a hand may be from the body: beyond, the units are wrong."""
+"""Largest distance of a hand from the body, over its limb's reach: beyond, units are wrong."""
 
 ORTHONORMAL: Final = 1e-6
-"""How far the products of a pose's axes may be from those of orthonormal ones."""
+"""Tolerance of the products of a pose's axes, which are orthonormal."""
 
 
 def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
@@ -171,9 +171,9 @@ class HandOnHold:
     def _check_seat(self) -> None:
         known_choice(self.seat, SEATS, "seat")
         posed = self.hold_pose is not None or self.hold_in_hand is not None
-        told = {"seat": self.seat == "best", "at": self.at is not None}
+        given = {"seat": self.seat == "best", "at": self.at is not None}
         for name, left_out in (("seat", "the seat"), ("at", "where it is seated")):
-            if told[name] and posed:
+            if given[name] and posed:
                 raise InvalidInputError(
                     "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, "
                     f"or {left_out}",

@@ -42,7 +42,7 @@ class Advice(Struct, frozen=True):
     changes : dict of str to any
         Fields of the plan request by their paths, and their new values. Null takes a field away,
         and a hand. A hand whose value is the path of another one is new, and a copy of that one
-        but for what else is told of it. Hands are counted as in the question: new ones come
+        but for its other values in here. Hands are counted as in the question: new ones come
         first, hands are taken away last.
     size : float
         How large the change is: the body's shift over 0.1 m plus its tilt over 0.2 rad; a hand's

@@ -1,4 +1,4 @@
-"""Why there is no plan: one struct over the kind of its vectors and of the hands' sets.
+"""Certificate that there is no plan: one struct over the kind of its vectors and of hands' sets.
 
 In the planner these are arrays and wrench spaces, in a reply lists and what travels of a set.
 """

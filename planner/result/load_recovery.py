@@ -35,7 +35,7 @@ from planner.result.plain_parts import Palm
 __all__ = ["LoadRecovery", "recover_floating_hand"]
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
-"""Which way a palm shears and presses along x and z."""
+"""Signs of a palm's shear along x and its pressing along z."""
 
 COUNT: Final = len(FINGERS)
 

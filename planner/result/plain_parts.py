@@ -85,8 +85,8 @@ class Price(LimitName, frozen=True, kw_only=True):
 
 
 LoadFactorStatus = Literal["found", "at_least", "unbounded", "none", "not_asked", "not_finished"]
-"""What is known of a load factor: it is there, or that it is no less; no multiple of the body
-wrench is too much, or none can be held; it was not asked for, or a deadline came before."""
+"""Status of a load factor: it is there, or that it is no less; no multiple of the body wrench is
+too much, or none can be held; it was not asked for, or a deadline came before."""
 
 
 class LoadFactor(NamedTuple):
@@ -259,11 +259,11 @@ class RobustLoadFactor(Struct, frozen=True):
         Of the draws.
     worst : float
         Deprecated: the same as ``hundredth``. It was the least of the draws that had one, which
-        hangs on how many there are.
+        depends on how many there are.
     tenth : float
         What it exceeds in nine in ten draws.
     tenth_interval : list of float, length 2
-        What holds that in 95 %, for all that so many draws tell.
+        Interval that holds it with 95 % confidence, for this number of draws.
     hundredth : float
         What it exceeds in 99 of a hundred draws.
     hundredth_interval : list of float, length 2

@@ -13,19 +13,19 @@ if TYPE_CHECKING:
 __all__ = ["MANY", "VARIES", "DrawnPlan", "Influence", "Quantiles", "Spread"]
 
 PERCENTS: Final = (5.0, 50.0, 95.0)
-"""That are told of a number over the draws."""
+"""Quantiles of a number over the samples that are reported [%]."""
 
 MANY: Final = 20
-"""Draws of which 5 % are one at least; of fewer the least, the median and the largest are told."""
+"""Samples from which on 5 % are one or more; of fewer the extremes and the median are reported."""
 
 VARIES: Final = 1e-4
-"""How far numbers must differ, over the largest, to differ at all: less is the solver's."""
+"""Least difference of numbers that counts, over the largest: less is the solver's error."""
 
 FEWEST: Final = 3
 """Load factors of which a correlation says anything."""
 
-TOLD: Final = 3
-"""Quantities that are told."""
+REPORTED_INFLUENCES: Final = 3
+"""Number of influences that are reported, the largest ones."""
 
 
 class DrawnPlan(Struct, frozen=True):
@@ -178,7 +178,7 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
             # a quantity that is ordered as one before says the same
             share = float((a @ b) ** 2 / ((a @ a) * (b @ b)))
             shares.setdefault(a.tobytes(), Influence(name, share))
-    return sorted(shares.values(), key=lambda each: -each.share)[:TOLD]
+    return sorted(shares.values(), key=lambda each: -each.share)[:REPORTED_INFLUENCES]
 
 
 def _centred_ranks(values: Array, least: float = 0.0) -> Array:

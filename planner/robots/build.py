@@ -30,7 +30,7 @@ PLACEHOLDER: Final = 1e3
 [N·m, N]."""
 
 ON_AXIS: Final = 1e-9
-"""How far from a joint's axis the next joint may be and still count as on it [m]."""
+"""Distance from a joint's axis up to which the next joint counts as on it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +174,7 @@ def _reduced(whole: Any, kept: Collection[str], locked: Mapping[str, float]) -> 
     """Return Pinocchio's model of the joints that are kept; all others stay where they are.
 
     `buildReducedModel` looks up frames by name alone, whatever they are frames of. URDF lets a
-    link have the name of a joint, so meanwhile names tell what they are names of.
+    link have the name of a joint, so meanwhile each name says which of the two it names.
     """
     q, others = pin.neutral(whole), []
     for i in range(ROOT_JOINT + 1, whole.njoints):

@@ -1,4 +1,4 @@
-"""What of a robot could be in the way: capsules about its links.
+"""Represent the links of a robot by capsules, for its clearance from the rock.
 
 A capsule is all places within its radius of a segment. A robot's file may have those of any link
 (``[capsules]``, by the link's name or a pattern of it). A limb's link without any has one from its

@@ -1,4 +1,4 @@
-"""Which joints of a URDF move a robot's limbs, which follow others, and where some are locked.
+"""Find the joints of a robot's limbs in its URDF: driven ones, ones that follow, locked ones.
 
 A limb's joints are ``q = matrix · a + offset`` where a are those that motors move; the others
 follow these (mimic). By virtual work the force of a motor is then ``matrixᵀ · τ``: its own joint's,
@@ -163,12 +163,12 @@ def _advice(joints: Iterable[JointElement], already: Collection[str]) -> str:
 
 
 class JointCoupling(NamedTuple):
-    """Where k joints of a limb are, by the n of them that move by themselves.
+    """Positions of k joints of a limb as a function of the n that move by themselves.
 
     Attributes
     ----------
     driving : tuple of JointElement, length n
-        From the body outward.
+        Joints that move by themselves, from the body outward.
     matrix : ndarray, shape (k, n)
         [1, or m/rad or rad/m where one of them slides]
     offset : ndarray, shape (k,)

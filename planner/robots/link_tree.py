@@ -1,7 +1,7 @@
-"""Where a robot's links are by its URDF, and what holds them up, joint by joint.
+"""Compute link places and joint torques of a robot from its URDF, joint by joint.
 
-The second way to joint torques, for checking the first (`planner.robots.robot`), with which it
-shares nothing but the texts: places follow from the joints of the URDF as it was read, and the
+This is the second way to joint torques, for checking the first (`planner.robots.robot`), with which
+it shares nothing but the texts: places follow from the joints of the URDF as it was read, and the
 torque of a joint from the moments about its axis of every link beyond it and of the rock on the
 hand.
 """
@@ -21,20 +21,20 @@ __all__ = ["LimbTorques", "LinkTree"]
 
 
 class LimbTorques(NamedTuple):
-    """What holds a robot up.
+    """Joint torques and body wrench that hold a robot up.
 
     Attributes
     ----------
     torques : dict of str to ndarray, shape (n,)
-        By limb [N·m].
+        Joint torques by limb [N·m].
     body_wrench : ndarray, shape (6,)
-        Of its own weight and acceleration, which the rock must give, in B [N, N·m].
+        Wrench of its own weight and acceleration, which the rock must give, in B [N, N·m].
     hands : dict of str to Pose
         H in B.
     com : ndarray, shape (3,)
         Centre of mass in B [m].
     payloads : ndarray, shape (6,)
-        Of the weight and acceleration of its payloads, in B [N, N·m].
+        Wrench of the weight and acceleration of its payloads, in B [N, N·m].
     """
 
     torques: dict[str, Array]

@@ -1,6 +1,6 @@
-"""How near a limb comes to a pose that none of its angles solve.
+"""Bring a limb as near as possible to a pose that none of its angles solve.
 
-What is least there, a sum of squares that does not vanish, has many minima, and is flat where a
+The least sum of squares, which does not vanish there, has many minima, and is flat where a
 limb is stretched: so it is sought from many postures, and with curvatures (sequential quadratic
 programming) instead of the slopes alone.
 """
@@ -27,10 +27,10 @@ DAMPED: Final = 8
 """Steps that bring them nearer."""
 
 STARTS: Final = 8
-"""So many of them, the nearest, are followed to the end."""
+"""Number of these postures, the nearest, that are followed to the end."""
 
-TOLD: Final = 4
-"""From so many starts what is missing is told: there it decides nothing."""
+FEW_STARTS: Final = 4
+"""Number of starts from which a missing distance is sought, which is only reported."""
 
 STEPS: Final = 150
 """Most steps from a start."""
@@ -39,7 +39,7 @@ CONVERGED: Final = 1e-10
 """Change of what is least, after which a start has been followed to its end."""
 
 FIRST: Final = 300.0
-"""How much heavier what comes first counts than what comes second."""
+"""Weight of the quantity that is least first, over that of the second."""
 
 PLACED: Final = 1e-3
 """Distance up to which a hand counts as in its place [m]."""
@@ -52,12 +52,12 @@ INSIDE: Final = 1e-6
 
 
 class _Approach(NamedTuple):
-    """Where a limb comes nearest to a pose by some measure.
+    """Posture in which a limb is nearest to a pose by some measure.
 
     Attributes
     ----------
     angles : ndarray, shape (n,)
-        [rad]
+        Joint angles [rad].
     off : ndarray, shape (2,)
         Distance of the hand from its place [m], and angle of its axes from those asked for [rad].
     measure : float
@@ -143,10 +143,10 @@ def lacking(limb: LimbBatch, starts: Sequence[Array]) -> tuple[float, float | No
         [rad].
     """
     (way, turn), (near, askew) = (
-        min(_ends(limb, starts[:TOLD], weights), key=lambda end: end.measure).off.tolist()
+        min(_ends(limb, starts[:FEW_STARTS], weights), key=lambda end: end.measure).off.tolist()
         for weights in (np.array([FIRST**2, 1.0]), np.array([1.0, FIRST**2]))
     )
-    # without a posture that is turned as asked, what is told is how far away the place is
+    # without a posture that is turned as asked, the distance of the place is returned
     missing = near if askew <= TURNED else way
     beyond = float(limb.beyond[0])
     if beyond > 0.0 and missing <= beyond + PLACED:

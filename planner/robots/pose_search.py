@@ -35,7 +35,7 @@ ABREAST: Final = 4
 """Starts that are followed together."""
 
 ROUNDS: Final = 8
-"""How often so many starts are tried for a pose that may be within reach."""
+"""Rounds of starts for a pose that may be within reach, at most."""
 
 CHOICE: Final = 2
 """Solutions among which the one of the least torques is taken."""
@@ -53,7 +53,7 @@ SAMPLES: Final = 4096
 """Random postures of each limb among which starts are looked up."""
 
 TURN_WEIGHT: Final = 0.35
-"""What a hand's axes count for, in reaches, when postures near a pose are looked up."""
+"""Weight of a hand's axes, in reaches, when postures near a pose are looked up."""
 
 
 def find_angles(batch: LimbBatch) -> Array:

@@ -35,22 +35,21 @@ __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
 
 
 Angles = Mapping[str, Array] | Mapping[str, Sequence[float]]
-"""Of limbs' joints, by limb [rad]."""
+"""Angles of limbs' joints, by limb [rad]."""
 
 BEYOND: Final = 1e-6
-"""How far an angle may be beyond its joint's limit [rad, or m]: what is left of it in seven
-digits."""
+"""Tolerance of an angle beyond its joint's limit [rad, or m]: the rounding of seven digits."""
 
 
 class Statics(NamedTuple):
-    """What holds a robot up whose joints stand still.
+    """Body wrench and joint torques that hold up a robot whose joints stand still.
 
     Attributes
     ----------
     body_wrench : ndarray, shape (6,)
-        That the rock must exert on the robot, in B about B's origin [N, N·m].
+        Wrench that the rock must exert on the robot, in B about B's origin [N, N·m].
     joint_torque : dict of str to ndarray, shape (n,)
-        By limb: torque of its joints while its hand carries nothing [N·m].
+        Torques of a limb's joints while its hand carries nothing, by limb [N·m].
     """
 
     body_wrench: Array
@@ -294,7 +293,7 @@ class Robot:
 
     @property
     def limb_mass(self) -> float:
-        """What all limbs weigh with their hands [kg]."""
+        """Mass of all limbs with their hands [kg]."""
         return sum(mass for mass, _, _ in self._limb_weights.values())
 
     def com_at(self, angles: Angles) -> Array:

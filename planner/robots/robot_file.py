@@ -26,7 +26,7 @@ from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 __all__ = ["STRONGEST", "Mount", "RobotDescription", "RobotFile", "section_table"]
 
 NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
-"""What a robot and a limb may be called: their names are part of keys."""
+"""Pattern of the names of a robot and of its limbs: they are part of keys."""
 
 TEXTS: Final = ("name", "urdf", "body")
 """Entries of the file that are plain text."""
@@ -115,7 +115,7 @@ class RobotFile:
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """Where a hand sits, and what the joints of its limb bear.
+    """Mount of a hand on a link, with the torque limits of its limb.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Mount:
         One number for all joints of the limb, or one each [N·m], [N] of one that slides; zero for
         one without a motor. None: the efforts of the URDF.
     radius : float, optional
-        Of its links that have no capsules [m].
+        Radius of its links that have no capsules [m].
     """
 
     link: str
@@ -141,7 +141,7 @@ class Mount:
 
 @dataclass(frozen=True, eq=False)
 class RobotDescription:
-    """What a robot's file says.
+    """Content of a robot's file.
 
     Attributes
     ----------
@@ -155,13 +155,13 @@ class RobotDescription:
     back : tuple of float, optional
         Direction out of its back in B, of unit length.
     mounts : mapping of str to Mount
-        By limb.
+        Mounts of the hands, by limb.
     locked : mapping of str to object
-        Where joints are that do not move, by name, as the file has them: their units are known
+        Places of the joints that do not move, by name, as the file has them: their units are known
         with the URDF only.
     capsules : mapping of str to tuple
-        Of links, by a pattern of their names: the ends of each one's segment in the link and its
-        radius, seven numbers [m].
+        Capsules of links, by a pattern of their names: the ends of each one's segment in the link
+        and its radius, seven numbers [m].
     """
 
     name: str

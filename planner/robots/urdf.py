@@ -36,7 +36,7 @@ WIDEST: Final = 100.0
 """Largest angle that is taken for one [rad]."""
 
 NEGATIVE: Final = 1e-9
-"""How far below zero rounding may put a principal moment, over the largest."""
+"""Tolerance of a principal moment below zero, over the largest, for rounding."""
 
 NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 """A number of XML: what Pinocchio reads otherwise, as `1_0`, would be a link without mass there."""
@@ -45,16 +45,16 @@ STEEPEST: Final = 1e3
 """Largest multiplier of a coupled joint that is taken for one."""
 
 UNITS: Final = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "value"): "kg"}
-"""Of attributes of elements."""
+"""Units of attributes of elements."""
 
 XACRO: Final = "/xacro"
-"""What the namespace of xacro ends with."""
+"""End of the namespace of xacro."""
 
 EXPAND: Final = (
     "this is a xacro, which is not expanded; expand it: xacro ROBOT.urdf.xacro > ROBOT.urdf "
     "(from ROS, or from pip install xacro)"
 )
-"""What a file is told that still has instructions for xacro in it."""
+"""Error message for a file that still has instructions for xacro in it."""
 
 THIN: Final = 1e-6
 """Radius of gyration that is none for a link [m]: so far below zero its mass may put a moment."""
@@ -133,7 +133,7 @@ class JointElement:
 
     @property
     def slides(self) -> bool:
-        """Whether it moves along its axis instead of about it."""
+        """True if it moves along its axis instead of about it."""
         return self.type == "prismatic"
 
 
@@ -153,7 +153,7 @@ class Urdf:
     joints: Mapping[str, JointElement]
 
     def trail(self, link: str) -> list[str]:
-        """Return a link and those that it hangs on, up to the root; refuse a ring."""
+        """Return a link and its parents, up to the root; refuse a ring."""
         trail = [link]
         while trail[-1] in self.joints:
             parent = self.joints[trail[-1]].parent

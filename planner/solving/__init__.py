@@ -1,4 +1,4 @@
-"""From a question to a verified plan."""
+"""Answer a question with a verified plan."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -38,10 +38,10 @@ MANY: Final = 96
 """Rows that may break on the way to where active ones meet; with more, it is sooner solved anew."""
 
 HOLDS: Final = 1e-9
-"""By how much a row may be broken, scaled."""
+"""Tolerance of a row, scaled."""
 
 PUSHES: Final = 1e-14
-"""How far below zero a multiplier may be at a weight of 1, those of the limits adding up to one."""
+"""Tolerance of a multiplier below zero at a weight of 1; those of the limits add up to one."""
 
 SOFT: Final = 1e-13
 """Softness of S, whose diagonal is scaled to ones."""
@@ -50,13 +50,13 @@ STEPS: Final = 6
 """Newton's steps for a set of active rows, at most."""
 
 MET: Final = 1e-10
-"""What may be missing of the equations of rows, scaled."""
+"""Tolerance of the equations of rows, scaled."""
 
 STILL: Final = 1e-13
-"""What may be missing of Q z + Cᵀ λ = 0 at a weight of 1."""
+"""Tolerance of Q z + Cᵀ λ = 0 at a weight of 1."""
 
 WHOLE: Final = 1e-9
-"""What may be missing of dᵀ λ = 1."""
+"""Tolerance of dᵀ λ = 1."""
 
 
 class Point(NamedTuple):
@@ -77,7 +77,7 @@ class Rows(NamedTuple):
 
     @classmethod
     def of(cls, data: StanceData) -> Rows:
-        """Return those of a stance: balance, limits, hard rows."""
+        """Return the rows of a stance: balance, limits, hard rows."""
         C, rest, limits = data.rows.whole, data.rows.rest, data.rows.limits
         nb = len(data.wrench)
         d = np.zeros(len(C))
@@ -85,7 +85,7 @@ class Rows(NamedTuple):
         return cls(C, d, np.concatenate([data.offset, rest]), nb)
 
     def room(self, z: Array, u: float) -> Array:
-        """Return by how much each row holds."""
+        """Return the slack of each row."""
         return np.asarray(self.b + self.d * u - self.C @ z)
 
     def tight(self, z: Array, u: float) -> Mask:
@@ -169,7 +169,7 @@ class Face:
         raise ApartError
 
     def keeps(self, least: Point, weight: float) -> bool:
-        """Whether the least point of the face is the optimum of another weight, too.
+        """Return whether the least point of the face is the optimum of another weight, too.
 
         It is where multipliers of the same rows, none below zero, make up for the larger gradient.
         """
@@ -255,5 +255,5 @@ def optimum(
 
 
 def _size(missing: Array) -> float:
-    """Return the Euclidean norm, which none of what is missing exceeds."""
+    """Return the Euclidean norm, which no component exceeds."""
     return math.sqrt(missing.dot(missing))

@@ -1,4 +1,4 @@
-"""What the multipliers of a program prove: bounds from below of its least value."""
+"""Prove lower bounds of a program's least value by its multipliers."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ __all__ = [
 ]
 
 OPTIMAL: Final = 1e-5
-"""How far, relatively, the utilisation may be above its proven lower bound."""
+"""Largest relative gap of the utilisation to its proven lower bound."""
 
 ROUNDED: Final = 1e-9
-"""What rounding may add to a bound, relative."""
+"""Relative rounding error of a bound."""
 
 STATIONARY: Final = 1e-5
-"""How far multipliers may be from stationary, and below zero, to count as a bound."""
+"""Tolerance of multipliers from stationary, and below zero, to count as a bound."""
 
 
 def is_least(value: float, bound: float) -> bool:
-    """Whether a utilisation, or an effort, is as low as its bound, as far as it counts."""
+    """Return whether a utilisation, or an effort, is as low as its bound, within `OPTIMAL`."""
     return value - bound <= OPTIMAL * max(1.0, value)
 
 

@@ -1,4 +1,4 @@
-"""From what solving has come to, to the plan that is reported: explained, with its warnings."""
+"""Make the plan that is reported from a solution: explained, with its warnings."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ from planner.solving.verified import Checks
 __all__ = ["explained_plan", "unexplained"]
 
 LEFT: Final = 0.5
-"""How far a tension may be from that of closing to be left there [N]: less than motors are held."""
+"""Distance from the closing tension up to which a tension stays [N]: finer than motors hold."""
 
 
 def explained_plan(

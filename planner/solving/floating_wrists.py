@@ -47,7 +47,7 @@ class FloatingSolution(Solution):
 
     @property
     def proven(self) -> bool:
-        """Whether its search did not end without proof."""
+        """False if its search ended without proof."""
         return self.search.found != "unproven"
 
     def best_in(
@@ -164,7 +164,7 @@ def _less_tense_beside(prepared: PreparedStance, search: WristSolution) -> Wrist
 
 
 def wrench_is_given(prepared: PreparedStance) -> bool:
-    """Whether a floating hand's wrench is given: sets linearised elsewhere prove little."""
+    """Return whether a floating hand's wrench is given: sets linearised elsewhere prove little."""
     return any(
         hand.wrist == "floating" and hand.wrench is not None
         for hand in prepared.question.stance.hands

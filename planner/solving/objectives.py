@@ -1,4 +1,4 @@
-"""What a plan may be the best in: each objective with its program, bound, check, prices and words.
+"""Objectives of a plan, each with its program, bound, check, prices and words.
 
 Every question is first answered with the plan of least utilisation, which says whether the limits
 can be kept. A `CappedObjective` then takes the best plan of its own within them. To add one is to
@@ -35,12 +35,12 @@ __all__ = [
 
 
 class Objective(ABC):
-    """What a plan is the best in.
+    """Objective of a plan.
 
     Attributes
     ----------
     name : str
-        As a question names it.
+        Name in a question.
     words : str
         What is least, for sentences.
     """
@@ -69,7 +69,7 @@ class MaxMargin(Objective):
 
 
 class CappedObjective(Objective):
-    """What is least at a utilisation within a cap: a convex function of the loads.
+    """Objective that is least at a utilisation within a cap: a convex function of the loads.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The load factor where the hands are not quite where they were put.
+"""Robust load factor: over places of the hands near the given ones.
 
 Every hand is closed at `PLACES` places about its own, whichever other hands there are. A sample
 puts each hand at one of its places, so that over all samples each place is taken equally often and
@@ -44,17 +44,17 @@ from planner.solving.fixed_wrists import most_of_fixed
 __all__ = ["find_robust_load_factor"]
 
 SEED: Final = 0
-"""Of the places and of how they are combined."""
+"""Seed of the places and of their combinations."""
 
 ROUNDS: Final = 16
-"""How often each place is taken: with 4 the tenth of an overhang's load factors changes by 6 %
-(rms) with the seed, with 8 by 3 %."""
+"""Samples that take each place: with 4 the tenth of an overhang's load factors changes by 6 % (rms)
+with the seed, with 8 by 3 %."""
 
 SURE: Final = 1.96
 """Standard deviations to either side of a quantile that hold it in 95 %."""
 
 LATE: Final = "all samples were planned"
-"""What a deadline may come before."""
+"""Words for the work that a deadline may leave unfinished."""
 
 Places = Sequence[WrenchSpace | None]
 """The sets of a hand at its places; None where it cannot be."""
@@ -63,7 +63,7 @@ Places = Sequence[WrenchSpace | None]
 def find_robust_load_factor(
     prepared: PreparedStance, *, overloaded: bool
 ) -> RobustLoadFactor | None:
-    """Return it where the hands are not quite where they were put; None if time does not allow.
+    """Return the load factor over places of the hands near the given ones; None if out of time.
 
     Parameters
     ----------

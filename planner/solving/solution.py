@@ -1,4 +1,4 @@
-"""What solving comes to: loads of all hands, and what their multipliers prove."""
+"""Solution of a stance: loads of all hands, and what their multipliers prove."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Solution:
 
     @property
     def proven(self) -> bool:
-        """Whether its search, if any, did not end without proof."""
+        """False if its search, if there is any, ended without proof."""
         return True
 
     def late(self, *names: Unfinished) -> Self:
@@ -158,7 +158,7 @@ class Verified:
 
 
 Answer = Verified | Failed | Infeasible
-"""What a question comes to."""
+"""Outcome of a question."""
 
 
 def load_factor_of(

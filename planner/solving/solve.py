@@ -1,4 +1,4 @@
-"""From a question to a verified plan: prepare, solve, recover the loads, verify, explain."""
+"""Answer a question with a verified plan: prepare, solve, recover the loads, verify, explain."""
 
 from __future__ import annotations
 
@@ -132,9 +132,9 @@ def _first_verified(prepared: PreparedStance, checks: Checks, found: Iterable[So
 
 
 def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
-    """Whether a plan of fixed wrists has loads beyond `UNLIMITED`, and far beyond what is needed.
+    """Return whether loads of a plan of fixed wrists exceed `UNLIMITED`, and the need by far.
 
-    Rows that all but contradict the balance let it be had so, a hair before they do.
+    With such loads the body is balanced where the hard rows nearly contradict the balance.
     """
     if prepared.hands.floating or found.utilisation <= 1.0:
         return False
@@ -263,8 +263,8 @@ def with_advice(question: Question, answer: Plan) -> Plan:
     start = time.perf_counter()
     odd = [each.field for each in answer.findings if each.kind == "unit"]
     if odd:
-        told = f"no advice is looked for while a unit is in doubt: {', '.join(odd)}"
-        return replace(answer, advice=(), warnings=(*answer.warnings, told))
+        warning = f"no advice is looked for while a unit is in doubt: {', '.join(odd)}"
+        return replace(answer, advice=(), warnings=(*answer.warnings, warning))
     found, whole = advise(question, try_stance)
     seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings
     if not whole and seconds is not None:

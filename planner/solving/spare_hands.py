@@ -35,7 +35,7 @@ STIFFEST: Final = 100.0
 """Largest of 1 / (1 − f): a newton off closing is then as dear as ten in other hands."""
 
 BOUND: Final = 1e-6
-"""How far, relatively, u* − v must be above the bound's least for no program to be solved.
+"""Relative excess of u* − v over the bound's least from which on no program is solved.
 
 Where a hand alone sets u*, Σ λ is one and both are zero but for rounding."""
 

@@ -1,10 +1,10 @@
-"""How sure a plan is: its stance planned anew with each draw of the hand's and the rock's numbers.
+"""Plan a stance anew for each sample of the hand's and the rock's numbers, which gives the spread.
 
-A draw changes what the hands are and what their tiles hold, and nothing that was asked: body,
-hands' poses, joints and body wrench stay. Hands that are seated close as the draw's hand seats
-them, H where it was; it is the rock that is elsewhere. One whose best seat was searched for stays
-where that was found. Floating wrists are sought from where they are with the question's own hands.
-A draw's plan has neither certificate nor prices nor words.
+A sample changes the hands and the strength of their tiles. Body, poses of the hands, joints and
+body wrench stay. A seated hand closes as the sample's hand seats it: its H stays, and its rock is
+elsewhere. A hand whose best seat was searched for stays where that was found. The search for
+floating wrists begins where they are with the question's own hands. A sample's plan has neither
+certificate nor prices nor words.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 __all__ = ["LeastUtilisation", "active_set_optimum", "least_utilisation"]
 
 SURE: Final = (1e-6, 1.0)
-"""How many times a row's multiplier may be less than its room for the row to be active at first."""
+"""Least ratios of a row's multiplier to its slack at which the row is active at first."""
 
 ROUNDS: Final = 12
 """Sets of active rows that are tried at most."""
@@ -48,18 +48,18 @@ LARGE: Final = 64
 """Loads of a stance up to which so many systems are worth it: fewer for more, by their cube."""
 
 FREE: Final = 1e-6
-"""How much more than one the multipliers of limits add up to where u is not free."""
+"""Excess over one of the sum of the limits' multipliers where u is not free."""
 
 
 class LeastUtilisation(NamedTuple):
-    """What came of `programs.unique`, and of `programs.less_tension` from there.
+    """Result of `programs.unique`, and of `programs.less_tension` from there.
 
     Attributes
     ----------
     outcome : Outcome
-        Of the least utilisation.
+        Outcome of the program of least utilisation.
     bound : float
-        The least utilisation is not below; −∞ without a solution.
+        Lower bound of the least utilisation; −∞ without a solution.
     meant : Outcome or None
         The plan that is meant; None where it is not found, for the time or as the outcome has not
         its last digits.
@@ -74,7 +74,7 @@ class LeastUtilisation(NamedTuple):
 
     @property
     def proven(self) -> bool:
-        """Whether the utilisation is the least, as far as it counts."""
+        """True if the utilisation is the least, within the tolerance of `is_least`."""
         return self.outcome.solved and is_least(self.outcome.value, self.bound)
 
 
@@ -119,7 +119,7 @@ def least_utilisation(
 
 
 def _far_beyond(outcome: Outcome) -> bool:
-    """Whether what makes a plan unique may cost more utilisation than counts."""
+    """Return whether the term that makes a plan unique may cost more utilisation than counts."""
     return OPTIMAL * outcome.value < TIE * outcome.value**2
 
 
@@ -186,7 +186,7 @@ def _meant(
     closing: Sequence[float],
     near: Outcome | None = None,
 ) -> LeastUtilisation:
-    """Return what is meant, from the exact least utilisation; ``near`` as of another wrench."""
+    """Return the plan that is meant, from the exact least one; ``near`` as of another wrench."""
     trade = tension_trade(exact.outcome.value, cap)
     spare = spare_hands(data, exact.outcome, trade)
     if spare:

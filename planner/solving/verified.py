@@ -28,20 +28,20 @@ __all__ = ["Checks", "idle_joints", "prepare_checks", "recover", "verify"]
 
 
 class Checks(NamedTuple):
-    """What recovers and checks the loads of a stance, known before there are any.
+    """Recovery and checks of the loads of a stance, made before there are any.
 
     Attributes
     ----------
     check : Check
-        What every plan must pass.
+        Check that every plan must pass.
     recovery : LoadRecovery or None
         Reads loads of fixed wrists; None where a wrist floats.
     idle : tuple of LimitUse
-        How much of their joints' torque limbs without a hand use.
+        Use of the joint torques of limbs without a hand.
     findings : tuple of Finding
-        What is odd about the stance as a scene, and about the sizes of the question's numbers.
+        Findings about the stance as a scene, and about the sizes of the question's numbers.
     oddities : tuple of str
-        What is odd about it, these included, in words.
+        All that is odd about it, these included, in words.
     """
 
     check: Check
@@ -52,7 +52,7 @@ class Checks(NamedTuple):
 
     @property
     def overloaded(self) -> bool:
-        """Whether a limb without a hand cannot bear itself, whatever the body needs."""
+        """True if a limb without a hand cannot bear itself, whatever the body needs."""
         return any(used.utilisation > 1.0 + SLACK for used in self.idle)
 
     @classmethod

@@ -72,8 +72,8 @@ def test_advice_says_that_time_was_too_short_for_its_load_factor(monkeypatch):
     class Change:
         kind, limbs, words, changes, size = "body", (), "shift it", {}, 1.0
 
-    told = advising._told(Trials(), Change(), Late())
-    assert (told.load_factor, told.load_factor_status) == (None, "not_finished")
+    advice = advising._advice(Trials(), Change(), Late())
+    assert (advice.load_factor, advice.load_factor_status) == (None, "not_finished")
 
 
 @pytest.mark.parametrize(
