@@ -15,12 +15,12 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("hand_models", "planner", "service")
 
 LIMITS = {
-    "docstrings that are fragments": 400,
-    "old words in the source": 440,
-    "old words in the documents": 20,
-    "module constants of one word": 1090,
-    "public names defined twice": 61,
-    "table cells above 25 words": 30,
+    "docstrings that are fragments": 10,
+    "old words in the source": 25,
+    "old words in the documents": 10,
+    "module constants of one word": 1080,
+    "public names defined twice": 58,
+    "table cells above 25 words": 0,
 }
 """The largest number of each that passes."""
 

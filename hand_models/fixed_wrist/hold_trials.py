@@ -100,7 +100,7 @@ def grid_of_trials(
     *,
     radius: float,
     most: int | None = None,
-    tell: Progress | None = None,
+    report: Progress | None = None,
 ) -> list[Trial]:
     """Return places on a grid across z of a rock's frame.
 
@@ -119,7 +119,7 @@ def grid_of_trials(
         Half the side of the square about a point in which that is found [m].
     most : int, optional
         Places that there may be, before it is known which of them are on rock.
-    tell : callable, optional
+    report : callable, optional
         Called with (points done, points in all).
 
     Raises
@@ -152,8 +152,8 @@ def grid_of_trials(
     found: list[Trial] = []
     points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist()
     for number, (x, y) in enumerate(points):
-        if tell is not None:
-            tell(number, len(points))
+        if report is not None:
+            report(number, len(points))
         depth = rock.entry((x, y, above), INTO)
         if not math.isfinite(depth):
             continue

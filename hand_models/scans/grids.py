@@ -190,7 +190,7 @@ def _sides(cell: float | None, own: Cell | None) -> Cell:
     sides = own if cell is None else (cell, cell)
     if sides is None:
         raise InvalidInputError(
-            "the file does not tell the distance between neighbours of its grid in a unit of "
+            "the file does not give the distance between neighbours of its grid in a unit of "
             "length; give it",
             field="cell",
         )

@@ -48,7 +48,7 @@ def mesh_scan(
     *,
     spacing: float | None = None,
     hole: float | None = None,
-    tell: Progress = lambda done, total: None,
+    report: Progress = lambda done, total: None,
 ) -> ScannedRock:
     """Return a scan as triangles, seen from where it was scanned; its own are kept, if it has any.
 
@@ -62,7 +62,7 @@ def mesh_scan(
     hole : float, optional
         The widest hole that is bridged, by default as ``scan.toml`` says [m]. Of triangles that are
         kept none is bridged, and wider ones are reported.
-    tell : callable, optional
+    report : callable, optional
         Called with the steps done and their number.
 
     Raises
@@ -73,16 +73,16 @@ def mesh_scan(
     """
     table = scan_table()
     hole = _length(table.scalar("mesh", "hole") if hole is None else hole, "hole")
-    tell(0, STEPS)
+    report(0, STEPS)
     if scan.faces is not None:
         if spacing is not None:
             raise InvalidInputError(
                 "is of points, and the file has triangles, which are kept", field="spacing"
             )
         rock = keep_triangles(scan, hole)
-        tell(STEPS, STEPS)
+        report(STEPS, STEPS)
         return rock
-    made = triangulated(scan, spacing, tell=tell)
+    made = triangulated(scan, spacing, report=report)
     points, axes, middle = made.points, made.axes, made.middle
     faces = made.corners[~made.gaps.open_(hole)]
     if not len(faces):
@@ -92,7 +92,7 @@ def mesh_scan(
     used, faces = np.unique(faces, return_inverse=True)
     points, faces = points[used], faces.reshape(-1, 3)
     start = start_on(points, scan, middle, axes)
-    tell(STEPS, STEPS)
+    report(STEPS, STEPS)
     return ScannedRock(
         vertices=points - start,
         # counterclockwise for who looks along z
@@ -132,7 +132,7 @@ class Triangulated(NamedTuple):
 
 
 def triangulated(
-    scan: Scan, spacing: float | None, *, tell: Progress = lambda done, total: None
+    scan: Scan, spacing: float | None, *, report: Progress = lambda done, total: None
 ) -> Triangulated:
     """Return a scan thinned and triangulated across the view; parameters as of `mesh_scan`."""
     axes = axes_along(scan.direction())
@@ -144,7 +144,7 @@ def triangulated(
         points = _fewer(points, 0.5 * _spacing(points), most)
     else:
         points = points[_kept(points, _length(spacing, "spacing"))]
-    tell(1, STEPS)
+    report(1, STEPS)
     _check_spread(points)
     try:
         flat = scipy.spatial.Delaunay(points[:, :2])
@@ -152,7 +152,7 @@ def triangulated(
         raise InvalidInputError(
             f"no triangles: {str(error).splitlines()[0]}", field="file"
         ) from None
-    tell(2, STEPS)
+    report(2, STEPS)
     corners = flat.simplices.astype(np.intp)
     return Triangulated(
         points, corners, Gaps.between(points[corners], flat.neighbors), middle, axes

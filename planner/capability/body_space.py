@@ -214,7 +214,7 @@ class BodySpace(BodyPrograms):
         motion = self.motion
         if motion is None:
             raise InvalidInputError(
-                "a given body wrench tells nothing of the mass; give load", field="body_wrench"
+                "a given body wrench does not determine the mass; give load", field="body_wrench"
             )
         k = motion.wrench.shape[1]
         if len(direction) not in (3, k):

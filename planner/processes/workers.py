@@ -89,14 +89,14 @@ class Workers(Generic[T, R]):
     hands : dict of Lane to dict
         Tasks that each process has by their numbers, the one in work first; of those processes
         that have been started and are not known to have died.
-    stillborn : int
+    failed_starts : int
         Processes in a row that could not be started, or have died before they were ready.
     """
 
     def __init__(self, make: Make[T, R], count: int) -> None:
         self._make, self.width = make, count
         self.hands: dict[Lane[T, R], dict[int, _Task[T]]] = {}
-        self.stillborn = 0
+        self.failed_starts = 0
         self._queue: deque[_Task[T]] = deque()
         self._knows: LRUCache[Hashable, Lane[T, R]] = LRUCache(KNOWN)
         self._unborn = ""
@@ -171,7 +171,7 @@ class Workers(Generic[T, R]):
             again = [task._replace(tried=True) for task in tasks[:1] if not task.tried]
             self._queue.extendleft(reversed([*again, *tasks[1:]]))
             return [(each.number, Lost(f"its process died, twice; {how}")) for each in lost]
-        self.stillborn = 0
+        self.failed_starts = 0
         if done is None:
             return []
         # its lane answers one after another
@@ -191,7 +191,7 @@ class Workers(Generic[T, R]):
 
     def _start(self) -> None:
         """Start processes in place of those that have died."""
-        while len(self.hands) < self.width and self.stillborn < STARTS:
+        while len(self.hands) < self.width and self.failed_starts < STARTS:
             try:
                 station = Station(self._make)
             except OSError as error:
@@ -201,9 +201,9 @@ class Workers(Generic[T, R]):
 
     def _miss(self, why: str) -> None:
         """Count a process that could not be started, or died before it was ready."""
-        self.stillborn += 1
+        self.failed_starts += 1
         self._unborn = why
-        if self.stillborn == STARTS:
+        if self.failed_starts == STARTS:
             log.warning(why)
 
     def _remove_dead(self, lane: Lane[T, R]) -> str:

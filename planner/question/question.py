@@ -98,7 +98,7 @@ class Question:
         self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
         if "robust" in self.want and "floating" in wrists.values():
-            raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
+            raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
         present = {}
         for limb, tensions in self.present.items():
             if wrists.get(limb) != "fixed":
@@ -123,7 +123,7 @@ class Question:
     def _check_draws(self) -> None:
         if "spread" not in self.want:
             if self.draws is not None:
-                raise InvalidInputError("only spread is told over draws; want it", field="draws")
+                raise InvalidInputError("'draws' are for 'spread': add it to want", field="draws")
             return
         if self.draws is not None:
             object.__setattr__(self, "draws", tuple(self.draws))

@@ -158,7 +158,7 @@ class Urdf:
         while trail[-1] in self.joints:
             parent = self.joints[trail[-1]].parent
             if parent in trail:
-                raise InvalidInputError(f"link {parent!r} hangs on itself; a robot must be a tree")
+                raise InvalidInputError(f"link {parent!r} is in a ring; a robot must be a tree")
             trail.append(parent)
         return trail
 
@@ -221,7 +221,7 @@ def parse_urdf(text: str) -> Urdf:
         other = by_child.setdefault(joint.child, joint)
         if other is not joint:
             raise InvalidInputError(
-                f"link {joint.child!r} hangs on two joints, {other.name!r} and {joint.name!r}; "
+                f"link {joint.child!r} has two parent joints, {other.name!r} and {joint.name!r}; "
                 "a robot must be a tree"
             )
     roots = [link for link in links if link not in by_child]

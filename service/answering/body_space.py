@@ -23,7 +23,7 @@ APPROXIMATE: Final = (
     "floating wrists: what their hands hold is linearised where the plan puts them; at the extents "
     "the exact model differs by up to {:.1f} N (moments over 0.1 m)"
 )
-NO_LOAD: Final = "no accelerations: a body wrench tells nothing of the mass; give a load instead"
+NO_LOAD: Final = "no accelerations: a body wrench does not determine the mass; give a load instead"
 NOT_AT_REST: Final = "no accelerations: the body cannot be held at rest"
 
 

@@ -90,7 +90,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     _add_views(reply, hand.space, request.want)
     if "robust" in (request.want or ()):
         if hand.palm is not None:
-            raise InvalidInputError("robust is told of hands with fixed wrists only", field="want")
+            raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
         reply.robust = _robust(robustness(asked.robot.hand, settled, BOTH_WAYS))
     reply.closing = _closings(settled)
     return reply

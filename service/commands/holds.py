@@ -146,7 +146,7 @@ def holds(
             tuple(dict.fromkeys(rotations)),
             radius=radius,
             most=MOST,
-            tell=report,
+            report=report,
         )
     if not trials:
         raise InvalidInputError(

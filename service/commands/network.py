@@ -125,8 +125,8 @@ def serve(
             tables.remark(f"serving {', '.join(service.keys)}; listening on {where}")
             if open_to := serving.exposed(config):
                 tables.note(
-                    f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh tells "
-                    "of this session (@/**); access control is zenoh's (-c FILE)"
+                    f"{', '.join(open_to)}: whoever reaches it can ask, and read what zenoh "
+                    "publishes about this session (@/**); access control is zenoh's (-c FILE)"
                 )
             stop.wait()
 

@@ -160,7 +160,7 @@ def rock(
         scan = scans.read_scan(file, **reading)
         if std_ratio is not None:
             scan = scans.drop_outliers(scan, std_ratio, neighbours=neighbours)
-        made = scans.mesh_scan(scan, spacing=spacing, hole=hole, tell=report)
+        made = scans.mesh_scan(scan, spacing=spacing, hole=hole, report=report)
         with tables.writing(output, "--output"):
             scans.write_rock(made, output)
         if picture is not None:

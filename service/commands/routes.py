@@ -80,7 +80,7 @@ def route(
     if output.suffix.lower() in ENDINGS:
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
-                raise InvalidInputError("is told of one route: needs -o DIR", field=option)
+                raise InvalidInputError("is for one route: needs -o DIR", field=option)
         return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
     if len(routes) > 1 or Path(routes[0]).is_dir():
         raise InvalidInputError(

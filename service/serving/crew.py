@@ -60,7 +60,7 @@ class Crew:
         What each lane does.
     rests_until : float
         When processes are started again, on the clock of `time.perf_counter`.
-    stillborn : int
+    failed_starts : int
         Processes in a row that could not be started, or died before they were ready.
     start : float
         How long the last process took to be ready [s]; zero before there is any.
@@ -70,7 +70,7 @@ class Crew:
         self._make, self.workers, self._memory = make, workers, memory
         self.work: dict[Lane[Job, Answer], Question | None] = {}
         self.rests_until = 0.0
-        self.stillborn = 0
+        self.failed_starts = 0
         self.start = 0.0
         self._purposes: dict[Station[Job, Answer], Purpose] = {}
         self._starting: dict[Station[Job, Answer], float] = {}
@@ -96,7 +96,7 @@ class Crew:
     def _ready(self, purpose: Purpose) -> list[Station[Job, Answer]]:
         return [each for each in self._all(purpose) if each.ready]
 
-    def hire(self) -> None:
+    def start_worker(self) -> None:
         """Fill empty places with the spare process, or with new ones.
 
         Where the system refuses a process, none is started for a while.
@@ -136,9 +136,9 @@ class Crew:
 
     def _rest(self) -> float:
         """Start none for a while, longer each time, and return how long [s]."""
-        rest = min(RESTING * 2.0**self.stillborn, LONGEST_REST)
+        rest = min(RESTING * 2.0**self.failed_starts, LONGEST_REST)
         self.rests_until = time.perf_counter() + rest
-        self.stillborn += 1
+        self.failed_starts += 1
         return rest
 
     def has_streams(self, lane: Lane[Job, Answer]) -> bool:
@@ -176,7 +176,7 @@ class Crew:
         size = None if self.has_streams(lane) else resident(lane.station.process.pid)
         return size is not None and size > GROWN
 
-    def dismiss(
+    def stop_worker(
         self, station: Station[Job, Answer], *, dead: bool = False
     ) -> tuple[str, list[Question]]:
         """End a process; parameters as for `Station.kill`.
@@ -192,7 +192,7 @@ class Crew:
         self._starting.pop(station, None)
         del self._purposes[station]
         if station.ready:
-            self.stillborn = 0
+            self.failed_starts = 0
         else:
             self._rest()
         left = [each for each in asked if each is not None and not each.replied]

@@ -37,7 +37,7 @@ __all__ = ["Dispatcher"]
 
 log = logging.getLogger(__name__)
 
-STILLBORN: Final = 3
+FAILED_STARTS: Final = 3
 """Processes in a row that may die before they are ready, when a service starts."""
 
 STOPS: Final = 2.0
@@ -181,7 +181,7 @@ class Dispatcher:
 
     def _step(self) -> None:
         if self._stops_at is None:
-            self._crew.hire()
+            self._crew.start_worker()
             self._deal()
         pipes = self._crew.pipes
         ready = wait([self._woken, *pipes], self._pause())
@@ -198,7 +198,7 @@ class Dispatcher:
                 self._deal()
             self._take_in()
         self._end_overdue()
-        if self._crew.up or self._crew.stillborn >= STILLBORN:
+        if self._crew.up or self._crew.failed_starts >= FAILED_STARTS:
             self._started.set()
 
     def _take_in(self) -> None:
@@ -354,8 +354,8 @@ class Dispatcher:
     def _end_process(
         self, station: Station[Job, Answer], why: str | None = None
     ) -> tuple[str, list[Question]]:
-        """End a process, which another replaces; as `Crew.dismiss`."""
-        how, left = self._crew.dismiss(station, dead=why is None)
+        """End a process, which another replaces; as `Crew.stop_worker`."""
+        how, left = self._crew.stop_worker(station, dead=why is None)
         self.watch.ended(station.process.pid, why or how)
         return how, left
 

@@ -150,7 +150,7 @@ class Replies:
         if answer.seconds > 0.0:
             self._mean += (answer.seconds - self._mean) / AVERAGED
         question.replied, question.payload = True, b""
-        self._watch.told(question, answer.status, answer.seconds)
+        self._watch.count(question, answer.status, answer.seconds)
         self._unnamed = (self._unnamed + 1) % UNNAMED
         send = partial(reply_to, question.query, question.key, lambda: answer)
         self._mail.send(question.place or str(self._unnamed), send)

@@ -98,7 +98,7 @@ class Watch:
         """
         start_http_server(port, addr=LOOPBACK, registry=self.registry)
 
-    def told(self, question: Question, status: str, worked: float) -> None:
+    def count(self, question: Question, status: str, worked: float) -> None:
         """Count a reply.
 
         Parameters

@@ -160,7 +160,7 @@ def test_points_too_far_apart_are_told(tmp_path):
 
 def test_progress_is_told(tmp_path):
     told = []
-    meshed(wall(0.02), tmp_path, tell=lambda done, total: told.append((done, total)), hole=0.1)
+    meshed(wall(0.02), tmp_path, report=lambda done, total: told.append((done, total)), hole=0.1)
     assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
 
 

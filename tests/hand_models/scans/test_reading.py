@@ -127,7 +127,7 @@ def test_every_grid_has_the_heights_that_were_written_and_holes_where_there_are_
 @pytest.mark.parametrize("name", ["a.npy", "e.tif"])
 def test_a_grid_without_a_cell_in_a_unit_of_length_is_refused(name, tmp_path):
     (path,) = (path for path, _ in grid_files(tmp_path) if path.name == name)
-    with pytest.raises(InvalidInputError, match=r"^cell: the file does not tell the distance"):
+    with pytest.raises(InvalidInputError, match=r"^cell: the file does not give the distance"):
         read_scan(path)
 
 

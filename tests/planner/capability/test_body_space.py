@@ -517,7 +517,7 @@ def test_what_cannot_be_told_is_null_and_a_warning_says_why():
     assert reply.acceleration is None
     assert reply.along is None
     assert reply.warnings == [
-        "no accelerations: a body wrench tells nothing of the mass; give a load instead"
+        "no accelerations: a body wrench does not determine the mass; give a load instead"
     ]
     reply = reply_to(space_request(wall_request(HEAVY)))
     assert reply.status == "overloaded"

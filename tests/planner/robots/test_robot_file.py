@@ -241,7 +241,7 @@ def test_what_no_limb_can_do_without(missing):
         (
             'child link="shank"',
             'child link="thigh"',
-            "urdf: link 'thigh' hangs on two joints, 'hip'",
+            "urdf: link 'thigh' has two parent joints, 'hip'",
         ),
         ('type="continuous"', 'type="ball"', "urdf: joint 'knee': type must be one of revolute"),
         ('type="continuous"', 'type="floating"', "limbs.leg.link: joint 'knee' .* is floating"),
@@ -324,7 +324,7 @@ def test_a_ring_of_links_is_no_robot():
         joint("one", "continuous", "a", "b"),
         joint("two", "continuous", "b", "a"),
     )
-    assert refused(text=text) == "urdf: link 'b' hangs on itself; a robot must be a tree"
+    assert refused(text=text) == "urdf: link 'b' is in a ring; a robot must be a tree"
 
 
 def test_a_robot_without_mass_is_refused():

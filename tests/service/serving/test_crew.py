@@ -13,7 +13,7 @@ import pytest
 
 from service.serving import PlanService, crew, open_session, zenoh_config
 from service.serving.crew import LONGEST_REST, RESTING, Crew
-from service.serving.dispatcher import STILLBORN
+from service.serving.dispatcher import FAILED_STARTS
 from service.wire import LostError
 from tests.suite.helpers.odd_answers import obedient
 
@@ -52,11 +52,11 @@ def test_the_rest_grows_while_no_process_can_be_started(
     with no_file_more():
         for _ in range(8):
             clock.now = max(clock.now, found.rests_until)
-            found.hire()
+            found.start_worker()
             rests.append(found.rests_until - clock.now)
             # nothing is tried before that is over
-            found.hire()
-            assert found.stillborn == len(rests)
+            found.start_worker()
+            assert found.failed_starts == len(rests)
     assert rests == [min(RESTING * 2.0**i, LONGEST_REST) for i in range(8)]
     assert rests[0] < rests[-1] == LONGEST_REST
     assert len(caplog.messages) == 8
@@ -66,7 +66,7 @@ def test_the_rest_grows_while_no_process_can_be_started(
     assert not found.work
     # as soon as it can be, all are there
     clock.now = found.rests_until
-    found.hire()
+    found.start_worker()
     try:
         assert len(found.stations) == 2
     finally:
@@ -140,4 +140,4 @@ def test_a_service_for_which_no_process_can_be_started_says_so(
     ):
         pass
     # each after a rest, the last perhaps while the start is given up; not at each of its turns
-    assert STILLBORN <= len(tried) < 2 * STILLBORN
+    assert FAILED_STARTS <= len(tried) < 2 * FAILED_STARTS
