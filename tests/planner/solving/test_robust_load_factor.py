@@ -236,6 +236,6 @@ def test_a_known_stance_tells_it_for_each_wrench(monkeypatch):
 def test_floating_hands_are_refused():
     first, *others = on_wall().hands
     stance = replace(on_wall(), hands=(replace(first, wrist="floating"), *others))
-    with pytest.raises(InvalidInputError, match="fixed wrists only") as caught:
+    with pytest.raises(InvalidInputError, match="requires fixed wrists") as caught:
         ask(stance, "robust")
     assert caught.value.field == "want"

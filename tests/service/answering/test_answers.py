@@ -406,9 +406,9 @@ def test_robust_is_told_of_fixed_wrists_only():
     floating = msgspec.structs.replace(first, wrist="floating")
     stance = msgspec.structs.replace(request.stance, hands=[floating, *others])
     asked = WrenchSpaceRequest(v=1, stance=stance, limb=first.limb, want=["robust"])
-    with pytest.raises(InvalidInputError, match="fixed wrists only") as caught:
+    with pytest.raises(InvalidInputError, match="requires fixed wrists") as caught:
         answering.wrench_space(asked)
     assert caught.value.field == "want"
-    with pytest.raises(InvalidInputError, match="fixed wrists only") as caught:
+    with pytest.raises(InvalidInputError, match="requires fixed wrists") as caught:
         answering.plan(msgspec.structs.replace(request, stance=stance, want=["robust"]))
     assert caught.value.field == "want"
