@@ -95,8 +95,6 @@ class NearPoints(NamedTuple):
         [m]
     lengths : ndarray, shape (p,)
         [m]
-    halves : ndarray of complex, shape (p,)
-        As of `Outlines`.
     phalanx : ndarray of int, shape (p,)
         Each one's.
     first : ndarray of int
@@ -105,7 +103,6 @@ class NearPoints(NamedTuple):
 
     points: Complexes
     lengths: Array
-    halves: Complexes
     phalanx: Indices
     first: Indices
 
@@ -115,7 +112,6 @@ class NearPoints(NamedTuple):
         return NearPoints(
             np.tile(self.points, count),
             np.tile(self.lengths, count),
-            np.tile(self.halves, count),
             (self.phalanx + len(self.first) * poses).ravel(),
             (self.first + len(self.points) * poses).ravel(),
         )
@@ -194,20 +190,14 @@ class PhalanxShape(NamedTuple):
             How far their tiles are pressed in [m].
         """
         of = near.phalanx
-        turn = u.ravel().conj()[of]
-        seen = (near.points - joint.ravel()[of]) * turn
+        seen = (near.points - joint.ravel()[of]) * u.ravel().conj()[of]
         away, from_tile = self._from_axis(seen)
         size = np.abs(away)
         depths = size - self.radius
         gap = self._level(depths, near) - self.fine
-        out = away / np.maximum(size, TINY)
-        # the mean over what a point stands for, along which its depth changes by so much
-        change = np.abs((near.halves * turn * out.conj()).real)
-        sunk = np.maximum((gap + depth.ravel())[of] - depths + change, 0.0)
-        partly = sunk * sunk / np.maximum(4.0 * change, TINY)
-        sunk = np.where(sunk < 2.0 * change, partly, sunk - change)
-        pressed = sunk * near.lengths
+        pressed = np.maximum((gap + depth.ravel())[of] - depths, 0.0) * near.lengths
         total = np.maximum(near.sums(pressed), TINY)
+        out = away / np.maximum(size, TINY)
         place = near.sums(pressed * (seen - away + self.radius * out)) / total
         push = near.sums(pressed * out) / total
         return Beside(
@@ -233,13 +223,12 @@ class PhalanxShape(NamedTuple):
         size = np.abs(away)
         # the bed sinks no lower than with any point alone
         least = near.least(size + self.alone(near.lengths)) + within
-        chosen = size - np.abs(near.halves) <= least[near.phalanx]
+        chosen = size <= least[near.phalanx]
         chosen |= from_tile <= (near.least(from_tile) + within)[near.phalanx]
         count = np.bincount(near.phalanx[chosen], minlength=len(near.first))
         return NearPoints(
             near.points[chosen],
             near.lengths[chosen],
-            near.halves[chosen],
             near.phalanx[chosen],
             np.cumsum(count) - count,
         )
@@ -343,9 +332,8 @@ def nearest_points(
     block += phalanx // q.shape[-1] * blocks_each
     points = rock.points.reshape(-1, BLOCK)[block].ravel()
     lengths = rock.lengths.reshape(-1, BLOCK)[block].ravel()
-    halves = rock.halves.reshape(-1, BLOCK)[block].ravel()
     count = BLOCK * np.bincount(phalanx, minlength=q.size)
     phalanx = np.repeat(phalanx, BLOCK)
-    near = NearPoints(points, lengths, halves, phalanx, np.cumsum(count) - count)
+    near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count)
     seen = (points - joints.ravel()[phalanx]) * u.ravel().conj()[phalanx]
     return shape.may_press(seen, near, within.ravel())

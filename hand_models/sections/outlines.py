@@ -38,8 +38,6 @@ class Outlines(NamedTuple):
         s + i t of places on the rock, chain by chain [m].
     lengths : ndarray, shape (n, p)
         Of the rock's boundary that each stands for [m].
-    halves : ndarray of complex, shape (n, p)
-        Half of these, along rock that is known by straight pieces; zero for smooth rock [m].
     centres : ndarray of complex, shape (n, p / `BLOCK`)
     radii : ndarray, shape (n, p / `BLOCK`)
         Circles around each `BLOCK` points in order [m].
@@ -49,7 +47,6 @@ class Outlines(NamedTuple):
 
     points: Complexes
     lengths: Array
-    halves: Complexes
     centres: Complexes
     radii: Array
     longest: Array
@@ -67,27 +64,22 @@ class Outlines(NamedTuple):
             Of the points, at most [m].
         """
         taken = [_points(section, reach, spacing) for section in sections]
-        blocks = math.ceil(max([1, *(len(points) for points, *_ in taken)]) / BLOCK)
+        blocks = math.ceil(max([1, *(len(points) for points, _ in taken)]) / BLOCK)
         points = np.full((len(taken), blocks * BLOCK), complex(FAR))
-        lengths, halves = np.full(points.shape, NOTHING), np.zeros_like(points)
+        lengths = np.full(points.shape, NOTHING)
         for i, each in enumerate(taken):
-            for values, own in zip((points, lengths, halves), each, strict=True):
+            for values, own in zip((points, lengths), each, strict=True):
                 values[i, : len(own)] = own
         in_blocks = points.reshape(len(taken), blocks, BLOCK)
         centres = in_blocks.mean(axis=-1)
         radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
         longest = lengths.reshape(in_blocks.shape).max(axis=-1)
-        return cls(points, lengths, halves, centres, radii, longest)
+        return cls(points, lengths, centres, radii, longest)
 
 
-Parts = tuple[Complexes, Array, Complexes]
-"""Places along rock, lengths that they stand for and half of each along the rock [m]."""
-
-
-def _points(section: Section | None, reach: float, spacing: float) -> Parts:
-    """Return places along the boundary within reach, at its corners as well."""
-    nothing = np.zeros(0, dtype=complex)
-    found: list[Parts] = [(nothing, np.zeros(0), nothing)]
+def _points(section: Section | None, reach: float, spacing: float) -> tuple[Complexes, Array]:
+    """Return places along the boundary within reach, at its corners as well, and their lengths."""
+    found: list[tuple[Complexes, Array]] = [(np.zeros(0, dtype=complex), np.zeros(0))]
     for chain in () if section is None else section.outline(reach, spacing):
         begin, step = chain[:-1], np.diff(chain)
         size = np.abs(step)
@@ -100,19 +92,16 @@ def _points(section: Section | None, reach: float, spacing: float) -> Parts:
         stops = np.sort(np.concatenate([ends, corners, corners]))
         for first, last in stops.reshape(-1, 2).tolist():
             found.append(_parts(chain[first : last + 1], size[first:last], spacing))
-    points, lengths, halves = (np.concatenate(values) for values in zip(*found, strict=True))
+    points, lengths = (np.concatenate(values) for values in zip(*found, strict=True))
     kept = np.abs(points) <= reach
-    halves = halves[kept] * (section is not None and section.pieced)
-    return points[kept], lengths[kept], halves
+    return points[kept], lengths[kept]
 
 
-def _parts(chain: Complexes, size: Array, spacing: float) -> Parts:
-    """Return the ends of equal parts of a chain whose pieces have these lengths."""
+def _parts(chain: Complexes, size: Array, spacing: float) -> tuple[Complexes, Array]:
+    """Return the ends of equal parts of a chain whose pieces have these lengths, and theirs [m]."""
     at = np.append(0.0, np.cumsum(size))
     count = max(math.ceil(at[-1] / spacing - ROUNDING), 1)
     places = np.linspace(0.0, at[-1], count + 1)
     lengths = np.full(count + 1, at[-1] / count)
     lengths[[0, -1]] *= 0.5
-    points = np.interp(places, at, chain)
-    halves = np.gradient(points)
-    return points, lengths, 0.5 * lengths * halves / np.maximum(np.abs(halves), NOTHING)
+    return np.interp(places, at, chain), lengths

@@ -55,8 +55,6 @@ class PolylineSection(Section):
         on a corner touches there and not at the lowest place of a fit.
     """
 
-    pieced = True
-
     def __init__(self, pieces: Sequence[Array], *, faceted: bool = False) -> None:
         self.pieces = tuple(pieces)
         self.faceted = faceted

@@ -77,15 +77,7 @@ class Rest(NamedTuple):
 
 
 class Section(ABC):
-    """Rock in a plane with coordinates (s, t); t grows into the rock.
-
-    Attributes
-    ----------
-    pieced : bool
-        Whether it is known by straight pieces.
-    """
-
-    pieced = False
+    """Rock in a plane with coordinates (s, t); t grows into the rock."""
 
     @abstractmethod
     def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:

@@ -21,11 +21,10 @@ DEPTH = 2e-4
 seeds = st.integers(0, 2**32 - 1)
 
 
-def all_of(points, lengths, halves):
+def all_of(points, lengths):
     """All points, (..., p), as those that phalanges may press on."""
     phalanx, along = np.divmod(np.arange(points.size), points.shape[-1])
-    first = np.flatnonzero(along == 0)
-    return NearPoints(points.ravel(), lengths.ravel(), halves.ravel(), phalanx, first)
+    return NearPoints(points.ravel(), lengths.ravel(), phalanx, np.flatnonzero(along == 0))
 
 
 def beside(section, angle, joint=0.0, depth=DEPTH):
@@ -36,8 +35,7 @@ def beside(section, angle, joint=0.0, depth=DEPTH):
     points = np.broadcast_to(rock.points[0], (*shape, rock.points.shape[1]))
     lengths = np.broadcast_to(rock.lengths[0], points.shape)
     joints = np.broadcast_to(np.asarray(joint, dtype=complex), shape)
-    halves = np.broadcast_to(rock.halves[0], points.shape)
-    every = all_of(points, lengths, halves)
+    every = all_of(points, lengths)
     return SHAPE.beside(every, joints, u, np.broadcast_to(depth, shape))
 
 
@@ -189,7 +187,7 @@ def test_of_the_points_that_may_press_phalanges_are_as_beside_all_rock(seed):
     joints, u = fan_out(q + turn * rng.uniform(-1.0, 1.0, (2, 3)), SHAPE.end)
     found = SHAPE.beside(near, joints, u, depth)
     shape = 2, 3, rock.points.shape[1]
-    every = all_of(*(np.broadcast_to(each[:, None], shape) for each in rock[:3]))
+    every = all_of(*(np.broadcast_to(each[:, None], shape) for each in rock[:2]))
     for value, want in zip(found, SHAPE.beside(every, joints, u, depth), strict=True):
         np.testing.assert_allclose(value, want, rtol=1e-9, atol=1e-12)
     assert len(near.points) < len(every.points)
