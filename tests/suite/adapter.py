@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,6 +13,7 @@ from unittest.mock import patch
 
 from click.testing import CliRunner
 
+from hand_models.experiments import pulling
 from hand_models.studies import load_study
 from service.answering import dispatch
 from service.commands.cli import run
@@ -97,5 +98,10 @@ def _coarse(problem: dict[str, Any]) -> Iterator[None]:
     if not numbers:
         yield
         return
-    with patch.multiple(load_study(problem["command"][1]), **numbers):
+    study = load_study(problem["command"][1])
+    with ExitStack() as patched:
+        for name, value in numbers.items():
+            # figures share their search and pull
+            module = study if hasattr(study, name) else pulling
+            patched.enter_context(patch.object(module, name, value))
         yield
