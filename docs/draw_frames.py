@@ -87,14 +87,14 @@ def draw_robot(axes: Any) -> None:
 def main() -> None:
     """Draw both views and write the picture."""
     figure = plt.figure(figsize=(11.0, 5.2), layout="constrained")
-    for place, draw, title, (elevation, azimuth), unit in (
-        (121, draw_robot, "world W, body B, four hands H", (18.0, -145.0), "m"),
-        (122, draw_hand, "hand H, finger F, phalanx P (of inner_left)", (24.0, -102.0), "m"),
+    for place, draw, title, (elevation, azimuth) in (
+        (121, draw_robot, "world W, body B, four hands H", (18.0, -145.0)),
+        (122, draw_hand, "hand H, finger F, phalanx P (of inner_left)", (24.0, -102.0)),
     ):
         axes: Any = figure.add_subplot(place, projection="3d")
         draw(axes)
         axes.set_title(title)
-        axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", zlabel=f"z [{unit}]")
+        axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
         axes.view_init(elevation, azimuth)
         axes.set_aspect("equal")
         axes.tick_params(labelsize=7)

@@ -43,16 +43,15 @@ class Column(NamedTuple):
     unit : str
         ``1`` for a number that has none; empty where there is no number.
     meaning : str
-    path : str
-        To its value in a reply as `row_of` reads it: keys and indices with dots between them; by
-        default the name.
+    path : tuple of str or int
+        Keys and indices to its value in a reply as `row_of` reads it; by default the name alone.
     """
 
     name: str
     kind: Kind
     unit: str
     meaning: str
-    path: str = ""
+    path: tuple[str | int, ...] = ()
 
 
 class Row(msgspec.Struct):
@@ -78,16 +77,16 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
     yield from _limiting()
     yield Column("verified", "bool", "", "whether the plan has passed its independent check")
     for limb in limbs:
-        hand, meaning = f"hands.{limb}", "the largest of the hand's limits"
-        yield Column(f"{limb}_utilisation", "float", "1", meaning, f"{hand}.utilisation")
+        hand, meaning = ("hands", limb), "the largest of the hand's limits"
+        yield Column(f"{limb}_utilisation", "float", "1", meaning, (*hand, "utilisation"))
         for i, finger in enumerate(FINGERS):
-            name, path = f"{limb}_{finger}_tension_N", f"{hand}.tensions.{i}"
-            yield Column(name, "float", "N", "tension of its tendon", path)
+            name = f"{limb}_{finger}_tension_N"
+            yield Column(name, "float", "N", "tension of its tendon", (*hand, "tensions", i))
         for i, axis in enumerate(AXES):
             unit = "N" if axis.startswith("f") else "N·m"
-            name, path = f"{limb}_{axis}_{unit.replace('·', '')}", f"{hand}.wrench.{i}"
+            name = f"{limb}_{axis}_{unit.replace('·', '')}"
             meaning = f"{axis} of the hand's wrench on the rock, in its own frame"
-            yield Column(name, "float", unit, meaning, path)
+            yield Column(name, "float", unit, meaning, (*hand, "wrench", i))
     yield Column("warnings", "text", "", f"with {BETWEEN!r} between them")
     if explained:
         yield Column(EXPLAINED[0], "text", "", "limits that together leave no plan")
@@ -107,10 +106,10 @@ def _route_columns() -> Iterator[Column]:
     yield Column("stages", "int", "1", "stances, those with a limb in the air among them")
     yield Column("crux", "int", "1", "the hardest stage, from zero")
     meaning = "its move, from one; zero is the start"
-    yield Column("crux_move", "int", "1", meaning, "hardest.move")
+    yield Column("crux_move", "int", "1", meaning, ("hardest", "move"))
     for part, what in (("phase", "of the move"), ("limb", "that moves"), ("reason", "in words")):
         meaning = f"the crux's {part}, {what}"
-        yield Column(f"crux_{part}", "text", "", meaning, f"hardest.{part}")
+        yield Column(f"crux_{part}", "text", "", meaning, ("hardest", part))
     yield Column("utilisation", "float", "1", "of the crux: the largest of any limit")
     yield Column("load_factor", "float", "1", "the least of all stages, where it is bounded")
     yield Column("load_factor_unbounded", "bool", "", "whether there is no end to any of them")
@@ -128,13 +127,13 @@ def _asked() -> Iterator[Column]:
 def _limiting() -> Iterator[Column]:
     for part in LimitName.__struct_fields__:
         meaning = f"{part} of the limit that is used most"
-        yield Column(f"limiting_{part}", "text", "", meaning, f"limiting.{part}")
+        yield Column(f"limiting_{part}", "text", "", meaning, ("limiting", part))
 
 
 def _failed() -> Iterator[Column]:
     for part in ("kind", "field", "message"):
         meaning = f"{part} of the error; empty for a plan"
-        yield Column(f"error_{part}", "text", "", meaning, f"error.{part}")
+        yield Column(f"error_{part}", "text", "", meaning, ("error", part))
 
 
 def chosen_columns(
@@ -179,7 +178,7 @@ def row_of(payload: bytes, columns: Sequence[Column]) -> Row:
     error = reply.get("error")
     values = _readable(reply)
     return Row(
-        [_at(values, column.path or column.name) for column in columns if column.name != INDEX],
+        [_at(values, column.path or (column.name,)) for column in columns if column.name != INDEX],
         reply.get("status"),
         None if error is None else msgspec.convert(error, ErrorDetail),
     )
@@ -204,13 +203,13 @@ def _readable(reply: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _at(value: Any, path: str) -> Any:
+def _at(value: Any, path: tuple[str | int, ...]) -> Any:
     """Return what is at the end of a path; None where a part of it is missing."""
-    for step in path.split("."):
-        try:
-            value = value[int(step) if isinstance(value, list) else step]
-        except (LookupError, TypeError):
-            return None
+    try:
+        for step in path:
+            value = value[step]
+    except (LookupError, TypeError):
+        return None
     return value
 
 

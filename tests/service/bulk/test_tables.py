@@ -14,7 +14,7 @@ import pytest
 
 from hand_models.base import InvalidInputError
 from service.answering import dispatch
-from service.bulk import chosen_columns, columns_of
+from service.bulk import chosen_columns, columns_of, row_of
 from service.commands.cli import run
 from tests.service.commands.test_interruption import limited
 from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint
@@ -329,3 +329,14 @@ def test_less_is_said_of_a_batch(lines, tmp_path, capfd):
         out = capfd.readouterr().out
         assert ("error: invalid" in out) == (not quiet)
         assert f"{COUNT} requests in" in out
+
+
+def test_the_values_of_a_limb_are_found_whatever_its_name():
+    hand = {"limb": "arm.1", "utilisation": 0.5, "tensions": [1, 2, 3, 4], "wrench": [5.0] * 6}
+    columns = columns_of(["arm.1"])
+    row = row_of(json.dumps({"status": "optimal", "hands": [hand]}).encode(), columns)
+    values = dict(zip((column.name for column in columns[1:]), row.values, strict=True))
+    assert values["arm.1_utilisation"] == 0.5
+    assert values["arm.1_inner_left_tension_N"] == 2
+    assert values["arm.1_mz_Nm"] == 5.0
+    assert values["limiting_limb"] is None
