@@ -14,9 +14,6 @@ from planner.robots import Robot, RobotFile, robosimian, robot_of
 from tests.suite.helpers.robots import TWO_LINK, limbs_toml
 from tests.suite.helpers.stances import random_hold, random_surface
 
-TRUNK = 10.0
-"""Mass of the two-link robot's trunk with its head [kg], at (0, 0, 0.1) and (0, 0, 0.4) m."""
-
 
 def two_link_robot(tip: float = 0.1, torque: str = "80.0") -> Robot:
     """A trunk with one limb of 0.6 and 0.4 + ``tip`` m, which turns about y from (0.5, 0, 0)."""
