@@ -1,5 +1,4 @@
 from .force_limits import (
-    PARAMETER_STUDIES as PARAMETER_STUDIES,
     HullPoints as HullPoints,
     Limit as Limit,
     Measure as Measure,
@@ -8,16 +7,13 @@ from .force_limits import (
     sharpened as sharpened,
 )
 from .gripper_fit import (
-    NEAR_EDGE as NEAR_EDGE,
-    NEAR_EDGE_ON_AVERAGE as NEAR_EDGE_ON_AVERAGE,
-    NEAR_FORCE as NEAR_FORCE,
-    NEAR_SHARE as NEAR_SHARE,
+    FIT_TOLERANCES as FIT_TOLERANCES,
     Datum as Datum,
     GripperFit as GripperFit,
 )
 from .hard_stop import PalmExperiment as PalmExperiment
 from .pictures import (
-    COLOURS as COLOURS,
+    PHALANX_COLOURS as PHALANX_COLOURS,
     conditions_title as conditions_title,
     draw_map as draw_map,
     label_solid as label_solid,
@@ -25,8 +21,6 @@ from .pictures import (
     panels as panels,
 )
 from .pulling import (
-    DRAGGED as DRAGGED,
-    UNBALANCED as UNBALANCED,
     Pulled as Pulled,
     even_pulls as even_pulls,
     explored as explored,
@@ -50,9 +44,9 @@ from .sweep import (
     sweep_cell as sweep_cell,
     sweep_map as sweep_map,
 )
-from .sweep_axis import SANDPAPER as SANDPAPER, Axis as Axis, Conditions as Conditions
+from .sweep_axis import Axis as Axis, Conditions as Conditions
 from .wrench_hull import (
-    UNITS as UNITS,
+    PLANAR_SCALE as PLANAR_SCALE,
     Extents as Extents,
     clipped_vertices as clipped_vertices,
     distance_along as distance_along,

@@ -22,14 +22,12 @@ from hand_models.compliance import (
     farthest,
     search_box,
 )
-from hand_models.experiments.wrench_hull import in_paper_signs
+from hand_models.experiments.wrench_hull import in_paper_signs, with_mirrored
 from hand_models.parameters import experiment_table
 from hand_models.wrench_spaces import Row
 
 __all__ = [
-    "GOALS",
-    "MEASURES",
-    "PARAMETER_STUDIES",
+    "MEASURE_UNITS",
     "HullPoints",
     "Limit",
     "Measure",
@@ -43,7 +41,7 @@ __all__ = [
 Measure = Literal["shear", "normal", "moment", "volume"]
 State = Literal["holds", "contact fails", "ejects"]
 
-MEASURES: Final[dict[Measure, str]] = {
+MEASURE_UNITS: Final[dict[Measure, str]] = {
     "shear": "N",
     "normal": "N",
     "moment": "N·m",
@@ -54,25 +52,6 @@ MEASURES: Final[dict[Measure, str]] = {
 ``shear`` is the largest F_x in the loading plane, the printed ratio of F_x to M_y; ``normal`` the
 largest −F_z, which in a skew symmetric hull has no F_x and no M_y; ``moment`` the largest M_y.
 """
-
-GOALS: Final[dict[Measure, tuple[float, float, float]]] = {
-    "shear": (1.0, 0.0, 0.0),
-    "normal": (0.0, -1.0, 0.0),
-    "moment": (0.0, 0.0, 1.0),
-}
-"""Directions in which a hull's farthest wrench is a measure."""
-
-PARAMETER_STUDIES: Final = "parameter_studies"
-"""Section of ``experiments.toml`` with what Figs. 15 and 16 have in common."""
-
-MIRRORED: Final = np.array([-1.0, 1.0, -1.0])
-"""Signs of a pose or a wrench when left and right change places."""
-
-GAIN: Final = 1e-3
-"""Least gain of a new point that is worth another search, relative to the limit."""
-
-STEPS: Final = 101
-"""Poses on the way back from the rock at which the fingers' push is looked at first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +89,9 @@ class HullPoints:
         """Return these points, and some more with their mirror images."""
         phalanges = tuple(None if row is None else row.phalanx for row in limiting)
         return HullPoints(
-            np.vstack([self.wrenches, wrenches, wrenches * MIRRORED]),
-            np.vstack([self.poses, poses, poses * MIRRORED]),
+            np.vstack([self.wrenches, with_mirrored(wrenches)]),
+            # a pose is mirrored as a wrench is: (−x, z, −ω_y)
+            np.vstack([self.poses, with_mirrored(poses)]),
             self.phalanges + phalanges + phalanges,
         )
 
@@ -152,8 +132,11 @@ def limit(points: Array, measure: Measure) -> Limit:
     EmptySetError
         If no wrench of the hull is in question.
     """
-    goal = np.array(GOALS[measure])
-    ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
+    # the direction in which the hull's farthest wrench is the measure
+    goal = np.array(
+        {"shear": (1.0, 0.0, 0.0), "normal": (0.0, -1.0, 0.0), "moment": (0.0, 0.0, 1.0)}[measure]
+    )
+    ratio = experiment_table().scalar("parameter_studies", "force_to_moment")
     planes = np.array([[1.0, 0.0, -ratio]] if measure == "shear" else np.zeros((0, 3)))
     result = scipy.optimize.linprog(
         -points @ goal,
@@ -227,7 +210,8 @@ def _farther(grasp: Gripper, points: HullPoints, found: Limit, starts: int) -> F
             end = farthest(grasp, direction, points.poses[start])
         except EmptySetError:
             continue
-        if end.reach - reached.max() > GAIN * abs(found.value):
+        # a gain of less than 0.1 % of the limit is not worth another search
+        if end.reach - reached.max() > 1e-3 * abs(found.value):
             return end
     return None
 
@@ -255,12 +239,13 @@ def unloaded_pose(grasp: Gripper) -> Array | None:
     By symmetry only F_z is to vanish. None if it does not within the printed shift of the base, or
     only where a phalanx has lost the rock.
     """
-    far = experiment_table().scalar(PARAMETER_STUDIES, "base_shift")
+    far = experiment_table().scalar("parameter_studies", "base_shift")
 
     def push(z: float) -> float:
         return float(grasp.evaluate(np.array([[0.0, z, 0.0]])).wrenches[0, 2])
 
-    way = -np.sign(push(0.0)) * np.linspace(0.0, far, STEPS)
+    # 101 poses bracket the first change of sign
+    way = -np.sign(push(0.0)) * np.linspace(0.0, far, 101)
     pushes = grasp.evaluate(np.column_stack([0.0 * way, way, 0.0 * way])).wrenches[:, 2]
     crossed = np.flatnonzero(pushes[:-1] * pushes[1:] <= 0.0)
     lost = np.flatnonzero(~np.isfinite(pushes))

@@ -11,6 +11,7 @@ goes: none that press more than that.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -23,34 +24,25 @@ from hand_models.experiments.wrench_hull import edge, extents, in_paper_signs, w
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = [
-    "NEAR_EDGE",
-    "NEAR_EDGE_ON_AVERAGE",
-    "NEAR_FORCE",
-    "NEAR_SHARE",
-    "Datum",
-    "GripperFit",
-]
+__all__ = ["FIT_TOLERANCES", "Datum", "FitTolerances", "GripperFit"]
 
-NEAR_SHARE: Final = 0.1
-NEAR_FORCE: Final = 0.3
-"""Tolerance of a force of Fig. 12 or an extent, relative; and the least one of a force [N]."""
 
-NEAR_EDGE: Final = 0.2
-NEAR_EDGE_ON_AVERAGE: Final = 0.1
-"""Tolerances of the edge of the surface, everywhere and on average [N·m]."""
+@dataclass(frozen=True, slots=True)
+class FitTolerances:
+    """Tolerances of what is read off Figs. 12 and 13."""
 
-WIDE: Final = 1.0
-ABOUT: Final = 0.4
-"""Shares by which the side view and the planes may be off: what they count beside the others."""
+    force_share: float = 0.1
+    """Of a force of Fig. 12 or an extent of Fig. 13, as a share of it."""
+    least_force: float = 0.3
+    """Least tolerance of a force of Fig. 12 [N]."""
+    edge: float = 0.2
+    edge_on_average: float = 0.1
+    """Of the edge of Fig. 13's surface, at every point and on average [N·m]."""
 
-RAYS: Final = 350
-"""Rays to the boundary of the wrenches held; more are sent in the directions `TOWARD`."""
 
-SHORT: Final = 1.008
-"""Factor by which the fine hull's wrenches are larger than those of the rays, about."""
+FIT_TOLERANCES: Final = FitTolerances()
 
-TOWARD: Final = np.array(
+DATA_DIRECTIONS: Final = np.array(
     [
         (1.0, 0.0, 0.0),
         (1.0, 0.0, 0.5),
@@ -70,9 +62,6 @@ TOWARD: Final = np.array(
     ]
 )
 """Directions of the data over the extents: along F_x, F_z and M_y, of the paper's signs."""
-
-HOPELESS: Final = 30.0
-"""Residual where a set of numbers gives no gripper that holds."""
 
 
 class Datum(NamedTuple):
@@ -136,29 +125,30 @@ class GripperFit:
         self.first = np.array([datum.first for datum in self.data])
 
     def _data(self) -> Iterable[Datum]:
-        settings = self._settings
+        settings, near = self._settings, FIT_TOLERANCES
         for end in ("unloaded", "pulled"):
             for kind in ("shear", "normal"):
                 values = settings.vector("fig12", f"{kind}_{end}")
                 for phalanx, value in zip(PHALANGES, values, strict=True):
-                    near = max(NEAR_SHARE * abs(value), NEAR_FORCE)
-                    yield Datum(f"{phalanx} {kind}, {end}", "N", value, near, True)
+                    tolerance = max(near.force_share * abs(value), near.least_force)
+                    yield Datum(f"{phalanx} {kind}, {end}", "N", value, tolerance, True)
         for name, words, unit in (
             ("force_x", "F_x", "N"),
             ("force_z", "F_z", "N"),
             ("moment", "M_y", "N·m"),
         ):
             value = settings.scalar("fig13", name)
-            yield Datum(f"extent of {words}", unit, value, NEAR_SHARE * abs(value), True)
+            yield Datum(f"extent of {words}", unit, value, near.force_share * abs(value), True)
         for force, moment in zip(self._edge_at.tolist(), self._edge.tolist(), strict=True):
-            yield Datum(f"edge at F_x = {force:g} N", "N·m", moment, NEAR_EDGE, True)
-        yield Datum("edge, off on average", "N·m", 0.0, NEAR_EDGE_ON_AVERAGE, True)
+            yield Datum(f"edge at F_x = {force:g} N", "N·m", moment, near.edge, True)
+        yield Datum("edge, off on average", "N·m", 0.0, near.edge_on_average, True)
         side = settings.scalar("fig13", "side_force_z")
         words = f"pull-off at F_x = {settings.scalar('fig13', 'side_force_x'):g} N"
-        yield Datum(words, "N", side, WIDE * abs(side), False)
+        # neither counts in the misfit: the side view may be off by all of it, an arm by 0.4
+        yield Datum(words, "N", side, abs(side), False)
         for kind in ("force", "moment"):
             arm = 1.0 / settings.scalar("fig14", f"{kind}_ratio")
-            yield Datum(f"M_y : F_x best for {kind}", "m", arm, ABOUT * arm, False)
+            yield Datum(f"M_y : F_x best for {kind}", "m", arm, 0.4 * arm, False)
 
     def start(self) -> Array:
         """Return where the table is."""
@@ -187,11 +177,14 @@ class GripperFit:
         """
         if fine:
             return held_wrenches(gripper)
-        toward = np.zeros((len(TOWARD), 6))
+        toward = np.zeros((len(DATA_DIRECTIONS), 6))
         size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
-        toward[:, PLANAR] = TOWARD / np.abs(size) * (1.0, 1.0, -1.0)
-        found = boundary(gripper, linear_box(gripper), RAYS, toward)
-        return with_mirrored(in_paper_signs(found.wrenches) * SHORT)
+        toward[:, PLANAR] = DATA_DIRECTIONS / np.abs(size) * (1.0, 1.0, -1.0)
+        found = boundary(
+            gripper, linear_box(gripper), 350, toward
+        )  # of the rays, some per cent off
+        # the fine hull's wrenches are larger than those of the rays by about 0.8 %
+        return with_mirrored(in_paper_signs(found.wrenches) * 1.008)
 
     def model(self, x: Array, *, fine: bool = False) -> Array:
         """Return what the model has for the data.
@@ -220,11 +213,12 @@ class GripperFit:
 
     def residuals(self, x: Array, *, fine: bool = False) -> Array:
         """Return how many tolerances each datum is off."""
+        hopeless = 30.0  # of every datum where a set of numbers gives no gripper that holds
         try:
             off = (self.model(x, fine=fine) - self.wanted) / self.tolerance
         except CruxError:
-            return np.full(len(self.data), HOPELESS)
-        return np.asarray(np.nan_to_num(np.clip(off, -HOPELESS, HOPELESS), nan=HOPELESS))
+            return np.full(len(self.data), hopeless)
+        return np.asarray(np.nan_to_num(np.clip(off, -hopeless, hopeless), nan=hopeless))
 
     def misfit(self, residuals: Array) -> float:
         """Return the largest residual of the data that come first."""

@@ -13,12 +13,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from hand_models.experiments.force_limits import MEASURES, Measure
+from hand_models.experiments.force_limits import MEASURE_UNITS, Measure
 from hand_models.finger import PHALANGES
 
 __all__ = [
-    "COLOURS",
-    "NO_GRASP",
+    "PHALANX_COLOURS",
     "conditions_title",
     "draw_map",
     "entry_name",
@@ -27,19 +26,15 @@ __all__ = [
     "panels",
 ]
 
-COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
+PHALANX_COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
 """Colours of phalanges, in every picture; for failures the paper's are red and blue, too."""
 
-NO_GRASP: Final = "no grasp"
-STATES: Final = {
+STATE_COLOURS: Final = {
     "contact fails": ("tab:blue", "closing alone overloads a tile"),
     "ejects": ("navy", "the gripper ejects itself"),
-    NO_GRASP: ("0.6", "no such grasp"),
+    "no grasp": ("0.6", "no such grasp"),
 }
 """Colour and legend of cells without limits."""
-
-SHOWN: Final = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
-"""Scale and unit that pictures have in place of an SI unit."""
 
 
 def panels(
@@ -106,21 +101,22 @@ def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
     measure : str
     """
     states, values = data["state"], data["limits"][measure]
+    handier = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
     sides, labels = [], []
     for side in (data["x"], data["y"]):
-        scale, unit = SHOWN.get(side["unit"], (1.0, side["unit"]))
+        scale, unit = handier.get(side["unit"], (1.0, side["unit"]))
         sides.append((scale * np.array(side["values"]), scale * side["current"]))
         labels.append(f"{entry_name(side['entry'])} [{unit}]")
     (x, current_x), (y, current_y) = sides
     mesh = axes.pcolormesh(x, y, values, cmap="YlOrRd", vmin=0.0, shading="nearest")
-    for state, (colour, _) in STATES.items():
+    for state, (colour, _) in STATE_COLOURS.items():
         if (states == state).any():
             shown = np.ma.masked_where(states != state, np.ones(states.shape))
             axes.pcolormesh(x, y, shown, cmap=ListedColormap([colour]), shading="nearest")
     axes.plot(current_x, current_y, "D", color="white", markeredgecolor="k", markersize=11)
     # the range that was asked for: half of each cell at its ends is beyond
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    unit = MEASURES[measure]
+    unit = MEASURE_UNITS[measure]
     name = measure if measure == "volume" else f"{measure} limit"
     axes.figure.colorbar(mesh, ax=axes, label=f"{name} [{unit}]")
     axes.set(xlabel=labels[0], ylabel=labels[1])
@@ -130,7 +126,9 @@ def legend(figure: Figure, maps: Sequence[dict[str, Any]]) -> None:
     """Draw the legend of colours and the diamond below the maps of a figure."""
     met = {state for data in maps for state in data["state"].flat}
     handles: list[Any] = [
-        Patch(color=colour, label=text) for state, (colour, text) in STATES.items() if state in met
+        Patch(color=colour, label=text)
+        for state, (colour, text) in STATE_COLOURS.items()
+        if state in met
     ]
     handles.append(
         Line2D([], [], marker="D", color="white", markeredgecolor="k", linestyle="", label="in use")

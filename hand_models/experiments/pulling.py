@@ -17,7 +17,7 @@ from hand_models.base import Array, EmptySetError, Progress
 from hand_models.compliance import SIDES, STEP, Gripper, Numbers, WristSearch, search
 from hand_models.experiments.study_result import part
 from hand_models.experiments.wrench_hull import (
-    UNITS,
+    PLANAR_SCALE,
     clipped_vertices,
     in_paper_signs,
     with_mirrored,
@@ -25,8 +25,6 @@ from hand_models.experiments.wrench_hull import (
 from hand_models.finger import PHALANGES
 
 __all__ = [
-    "DRAGGED",
-    "UNBALANCED",
     "Pulled",
     "even_pulls",
     "explored",
@@ -37,31 +35,18 @@ __all__ = [
     "wrist_poses",
 ]
 
-DRAGGED: Final = "dragged_backwards"
-UNBALANCED: Final = "no_pose"
-"""How a load ends, where not at a tile's limit: a tile has less drag than it needs (`Surface`), or
-nothing balances."""
 
-PER_AXIS: Final = 60
-"""Poses of the wrist along each axis of the studies' searches."""
+@dataclass(frozen=True, slots=True)
+class PullingSettings:
+    """How finely a gripper's poses are searched and balanced."""
 
-NEWTON_STEPS: Final = 12
-"""For each increment of the load, at most."""
+    poses_per_axis: int = 60
+    """Poses of the wrist along each axis of a search."""
+    balance_tolerance: float = 1e-8
+    """Largest part of a wrench that a pose may leave over [N]."""
 
-BALANCED: Final = 1e-8
-"""Largest part of a wrench that a pose may leave over [N]."""
 
-INCREMENT: Final = 1.0
-"""Increment of the load along each direction; halved where the next load does not hold [N]."""
-
-FINEST: Final = 2.0**-7
-"""Increment at which a direction is done [N]."""
-
-LARGEST: Final = 1e4
-"""Load at which a direction is given up [N]."""
-
-GOLDEN: Final = np.pi * (3.0 - np.sqrt(5.0))
-"""Golden angle, by which points of a spiral spread evenly."""
+PULLING_SETTINGS: Final = PullingSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +62,8 @@ class Pulled:
     side, phalanx : tuple of (str or None), length m
         The tile that fails; None where no pose balances the next load.
     way : tuple of str, length m
-        The name of the tile's limit, or ``dragged_backwards``, or ``no_pose``.
+        The name of the tile's limit, or ``dragged_backwards`` where a tile has less drag than it
+        needs (`Surface`), or ``no_pose`` where nothing balances.
     """
 
     wrenches: Array
@@ -98,7 +84,7 @@ def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSea
         If it does not hold without load.
     """
     unloaded(gripper)
-    found = search(gripper, PER_AXIS, part(progress, 0, 1, 10))
+    found = search(gripper, PULLING_SETTINGS.poses_per_axis, part(progress, 0, 1, 10))
     wrenches = in_paper_signs(found.wrenches)
     size = np.abs(clipped_vertices(wrenches)).max(axis=0)
     pulled = pull(gripper, even_pulls(count, size), part(progress, 1, 10, 10))
@@ -108,7 +94,8 @@ def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSea
 
 def held_wrenches(gripper: Gripper) -> Array:
     """Return the outermost wrenches held by a gripper and its mirror image, shape (n, 3)."""
-    return with_mirrored(in_paper_signs(search(gripper, PER_AXIS).wrenches))
+    found = search(gripper, PULLING_SETTINGS.poses_per_axis)
+    return with_mirrored(in_paper_signs(found.wrenches))
 
 
 def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array, Array]:
@@ -131,19 +118,20 @@ def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array,
     poses, m = start.copy(), len(start)
     steps = 1j * STEP * np.eye(3)
     with np.errstate(invalid="ignore"):
-        for _ in range(NEWTON_STEPS):
+        for _ in range(12):  # Newton steps for each increment of the load, at most
             moved = (poses[:, None, :] + steps).reshape(-1, 3)
             found = _wrenches(gripper, moved).reshape(m, 3, 3)
             left = found[:, 0].real - wrenches
-            residual = np.abs(left * UNITS).max(axis=1)
+            residual = np.abs(left * PLANAR_SCALE).max(axis=1)
             # tiny steps move no real part: all three rows have the wrench itself
             stiffness = found.imag.swapaxes(1, 2) / STEP
-            going = (residual > BALANCED) & (np.abs(np.linalg.det(stiffness)) > 0.0)
+            going = residual > PULLING_SETTINGS.balance_tolerance
+            going &= np.abs(np.linalg.det(stiffness)) > 0.0
             if not going.any():
                 break
             poses[going] -= np.linalg.solve(stiffness[going], left[going, :, None])[..., 0]
         left = _wrenches(gripper, poses) - wrenches
-    return poses, np.asarray(np.abs(left * UNITS).max(axis=1))
+    return poses, np.asarray(np.abs(left * PLANAR_SCALE).max(axis=1))
 
 
 def unloaded(gripper: Gripper) -> Array:
@@ -168,7 +156,7 @@ def pulled_off_poses(gripper: Gripper, pulls: Array) -> Array:
     at, poses = np.zeros((1, 3)), []
     for force in pulls:
         at, residual = wrist_poses(gripper, np.array([[0.0, -force, 0.0]]), at)
-        if not residual[0] <= BALANCED:
+        if not residual[0] <= PULLING_SETTINGS.balance_tolerance:
             break
         poses.append(at[0])
     return np.array(poses)
@@ -191,19 +179,21 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
         If it does not hold without load.
     """
     m = len(directions)
-    unit = directions / np.linalg.norm(directions * UNITS, axis=1)[:, None]
+    unit = directions / np.linalg.norm(directions * PLANAR_SCALE, axis=1)[:, None]
     poses = np.repeat(unloaded(gripper)[None], m, axis=0)
-    loads, increments = np.zeros(m), np.full(m, INCREMENT)
+    balanced_to = PULLING_SETTINGS.balance_tolerance
+    # [N], halved where the next load does not hold
+    loads, increments = np.zeros(m), np.full(m, 1.0)
     tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
     limits = gripper.limits
-    fails: list[tuple[str | None, str | None, str]] = [(None, None, UNBALANCED)] * m
+    fails: list[tuple[str | None, str | None, str]] = [(None, None, "no_pose")] * m
     going = np.ones(m, dtype=bool)
     while going.any():
         i = np.flatnonzero(going)
         tried, residual = wrist_poses(
             gripper, (loads[i] + increments[i])[:, None] * unit[i], poses[i]
         )
-        found, balanced = gripper.evaluate(tried), residual <= BALANCED
+        found, balanced = gripper.evaluate(tried), residual <= balanced_to
         holds = found.holds & balanced
         poses[i[holds]] = tried[holds]
         loads[i[holds]] += increments[i[holds]]
@@ -212,15 +202,15 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
         for k in np.flatnonzero(~holds):
             row = limits[found.limiting[k]]
             if not balanced[k]:
-                fails[i[k]] = (None, None, UNBALANCED)
+                fails[i[k]] = (None, None, "no_pose")
             elif found.utilisation[k] > 1.0:
                 fails[i[k]] = (row.finger, row.phalanx, row.limit)
             else:
-                fails[i[k]] = (*tiles[drags[k].argmin()], DRAGGED)
+                fails[i[k]] = (*tiles[drags[k].argmin()], "dragged_backwards")
         over = i[~holds]
         increments[over] *= 0.5
-        going[over] = increments[over] >= FINEST
-        going &= loads < LARGEST
+        going[over] = increments[over] >= 2.0**-7  # [N], where a direction is done
+        going &= loads < 1e4  # [N], where a direction is given up
         if progress is not None:
             progress(m - int(going.sum()), m)
     sides, phalanges, ways = zip(*fails, strict=True)
@@ -245,7 +235,8 @@ def even_pulls(count: int, size: Array) -> Array:
     """
     k = np.arange(count)
     height = (k + 0.5) / count
-    turn = GOLDEN * k
+    # by the golden angle, which spreads a spiral's points evenly
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * k
     around = np.sqrt(1.0 - height**2)
     spiral = np.column_stack([around * np.cos(turn), -height, around * np.sin(turn)])
     half = spiral[spiral[:, 0] > 0.0]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,29 +16,19 @@ from matplotlib.figure import Figure
 from hand_models.base import EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import gripper_table
 from hand_models.experiments.force_limits import (
-    GOALS,
-    MEASURES,
-    PARAMETER_STUDIES,
+    MEASURE_UNITS,
     HullPoints,
     Measure,
     rest_state,
     sharpened,
 )
-from hand_models.experiments.pictures import NO_GRASP, conditions_title, draw_map, legend, panels
+from hand_models.experiments.pictures import conditions_title, draw_map, legend, panels
 from hand_models.experiments.study_result import StudyResult, track
 from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
 
 __all__ = ["Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
-
-RAYS: Final = 300
-CUTS: Final = 4
-STARTS: Final = 2
-"""How finely the hull of a cell is found: limits come out within 5 %, nearly all within 1 %."""
-
-POINTS: Final = 15
-"""Values along an axis where nothing else is asked for."""
 
 
 def sweep_cell(
@@ -56,15 +46,16 @@ def sweep_cell(
     try:
         grasp = conditions.gripper(table)
     except InvalidInputError:
-        return {"state": NO_GRASP, "limits": limits}
+        return {"state": "no grasp", "limits": limits}
     state = rest_state(grasp)
     if state != "holds" or not measures:
         return {"state": state, "limits": limits}
     try:
-        points = HullPoints.explored(grasp, RAYS)
+        # so fine that limits come out within 5 %, nearly all within 1 %
+        points = HullPoints.explored(grasp, rays=300)
         for measure in measures:
-            if measure in GOALS:
-                points, end = sharpened(grasp, points, measure, CUTS, STARTS)
+            if measure != "volume":
+                points, end = sharpened(grasp, points, measure, cuts=4, starts=2)
                 limits[measure] = end.value
     except EmptySetError:
         return {"state": "contact fails", "limits": {}}
@@ -131,7 +122,7 @@ def sweep_map(
     }
 
 
-def radius_axes(table: ParameterTable, points: int = POINTS) -> tuple[Axis, Axis]:
+def radius_axes(table: ParameterTable, points: int = 15) -> tuple[Axis, Axis]:
     """Return the axes of Fig. 16: radii of the middle and the distal pulley."""
     low, high = experiment_table().vector("fig16", "radii")
     values = tuple(np.linspace(low, high, points).tolist())
@@ -151,7 +142,7 @@ class Sweep:
     conditions : Conditions, optional
         Those of Fig. 16 by default, on the first of its surfaces.
     measures : tuple of str
-        Of `force_limits.MEASURES`.
+        Of `force_limits.MEASURE_UNITS`.
     """
 
     x: str | None = None
@@ -168,13 +159,13 @@ class Sweep:
             If there is no such measure, entry or surface, a range cannot be, or there is no grasp.
         """
         for measure in self.measures:
-            if measure not in MEASURES:
+            if measure not in MEASURE_UNITS:
                 raise InvalidInputError(
-                    f"{measure!r}: valid are {', '.join(MEASURES)}", field="--measure"
+                    f"{measure!r}: valid are {', '.join(MEASURE_UNITS)}", field="--measure"
                 )
         table = gripper_table(hand)
         conditions = self.conditions or Conditions.of_fig16()[0]
-        least, most = experiment_table().vector(PARAMETER_STUDIES, "diameter_range")
+        least, most = experiment_table().vector("parameter_studies", "diameter_range")
         if not least <= conditions.diameter <= most:
             raise InvalidInputError(
                 f"must be from {least:g} to {most:g} m, got {conditions.diameter:g}",
@@ -199,7 +190,7 @@ class Sweep:
         if x.entry == y.entry:
             raise InvalidInputError(f"must not be that of --x, {x.entry}", field="--y")
         found = sweep_map(table, x, y, conditions, self.measures, progress)
-        if (found["state"] == NO_GRASP).all():
+        if (found["state"] == "no grasp").all():
             # raises the reason
             conditions.gripper(y.set(x.set(table, x.values[0]), y.values[0]))
         data = {
@@ -237,5 +228,5 @@ def _summary(found: dict[str, Any]) -> list[str]:
                 f"{side['entry']} = {side['values'][k]:.4g} {side['unit']}"
                 for side, k in zip((found["x"], found["y"]), place, strict=True)
             )
-            lines.append(f"most {measure}: {best:.4g} {MEASURES[measure]} at {there}")
+            lines.append(f"most {measure}: {best:.4g} {MEASURE_UNITS[measure]} at {there}")
     return lines

@@ -5,13 +5,11 @@ from __future__ import annotations
 import difflib
 import math
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
 from hand_models.base import InvalidInputError, within
 from hand_models.compliance import Gripper, pulled_off
-from hand_models.experiments.force_limits import PARAMETER_STUDIES
 from hand_models.parameters import (
     LARGEST,
     ParameterTable,
@@ -22,19 +20,7 @@ from hand_models.parameters import (
 )
 from hand_models.tile import Surface
 
-__all__ = ["CONCRETE", "SANDPAPER", "Axis", "Conditions"]
-
-CONCRETE: Final = "concrete-fine"
-"""The surface of Figs. 15 and 16."""
-
-SANDPAPER: Final = "sandpaper-36"
-"""Surface of the paper's experiments; what they publish of it replaces the preset's numbers."""
-
-MOST_POINTS: Final = 201
-"""Most points of an axis."""
-
-IDLE: Final = frozenset({("tile", "base_engagement")})
-"""Entries that are read and do nothing: the gripper has no base tile."""
+__all__ = ["Axis", "Conditions"]
 
 
 @dataclass(frozen=True)
@@ -43,14 +29,14 @@ class Conditions:
 
     diameter: float
     tension: float
-    surface: str = CONCRETE
+    surface: str = "concrete-fine"  # of Figs. 15 and 16
 
     @classmethod
     def of_figure(cls, figure: str) -> Conditions:
         """Return those of a figure of the experiments on sandpaper, such as ``fig12``."""
         settings = experiment_table()
         return cls(
-            settings.scalar(figure, "diameter"), settings.scalar(figure, "tension"), SANDPAPER
+            settings.scalar(figure, "diameter"), settings.scalar(figure, "tension"), "sandpaper-36"
         )
 
     @classmethod
@@ -58,7 +44,7 @@ class Conditions:
         """Return those of Fig. 16, surface A first."""
         settings = experiment_table()
         tension = settings.scalar("fig16", "tension")
-        return tuple(cls(d, tension) for d in settings.vector(PARAMETER_STUDIES, "diameters"))
+        return tuple(cls(d, tension) for d in settings.vector("parameter_studies", "diameters"))
 
     def gripper(self, table: ParameterTable, most_pressing: float = math.inf) -> Gripper:
         """Return a gripper of these numbers, which presses no more than ``most_pressing`` [N].
@@ -69,7 +55,8 @@ class Conditions:
             If a number is out of range, there is no such surface, or the fingers do not lie on it.
         """
         surface = None
-        if self.surface != SANDPAPER:
+        # what the paper's experiments publish of sandpaper replaces the preset's numbers
+        if self.surface != "sandpaper-36":
             with within("surface"):
                 surface = pulled_off(Surface.named(self.surface), table)
         return Gripper(self.diameter, self.tension, surface, table, most_pressing)
@@ -144,8 +131,8 @@ class Axis:
             raise InvalidInputError(
                 f"HIGH must not exceed {most:.4g} {axis.unit}, got {high:g}", field=entry
             )
-        if not 2 <= count <= MOST_POINTS:
-            raise InvalidInputError(f"N must be from 2 to {MOST_POINTS}, got {count}", field=entry)
+        if not 2 <= count <= 201:
+            raise InvalidInputError(f"N must be from 2 to 201, got {count}", field=entry)
         if axis.section in hand_table().sections:
             for value in (low, high):
                 changed = axis.set(table, value).quantity(axis.section, axis.name)
@@ -179,12 +166,14 @@ def _entries(table: ParameterTable, surface: str) -> dict[str, Axis]:
     """Return the numbers that a gripper reads, by a caller's names, still without values."""
     reading = _Read(table)
     settings = experiment_table()
-    diameter = settings.vector(PARAMETER_STUDIES, "diameters")[0]
+    diameter = settings.vector("parameter_studies", "diameters")[0]
     Conditions(diameter, settings.scalar("fig16", "tension"), surface).gripper(reading)
+    # read, but of no effect: the gripper has no base tile
+    idle = {("tile", "base_engagement")}
     axes = [
         Axis(section, name, index, (), quantity.unit)
         for section, name, quantity in table
-        if (section, name) in reading.entries - IDLE
+        if (section, name) in reading.entries - idle
         for index in (range(len(quantity.value)) if isinstance(quantity.value, list) else (None,))
     ]
     return {axis.entry: axis for axis in axes}

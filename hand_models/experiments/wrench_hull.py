@@ -20,7 +20,7 @@ from hand_models.compliance import PLANAR
 from hand_models.wrench_spaces import SCALE, TOLERANCE, hull, hull_facets
 
 __all__ = [
-    "UNITS",
+    "PLANAR_SCALE",
     "Extents",
     "clipped_vertices",
     "distance_along",
@@ -33,12 +33,8 @@ __all__ = [
     "with_mirrored",
 ]
 
-UNITS: Final = SCALE[list(PLANAR)]
+PLANAR_SCALE: Final = SCALE[list(PLANAR)]
 """Per newton, newton and newton metre: what makes wrenches commensurate."""
-
-
-MIRROR: Final = (-1.0, 1.0, -1.0)
-"""Signs that mirror wrenches (F_x, F_z, M_y) of a symmetric gripper."""
 
 
 class Extents(NamedTuple):
@@ -62,7 +58,7 @@ def extents(points: Array) -> Extents:
 
 def with_mirrored(points: Array) -> Array:
     """Return wrenches (n, 3) of a symmetric gripper, and their images (−F_x, F_z, −M_y)."""
-    return np.vstack([points, points * MIRROR])
+    return np.vstack([points, points * (-1.0, 1.0, -1.0)])
 
 
 def edge(points: Array, at: Array) -> Array:
@@ -95,12 +91,12 @@ def vertices(points: Array) -> Array:
     SolverError
         If the points span no volume.
     """
-    return points[hull(points * UNITS).vertices]
+    return points[hull(points * PLANAR_SCALE).vertices]
 
 
 def volume(points: Array) -> float:
     """Return the volume of a hull over F_x, F_z and M_y [N³·m]."""
-    return float(hull(points * UNITS).volume / np.prod(UNITS))
+    return float(hull(points * PLANAR_SCALE).volume / np.prod(PLANAR_SCALE))
 
 
 def clipped_vertices(points: Array) -> Array:
@@ -130,14 +126,14 @@ def section(points: Array, normal: ArrayLike) -> Array:
         Wrenches [N, N, N·m].
     normal : array_like, shape (3,)
     """
-    way = np.asarray(normal, dtype=float) / UNITS
+    way = np.asarray(normal, dtype=float) / PLANAR_SCALE
     slack = _slack(points)
-    met = _met(points, (points * UNITS) @ way / np.linalg.norm(way), slack)
+    met = _met(points, (points * PLANAR_SCALE) @ way / np.linalg.norm(way), slack)
     if not len(met):
         return met
     # coordinates in the plane, of commensurate units
     basis = np.linalg.svd(way[None])[2][1:]
-    return met[_outermost(met * UNITS @ basis.T, slack)]
+    return met[_outermost(met * PLANAR_SCALE @ basis.T, slack)]
 
 
 def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
@@ -156,11 +152,11 @@ def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> 
     start : array_like, shape (3,) or (m, 3), optional
         The origin by default [N, N, N·m].
     """
-    normals, offsets = hull_facets(points * UNITS)
+    normals, offsets = hull_facets(points * PLANAR_SCALE)
     slack = _slack(points)
-    gaps = offsets - np.broadcast_to(start, directions.shape) * UNITS @ normals.T
+    gaps = offsets - np.broadcast_to(start, directions.shape) * PLANAR_SCALE @ normals.T
     gaps = np.where(gaps < -slack, gaps, np.maximum(gaps, slack))
-    slopes = (directions * UNITS) @ normals.T
+    slopes = (directions * PLANAR_SCALE) @ normals.T
     with np.errstate(divide="ignore", over="ignore"):
         ratios = gaps / slopes
     most = np.where(slopes > 0.0, ratios, np.inf).min(axis=1)
@@ -171,7 +167,7 @@ def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> 
 
 def _slack(points: Array) -> float:
     """Return how near wrenches of a hull are that rounding alone may part [N]."""
-    return TOLERANCE * float(np.abs(points * UNITS).max(initial=0.0))
+    return TOLERANCE * float(np.abs(points * PLANAR_SCALE).max(initial=0.0))
 
 
 def _met(points: Array, height: Array, slack: float) -> Array:
@@ -179,7 +175,7 @@ def _met(points: Array, height: Array, slack: float) -> Array:
 
     Vertices no farther than ``slack`` from it, and where edges cross it between the others.
     """
-    triangles = hull(points * UNITS).simplices
+    triangles = hull(points * PLANAR_SCALE).simplices
     pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]])
     near, far = np.unique(np.sort(pairs), axis=0).T
     side = np.where(np.abs(height) <= slack, 0.0, np.sign(height))

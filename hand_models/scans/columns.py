@@ -7,28 +7,14 @@ import re
 from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.scans.scan import RawScan
+from hand_models.scans.scan import AXIS_NAMES, RawScan
 
 __all__ = ["read_columns"]
-
-AXES: Final = ("x", "y", "z")
-
-NAMES: Final = {
-    **dict.fromkeys(("easting", "east", "e", "points:0"), "x"),
-    **dict.fromkeys(("northing", "north", "n", "points:1"), "y"),
-    **dict.fromkeys(("height", "elevation", "elev", "altitude", "h", "points:2"), "z"),
-}
-"""Columns by other names than x, y and z."""
-
-DEGREES: Final = ("lat", "lon", "lng", "long", "latitude", "longitude")
-
-SAMPLE: Final = 1000
-"""Number of lines that show how a table is written."""
 
 
 class _Style(NamedTuple):
@@ -36,16 +22,6 @@ class _Style(NamedTuple):
 
     mark: str | None
     decimal: str
-
-
-STYLES: Final = (
-    _Style(";", "."),
-    _Style(";", ","),
-    _Style(None, "."),
-    _Style(",", "."),
-    _Style(None, ","),
-)
-"""Ways to write a table, tried in this order."""
 
 
 def read_columns(path: Path) -> RawScan:
@@ -62,20 +38,21 @@ def read_columns(path: Path) -> RawScan:
         del lines[0]
     if not lines:
         return RawScan(np.empty((0, 3)))
-    style = _style(lines, path)
+    sample = 1000  # lines that show how a table is written
+    style = _style(lines[: sample + 1], path)
     first = _cells(lines[0], style)
     names = None
     if not _numbers(first, style):
         names = _names(first, style)
         del lines[0]
     width = len(_cells(lines[0], style)) if lines else len(names or ())
-    if width < len(AXES):
+    if width < len(AXIS_NAMES):
         raise InvalidInputError(f"three columns are needed, the first line has {width}: {path}")
     columns = [0, 1, 2] if names is None else _meant(names, width, path)
     if not lines:
         return RawScan(np.empty((0, 3)))
     if names is None:
-        _check_unnamed(lines, style, width, path)
+        _check_unnamed(lines[:sample], style, width, path)
     numbers = [place + 1 for place in places[-len(lines) :]]
     return RawScan(_read(lines, numbers, style, columns, path))
 
@@ -95,15 +72,18 @@ def _is_count(line: str, rest: int) -> bool:
 
 
 def _style(lines: Sequence[str], path: Path) -> _Style:
-    """Return the way of writing in which most of the first lines are three numbers or more."""
-    some = lines[1 : SAMPLE + 1] or lines[:1]
-    fits = [sum(_numbers(_cells(line, style), style) for line in some) for style in STYLES]
+    """Return the way of writing in which most of some lines are three numbers or more."""
+    # in the order in which they are tried
+    marks = ((";", "."), (";", ","), (None, "."), (",", "."), (None, ","))
+    styles = [_Style(*each) for each in marks]
+    some = lines[1:] or lines
+    fits = [sum(_numbers(_cells(line, style), style) for line in some) for style in styles]
     best = max(fits)
     if not best:
         raise InvalidInputError(
             f"no three numbers in a line, parted by commas, semicolons or blanks: {path}"
         )
-    return STYLES[fits.index(best)]
+    return styles[fits.index(best)]
 
 
 def _cells(line: str, style: _Style) -> list[str]:
@@ -115,10 +95,10 @@ def _cells(line: str, style: _Style) -> list[str]:
 def _numbers(cells: Sequence[str], style: _Style) -> bool:
     """Return whether the first cells are numbers, and at least three are."""
     try:
-        found = [_number(cell, style) for cell in cells[: len(AXES)]]
+        found = [_number(cell, style) for cell in cells[: len(AXIS_NAMES)]]
     except ValueError:
         return False
-    return len(found) == len(AXES) and any(map(np.isfinite, found))
+    return len(found) == len(AXIS_NAMES) and any(map(np.isfinite, found))
 
 
 def _number(cell: str, style: _Style) -> float:
@@ -131,31 +111,39 @@ def _number(cell: str, style: _Style) -> float:
 
 def _names(cells: Sequence[str], style: _Style) -> list[str]:
     """Return columns' names without marks and unit: ``//X``, ``x [m]`` and ``X_m`` are x."""
-    if len(cells) < len(AXES) and style.mark != ",":
+    if len(cells) < len(AXIS_NAMES) and style.mark != ",":
         # they are parted by something else than the numbers
         cells = re.split(r"[\s,;]+", " ".join(cells))
     bare = [re.sub(r"[\[(].*", "", cell.strip(" \t\"'/#")).strip().lower() for cell in cells]
     found = [re.sub(r"[_ ](m|cm|mm)$", "", name) for name in bare]
     if style.mark is None:
         found = [name for name in found if name]
-    return found if set(AXES) <= set(found) else [NAMES.get(name, name) for name in found]
+    if set(AXIS_NAMES) <= set(found):
+        return found
+    others = {
+        **dict.fromkeys(("easting", "east", "e", "points:0"), "x"),
+        **dict.fromkeys(("northing", "north", "n", "points:1"), "y"),
+        **dict.fromkeys(("height", "elevation", "elev", "altitude", "h", "points:2"), "z"),
+    }
+    return [others.get(name, name) for name in found]
 
 
 def _meant(names: Sequence[str], width: int, path: Path) -> list[int]:
     """Return where x, y and z are among columns that have names."""
-    if set(AXES) <= set(names):
+    if set(AXIS_NAMES) <= set(names):
         if len(names) > width:
             raise InvalidInputError(
                 f"{len(names)} columns have names, and the next line has {width} numbers: {path}"
             )
-        return [names.index(axis) for axis in AXES]
-    degrees = [name for name in names if name in DEGREES]
+        return [names.index(axis) for axis in AXIS_NAMES]
+    angles = ("lat", "lon", "lng", "long", "latitude", "longitude")
+    degrees = [name for name in names if name in angles]
     if degrees:
         raise InvalidInputError(
             f"column {degrees[0]} is in degrees, which are no lengths: project it to metres (UTM "
             f"or the national grid) first: {path}"
         )
-    if len(names) == len(AXES) == width:
+    if len(names) == len(AXIS_NAMES) == width:
         return [0, 1, 2]
     raise InvalidInputError(
         f"which columns are x, y and z does not follow from their names, {', '.join(names[:9])}: "
@@ -165,15 +153,15 @@ def _meant(names: Sequence[str], width: int, path: Path) -> list[int]:
 
 def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) -> None:
     """Refuse a table whose first three columns are hardly x, y and z."""
-    some = [_cells(line, style) for line in lines[:SAMPLE]]
+    some = [_cells(line, style) for line in lines]
     whole = all(cell.removeprefix("-").isdecimal() for cells in some for cell in cells)
-    if style.mark == "," and width == 2 * len(AXES) and whole:
+    if style.mark == "," and width == 2 * len(AXIS_NAMES) and whole:
         raise InvalidInputError(
             "commas are between the columns and in the numbers, which cannot be told apart: write "
             f"points in the numbers, or semicolons between the columns: {path}"
         )
     begin = [cells[0] for cells in some]
-    if width > len(AXES) and len(some) > 2 and all(cell.isdecimal() for cell in begin):
+    if width > len(AXIS_NAMES) and len(some) > 2 and all(cell.isdecimal() for cell in begin):
         numbers = [int(cell) for cell in begin]
         if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
             raise InvalidInputError(

@@ -9,8 +9,9 @@ import io
 import math
 import zipfile
 from collections.abc import Mapping
+from enum import IntEnum
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,46 +24,29 @@ __all__ = ["is_esri", "read_esri", "read_geotiff", "read_numpy"]
 Cell = tuple[float, float]
 """Width along x and height along y of a cell of a grid, in the file's unit."""
 
-MAGIC: Final = (b"\x93NUMPY", b"PK")
-"""First bytes of an ``.npy`` and of an ``.npz``."""
 
-HEIGHTS: Final = ("elevation", "heights", "height", "z", "dem")
-"""Names of heights in an ``.npz``, if it has more than one array of two dimensions."""
+class GeoTag(IntEnum):
+    """Tags of a GeoTIFF."""
 
-COLUMNS: Final = "ncols"
-"""The first word of an ESRI ASCII grid."""
-
-PIXEL_SCALE: Final = 33550
-TRANSFORMATION: Final = 34264
-GEO_KEYS: Final = 34735
-NO_DATA: Final = 42113
-"""Tags of a GeoTIFF."""
-
-DEFLATE: Final = 1032
-"""Bytes that one byte of a compressed array may stand for, at most."""
-
-SHORT: Final = 1024
-"""Length of an array that may be stored in fewer bytes than that says."""
-
-TIFF_RATIO: Final = 1500
-"""Heights that one byte of a compressed TIFF may stand for: of LZW at most 1,400."""
-
-MODEL_TYPE: Final = 1024
-GEOGRAPHIC: Final = 2
-"""The GeoKey of a model's type, and its value for degrees."""
+    PIXEL_SCALE = 33550
+    TRANSFORMATION = 34264
+    GEO_KEYS = 34735
+    NO_DATA = 42113
 
 
 def read_numpy(path: Path, cell: float | None) -> RawScan:
     """Return the heights of an ``.npy``, or of an ``.npz`` with its cells ``dx`` and ``dy``."""
     with path.open("rb") as file:
-        if not file.read(len(MAGIC[0])).startswith(MAGIC):
+        # an .npy begins with the first, an .npz with the second
+        if not file.read(6).startswith((b"\x93NUMPY", b"PK")):
             raise InvalidInputError(f"no NumPy file: {path}")
     arrays = _arrays(path)
     flat = [name for name, array in arrays.items() if array.ndim == 2]
-    named = [name for name in HEIGHTS if name in flat]
+    usual = ("elevation", "heights", "height", "z", "dem")
+    named = [name for name in usual if name in flat]
     if len(flat) != 1 and not named:
         raise InvalidInputError(
-            f"one grid of heights is needed, or one named {', '.join(HEIGHTS)}; {path} has "
+            f"one grid of heights is needed, or one named {', '.join(usual)}; {path} has "
             f"{len(flat)} arrays of two dimensions"
         )
     heights = arrays[flat[0] if len(flat) == 1 else named[0]]
@@ -81,7 +65,8 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     found: dict[str, NDArray[Any]] = {}
     with zipfile.ZipFile(path) as archive:
         for info in archive.infolist():
-            if info.file_size > DEFLATE * info.compress_size + SHORT:
+            # a compressed byte stands for 1032 at most, but for more in an array of 1024 or less
+            if info.file_size > 1032 * info.compress_size + 1024:
                 raise InvalidInputError(f"{info.filename} in {path} is broken")
             with archive.open(info) as file:
                 content = io.BytesIO(file.read(info.file_size))
@@ -120,30 +105,31 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
             f"no TIFF file, or of numbers other than integers and 32-bit floats: {path}; 64-bit "
             "floats are to be made 32-bit ones, as by gdal_translate -ot Float32"
         ) from None
-    if math.prod(image.size) > TIFF_RATIO * path.stat().st_size:
+    # heights that a byte of the file may stand for: of LZW at most 1,400
+    if math.prod(image.size) > 1500 * path.stat().st_size:
         raise InvalidInputError(
             f"{image.size[0]} by {image.size[1]} heights are more than {path} can have: cut short?"
         )
     with image:
-        tags = {tag: image.getexif().get(tag) for tag in (NO_DATA, PIXEL_SCALE, TRANSFORMATION)}
-        keys = tuple(image.getexif().get(GEO_KEYS, ()))
+        tags = {tag: image.getexif().get(tag) for tag in GeoTag}
         heights = np.asarray(image)
     if heights.ndim != 2:
         raise InvalidInputError(f"one band of heights is needed: {path}")
-    if tags[NO_DATA] is not None:
-        heights = _without(heights, float(str(tags[NO_DATA]).strip("\0 ")))
-    return _grid(heights, _sides(cell, _geo_cell(tags, keys)))
+    if (missing := tags[GeoTag.NO_DATA]) is not None:
+        heights = _without(heights, float(str(missing).strip("\0 ")))
+    return _grid(heights, _sides(cell, _geo_cell(tags)))
 
 
-def _geo_cell(tags: Mapping[int, Any], keys: tuple[int, ...]) -> Cell | None:
+def _geo_cell(tags: Mapping[GeoTag, Any]) -> Cell | None:
     """Return the cell of a GeoTIFF in its unit, None if it is in degrees or not given."""
-    types = [keys[i + 3] for i in range(4, len(keys) - 3, 4) if keys[i] == MODEL_TYPE]
-    if GEOGRAPHIC in types:
+    # four numbers a key: 1024 is that of the model's type, and its value 2 means degrees
+    keys = tags[GeoTag.GEO_KEYS] or ()
+    if 2 in [keys[i + 3] for i in range(4, len(keys) - 3, 4) if keys[i] == 1024]:
         return None
-    if tags[PIXEL_SCALE] is not None:
-        return float(tags[PIXEL_SCALE][0]), float(tags[PIXEL_SCALE][1])
-    if tags[TRANSFORMATION] is not None:
-        across, down = np.reshape(tags[TRANSFORMATION], (4, 4))[:2, :2].T
+    if (scale := tags[GeoTag.PIXEL_SCALE]) is not None:
+        return float(scale[0]), float(scale[1])
+    if (turn := tags[GeoTag.TRANSFORMATION]) is not None:
+        across, down = np.reshape(turn, (4, 4))[:2, :2].T
         return float(np.hypot(*across)), float(np.hypot(*down))
     return None
 
@@ -151,7 +137,7 @@ def _geo_cell(tags: Mapping[int, Any], keys: tuple[int, ...]) -> Cell | None:
 def is_esri(path: Path) -> bool:
     """Return whether a text is an ESRI ASCII grid, not columns."""
     with path.open("rb") as file:
-        return file.read(len(COLUMNS)).lower() == COLUMNS.encode()
+        return file.read(5).lower() == b"ncols"
 
 
 def read_esri(path: Path, cell: float | None) -> RawScan:
@@ -166,7 +152,7 @@ def read_esri(path: Path, cell: float | None) -> RawScan:
             break
         header[words[0].lower()] = float(words[1])
     values = np.array(" ".join([first, *lines]).split(), dtype=float)
-    shape = int(header.get("nrows", 0)), int(header.get(COLUMNS, 0))
+    shape = int(header.get("nrows", 0)), int(header.get("ncols", 0))
     if values.size != math.prod(shape):
         raise InvalidInputError(
             f"{shape[0]} rows of {shape[1]} heights are needed, {values.size} are in {path}"

@@ -8,7 +8,6 @@ the outline have circles that reach beyond it, however short their edges: those 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,6 @@ from hand_models.rock import connected, grouped
 from hand_models.scans.rock import Hole, Step
 
 __all__ = ["Gaps", "empty_circles"]
-
-SLIVER: Final = 1e-6
-"""Area of a triangle without one, of its longest edge's square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +45,8 @@ class Gaps:
         """Return the gaps that triangles (m, 3, 3) with these neighbours (m, 3) bridge."""
         edges = _edges(triangles)
         across, area = np.hypot(edges[..., 0], edges[..., 1]), _areas(edges)
-        sliver = 2.0 * area <= SLIVER * across.max(axis=1) ** 2
+        # hardly any area, as a part of the longest edge's square
+        sliver = 2.0 * area <= 1e-6 * across.max(axis=1) ** 2
         circle = np.where(sliver, 0.0, across.prod(axis=1) / np.where(sliver, 1.0, 2.0 * area))
         width = np.maximum(circle, np.linalg.norm(edges, axis=2).max(axis=1))
         width[sliver & (beside < 0).any(axis=1)] = np.inf

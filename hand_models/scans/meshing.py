@@ -9,7 +9,7 @@ edge longer than that, which are steps that hide rock.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -20,27 +20,17 @@ from hand_models.rock import Triangles, filled_cells
 from hand_models.scans.holes import Gaps
 from hand_models.scans.kept import keep_triangles
 from hand_models.scans.rock import ScannedRock
-from hand_models.scans.scan import UNITS, Scan, Unit, axes_along, in_scan, start_on
+from hand_models.scans.scan import (
+    SCAN_SETTINGS,
+    UNIT_METRES,
+    Scan,
+    Unit,
+    axes_along,
+    in_scan,
+    start_on,
+)
 
 __all__ = ["Triangulated", "mesh_scan", "too_large", "too_small", "triangulated", "wider_holes"]
-
-STEPS: Final = 3
-"""Number of steps that are reported: thinned, triangulated, parted from holes."""
-
-SAMPLE: Final = 20_000
-"""Number of points from whose neighbours the spacing is measured."""
-
-FLAT: Final = 1e-9
-"""Width of points on a line, of their length."""
-
-GROWTH: Final = 1.15
-"""Least factor by which squares grow until few enough points are left."""
-
-SMALLEST: Final = 0.1
-"""Size of the smallest rock that is scanned to be held, about a palm's length [m]."""
-
-WIDER: Final = 1.2
-"""Ratio of the next width of a hole that is tried to the last."""
 
 
 def mesh_scan(
@@ -71,16 +61,16 @@ def mesh_scan(
         If a length is not above zero, points are on a line, nothing is left, the frame's origin is
         not on the rock, or a spacing is given for triangles that are kept.
     """
-    table = scan_table()
+    table, steps = scan_table(), SCAN_SETTINGS.mesh_steps
     hole = _length(table.scalar("mesh", "hole") if hole is None else hole, "hole")
-    report(0, STEPS)
+    report(0, steps)
     if scan.faces is not None:
         if spacing is not None:
             raise InvalidInputError(
                 "is of points, and the file has triangles, which are kept", field="spacing"
             )
         rock = keep_triangles(scan, hole)
-        report(STEPS, STEPS)
+        report(steps, steps)
         return rock
     made = triangulated(scan, spacing, report=report)
     points, axes, middle = made.points, made.axes, made.middle
@@ -88,18 +78,18 @@ def mesh_scan(
     if not len(faces):
         raise _nothing_left(scan, made, hole)
     filled = filled_cells(Triangles(points, made.corners))
-    holes, steps = made.gaps.left(hole)
+    holes, drops = made.gaps.left(hole)
     used, faces = np.unique(faces, return_inverse=True)
     points, faces = points[used], faces.reshape(-1, 3)
     start = start_on(points, scan, middle, axes)
-    report(STEPS, STEPS)
+    report(steps, steps)
     return ScannedRock(
         vertices=points - start,
         # counterclockwise for who looks along z
         faces=_clockwise(points, faces),
         pose=Pose(middle + axes @ start, axes),
         holes=tuple(each._replace(place=each.place - start) for each in holes),
-        steps=tuple(each._replace(place=each.place - start) for each in steps),
+        steps=tuple(each._replace(place=each.place - start) for each in drops),
         read=scan.read,
         dropped=scan.dropped,
         covered=made.gaps.covered(hole),
@@ -144,7 +134,7 @@ def triangulated(
         points = _fewer(points, 0.5 * _spacing(points), most)
     else:
         points = points[_kept(points, _length(spacing, "spacing"))]
-    report(1, STEPS)
+    report(1, SCAN_SETTINGS.mesh_steps)
     _check_spread(points)
     try:
         flat = scipy.spatial.Delaunay(points[:, :2])
@@ -152,7 +142,7 @@ def triangulated(
         raise InvalidInputError(
             f"no triangles: {str(error).splitlines()[0]}", field="file"
         ) from None
-    report(2, STEPS)
+    report(2, SCAN_SETTINGS.mesh_steps)
     corners = flat.simplices.astype(np.intp)
     return Triangulated(
         points, corners, Gaps.between(points[corners], flat.neighbors), middle, axes
@@ -195,8 +185,7 @@ def too_large(extent: float) -> str:
         Of its longest side [m].
     """
     largest = scan_table().scalar("scan", "largest")
-    fit = [unit for unit, metres in UNITS.items() if SMALLEST <= metres * extent <= largest]
-    unit = f"in {' or '.join(fit)} (--unit), or " if fit else ""
+    unit = _fitting(extent)
     return (
         f"{extent:.4g} m across, and a hold may be {largest:g} m; is it {unit}to be "
         "scaled (--width), or cut to what hands reach?"
@@ -213,19 +202,25 @@ def too_small(extent: float, unit: Unit) -> str:
     unit : {'m', 'cm', 'mm'}
         In which the file was read.
     """
-    if extent >= SMALLEST:
+    if extent >= SCAN_SETTINGS.smallest_rock:
         return ""
-    largest, number = scan_table().scalar("scan", "largest"), extent / UNITS[unit]
-    fit = [other for other in UNITS if SMALLEST <= number * UNITS[other] <= largest]
-    asked = f"in {' or '.join(fit)} (--unit), or " if fit else ""
+    asked = _fitting(extent / UNIT_METRES[unit])
     return f"{extent:.3g} m across, less than a palm is long; is it {asked}to be scaled (--width)?"
+
+
+def _fitting(number: float) -> str:
+    """Return in words in which units a number is the size of rock that may be held, if in any."""
+    least, most = SCAN_SETTINGS.smallest_rock, scan_table().scalar("scan", "largest")
+    fit = [unit for unit, metres in UNIT_METRES.items() if least <= number * metres <= most]
+    return f"in {' or '.join(fit)} (--unit), or " if fit else ""
 
 
 def wider_holes(hole: float) -> list[float]:
     """Return widths above one that may be tried instead, up to the widest that is sensible [m]."""
     widest = scan_table().scalar("mesh", "widest_bridge")
     found, wider = [], hole
-    while (wider := math.ceil(1e3 * WIDER * wider - 1e-9) / 1e3) < widest:
+    # by a fifth each, up to the next millimetre
+    while (wider := math.ceil(1e3 * 1.2 * wider - 1e-9) / 1e3) < widest:
         found.append(wider)
     return [*found, widest] if hole < widest else []
 
@@ -240,7 +235,7 @@ def _check_spread(points: Array) -> None:
     """Refuse points that are on a line across the view."""
     across = points[:, :2] - points[:, :2].mean(axis=0)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(across.T @ across), 0.0))
-    if spread[0] <= math.sqrt(FLAT) * spread[1]:
+    if spread[0] <= math.sqrt(1e-9) * spread[1]:  # width of their length
         raise InvalidInputError(
             "seen along the view, the points lie on one line: they are no surface", field="file"
         )
@@ -249,7 +244,7 @@ def _check_spread(points: Array) -> None:
 def _spacing(points: Array) -> float:
     """Return the median distance of a point to the nearest one across the view [m]."""
     across = np.unique(points[:, :2], axis=0)
-    some = across[:: max(1, len(across) // SAMPLE)]
+    some = across[:: max(1, len(across) // 20_000)]  # so many or some more are enough
     distance = np.asarray(scipy.spatial.cKDTree(across).query(some, k=2)[0])
     return float(np.median(distance[:, 1]))
 
@@ -260,7 +255,7 @@ def _fewer(points: Array, side: float, most: int) -> Array:
         kept = points[_kept(points, side)]
         if len(kept) <= most:
             return kept
-        side *= max(GROWTH, math.sqrt(len(kept) / most))
+        side *= max(1.15, math.sqrt(len(kept) / most))
 
 
 def _kept(points: Array, side: float) -> Indices:

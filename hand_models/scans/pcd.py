@@ -11,25 +11,11 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError, Pose, to_install
-from hand_models.scans.scan import RawScan
+from hand_models.scans.scan import AXIS_NAMES, RawScan
 
 __all__ = ["read_pcd"]
 
-AXES: Final = ("x", "y", "z")
-
-HEAD: Final = 65_536
-"""Bytes in which a PCD file has its header."""
-
-HEADER_LINES: Final = 10
-"""Lines of a header, comments apart; the reader looks no farther."""
-
-MOST_COLUMNS: Final = 10_000
-"""Numbers of a point; the longest descriptors in use have some 2,000."""
-
-LZF: Final = 100
-"""Bytes that one compressed byte may stand for: 264 for every three."""
-
-NOWHERE: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+UNKNOWN_VIEWPOINT: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """The VIEWPOINT that programs write which know none."""
 
 
@@ -40,7 +26,8 @@ def read_pcd(path: Path) -> RawScan:
     placed by it. Without one it says where the scanner was in the points' own axes.
     """
     with path.open("rb") as file:
-        _check_header(path, file.read(HEAD), path.stat().st_size)
+        # a PCD file has its header in the first 64 KiB
+        _check_header(path, file.read(65_536), path.stat().st_size)
     try:
         from pypcd4.pypcd4 import PointCloud
     except ImportError:
@@ -48,15 +35,17 @@ def read_pcd(path: Path) -> RawScan:
             f"reading PCD needs the package pypcd4: {to_install('scans')}"
         ) from None
     cloud = PointCloud.from_path(path)
-    absent = [axis for axis in AXES if axis not in cloud.fields]
+    absent = [axis for axis in AXIS_NAMES if axis not in cloud.fields]
     if absent:
         raise InvalidInputError(f"no field {absent[0]} in {path}")
-    points = np.column_stack([np.atleast_1d(cloud.pc_data[axis]) for axis in AXES]).astype(float)
+    points = np.column_stack([np.atleast_1d(cloud.pc_data[axis]) for axis in AXIS_NAMES]).astype(
+        float
+    )
     if len(points) != cloud.metadata.points:
         raise InvalidInputError(
             f"{len(points)} of {cloud.metadata.points} points, cut short: {path}"
         )
-    if tuple(cloud.metadata.viewpoint) == NOWHERE:
+    if tuple(cloud.metadata.viewpoint) == UNKNOWN_VIEWPOINT:
         return RawScan(points)
     x, y, z, *turn = cloud.metadata.viewpoint
     length = math.hypot(*turn)
@@ -74,9 +63,10 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     found = {words[0].upper(): words[1:] for words in named}
     if b"FIELDS" not in found or b"DATA" not in found:
         raise InvalidInputError(f"no PCD file, its header is missing: {path}")
-    if len(found) < len(named) or len(named) > HEADER_LINES:
+    # pypcd4 looks no farther than ten lines, comments apart
+    if len(found) < len(named) or len(named) > 10:
         raise InvalidInputError(
-            f"its header has {len(named)} lines, of {HEADER_LINES} at most, each once: {path}"
+            f"its header has {len(named)} lines, of 10 at most, each once: {path}"
         )
     try:
         sizes, counts = ([int(each) for each in found[name]] for name in (b"SIZE", b"COUNT"))
@@ -87,13 +77,13 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
         raise InvalidInputError(
             f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of its header are to be whole numbers: {path}"
         ) from None
-    kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", NOWHERE)
+    kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", UNKNOWN_VIEWPOINT)
     if len(kinds) != len(sizes) or not {*kinds} <= {b"F", b"I", b"U"}:
         raise InvalidInputError(
             f"TYPE of its header is to be F, I or U of each field, got {_words(kinds)}: {path}",
             field="file",
         )
-    if len(pose) != len(NOWHERE):
+    if len(pose) != len(UNKNOWN_VIEWPOINT):
         raise InvalidInputError(
             "VIEWPOINT of its header is to be seven numbers, a place and a quaternion [w, x, y, z]"
             f", got {_words(pose)}: {path}",
@@ -101,9 +91,10 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
         )
     if min(sizes + counts + rows) < 0:
         raise InvalidInputError(f"a number of its header is below zero: {path}")
-    if not 0 < sum(counts) <= MOST_COLUMNS:
+    # the longest descriptors in use have some 2,000 numbers
+    if not 0 < sum(counts) <= 10_000:
         raise InvalidInputError(
-            f"a point has at least one number, and {MOST_COLUMNS:,} at most, the header of {path} "
+            f"a point has at least one number, and 10,000 at most, the header of {path} "
             f"names {sum(counts):,}"
         )
     if width * height != points:
@@ -118,7 +109,8 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     else:
         sizes_of = head[data : data + 8].ljust(8, b"\0")
         packed, unpacked = struct.unpack("<II", sizes_of)
-        needed = 8 + max(packed, -(-max(unpacked, points * record) // LZF))
+        # LZF writes at most 264 bytes as three
+        needed = 8 + max(packed, -(-max(unpacked, points * record) // 100))
     if needed > left:
         raise InvalidInputError(
             f"{points:,} points need at least {needed:,} bytes, and {left:,} are there, cut short: "

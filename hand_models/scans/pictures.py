@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,20 +20,6 @@ from hand_models.scans.rock import ScannedRock
 
 __all__ = ["plot_holds", "plot_rock"]
 
-LIGHT: Final = np.array([0.5, -0.5, -0.7]) / np.linalg.norm([0.5, -0.5, -0.7])
-"""Toward the light, in the rock's frame."""
-
-DARK: Final = 0.35
-"""Brightness of rock that is turned away from the light."""
-
-NAMED: Final = 12
-"""Holes whose width is written beside them."""
-
-APART: Final = np.array([0.11, 0.04])
-"""Distance of widths that are written, sideways and upward, as part of the rock's longer side."""
-
-COLOURS: Final = "viridis"
-
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
     """Draw rock as the scanner saw it, holes left white, and write the picture.
@@ -45,7 +31,7 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
         Of the picture; its ending says of what kind.
     title : str
     """
-    axes, colours = _paint(rock.vertices, rock.faces, COLOURS, title)
+    axes, colours = _paint(rock.vertices, rock.faces, "viridis", title)
     axes.plot(0.0, 0.0, "+", color="red", markersize=14, markeredgewidth=2, label="origin")
     _name_holes(axes, rock)
     if rock.holes:
@@ -55,9 +41,10 @@ def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
 
 def _name_holes(axes: Axes, rock: ScannedRock) -> None:
     """Write the widths of the widest holes beside them, but none over that of a wider one."""
-    apart = APART * float(np.ptp(rock.vertices[:, :2], axis=0).max())
+    # of widths that are written, sideways and upward, as part of the rock's longer side
+    apart = np.array([0.11, 0.04]) * float(np.ptp(rock.vertices[:, :2], axis=0).max())
     named: list[Array] = []
-    for hole in rock.holes[:NAMED]:
+    for hole in rock.holes[:12]:
         spot = hole.place[[1, 0]] + [0.0, 0.5 * hole.width]  # above it
         if any((np.abs(spot - other) < apart).all() for other in named):
             continue
@@ -202,4 +189,6 @@ def _brightness(corners: Array) -> Array:
     """Return how bright each triangle is, shape (m,)."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
-    return np.asarray(DARK + (1.0 - DARK) * np.clip(normal @ LIGHT / length, 0.0, 1.0))
+    light = np.array([0.5, -0.5, -0.7]) / np.linalg.norm([0.5, -0.5, -0.7])
+    dark = 0.35  # brightness of rock that is turned away from the light
+    return np.asarray(dark + (1.0 - dark) * np.clip(normal @ light / length, 0.0, 1.0))

@@ -15,16 +15,19 @@ from hand_models.rock import MESH_ENDINGS, read_vertices
 from hand_models.scans.columns import read_columns
 from hand_models.scans.grids import is_esri, read_esri, read_geotiff, read_numpy
 from hand_models.scans.pcd import read_pcd
-from hand_models.scans.scan import UNITS, UPS, RawScan, Scan, Unit, Up
+from hand_models.scans.scan import UNIT_METRES, UP_ROTATIONS, RawScan, Scan, Unit, Up
 
-__all__ = ["ENDINGS", "read_scan"]
+__all__ = ["SCAN_ENDINGS", "read_scan"]
 
-TEXTS: Final = (".xyz", ".txt", ".csv", ".pts", ".asc")
-GRIDS: Final = (".npy", ".npz", ".tif", ".tiff")
+SCAN_ENDINGS: Final = (
+    ".pcd",
+    *MESH_ENDINGS,
+    *(".xyz", ".txt", ".csv", ".pts", ".asc"),
+    *(".npy", ".npz", ".tif", ".tiff"),
+)
+"""Endings of point clouds, of triangles, of tables in text, and of grids of heights."""
 
-ENDINGS: Final = (".pcd", *MESH_ENDINGS, *TEXTS, *GRIDS)
-
-OTHERS: Final = {
+ADVICE_BY_ENDING: Final = {
     **dict.fromkeys(
         (".las", ".laz", ".e57", ".ptx", ".fls", ".rcp", ".bin"),
         "save it as PLY or PCD with 64-bit coordinates, or as text with all decimals, in "
@@ -40,23 +43,6 @@ OTHERS: Final = {
     ),
 }
 """Advice for files of other kinds, by their suffix."""
-
-FEWEST: Final = 3
-"""Points of a triangle."""
-
-LARGEST: Final = 1e12
-"""Largest number of a file; what is beyond that is lost in rounding."""
-
-UNTURNED: Final = 1e-3
-"""Turn of a scanner that is taken for none [rad]."""
-
-
-FEW_DIGITS: Final = (6, 7)
-"""Digits that programs write by default: C++ streams and ``%g``, and floats of
-32 bits."""
-
-SAME: Final = 0.9
-"""Part of the points that are at places of their own, below which digits are taken to be lost."""
 
 
 def read_scan(
@@ -103,10 +89,10 @@ def read_scan(
         If the file cannot be read or has no three points, a grid's cell is not known, or a
         parameter is out of range.
     """
-    if unit not in UNITS:
-        raise InvalidInputError(f"valid are {', '.join(UNITS)}, got {unit!r}", field="unit")
-    if up not in UPS:
-        raise InvalidInputError(f"valid are {', '.join(UPS)}, got {up!r}", field="up")
+    if unit not in UNIT_METRES:
+        raise InvalidInputError(f"valid are {', '.join(UNIT_METRES)}, got {unit!r}", field="unit")
+    if up not in UP_ROTATIONS:
+        raise InvalidInputError(f"valid are {', '.join(UP_ROTATIONS)}, got {up!r}", field="up")
     raw = _raw(path, cell)
     if raw.scanner is not None and view is None and viewpoint is None:
         raw = _in_world(raw, raw.scanner)
@@ -115,7 +101,7 @@ def read_scan(
     read = len(raw.points)
     raw = _finite(raw)
     _check_numbers(raw.points, read, path)
-    scale, turn = _scale(raw.points, unit, width), UPS[up]
+    scale, turn = _scale(raw.points, unit, width), UP_ROTATIONS[up]
     _check_digits(raw.points, scale, path)
     if not np.ptp(raw.points, axis=0).any():
         place = ", ".join(f"{x:g}" for x in raw.points[0])
@@ -152,7 +138,8 @@ def read_scan(
 
 def _in_world(raw: RawScan, scanner: Pose) -> RawScan:
     """Return points placed by the pose of the scanner in whose frame they are, if it is turned."""
-    if 0.5 * (float(np.trace(scanner.rotation)) - 1.0) > math.cos(UNTURNED):
+    # a turn below 1e-3 rad is taken for none
+    if 0.5 * (float(np.trace(scanner.rotation)) - 1.0) > math.cos(1e-3):
         return raw
     return raw._replace(points=raw.points @ scanner.rotation.T + scanner.position)
 
@@ -169,14 +156,14 @@ def _finite(raw: RawScan) -> RawScan:
 
 
 def _check_numbers(points: Array, read: int, path: Path) -> None:
-    if len(points) < FEWEST:
+    if len(points) < 3:
         more = read - len(points)
         others = f", and {more} that are not finite" if more else ""
         raise InvalidInputError(
             f"at least three points are needed, {path} has {len(points)}{others}", field="file"
         )
     largest = float(np.abs(points).max())
-    if largest > LARGEST:
+    if largest > 1e12:  # what is beyond that is lost in rounding
         raise InvalidInputError(
             f"numbers up to {largest:.3g} are no lengths; where they stand for points that were "
             "not measured, write nan",
@@ -210,14 +197,16 @@ def _check_digits(points: Array, scale: float, path: Path) -> None:
             f"before the export, or export 64-bit floats (double): {path}",
             field="file",
         )
-    for digits in FEW_DIGITS:
+    # that programs write by default: C++ streams and %g, and floats of 32 bits
+    for digits in (6, 7):
         step = 10.0 ** (math.floor(math.log10(max(largest, 1e-300))) + 1 - digits)
         if scale * step <= coarsest:
             return
         cut = points[:, np.abs(points).max(axis=0).argmax()]
         if np.allclose(cut, step * np.round(cut / step), rtol=1e-12, atol=0.0):
             distinct = len(np.unique(points, axis=0))
-            if distinct <= SAME * len(points):
+            # so few places that digits are taken to be lost
+            if distinct <= 0.9 * len(points):
                 raise InvalidInputError(
                     f"coordinates up to {largest:,.0f} have {digits} digits, steps of {step:g} "
                     f"{_of_unit(scale)}, and {len(points):,} points are at {distinct:,} places: "
@@ -228,16 +217,18 @@ def _check_digits(points: Array, scale: float, path: Path) -> None:
 
 def _of_unit(scale: float) -> str:
     """Return the unit of numbers by its metres, if it has a name."""
-    return next((name for name, metres in UNITS.items() if metres == scale), f"times {scale:.3g} m")
+    return next(
+        (name for name, metres in UNIT_METRES.items() if metres == scale), f"times {scale:.3g} m"
+    )
 
 
 def _raw(path: Path, cell: float | None) -> RawScan:
     """Return what a file has; an error whose field its reader does not name is of the file."""
     ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        does = OTHERS.get(ending, "")
+    if ending not in SCAN_ENDINGS:
+        does = ADVICE_BY_ENDING.get(ending, "")
         raise InvalidInputError(
-            f"{path}: a scan's file ends in {', '.join(ENDINGS)}" + (does and f"; {does}"),
+            f"{path}: a scan's file ends in {', '.join(SCAN_ENDINGS)}" + (does and f"; {does}"),
             field="file",
         )
     with reading_file(path):
@@ -266,7 +257,7 @@ def _read_vertices(path: Path) -> RawScan:
 
 def _scale(points: Array, unit: Unit, width: float | None) -> float:
     if width is None:
-        return UNITS[unit]
+        return UNIT_METRES[unit]
     if unit != "m":
         raise InvalidInputError("give a unit or a width, not both", field="width")
     if not (math.isfinite(width) and width > 0.0):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -21,15 +21,6 @@ from hand_models.scans.rock import ScannedRock
 from hand_models.scans.scan import Scan
 
 __all__ = ["Remedy", "drop_outliers", "remedy"]
-
-STD_RATIO: Final = 2.0
-"""Standard deviations beyond which points are dropped on trial, as in Open3D's example."""
-
-KEPT: Final = 0.95
-"""Part of what was covered that has to be covered still: dropped points may be of the rim."""
-
-FEWER: Final = 0.5
-"""Part of the holes and steps that a remedy may leave at most, if none leaves as few as meant."""
 
 
 class Remedy(NamedTuple):
@@ -76,7 +67,8 @@ def remedy(
     table = scan_table()
     many, open_ = table.scalar("mesh", "many_holes"), len(rock.holes) + len(rock.steps)
     enough = min(table.scalar("mesh", "left_holes") * max(open_, many), many)
-    covered = max(KEPT * rock.covered, table.scalar("mesh", "least_covered"))
+    # dropped points may be of the rim: 5 % less may be covered than was
+    covered = max(0.95 * rock.covered, table.scalar("mesh", "least_covered"))
     helping = []
     for option, value, std_ratio, gaps in _trials(scan, hole, spacing):
         wide = value if option == "hole" else hole
@@ -86,7 +78,7 @@ def remedy(
         found = Remedy(option, value, left, std_ratio)
         if left <= enough:
             return found
-        if left <= min(FEWER * open_, many):
+        if left <= min(0.5 * open_, many):
             helping.append(found)
     return min(helping, key=lambda each: each.left, default=None)
 
@@ -95,16 +87,16 @@ def _trials(
     scan: Scan, hole: float, spacing: float | None
 ) -> Iterator[tuple[str, float, float | None, Gaps]]:
     """Yield an option, its value, the ratio of dropped points beside it, and what is then open."""
-    dropped = None
+    dropped, std_ratio = None, 2.0  # as in Open3D's example
     if not scan.outliers and len(scan.points) > scan_table().scalar("outliers", "neighbours"):
-        dropped = triangulated(drop_outliers(scan, STD_RATIO), spacing).gaps
-        yield "std_ratio", STD_RATIO, None, dropped
+        dropped = triangulated(drop_outliers(scan, std_ratio), spacing).gaps
+        yield "std_ratio", std_ratio, None, dropped
     gaps = triangulated(scan, spacing).gaps
     for wider in wider_holes(hole):
         yield "hole", wider, None, gaps
     if dropped is not None:
         for wider in wider_holes(hole):
-            yield "hole", wider, STD_RATIO, dropped
+            yield "hole", wider, std_ratio, dropped
 
 
 def drop_outliers(scan: Scan, std_ratio: float, *, neighbours: int | None = None) -> Scan:

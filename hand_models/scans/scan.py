@@ -13,8 +13,10 @@ from hand_models.parameters import scan_table
 from hand_models.rock import FilledCells
 
 __all__ = [
-    "UNITS",
-    "UPS",
+    "AXIS_NAMES",
+    "SCAN_SETTINGS",
+    "UNIT_METRES",
+    "UP_ROTATIONS",
     "RawScan",
     "Scan",
     "Unit",
@@ -28,10 +30,10 @@ __all__ = [
 Unit = Literal["m", "cm", "mm"]
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
 
-UNITS: Final[Mapping[Unit, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+UNIT_METRES: Final[Mapping[Unit, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in a unit."""
 
-UPS: Final[Mapping[Up, Array]] = {
+UP_ROTATIONS: Final[Mapping[Up, Array]] = {
     "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
     "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
     "z": np.eye(3),
@@ -41,15 +43,20 @@ UPS: Final[Mapping[Up, Array]] = {
 }
 """Rotation that turns the axis of a file that points up to z, by that axis."""
 
-UPRIGHT: Final = 0.7
-"""Least |z| of a normal of rock that is taken to be ground, seen from above."""
 
-CLOSED: Final = 0.05
-"""Part of its area that a surface shows to any side, below which it is taken to be closed."""
+@dataclass(frozen=True, slots=True)
+class ScanSettings:
+    """Numbers that several functions of the scans have in common."""
+
+    mesh_steps: int = 3
+    """Steps that are reported: thinned, triangulated, parted from holes."""
+    smallest_rock: float = 0.1
+    """Size of the smallest rock that is scanned to be held, about a palm's length [m]."""
 
 
-STEEP: Final = 0.1
-"""Across the view, what is left of an axis that may point up in a picture."""
+SCAN_SETTINGS: Final = ScanSettings()
+
+AXIS_NAMES: Final = ("x", "y", "z")
 
 
 def areas_of(points: Array, faces: Indices) -> Array:
@@ -147,7 +154,8 @@ class Scan:
             return normal
         if depth.max() < 0.0:
             return -normal
-        if abs(normal[2]) >= UPRIGHT:
+        # rock whose normal is that steep is taken to be ground, seen from above
+        if abs(normal[2]) >= 0.7:
             return np.asarray(-normal * np.sign(normal[2]))
         whose = "the file's origin, as it names none" if self.assumed else "the scanner's place"
         raise InvalidInputError(
@@ -162,7 +170,8 @@ class Scan:
         areas = areas_of(self.points, self.faces)
         total = areas.sum(axis=0)
         length = float(np.linalg.norm(total))
-        if length <= CLOSED * float(np.linalg.norm(areas, axis=1).sum()):
+        # a surface that shows less than 5 % of its area to any side is taken to be closed
+        if length <= 0.05 * float(np.linalg.norm(areas, axis=1).sum()):
             return None
         return np.asarray(total / length)
 
@@ -188,7 +197,7 @@ def axes_along(view: Array) -> Array:
     for upward in (np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])):
         x = upward - (upward @ view) * view
         length = np.linalg.norm(x)
-        if length > STEEP:
+        if length > 0.1:  # enough of the axis is across the view to point up in a picture
             break
     x = x / length
     return np.column_stack([x, np.cross(view, x), view])

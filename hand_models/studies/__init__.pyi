@@ -1,5 +1,5 @@
 from .study import (
-    STUDIES as STUDIES,
+    STUDY_MODULES as STUDY_MODULES,
     Study as Study,
     as_json as as_json,
     load_study as load_study,

@@ -29,59 +29,18 @@ from matplotlib.figure import Figure
 
 from hand_models.base import Array, Progress
 from hand_models.compliance import gripper_table
-from hand_models.experiments import SANDPAPER, Claim, GripperFit, StudyResult, panels
+from hand_models.experiments import Claim, GripperFit, StudyResult, panels
 from hand_models.parameters import ParameterTable
+from hand_models.studies.settings import STUDY_SETTINGS
 from hand_models.tile import Surface
 
 __all__ = ["Met", "as_draws", "global_search", "plot", "run"]
 
-STARTS: Final = 3
-"""Starts of the search, the recorded set among them."""
-
-EVALUATIONS: Final = 2400
-REFITS: Final = 1000
-"""Sets tried from each start, and where something is held or asked for more closely."""
-
-POPULATION: Final = 16
-"""Sets of one generation."""
-
-WIDE: Final = 0.25
-NEAR: Final = 0.06
-"""First standard deviation, in plausible ranges, from a start at random and from a known set."""
-
-POWER: Final = 8
-EVEN: Final = 0.2
-"""Power of the residuals in the objective, and the weight of their root mean square."""
-
-BEYOND: Final = 100.0
-"""Cost of a number beyond its range, times the square of the excess in ranges."""
-
-SETS: Final = 30
-"""That meet the data, to be kept."""
-
-TRIED: Final = 3
-"""Times as many are looked at on the fine hull."""
-
-MEETS: Final = 1.0
-"""Misfit up to which a set meets the data."""
-
-CLOSER: Final = 0.3
-"""Share of its tolerance within which a datum is asked for more closely."""
-
-OF_HAND: Final = {
-    "finger": {"pulley_radii[1]": "m", "pulley_radii[2]": "m"},
-    "tile": {
-        **{f"engagement[{i}]": "1" for i in range(3)},
-        **{f"contact_stiffness[{i}]": "N/m" for i in range(3)},
-    },
-}
-"""Numbers of the gripper's set that the hand has as well, by section, with their units."""
-
-VARIANTS: Final = (
+SEARCH_VARIANTS: Final = (
     ("no friction of pressed tiles, T ≥ 0", "friction", 0.0),
-    ("side view of Fig. 13 within 2 N", "pull-off at F_x = 40 N", CLOSER),
+    ("side view of Fig. 13 within 2 N", "pull-off at F_x = 40 N", 0.3),
 )
-"""Numbers that are held, or data that are asked for more closely, one after the other."""
+"""Number that is held and its value, or datum that is asked for within a share of its tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,9 +106,10 @@ def global_search(
         x = best.copy()
         x[free] = np.clip(part, 0.0, 1.0)
         off = fit.residuals(x)
-        worst, even = np.linalg.norm(off / share, POWER), np.sqrt((off**2).mean())
-        found = float(worst + EVEN * even + BEYOND * ((part - x[free]) ** 2).sum())
-        if fit.misfit(off) <= MEETS:
+        worst, even = np.linalg.norm(off / share, 8), np.sqrt((off**2).mean())
+        # beyond its range, a number costs 100 times the square of the excess in ranges
+        found = float(worst + 0.2 * even + 100.0 * ((part - x[free]) ** 2).sum())
+        if fit.misfit(off) <= 1.0:
             sets.append(x)
         if found < least:
             best, least = x, found
@@ -157,7 +117,8 @@ def global_search(
 
     cost(best[free])
     left = evaluations
-    options = {"popsize": POPULATION, "verbose": -9, "seed": seed}
+    # 16 sets a generation
+    options = {"popsize": 16, "verbose": -9, "seed": seed}
     while left > 0:
         strategy = cma.CMAEvolutionStrategy(best[free], spread, {**options, "maxfevals": left})
         while not strategy.stop():
@@ -165,7 +126,7 @@ def global_search(
             strategy.tell(tried, [cost(part) for part in tried])
         left -= int(strategy.result.evaluations)
         # where it has converged with evaluations left, it begins again there
-        spread, options["seed"] = NEAR, options["seed"] + 1
+        spread, options["seed"] = STUDY_SETTINGS.calibrate_spread, options["seed"] + 1
     return Met(best, np.array(sets).reshape(-1, len(start)))
 
 
@@ -182,8 +143,9 @@ def farthest_apart(sets: Array, count: int) -> list[int]:
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Search the gripper's numbers, keep what meets the data, and return what each aim costs."""
     fit = GripperFit(gripper_table(hand))
-    n, looks = len(fit.numbers), TRIED * SETS
-    total = STARTS * EVALUATIONS + len(VARIANTS) * REFITS + looks + 1
+    n, effort = len(fit.numbers), STUDY_SETTINGS
+    searched = effort.calibrate_starts * effort.calibrate_evaluations
+    total = searched + len(SEARCH_VARIANTS) * effort.calibrate_refits + effort.calibrate_looks + 1
     done = 0
 
     def tick() -> None:
@@ -192,10 +154,12 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         progress(done, total)
 
     rng = np.random.default_rng(0)
-    starts = [fit.start(), *rng.uniform(0.2, 0.8, (STARTS - 1, n))]
+    starts = [fit.start(), *rng.uniform(0.2, 0.8, (effort.calibrate_starts - 1, n))]
+    # the first standard deviation, in plausible ranges: wide from a start at random
+    spreads = [effort.calibrate_spread] + [0.25] * (len(starts) - 1)
     met = [
-        global_search(fit, start, WIDE if k else NEAR, EVALUATIONS, k + 1, tick)
-        for k, start in enumerate(starts)
+        global_search(fit, start, spread, effort.calibrate_evaluations, k, tick)
+        for k, (start, spread) in enumerate(zip(starts, spreads, strict=True), start=1)
     ]
     ends = [fit.residuals(each.best, fine=True) for each in met]
     kept = _kept(fit, met, tick)
@@ -213,7 +177,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "misfit": fit.misfit(after),
         "misfit_of_recorded": misfits[0],
         "sets": kept,
-        "variants": [_variant(fit, x, *each, tick) for each in VARIANTS],
+        "variants": [_variant(fit, x, *each, tick) for each in SEARCH_VARIANTS],
     }
     data["numbers"] = _numbers(fit, x, np.array([each["at"] for each in kept]))
     progress(total, total)
@@ -261,13 +225,14 @@ def _kept(fit: GripperFit, met: list[Met], tick: Callable[[], None]) -> list[dic
     for valley, each in enumerate(met, start=1):
         if not len(each.sets):
             continue
-        for i in farthest_apart(each.sets, TRIED * SETS // len(met)):
+        for i in farthest_apart(each.sets, STUDY_SETTINGS.calibrate_looks // len(met)):
             tick()
             misfit = fit.misfit(fit.residuals(each.sets[i], fine=True))
-            if misfit <= MEETS:
+            if misfit <= 1.0:
                 found.append({"valley": valley, "misfit": misfit, "at": each.sets[i]})
-    if len(found) > SETS:
-        far = farthest_apart(np.array([each["at"] for each in found]), SETS)
+    most = STUDY_SETTINGS.calibrate_sets
+    if len(found) > most:
+        far = farthest_apart(np.array([each["at"] for each in found]), most)
         found = [found[i] for i in far]
     return [{**each, "values": fit.values(each["at"])} for each in found]
 
@@ -283,7 +248,8 @@ def _variant(
     else:
         i = fit.names.index(name)
         held[i] = (value - fit.low[i]) / fit.width[i]
-    met = global_search(fit, x, NEAR, REFITS, 1, tick, closer, held)
+    spread, tried = STUDY_SETTINGS.calibrate_spread, STUDY_SETTINGS.calibrate_refits
+    met = global_search(fit, x, spread, tried, 1, tick, closer, held)
     off = fit.residuals(met.best, fine=True)
     worst = int(np.abs(np.where(fit.first, off, 0.0)).argmax())
     return {
@@ -322,7 +288,7 @@ def as_draws(data: Mapping[str, Any]) -> str:
     """
     sets = data["sets"]
     columns = dict(zip((n["name"] for n in data["numbers"]), _columns(sets), strict=True))
-    angle = Surface.named(SANDPAPER).pull_off_angle
+    angle = Surface.named("sandpaper-36").pull_off_angle
     slopes = np.array(columns["pull_off_slope"])
     ratios = 1.0 / (np.cos(angle) + slopes * np.sin(angle))
     lines = ["# How the sets came about.", "[fit]"]
@@ -337,7 +303,15 @@ def as_draws(data: Mapping[str, Any]) -> str:
     misfit = "the largest of how far the data are off, over their tolerances (study calibrate)"
     entry("misfit", [each["misfit"] for each in sets], "1", misfit)
     entry("valley", [each["valley"] for each in sets], "1", "which start of the search led there")
-    for section, names in OF_HAND.items():
+    # of the gripper's set, what the hand has as well
+    of_hand = {
+        "finger": {"pulley_radii[1]": "m", "pulley_radii[2]": "m"},
+        "tile": {
+            **{f"engagement[{i}]": "1" for i in range(3)},
+            **{f"contact_stiffness[{i}]": "N/m" for i in range(3)},
+        },
+    }
+    for section, names in of_hand.items():
         lines += ["", f"[{section}]"]
         for name, unit in names.items():
             quoted = f'"{name}"' if "[" in name else name
@@ -345,7 +319,7 @@ def as_draws(data: Mapping[str, Any]) -> str:
     lines += ["", "# The law of a tile, and its strength on sandpaper.", "[defaults]"]
     entry("pull_off_ratio", ratios, "1", "of T + k P = T_max, at pull_off_angle")
     entry("friction", columns["friction"], "1", "of the gripper's set")
-    lines += ["", f"[{SANDPAPER}]"]
+    lines += ["", "[sandpaper-36]"]
     entry("shear_limit", columns["shear_limit"], "N", "T_max of the gripper's set")
     return "\n".join(lines) + "\n"
 

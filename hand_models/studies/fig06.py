@@ -4,30 +4,19 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import scipy
 from matplotlib.figure import Figure
 
-from hand_models.base import Progress
+from hand_models.base import Array, Progress
 from hand_models.experiments import PalmExperiment, StudyResult, StudyText, panels, track
 from hand_models.parameters import ParameterTable
+from hand_models.studies.settings import STUDY_SETTINGS
 from hand_models.tendon import share_load
 
 __all__ = ["plot", "run"]
-
-PRINTED_GAIN: Final = 0.14
-"""Section 4.2: friction improves the maximum load by at least this."""
-
-FRICTIONS: Final = np.linspace(0.0, 1.5, 151)
-"""For the curves of load over μ."""
-
-SPRING_RANGE: Final = np.linspace(0.0, 3000.0, 61)
-"""For the curves of gain over k_p [N/m]."""
-
-EXACT: Final = 1e-9
-"""Relative difference that still counts as the same."""
 
 Pair = tuple[int, int]
 
@@ -39,6 +28,8 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     pairs = list(itertools.combinations(numbers, 2))
     loaded = [order for pair in pairs for order in (pair, pair[::-1])]
     loaded += [(number, number) for number in numbers]
+    frictions = np.linspace(0.0, 1.5, 151)
+    stiffnesses = np.linspace(0.0, 3000.0, 61)  # k_p [N/m]
     data = {
         "contact_springs": experiment.springs,
         "preload_stiffness": experiment.preload_stiffness,
@@ -52,36 +43,40 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             }
             for pair in track(progress, loaded)
         ],
-        "curves": [_curve(experiment, pair) for pair in pairs],
-        "friction_axis": FRICTIONS,
-        "preload_axis": SPRING_RANGE,
-        "preload_stiffness_at_printed_gain": _least_gain_is_printed(experiment, pairs),
+        "curves": [_curve(experiment, pair, frictions, stiffnesses) for pair in pairs],
+        "friction_axis": frictions,
+        "preload_axis": stiffnesses,
+        "preload_stiffness_at_printed_gain": _least_gain_is_printed(experiment, pairs, stiffnesses),
     }
     text = StudyText("fig06")
     _check(text, experiment, pairs, data)
     return text.result(data)
 
 
-def _curve(experiment: PalmExperiment, pair: Pair) -> dict[str, Any]:
+def _curve(
+    experiment: PalmExperiment, pair: Pair, frictions: Array, stiffnesses: Array
+) -> dict[str, Any]:
     """Return load over μ and gain over k_p of a pair, and where μ is best by Eq. 2."""
     k2, k1 = sorted(experiment.springs[number - 1] for number in pair)
-    others = [replace(experiment, preload_stiffness=kp) for kp in SPRING_RANGE]
+    others = [replace(experiment, preload_stiffness=kp) for kp in stiffnesses]
     return {
         "springs": pair,
         "best_friction": 2.0 * (k1 - k2) / (k1 + k2),
-        "load_over_friction": np.array([experiment.load(pair, mu) for mu in FRICTIONS]),
+        "load_over_friction": np.array([experiment.load(pair, mu) for mu in frictions]),
         "gain_over_preload_stiffness": np.array([other.gain(pair) for other in others]),
     }
 
 
-def _least_gain_is_printed(experiment: PalmExperiment, pairs: list[Pair]) -> float | None:
+def _least_gain_is_printed(
+    experiment: PalmExperiment, pairs: list[Pair], stiffnesses: Array
+) -> float | None:
     """Return the k_p at which the least gain of all pairs is the printed one [N/m], if any is."""
 
     def excess(stiffness: float) -> float:
         softer = replace(experiment, preload_stiffness=stiffness)
-        return min(softer.gain(pair) for pair in pairs) - PRINTED_GAIN
+        return min(softer.gain(pair) for pair in pairs) - STUDY_SETTINGS.fig06_printed_gain
 
-    softest, stiffest = SPRING_RANGE[0], SPRING_RANGE[-1]
+    softest, stiffest = stiffnesses[0], stiffnesses[-1]
     if excess(softest) < 0.0 or excess(stiffest) > 0.0:
         return None
     return float(scipy.optimize.brentq(excess, softest, stiffest))
@@ -91,28 +86,30 @@ def _check(
     text: StudyText, experiment: PalmExperiment, pairs: list[Pair], data: dict[str, Any]
 ) -> None:
     gains = {c["springs"]: c["gain"] for c in data["configurations"]}
+    printed, frictions = STUDY_SETTINGS.fig06_printed_gain, data["friction_axis"]
+    exact = 1e-9  # a relative difference that still counts as the same
     listed = ", ".join(f"{a}-{b} {100 * gains[a, b]:.1f} %" for a, b in pairs)
-    text.check("gain", listed, min(gains[pair] for pair in pairs) >= PRINTED_GAIN - EXACT)
+    text.check("gain", listed, min(gains[pair] for pair in pairs) >= printed - exact)
     differences = np.array([_against_equations(experiment, pair) for pair in pairs])
     for i, name in enumerate(("equation_1", "equation_3")):
         off = differences[:, i].max()
-        text.check(name, f"differ by {off:.0e}", off <= EXACT)
+        text.check(name, f"differ by {off:.0e}", off <= exact)
     # how far the first friction of the largest load is from Eq. 2
-    step = FRICTIONS[1] - FRICTIONS[0]
+    step = frictions[1] - frictions[0]
     loads = np.array([curve["load_over_friction"] for curve in data["curves"]])
-    first = (loads >= loads.max(axis=1, keepdims=True) * (1.0 - EXACT)).argmax(axis=1)
-    off = np.abs(FRICTIONS[first] - [curve["best_friction"] for curve in data["curves"]]).max()
+    first = (loads >= loads.max(axis=1, keepdims=True) * (1.0 - exact)).argmax(axis=1)
+    off = np.abs(frictions[first] - [curve["best_friction"] for curve in data["curves"]]).max()
     given = f"first at it within {off:.3f}, curves' step {step:.2f}"
     text.check("equation_2", given, off <= step)
     softer = experiment.springs[0]
     matched = share_load([2.0 * softer, softer], experiment.preload_stiffness, 2.0 / 3.0)
     shares = float(matched.tile_stiffness[0] / matched.tile_stiffness[1])
-    text.check("matched", shares, abs(shares - 2.0) <= EXACT)
+    text.check("matched", shares, abs(shares - 2.0) <= exact)
     shifted = differences[:, 2].min()
     given = f"its share grows by {100 * shifted:.1f} % of the load or more"
     text.check("shift", given, shifted > 0.0)
     off = max(abs(gains[a, b] - gains[b, a]) for a, b in pairs)
-    text.check("order", f"differ by {off:.0e}", off <= EXACT)
+    text.check("order", f"differ by {off:.0e}", off <= exact)
 
 
 def _against_equations(experiment: PalmExperiment, pair: Pair) -> tuple[float, float, float]:
@@ -154,12 +151,12 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     # springs 1-3 and 2-3 gain alike: by Eq. 3 the gain depends on the stiffer one alone
     for curve, style in zip(data["curves"], itertools.cycle(("-", "-", "--")), strict=False):
         name, loads = "-".join(map(str, curve["springs"])), curve["load_over_friction"]
-        (line,) = over_friction.plot(FRICTIONS, loads / loads[0], style, label=name)
+        (line,) = over_friction.plot(data["friction_axis"], loads / loads[0], style, label=name)
         colour = line.get_color()
         over_friction.axvline(curve["best_friction"], color=colour, linestyle=":", linewidth=1.0)
         gains = 100.0 * curve["gain_over_preload_stiffness"]
-        over_springs.plot(1e-3 * SPRING_RANGE, gains, style, color=colour, label=name)
-    over_springs.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0)
+        over_springs.plot(1e-3 * data["preload_axis"], gains, style, color=colour, label=name)
+    over_springs.axhline(100.0 * STUDY_SETTINGS.fig06_printed_gain, color="tab:red", linewidth=1.0)
     used = 1e-3 * data["preload_stiffness"]
     over_springs.axvline(used, color="0.4", linestyle="--", linewidth=1.0)
     over_springs.set_ylim(0.0, None)

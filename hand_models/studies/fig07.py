@@ -13,23 +13,14 @@ from matplotlib.figure import Figure
 from hand_models.base import Progress
 from hand_models.experiments import PalmExperiment, StudyResult, StudyText, panels, track
 from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.settings import STUDY_SETTINGS
 
 __all__ = ["plot", "run"]
 
-TILES: Final = 4
-PRINTED_GAIN: Final = 0.24
-"""Section 4.2: at least this in all 8 configurations."""
-
-VARIANTS: Final = {"tiles": False, "tiles and palm": True}
+ROD_VARIANTS: Final = {"tiles": False, "tiles and palm": True}
 """Where the pulleys are fixed rods, and whether that is the palm's own too."""
 
-COLOURS: Final = {"tiles": "tab:blue", "tiles and palm": "tab:orange"}
-
-SIGNIFICANT: Final = 0.05
-"""Probability by chance below which a rank correlation counts."""
-
-ALIKE: Final = 1e-9
-"""Gains that differ by less are the same."""
+ROD_COLOURS: Final = {"tiles": "tab:blue", "tiles and palm": "tab:orange"}
 
 Loaded = list[dict[str, Any]]
 """Configurations of springs, with their loads and gains."""
@@ -56,7 +47,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
                     [c for c in unlike if c["springs"].count(min(c["springs"])) == count]
                 ),
             }
-            for count in range(1, TILES)
+            for count in range(1, STUDY_SETTINGS.fig07_tiles)
         ],
         # of each pair of springs there are eight
         "eight_of_two_springs": [
@@ -71,18 +62,19 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             for stiffness, found in zip(tried, for_others, strict=True)
         ],
     }
-    text = StudyText("fig07")
+    text, printed = StudyText("fig07"), STUDY_SETTINGS.fig07_printed_gain
     for name, summary in data["variants"].items():
         least, largest = (100.0 * summary[end] for end in ("least", "largest"))
         count = f"{summary['reach_printed']} of {summary['configurations']}"
         given = f"{least:+.0f} to {largest:+.0f} %; {count} reach 24 %"
-        text.check("gain", given, summary["least"] >= PRINTED_GAIN, rods=name)
+        text.check("gain", given, summary["least"] >= printed, rods=name)
         hurt = ", ".join("".join(map(str, s)) for s in summary["hurts"]) or "none"
         given = f"least {least:+.1f} %; hurt: {hurt}"
         text.check("helpful", given, summary["least"] >= 0.0, rods=name)
         found = _discrepancy_correlations(experiment, unlike, name)
         given = ", ".join(f"{what} {r:+.2f}" for what, (r, _) in found.items())
-        significant = all(r > 0.0 and p < SIGNIFICANT for r, p in found.values())
+        # a correlation counts if its probability by chance is below 5 %
+        significant = all(r > 0.0 and p < 0.05 for r, p in found.values())
         text.check("discrepancies", given, significant, rods=name)
     return text.result(data)
 
@@ -91,11 +83,11 @@ def _loaded(experiment: PalmExperiment) -> Loaded:
     """Return every sequence of springs, mirror images once."""
     numbers, mu = range(1, len(experiment.springs) + 1), experiment.friction
     found = []
-    for sequence in itertools.product(numbers, repeat=TILES):
+    for sequence in itertools.product(numbers, repeat=STUDY_SETTINGS.fig07_tiles):
         if sequence <= sequence[::-1]:
             without = experiment.load(sequence, 0.0)
             loads = {
-                name: experiment.load(sequence, mu, mu * own) for name, own in VARIANTS.items()
+                name: experiment.load(sequence, mu, mu * own) for name, own in ROD_VARIANTS.items()
             }
             found.append({
                 "springs": sequence,
@@ -113,14 +105,14 @@ def _unlike(configurations: Loaded) -> Loaded:
 def _gains(configurations: Loaded) -> dict[str, Any]:
     """Return the range of gains, how many reach the printed one, and where friction hurts."""
     summaries = {}
-    for name in VARIANTS:
+    for name in ROD_VARIANTS:
         gains = np.array([c["gain"][name] for c in configurations])
         summaries[name] = {
             "configurations": len(gains),
             "least": gains.min(),
             "median": np.median(gains),
             "largest": gains.max(),
-            "reach_printed": int((gains >= PRINTED_GAIN).sum()),
+            "reach_printed": int((gains >= STUDY_SETTINGS.fig07_printed_gain).sum()),
             "hurts": [c["springs"] for c in configurations if c["gain"][name] < 0.0],
         }
     return summaries
@@ -139,7 +131,7 @@ def _discrepancy_correlations(
         "mean/softest": k.mean(axis=1) / k.min(axis=1),
         "deviation/mean": k.std(axis=1) / k.mean(axis=1),
     }
-    if np.ptp(gains) <= ALIKE:
+    if np.ptp(gains) <= 1e-9:
         return dict.fromkeys(measures, (0.0, 1.0))
     answers = {what: scipy.stats.spearmanr(values, gains) for what, values in measures.items()}
     return {what: (answer.statistic, answer.pvalue) for what, answer in answers.items()}
@@ -159,7 +151,7 @@ def _draw_sequences(data: dict[str, Any]) -> Figure:
     figure, (loads, gains) = panels(2, 1, (14.0, 7.5), grid="y", sharex=True)
     without = [1e-3 * c["load_without_friction"] for c in shown]
     loads.bar(places - 0.28, without, 0.28, color="0.7", label="bearings everywhere, μ = 0")
-    for shift, (name, colour) in zip((0.0, 0.28), COLOURS.items(), strict=True):
+    for shift, (name, colour) in zip((0.0, 0.28), ROD_COLOURS.items(), strict=True):
         height = [1e-3 * c["load_with_friction"][name] for c in shown]
         label = f"rods at {name}, μ = {data['friction']:g}"
         loads.bar(places + shift, height, 0.28, color=colour, label=label)
@@ -168,7 +160,8 @@ def _draw_sequences(data: dict[str, Any]) -> Figure:
     text.label(loads, "loads", stiffness=1e-3 * data["preload_stiffness"])
     loads.set_ylim(top=1.35 * loads.get_ylim()[1])
     loads.legend(loc="upper left", ncols=3)
-    gains.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0, label="printed, at least")
+    printed = 100.0 * STUDY_SETTINGS.fig07_printed_gain
+    gains.axhline(printed, color="tab:red", linewidth=1.0, label="printed, at least")
     gains.axhline(0.0, color="black", linewidth=0.8)
     gains.set_xticks(places, ["".join(map(str, c["springs"])) for c in shown], rotation=90)
     gains.set_xlim(-0.8, len(shown) - 0.2)
@@ -185,7 +178,7 @@ def _draw_dependence(data: dict[str, Any]) -> Figure:
         ("sensitivity", "preload_stiffness", 1e-3),
     )
     for axes, (entries, key, scale), apart in zip(both, of, (0.1, 0.015), strict=True):
-        for side, (name, colour) in zip((-1.0, 1.0), COLOURS.items(), strict=True):
+        for side, (name, colour) in zip((-1.0, 1.0), ROD_COLOURS.items(), strict=True):
             x = np.array([scale * entry[key] + side * apart for entry in data[entries]])
             ranges = [entry["variants"][name] for entry in data[entries]]
             low, middle, high = (
@@ -197,11 +190,11 @@ def _draw_dependence(data: dict[str, Any]) -> Figure:
                 reached = f"{r['reach_printed']}/{r['configurations']}"
                 style = {"xytext": (6, 3), "textcoords": "offset points", "fontsize": 8}
                 axes.annotate(reached, (place, spot), **style)
-        axes.axhline(100.0 * PRINTED_GAIN, color="tab:red", linewidth=1.0)
+        axes.axhline(100.0 * STUDY_SETTINGS.fig07_printed_gain, color="tab:red", linewidth=1.0)
         axes.axhline(0.0, color="black", linewidth=0.8)
     softest, springs = both
-    softest.set_xticks(range(1, TILES))
-    softest.set_xlim(0.6, TILES - 0.4)
+    softest.set_xticks(range(1, STUDY_SETTINGS.fig07_tiles))
+    softest.set_xlim(0.6, STUDY_SETTINGS.fig07_tiles - 0.4)
     springs.margins(x=0.12)
     text.label(softest, "softest")
     text.label(springs, "preload")

@@ -12,15 +12,16 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import scipy
 from matplotlib.figure import Figure
 
 from hand_models.base import Array, Progress
-from hand_models.experiments import SANDPAPER, StudyResult, StudyText, panels
+from hand_models.experiments import StudyResult, StudyText, panels
 from hand_models.parameters import ParameterTable
+from hand_models.studies.settings import STUDY_SETTINGS
 from hand_models.tile import (
     LEAST_SPINES,
     SpineArray,
@@ -37,64 +38,45 @@ from hand_models.tile import (
 
 __all__ = ["plot", "run"]
 
-ANGLES: Final = np.radians(np.linspace(-30.0, 67.5, 14))
-"""Loading angles φ of the trials."""
-
-REPEATS: Final = 5
-"""Trials in each direction: "each point represents data of at least 5 measurements"."""
-
-SEED: Final = 10
-"""Seed of the trials."""
-
-TRIALS: Final = 4000
-"""Simulated tiles for means and scatter."""
-
-CURVE: Final = np.radians(np.linspace(-30.0, 90.0, 121))
-"""Loading angles φ of the curves."""
-
-BEYOND: Final = math.radians(60.0)
-"""Where the planner's law, held beyond φ_max, is held against the array."""
-
-DIRECTIONS: Final = 100_000
-"""Random directions for volumes."""
-
-COUNTS: Final = (1, 2, 4, 8)
-"""Half-planes for which the gap is listed."""
-
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Simulate the trials, the table of strengths and the surface.
 
     They are of one tile's spines and of the rock, so no number of the hand's matters.
     """
-    surface, array = Surface.named(SANDPAPER), SpineArray.named(SANDPAPER)
+    surface, array = Surface.named("sandpaper-36"), SpineArray.named("sandpaper-36")
     progress(0, 1)
     limit = surface.pull_off_angle
-    rng = np.random.default_rng(SEED)
-    trials = np.stack([array.simulate(rng, REPEATS, angle) for angle in ANGLES])
-    drag = statistics(array.simulate_drag(np.random.default_rng(SEED + 1), TRIALS))
-    spread = statistics(array.simulate(np.random.default_rng(SEED + 1), TRIALS, CURVE))
-    mean = drag.mean * array.share(CURVE)
+    # loading angles φ of the trials and of the curves; "each point represents data of at least 5
+    # measurements"
+    angles, repeats = np.radians(np.linspace(-30.0, 67.5, 14)), 5
+    curve = np.radians(np.linspace(-30.0, 90.0, 121))
+    seed, tiles = STUDY_SETTINGS.fig10_seed, STUDY_SETTINGS.fig10_tiles
+    rng = np.random.default_rng(seed)
+    trials = np.stack([array.simulate(rng, repeats, angle) for angle in angles])
+    drag = statistics(array.simulate_drag(np.random.default_rng(seed + 1), tiles))
+    spread = statistics(array.simulate(np.random.default_rng(seed + 1), tiles, curve))
+    mean = drag.mean * array.share(curve)
     data: dict[str, Any] = {
-        "surface": SANDPAPER,
-        "trials": {"angle": ANGLES, "strength": trials},
+        "surface": "sandpaper-36",
+        "trials": {"angle": angles, "strength": trials},
         "array": {
-            "angle": CURVE,
+            "angle": curve,
             "mean": mean,
             "deviation": spread.deviation,
             "quantiles_5_50_95": spread.quantiles,
         },
         "planner": {
-            "law": surface.strength(CURVE),
-            "half_plane": directional_strength(inner_half_planes(surface), _directions(CURVE, 0.0)),
+            "law": surface.strength(curve),
+            "half_plane": directional_strength(inner_half_planes(surface), _directions(curve, 0.0)),
             "shear_limit": surface.shear_limit,
             "pull_off_limit": surface.pull_off_limit,
             "pull_off_angle": limit,
             "shear_scatter": surface.shear_scatter,
         },
-        "fit_of_trials": fit_line(np.repeat(ANGLES, REPEATS), trials.ravel(), limit)._asdict(),
-        "fit_of_mean": fit_line(CURVE, mean, limit)._asdict(),
-        "cartesian_line_of_mean": _cartesian_line(CURVE, mean, limit),
+        "fit_of_trials": fit_line(np.repeat(angles, repeats), trials.ravel(), limit)._asdict(),
+        "fit_of_mean": fit_line(curve, mean, limit)._asdict(),
+        "cartesian_line_of_mean": _cartesian_line(curve, mean, limit),
         "tile_shear": _table(),
         "lateral_fit": fit_lateral(array, limit)._asdict(),
         "bounds": _gaps(surface),
@@ -132,12 +114,13 @@ def _cartesian_line(angles: Array, strengths: Array, pull_off_angle: float) -> d
 
 def _table() -> list[dict[str, Any]]:
     """Simulate every cell of the measured table."""
-    cells = []
+    cells, settings = [], STUDY_SETTINGS
     for concrete in ("fine", "coarse"):
         array = SpineArray.named(f"concrete-{concrete}")
         for cell in measured_tile_shear(concrete):
             tile = replace(array, spines=cell.spines, backlash=cell.backlash)
-            found = statistics(tile.simulate_drag(np.random.default_rng(SEED), TRIALS))
+            rng = np.random.default_rng(settings.fig10_seed)
+            found = statistics(tile.simulate_drag(rng, settings.fig10_tiles))
             simulated = {"simulated_mean": found.mean, "simulated_deviation": found.deviation}
             cells.append({"concrete": concrete, **cell._asdict(), **simulated})
     return cells
@@ -145,12 +128,13 @@ def _table() -> list[dict[str, Any]]:
 
 def _gaps(surface: Surface) -> list[dict[str, float]]:
     """Return, for numbers of half-planes, how far they are inside and outside the law."""
-    directions = np.abs(np.random.default_rng(SEED).normal(size=(DIRECTIONS, 3)))
+    rng = np.random.default_rng(STUDY_SETTINGS.fig10_seed)
+    directions = np.abs(rng.normal(size=(100_000, 3)))  # for volumes
     directions *= (1.0, -1.0, 1.0)
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     sideways = np.array([[0.0, 0.0, 1.0]])
     gaps = []
-    for count in COUNTS:
+    for count in (1, 2, 4, 8):
         pieces = replace(surface, half_planes=count)
         reach = float(directional_strength(inner_half_planes(pieces), sideways)[0])
         gap = bounds_gap(pieces, directions)._asdict()
@@ -176,9 +160,10 @@ def hull_over_surface(surface: Surface) -> float:
 
 
 def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str, Any]) -> None:
-    limit = surface.pull_off_angle
+    limit, curve = surface.pull_off_angle, data["array"]["angle"]
     # what the mean of the measurements in one direction is known to
-    error = np.mean(data["array"]["deviation"][within_law(CURVE, limit)]) / math.sqrt(REPEATS)
+    repeats = data["trials"]["strength"].shape[1]
+    error = np.mean(data["array"]["deviation"][within_law(curve, limit)]) / math.sqrt(repeats)
     for name, key in (("linear_in_angle", "fit_of_mean"), ("straight", "cartesian_line_of_mean")):
         line = data[key]
         given = f"off by up to {line['worst']:.1f} N, R² {line['r_squared']:.2f}"
@@ -187,9 +172,11 @@ def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str,
     text.check("shear_limit", fitted, abs(fitted - planned) <= error, claimed=planned)
     ratio, at_limit = surface.pull_off_limit / planned, float(array.share(limit))
     text.check("ratio", at_limit, abs(at_limit - ratio) <= 0.01 * ratio, claimed=ratio)
-    kept, beyond = float(surface.strength(BEYOND) / planned), float(array.share(BEYOND))
+    # beyond φ_max the planner's law, which it holds there, is compared with the array at 60°
+    far = math.radians(60.0)
+    kept, beyond = float(surface.strength(far) / planned), float(array.share(far))
     text.check("beyond", beyond, beyond >= kept, claimed=kept)
-    pressed = CURVE[CURVE < 0.0]
+    pressed = curve[curve < 0.0]
     force, friction = array.share(pressed), array.tile_friction
     gained = float(np.polyfit(-force * np.sin(pressed), force * np.cos(pressed), 1)[0])
     text.check("friction", gained, abs(gained - friction) <= 1e-6, claimed=friction)
@@ -221,10 +208,6 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     }
 
 
-OF_TRIALS: Final = {"marker": ".", "linestyle": "", "color": "tab:blue", "alpha": 0.6}
-DOTTED: Final = {"linestyle": ":", "color": "k"}
-
-
 def _draw_curve(data: dict[str, Any]) -> Figure:
     """Draw the limit curve over the loading angle, and in Cartesian coordinates."""
     figure, (polar, cartesian) = panels(1, 2, (13.0, 5.0))
@@ -232,16 +215,19 @@ def _draw_curve(data: dict[str, Any]) -> Figure:
     fitted = np.linspace(0.0, limit, 46)
     line = fit["shear_limit"] + (fit["pull_off_limit"] - fit["shear_limit"]) * fitted / limit
     low, _, high = data["array"]["quantiles_5_50_95"]
-    trials = data["trials"]["strength"].ravel()
+    strengths, curve = data["trials"]["strength"], data["array"]["angle"]
+    at = np.repeat(data["trials"]["angle"], strengths.shape[1])
+    dots = {"marker": ".", "linestyle": "", "color": "tab:blue", "alpha": 0.6}
+    dotted = {"linestyle": ":", "color": "k"}
     polar.axvspan(-30.0, 0.0, color="0.9")
-    polar.fill_between(np.degrees(CURVE), low, high, color="tab:blue", alpha=0.15, linewidth=0.0)
+    polar.fill_between(np.degrees(curve), low, high, color="tab:blue", alpha=0.15, linewidth=0.0)
     cartesian.axhspan(0.0, -20.0, color="0.9")
     for angles, strength, label, of_points, style in (
-        (np.repeat(ANGLES, REPEATS), trials, None, "70 simulated trials", OF_TRIALS),
+        (at, strengths.ravel(), None, "70 simulated trials", dots),
         (fitted, line, "Eq. 21 fitted to the trials", None, {"color": "tab:red"}),
-        (CURVE, data["array"]["mean"], "spine array, mean", None, {"color": "tab:blue"}),
-        (CURVE, data["planner"]["law"], "planner, Eq. 21", None, {"color": "k"}),
-        (CURVE, data["planner"]["half_plane"], "planner, half-planes", None, DOTTED),
+        (curve, data["array"]["mean"], "spine array, mean", None, {"color": "tab:blue"}),
+        (curve, data["planner"]["law"], "planner, Eq. 21", None, {"color": "k"}),
+        (curve, data["planner"]["half_plane"], "planner, half-planes", None, dotted),
     ):
         polar.plot(np.degrees(angles), strength, label=label, **style)
         shear, pull_off = strength * np.cos(angles), strength * np.sin(angles)
@@ -286,7 +272,7 @@ def _draw_table(data: dict[str, Any]) -> Figure:
 
 def _draw_surface() -> Figure:
     """Draw the strength over the azimuth at three loading angles."""
-    surface, array = Surface.named(SANDPAPER), SpineArray.named(SANDPAPER)
+    surface, array = Surface.named("sandpaper-36"), SpineArray.named("sandpaper-36")
     figure, shown = panels(1, 3, (13.0, 4.6))
     azimuth, text = np.radians(np.linspace(-90.0, 90.0, 181)), StudyText("fig10")
     for axes, part in zip(shown, (0.0, 0.5, 1.0), strict=True):

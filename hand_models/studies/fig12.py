@@ -8,7 +8,7 @@ the base moves is then a test.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,9 +16,8 @@ from matplotlib.figure import Figure
 from hand_models.base import Array, Progress
 from hand_models.compliance import FingerLoads, Gripper, gripper_table
 from hand_models.experiments import (
-    COLOURS,
-    NEAR_FORCE,
-    NEAR_SHARE,
+    FIT_TOLERANCES,
+    PHALANX_COLOURS,
     Conditions,
     StudyResult,
     StudyText,
@@ -29,21 +28,10 @@ from hand_models.experiments import (
 )
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.settings import STUDY_SETTINGS
 from hand_models.tile import inner_half_planes
 
 __all__ = ["balance_matrix", "plot", "run"]
-
-KINDS: Final = ("shear", "normal")
-"""Kinds of forces."""
-
-POINTS: Final = 45
-"""Points of the lines, from no load to the pull of the figure."""
-
-SIDEWAYS: Final = 24
-"""Directions of (F_x, F_z) in which the shift of the base is looked at, too."""
-
-NEAR_SHIFT: Final = 0.25
-"""The base's shift is the paper's within this share of it."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -54,14 +42,15 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     gripper = conditions.gripper(gripper_table(hand))
     rest = unloaded(gripper)
     slip = pull(gripper, np.array([[0.0, -1.0, 0.0]]))
-    pulls = np.linspace(0.0, table.scalar("fig12", "pull"), POINTS)
+    pulls = np.linspace(0.0, table.scalar("fig12", "pull"), STUDY_SETTINGS.fig12_points)
     poses = pulled_off_poses(gripper, pulls)
-    further = np.linspace(0.0, -slip.wrenches[0, 1], POINTS)
+    further = np.linspace(0.0, -slip.wrenches[0, 1], STUDY_SETTINGS.fig12_points)
     beyond, at_slip, loads = (
         gripper.finger_loads(at)[0]
         for at in (pulled_off_poses(gripper, further), slip.poses, poses)
     )
-    turns = np.linspace(-np.pi / 2, np.pi / 2, SIDEWAYS + 1)
+    # of (F_x, F_z), in whose directions the shift of the base is looked at, too
+    turns = np.linspace(-np.pi / 2, np.pi / 2, 25)
     around = np.column_stack([np.sin(turns), -np.cos(turns), np.zeros(len(turns))])
     elsewhere = pull(gripper, around)
     progress(1, 1)
@@ -83,7 +72,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "pull_of_figure": table.scalar("fig12", "pull"),
         "read_off": {
             f"{kind}_{end}": table.vector("fig12", f"{kind}_{end}")
-            for kind in KINDS
+            for kind in ("shear", "normal")
             for end in ("unloaded", "pulled")
         },
         "condition_printed": table.scalar("fig12", "condition"),
@@ -140,10 +129,12 @@ def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
 
 
 def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None:
-    for kind in KINDS:
+    for kind in ("shear", "normal"):
         for end, where, at in (("unloaded", "without load", 0), ("pulled", "at the end", -1)):
             read, got = np.array(data["read_off"][f"{kind}_{end}"]), data[kind][at]
-            near = np.abs(got - read) <= np.maximum(NEAR_SHARE * read, NEAR_FORCE)
+            near = np.abs(got - read) <= np.maximum(
+                FIT_TOLERANCES.force_share * read, FIT_TOLERANCES.least_force
+            )
             there = data["pull"][at]
             given = f"{_listed(got)} N; pulled by {there:g} N"
             holds = (at == 0 or there == data["pull_of_figure"]) and near.all()
@@ -160,7 +151,7 @@ def _check_lines(text: StudyText, data: dict[str, Any], table: ParameterTable) -
         given = ", ".join(f"{PHALANGES[i]} {total[i]:+.2f}" for i in meant) + " N"
         given += f"; {back:.1g} N back on the way" if back > 0.0 else ""
         text.check("course", given, (rising[-1] > rising[0]).all(), course=course)
-    for kind, span in zip(KINDS, table.vector("fig12", "sensor_range"), strict=True):
+    for kind, span in zip(("shear", "normal"), table.vector("fig12", "sensor_range"), strict=True):
         within = table.scalar("fig12", "sensor_accuracy") * span
         fitted = np.polynomial.polynomial.polyfit(data["pull"], data[kind], 1)
         straight = np.polynomial.polynomial.polyval(data["pull"], fitted).T
@@ -181,8 +172,9 @@ def _check_slip(text: StudyText, data: dict[str, Any], table: ParameterTable) ->
     shift, own = table.scalar("fig12", "base_shift"), slip["base_shift"]
     furthest = data["base_shift_elsewhere"]["shift"].max()
     given = f"{1e3 * own:.2f} mm; pulled aside, up to {1e3 * furthest:.2f} mm"
-    holds = abs(max(own, furthest) - shift) <= NEAR_SHIFT * shift
-    text.check("base", given, holds, shift=1e3 * shift, near=100 * NEAR_SHIFT)
+    near = 0.25  # share within which the base's shift is the paper's
+    holds = abs(max(own, furthest) - shift) <= near * shift
+    text.check("base", given, holds, shift=1e3 * shift, near=100 * near)
 
 
 def _listed(values: Array) -> str:
@@ -194,7 +186,7 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     data, slip, text = result.data, result.data["slip"], StudyText("fig12")
     figure, (shear, normal, condition) = panels(1, 3, (14.0, 4.4))
     for axes, kind in ((shear, "shear"), (normal, "normal")):
-        for i, (name, colour) in enumerate(COLOURS.items()):
+        for i, (name, colour) in enumerate(PHALANX_COLOURS.items()):
             axes.plot(data["pull"], data[kind][:, i], color=colour, label=name)
             axes.plot(data["until_slip"]["pull"], data["until_slip"][kind][:, i], ":", color=colour)
             read = [data["read_off"][f"{kind}_{end}"][i] for end in ("unloaded", "pulled")]

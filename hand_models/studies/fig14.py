@@ -10,7 +10,7 @@ M_y = a F_x.
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,10 +18,7 @@ from matplotlib.figure import Figure
 from hand_models.base import Array, Progress
 from hand_models.compliance import gripper_table
 from hand_models.experiments import (
-    COLOURS,
-    DRAGGED,
-    SANDPAPER,
-    UNBALANCED,
+    PHALANX_COLOURS,
     Conditions,
     Role,
     StudyResult,
@@ -37,24 +34,10 @@ from hand_models.experiments import (
 )
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.settings import STUDY_SETTINGS
 from hand_models.wrench_spaces import TOLERANCE
 
 __all__ = ["loading_planes", "plot", "run"]
-
-DIRECTIONS: Final = 600
-"""Directions of loads that are pulled until a tile lets go."""
-
-PLANES: Final = 181
-"""Planes of loading that are looked at."""
-
-STEPS: Final = 1000
-"""Steps of progress in all."""
-
-ABOUT: Final = 0.25
-"""A figure printed as "about" is met within this share of it."""
-
-FLAT: Final = 0.01
-"""Planes are as good as the best within this share."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -63,14 +46,17 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     diameters, tension = table.vector("fig14", "diameters"), table.scalar("fig14", "tension")
     larger = max(diameters)
     cases = [
-        *(Conditions(diameter, tension, SANDPAPER) for diameter in diameters),
-        *(Conditions(larger, held, SANDPAPER) for held in table.vector("fig14", "other_tensions")),
+        *(Conditions(diameter, tension, "sandpaper-36") for diameter in diameters),
+        *(
+            Conditions(larger, held, "sandpaper-36")
+            for held in table.vector("fig14", "other_tensions")
+        ),
     ]
-    surfaces = []
+    surfaces, steps = [], 1000  # of progress in all
     for done, conditions in enumerate(cases):
-        start, end = (STEPS * i // len(cases) for i in (done, done + 1))
-        surfaces.append(_surface(conditions, hand, part(progress, start, end, STEPS)))
-    progress(STEPS, STEPS)
+        start, end = (steps * i // len(cases) for i in (done, done + 1))
+        surfaces.append(_surface(conditions, hand, part(progress, start, end, steps)))
+    progress(steps, steps)
     text = StudyText("fig14")
     _check_failures(text, *surfaces[:2])
     _check_planes(text, surfaces[:2], table)
@@ -80,7 +66,8 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 
 def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -> dict[str, Any]:
     """Return hull, failures and planes of the gripper on one surface."""
-    _, pulled, wrenches = explored(conditions.gripper(gripper_table(hand)), DIRECTIONS, progress)
+    gripper = conditions.gripper(gripper_table(hand))
+    _, pulled, wrenches = explored(gripper, STUDY_SETTINGS.fig14_pulls, progress)
     shown = clipped_vertices(wrenches)
     # in an order that is everyone's
     shown = shown[np.lexsort(shown.T)]
@@ -118,14 +105,14 @@ def loading_planes(points: Array) -> dict[str, Any]:
         Of the part F_z ≤ 0.
     """
     size = np.abs(points).max(axis=0)
-    turns = np.linspace(-0.5 * np.pi, 0.5 * np.pi, PLANES)[1:-1]
+    turns = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)[1:-1]
     arms = np.tan(turns) * size[2] / size[0]
     slices = [_strengths(section(points, (arm, 0.0, -1.0))) for arm in arms]
     planes: dict[str, Any] = {"arm": arms}
     for name in ("force", "moment"):
         planes[name] = np.array([strengths[name].max(initial=0.0) for strengths in slices])
     for name, best in _best(points).items():
-        good = arms[planes[name] >= (1.0 - FLAT) * best[name]]
+        good = arms[planes[name] >= (1.0 - 0.01) * best[name]]  # within 1 % of the best
         alike = [good.min(), good.max()] if len(good) else None
         planes[f"best_for_{name}"] = {**best, "arms_as_good": alike}
     return planes
@@ -172,7 +159,8 @@ def _check_failures(text: StudyText, near: dict[str, Any], far: dict[str, Any]) 
         given = f"median M_y : F_x {1e3 * here:.1f} mm, {1e3 * others:.1f} mm where others fail"
         small = bool(here < others)
     text.check("distal_where", given, small)
-    limits = [entry for entry in far["shares"] if entry["way"] not in (DRAGGED, UNBALANCED)]
+    beside = ("dragged_backwards", "no_pose")  # no limits of a tile
+    limits = [entry for entry in far["shares"] if entry["way"] not in beside]
     mine = sum(entry["share"] for entry in limits if entry["phalanx"] == "proximal")
     letting_go = mine / sum(entry["share"] for entry in limits) if limits else 0.0
     given = f"{_listed(far)}; of tiles that let go {100 * letting_go:.1f} %"
@@ -181,6 +169,7 @@ def _check_failures(text: StudyText, near: dict[str, Any], far: dict[str, Any]) 
 
 def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: ParameterTable) -> None:
     fitted = table.scalar("fig13", "diameter")
+    about = 0.25  # share within which a figure printed as "about" is met
     for surface in surfaces:
         where = f"on {1e3 * surface['diameter']:g} mm"
         # the gripper's numbers were fitted to those planes on the surface of Fig. 13
@@ -195,9 +184,9 @@ def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: Parame
                 f"{100 * there:.1f} % of the best; best of straight pulls "
                 f"{surface['best_pulls'][name]['ratio']:.3g} : 1"
             )
-            holds = abs(ratio - printed) <= ABOUT * printed
+            holds = abs(ratio - printed) <= about * printed
             words: dict[str, Any] = {"where": where, "aim": aim, "printed": printed}
-            text.check("best_plane", given, holds, role=role, about=100 * ABOUT, **words)
+            text.check("best_plane", given, holds, role=role, about=100 * about, **words)
             ratios.append(ratio)
         force, moment = ratios
         given = f"{force:.3g} : 1 for force, {moment:.3g} : 1 for moment"
@@ -207,8 +196,8 @@ def _check_planes(text: StudyText, surfaces: list[dict[str, Any]], table: Parame
     if best["arms_as_good"]:
         span = "from {:.2f} to {:.2f} cm".format(*(100 * arm for arm in best["arms_as_good"]))
     given = f"{100 * best['arm']:.2f} cm; within 1 % of the best {span}"
-    holds = abs(best["arm"] - anchor) <= ABOUT * anchor
-    text.check("anchor", given, holds, anchor=100 * anchor, about=100 * ABOUT)
+    holds = abs(best["arm"] - anchor) <= about * anchor
+    text.check("anchor", given, holds, anchor=100 * anchor, about=100 * about)
 
 
 def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any]) -> None:
@@ -239,8 +228,8 @@ def _draw_failures(surfaces: list[dict[str, Any]]) -> Figure:
         top, side = (figure.add_subplot(2, 3, 3 * row + k) for k in (2, 3))
         wrenches = surface["pulls"]["wrenches"]
         fails = np.array(surface["pulls"]["phalanx"])
-        dragged = np.array(surface["pulls"]["way"]) == DRAGGED
-        for phalanx, colour in COLOURS.items():
+        dragged = np.array(surface["pulls"]["way"]) == "dragged_backwards"
+        for phalanx, colour in PHALANX_COLOURS.items():
             for marker, those, how in (
                 (".", ~dragged, "lets go"),
                 ("x", dragged, "dragged backwards"),

@@ -9,7 +9,7 @@ wrench it has one without F_x and M_y that pulls as hard.
 from __future__ import annotations
 
 import itertools
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import scipy
@@ -18,7 +18,6 @@ from matplotlib.figure import Figure
 from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import (
-    PARAMETER_STUDIES,
     Conditions,
     HullPoints,
     Limit,
@@ -34,29 +33,9 @@ from hand_models.experiments import (
     volume,
 )
 from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.settings import STUDY_SETTINGS
 
 __all__ = ["plot", "run"]
-
-TENSIONS: Final = 29
-"""How many are tried."""
-
-RAYS: Final = 2000
-CUTS: Final = 12
-STARTS: Final = 4
-"""Rays and cuts of each hull before its limits are sought; starts of each search for them."""
-
-FORCES: Final = ("shear", "normal")
-COLOURS: Final = ("tab:blue", "tab:red")
-VALUES: Final = ("shear", "pure_shear", "normal", "volume", "pressed_share")
-WHO: Final = ("shear_phalanges", "normal_phalanges")
-"""Results at each tension, and phalanges whose contacts fail there: none where nothing holds."""
-
-CLOSE: Final = 0.1
-"""Newtons to which the tension is found at which closing alone fails."""
-
-SLACK: Final = 0.02
-"""Share of the largest limit by which a limit may wander where it is said to fall: hulls are
-found by local search."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -70,25 +49,29 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     table = gripper_table(hand)
     settings = experiment_table()
     least, most = settings.vector("fig15", "tensions")
-    tried = np.linspace(least, most, TENSIONS)
-    diameters = settings.vector(PARAMETER_STUDIES, "diameters")
+    tensions = STUDY_SETTINGS.fig15_tensions
+    tried = np.linspace(least, most, tensions)
+    diameters = settings.vector("parameter_studies", "diameters")
     each = [Conditions(*pair) for pair in itertools.product(diameters, tried.tolist())]
     found = [_at(conditions.gripper(table)) for conditions in track(progress, each)]
+    # at each tension; none where nothing holds
+    values = ("shear", "pure_shear", "normal", "volume", "pressed_share")
+    failing = ("shear_phalanges", "normal_phalanges")
     curves = []
     for i, diameter in enumerate(diameters):
-        rows = found[i * TENSIONS : (i + 1) * TENSIONS]
+        rows = found[i * tensions : (i + 1) * tensions]
         curves.append(
             {
                 "diameter": diameter,
                 "state": [row["state"] for row in rows],
-                **{key: np.array([row.get(key, np.nan) for row in rows]) for key in VALUES},
-                **{key: [row.get(key, []) for row in rows] for key in WHO},
+                **{key: np.array([row.get(key, np.nan) for row in rows]) for key in values},
+                **{key: [row.get(key, []) for row in rows] for key in failing},
                 "closing_alone_fails_at": _closing_limit(table, diameter, tried),
             }
         )
     data: dict[str, Any] = {
         "surface": each[0].surface,
-        "force_to_moment": settings.scalar(PARAMETER_STUDIES, "force_to_moment"),
+        "force_to_moment": settings.scalar("parameter_studies", "force_to_moment"),
         "tension": tried,
         "curves": curves,
     }
@@ -100,15 +83,16 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 def _at(grasp: Gripper) -> dict[str, Any]:
     """Return the limits of a gripper, and what is behind them."""
     state = rest_state(grasp)
+    cuts, starts = STUDY_SETTINGS.fig15_cuts, STUDY_SETTINGS.fig15_starts
     try:
-        points = HullPoints.explored(grasp, RAYS)
-        points, _ = sharpened(grasp, points, "shear", CUTS, STARTS)
-        points, normal = sharpened(grasp, points, "normal", CUTS, STARTS)
+        points = HullPoints.explored(grasp, STUDY_SETTINGS.fig15_rays)
+        points, _ = sharpened(grasp, points, "shear", cuts, starts)
+        points, normal = sharpened(grasp, points, "normal", cuts, starts)
         # the points added for one limit may raise the other
         shear = limit(points.wrenches, "shear")
     except EmptySetError:
         return {"state": state}
-    ratio = experiment_table().scalar(PARAMETER_STUDIES, "force_to_moment")
+    ratio = experiment_table().scalar("parameter_studies", "force_to_moment")
     return {
         "state": state,
         "shear": shear.value,
@@ -149,12 +133,15 @@ def _closing_limit(table: ParameterTable, diameter: float, tried: Array) -> floa
     first = over.index(True)
     if first == 0:
         return float(tried[0])
-    return float(scipy.optimize.bisect(excess, tried[first - 1], tried[first], xtol=CLOSE))
+    return float(scipy.optimize.bisect(excess, tried[first - 1], tried[first], xtol=0.1))  # [N]
 
 
 def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     """Hold the sentences of Section 7.1 against the curves, as far as closing alone holds."""
     strong, weak = (_Curve(curve) for curve in curves)
+    # share of the largest limit by which one may wander where it is said to fall: hulls are found
+    # by local search
+    slack = 0.02
     both = strong.holds & weak.holds
     if not both.any():
         raise InvalidInputError("closes at none of the tensions without failing", field="hand")
@@ -172,12 +159,12 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     for curve in (weak, strong):
         best = curve.best("shear")
         after = curve["shear"][best : curve.last + 1]
-        falls = bool((np.diff(after) <= SLACK * after[0]).all())
+        falls = bool((np.diff(after) <= slack * after[0]).all())
         given = f"most, {after[0]:.1f} N, at {tried[best]:g} N; {after[-1]:.1f} N at "
         given += f"{tried[curve.last]:g} N" + ("" if falls else "; not steadily")
-        holds = len(after) > 1 and falls and after[-1] < (1.0 - SLACK) * after[0]
+        holds = len(after) > 1 and falls and after[-1] < (1.0 - slack) * after[0]
         text.check("reduces_shear", given, holds, where=curve.name)
-    for force in FORCES:
+    for force in ("shear", "normal"):
         high, low = strong[force][both], weak[force][both]
         ratios = low / high
         given = f"{ratios.min():.2f} to {ratios.max():.2f} times that on {strong.name}"
@@ -190,7 +177,8 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     curved, flat = (float(np.mean(curve["pressed_share"][both])) for curve in (strong, weak))
     given = f"{curved:.0%}, {flat:.0%}; mean over the tensions at which both hold"
     text.check("normal_share", given, curved > flat, strong=strong.name, weak=weak.name)
-    beyond = [strong[key][i] for i in range(strong.best("shear"), strong.last + 1) for key in WHO]
+    steps = range(strong.best("shear"), strong.last + 1)
+    beyond = [strong[f"{force}_phalanges"][i] for i in steps for force in ("shear", "normal")]
     others = sorted({p for found in beyond for p in found} - {"proximal", "distal"})
     ends = sum("proximal" in found or "distal" in found for found in beyond)
     given = f"at {ends} of {len(beyond)} limits; also: {', '.join(others) or 'nobody'}"
@@ -218,8 +206,8 @@ def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the limits over the tension, dotted where closing alone fails."""
     data, tension, text = result.data, result.data["tension"], StudyText("fig15")
     figure, both = panels(1, 2, (12.0, 4.8))
-    for axes, force in zip(both, FORCES, strict=True):
-        for curve, colour in zip(data["curves"], COLOURS, strict=True):
+    for axes, force in zip(both, ("shear", "normal"), strict=True):
+        for curve, colour in zip(data["curves"], ("tab:blue", "tab:red"), strict=True):
             values, fails = curve[force], curve["closing_alone_fails_at"]
             held = np.where(np.array(curve["state"]) == "holds", values, np.nan)
             name = f"{1e3 * curve['diameter']:g} mm"

@@ -33,35 +33,25 @@ from hand_models.experiments import (
 )
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
+from hand_models.studies.settings import STUDY_SETTINGS
 
 __all__ = ["plot", "run"]
 
-POINTS: Final = 16
-COARSE_POINTS: Final = 6
-"""Radii along an axis, at the printed tension and at the lower one; the latter among the former:
-``POINTS - 1`` is a multiple of ``COARSE_POINTS - 1``."""
-
 MEASURES_SHOWN: Final[tuple[Measure, ...]] = ("shear", "normal")
-SURFACES: Final = ("A", "B")
-
-STEP: Final = 1e-3
-"""Step of a radius, relative to itself, for derivatives of the contact forces."""
-
-UNMOVED: Final = 1e-6
-"""Newtons per millimetre of radius below which a contact force does not depend on it."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
     """Compute the maps of both surfaces, and coarser ones at a lower tension."""
     table = gripper_table(hand)
-    usual = dict(zip(SURFACES, Conditions.of_fig16(), strict=True))
+    usual = dict(zip(("A", "B"), Conditions.of_fig16(), strict=True))
     tension = experiment_table().scalar("fig16", "lower_tension")
     lower = {name: replace(conditions, tension=tension) for name, conditions in usual.items()}
     # limits at the lower tension at fewer radii, but whether it holds at all of them
+    points, fewer = STUDY_SETTINGS.fig16_points, STUDY_SETTINGS.fig16_coarse_points
     jobs: list[tuple[str, dict[str, Conditions], int, Sequence[Measure]]] = [
-        ("maps", usual, POINTS, MEASURES_SHOWN),
-        ("maps_at_lower_tension", lower, COARSE_POINTS, MEASURES_SHOWN),
-        ("states_at_lower_tension", lower, POINTS, ()),
+        ("maps", usual, points, MEASURES_SHOWN),
+        ("maps_at_lower_tension", lower, fewer, MEASURES_SHOWN),
+        ("states_at_lower_tension", lower, points, ()),
     ]
     done, total = 0, sum(n * n * len(surfaces) for _, surfaces, n, _ in jobs)
     data: dict[str, Any] = {}
@@ -76,7 +66,7 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             at: sweep_cell(table, surfaces[name], MEASURES_SHOWN)
             for at, surfaces in (("usual", usual), ("lower", lower))
         }
-        for name in SURFACES
+        for name in usual
     }
     data["normal_slopes"] = _slopes(table, usual["A"])
     text = StudyText("fig16")
@@ -86,17 +76,17 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 
 def _slopes(table: ParameterTable, conditions: Conditions) -> Array:
     """Return ∂(normal force of a phalanx)/∂(radius of a pulley) at rest, a row a phalanx [N/m]."""
-    columns = []
+    columns, step = [], 1e-3  # relative to a radius, for derivatives of the contact forces
     for i in range(len(PHALANGES)):
         axis = Axis("finger", "pulley_radii", i, (), "m")
         radius = axis.current(table)
         more, less = (
-            conditions.gripper(axis.set(table, radius * (1.0 + sign * STEP)))
+            conditions.gripper(axis.set(table, radius * (1.0 + sign * step)))
             .finger_loads(np.zeros((1, 3)))[0]
             .normals[0]
             for sign in (1.0, -1.0)
         )
-        columns.append((more - less) / (2.0 * STEP * radius))
+        columns.append((more - less) / (2.0 * step * radius))
     return np.column_stack(columns)
 
 
@@ -109,18 +99,18 @@ def _check(text: StudyText, data: dict[str, Any]) -> None:
         given = f"{above.mean():.0%} of those where it is, {below.mean():.0%} of the others"
         text.check("distal_larger", given, above.mean() > below.mean(), surface=name)
         text.check("every_larger", f"{above.mean():.0%}", above.all(), surface=name)
-    for name in SURFACES:
+    for name in maps:
         cell = data["in_use"][name]["usual"]
         given = ", ".join([cell["state"], *(f"{m} {v:.1f} N" for m, v in cell["limits"].items())])
         holds = cell["state"] == "holds" and all(v > 0.0 for v in cell["limits"].values())
         text.check("in_use", given, holds, surface=name)
-    for name in SURFACES:
+    for name in maps:
         high, low = maps[name], states[name]
         tension, lower = (found["conditions"]["tension"] for found in (high, low))
         given = f"{low['failing']:.1%}, {high['failing']:.1%} at {tension:g} N"
         fewer = low["failing"] < high["failing"]
         text.check("lower_tension", given, fewer, surface=name, tension=tension, lower=lower)
-    for name, measure in itertools.product(SURFACES, MEASURES_SHOWN):
+    for name, measure in itertools.product(maps, MEASURES_SHOWN):
         high, low = maps[name]["limits"][measure], data["maps_at_lower_tension"][name]
         # cell by cell of the coarser map
         every = (len(high) - 1) // (len(low["state"]) - 1)
@@ -135,7 +125,8 @@ def _check(text: StudyText, data: dict[str, Any]) -> None:
         text.check(
             "lower_limits", given, ratio < 1.0, surface=name, measure=measure, tension=tension
         )
-    moved = np.abs(1e-3 * data["normal_slopes"]) > UNMOVED
+    # a contact force depends on a radius by more than 1e-6 N/mm
+    moved = np.abs(1e-3 * data["normal_slopes"]) > 1e-6
     given = ", ".join(f"{name} {n}" for name, n in zip(PHALANGES, moved.sum(axis=0), strict=True))
     text.check("every_force", given, moved.all())
 

@@ -25,17 +25,21 @@ from hand_models.experiments import StudyResult
 from hand_models.parameters import ParameterTable, hand_table
 
 __all__ = [
-    "STUDIES",
+    "STUDY_MODULES",
     "Study",
     "as_json",
     "load_study",
     "run_study",
 ]
 
-FIGURES: Final = ("fig06", "fig07", "fig10", "fig12", "fig13", "fig14", "fig15", "fig16")
-
-STUDIES: Final[Mapping[str, str]] = {
-    **{name: f"hand_models.studies.{name}" for name in (*FIGURES, "calibrate")},
+STUDY_MODULES: Final[Mapping[str, str]] = {
+    **{
+        name: f"hand_models.studies.{name}"
+        for name in (
+            *("fig06", "fig07", "fig10", "fig12"),
+            *("fig13", "fig14", "fig15", "fig16", "calibrate"),
+        )
+    },
     "sweep": "hand_models.experiments.sweep",
 }
 """Modules of the studies by the name of their figure; loaded when asked for."""
@@ -59,9 +63,9 @@ def load_study(name: str) -> Study:
     InvalidInputError
         If there is none of that name.
     """
-    if name not in STUDIES:
-        raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDIES)}", field="NAME")
-    return cast("Study", import_module(STUDIES[name]))
+    if name not in STUDY_MODULES:
+        raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDY_MODULES)}", field="NAME")
+    return cast("Study", import_module(STUDY_MODULES[name]))
 
 
 def as_json(result: StudyResult) -> dict[str, Any]:
@@ -82,7 +86,7 @@ def run_study(
     Parameters
     ----------
     name : str or Study
-        One of `STUDIES`, or a study of the caller's own.
+        One of `STUDY_MODULES`, or a study of the caller's own.
     folder : Path
         Made if it does not exist.
     progress : Progress

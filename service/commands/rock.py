@@ -51,7 +51,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     return numbers
 
 
-@click.command(epilog=f"FILE ends in {', '.join(scans.ENDINGS)}.")
+@click.command(epilog=f"FILE ends in {', '.join(scans.SCAN_ENDINGS)}.")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "-o",
@@ -64,7 +64,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
 )
 @click.option(
     "--unit",
-    type=click.Choice(list(scans.UNITS)),
+    type=click.Choice(list(scans.UNIT_METRES)),
     default="m",
     show_default=True,
     help="Of the file's numbers.",
@@ -82,7 +82,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
 )
 @click.option(
     "--up",
-    type=click.Choice(list(scans.UPS)),
+    type=click.Choice(list(scans.UP_ROTATIONS)),
     default="z",
     show_default=True,
     help="The file's axis that points up; of a wall that was seen along z another is to be given.",

@@ -8,8 +8,7 @@ import pytest
 from hand_models.base import EmptySetError
 from hand_models.compliance import Gripper, gripper_table, sandpaper
 from hand_models.experiments import (
-    DRAGGED,
-    UNITS,
+    PLANAR_SCALE,
     even_pulls,
     in_paper_signs,
     pull,
@@ -36,7 +35,7 @@ def test_poses_give_the_wrenches_asked_for(gripper):
     poses, residual = wrist_poses(gripper, wanted, np.repeat(unloaded(gripper)[None], 3, axis=0))
     assert residual.max() < 1e-8
     found = in_paper_signs(gripper.evaluate(poses).wrenches)
-    np.testing.assert_allclose(found * UNITS, wanted * UNITS, atol=1e-8)
+    np.testing.assert_allclose(found * PLANAR_SCALE, wanted * PLANAR_SCALE, atol=1e-8)
     # mirrored wrenches, mirrored poses
     np.testing.assert_allclose(poses[2], poses[1] * (-1.0, 1.0, -1.0), atol=1e-9)
 
@@ -55,8 +54,8 @@ def test_directions_are_even_and_mirrored(pulled):
 
 def test_every_pull_ends_where_the_tile_named_lets_go(gripper, pulled):
     directions, found = pulled
-    length = np.linalg.norm(found.wrenches * UNITS, axis=1)
-    unit = directions / np.linalg.norm(directions * UNITS, axis=1)[:, None]
+    length = np.linalg.norm(found.wrenches * PLANAR_SCALE, axis=1)
+    unit = directions / np.linalg.norm(directions * PLANAR_SCALE, axis=1)[:, None]
     np.testing.assert_allclose(found.wrenches, length[:, None] * unit, atol=1e-9)
     verdict = gripper.evaluate(found.poses)
     assert verdict.holds.all()
@@ -65,7 +64,7 @@ def test_every_pull_ends_where_the_tile_named_lets_go(gripper, pulled):
     over = gripper.evaluate(beyond)
     assert not over.holds.any()
     names = [
-        None if way == DRAGGED else (side, phalanx, way)
+        None if way == "dragged_backwards" else (side, phalanx, way)
         for side, phalanx, way in zip(found.side, found.phalanx, found.way, strict=True)
     ]
     for k, name in enumerate(names):
@@ -97,12 +96,14 @@ def test_a_stronger_surface_never_holds_less(pulled):
         lateral_limit=1.5 * surface.lateral_limit,
     )
     more = pull(Gripper(0.3, 37.0, stronger, table), directions)
-    gain = np.linalg.norm(more.wrenches * UNITS, axis=1) - np.linalg.norm(
-        found.wrenches * UNITS, axis=1
+    gain = np.linalg.norm(more.wrenches * PLANAR_SCALE, axis=1) - np.linalg.norm(
+        found.wrenches * PLANAR_SCALE, axis=1
     )
     assert gain.min() >= -1e-9
     # where no tile is dragged backwards, something is gained
-    assert all(g > 0.1 for g, way in zip(gain, found.way, strict=True) if way != DRAGGED)
+    assert all(
+        g > 0.1 for g, way in zip(gain, found.way, strict=True) if way != "dragged_backwards"
+    )
 
 
 def test_a_gripper_that_does_not_hold_itself_is_refused():

@@ -19,7 +19,6 @@ from hand_models.experiments import (
     sweep_map,
 )
 from hand_models.experiments.pictures import entry_name
-from hand_models.experiments.sweep import CUTS, RAYS, STARTS
 from hand_models.parameters import ParameterTable, Quantity, hand_table
 from service.commands.cli import run
 
@@ -82,8 +81,8 @@ def test_a_cell_is_what_the_gripper_holds(table):
     grasp = CONDITIONS.gripper(table)
     cell = sweep_cell(table, CONDITIONS, ["shear", "normal"])
     assert cell["state"] == rest_state(grasp)
-    points, shear = sharpened(grasp, HullPoints.explored(grasp, RAYS), "shear", CUTS, STARTS)
-    _, normal = sharpened(grasp, points, "normal", CUTS, STARTS)
+    points, shear = sharpened(grasp, HullPoints.explored(grasp, 300), "shear", 4, 2)
+    _, normal = sharpened(grasp, points, "normal", 4, 2)
     assert cell["limits"] == {"shear": shear.value, "normal": normal.value}
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, strategies as st
 from scipy.optimize import linprog
 
 from hand_models.experiments import (
-    UNITS,
+    PLANAR_SCALE,
     clipped_vertices,
     distance_along,
     extents,
@@ -18,14 +18,14 @@ from hand_models.experiments import (
 
 BOX = np.array([[x, z, m] for x in (-40.0, 40.0) for z in (-20.0, 30.0) for m in (-1.0, 1.0)])
 CLOUDS = st.integers(0, 10_000).map(
-    lambda seed: np.random.default_rng(seed).normal(size=(30, 3)) / UNITS
+    lambda seed: np.random.default_rng(seed).normal(size=(30, 3)) / PLANAR_SCALE
 )
 
 
 def inside(points, wrench):
     """Whether a wrench is a convex combination of points, by a linear program."""
-    A = np.vstack([(points * UNITS).T, np.ones(len(points))])
-    b = np.append(np.asarray(wrench) * UNITS, 1.0)
+    A = np.vstack([(points * PLANAR_SCALE).T, np.ones(len(points))])
+    b = np.append(np.asarray(wrench) * PLANAR_SCALE, 1.0)
     found = linprog(np.zeros(len(points)), A_eq=A, b_eq=b, method="highs")
     return found.status == 0
 
@@ -33,12 +33,12 @@ def inside(points, wrench):
 def farthest(points, start, direction):
     """The largest s with start + s · direction a convex combination, by a linear program."""
     A = np.zeros((4, len(points) + 1))
-    A[:3, :-1], A[3, :-1] = (points * UNITS).T, 1.0
-    A[:3, -1] = -direction * UNITS
+    A[:3, :-1], A[3, :-1] = (points * PLANAR_SCALE).T, 1.0
+    A[:3, -1] = -direction * PLANAR_SCALE
     found = linprog(
         np.append(np.zeros(len(points)), -1.0),
         A_eq=A,
-        b_eq=np.append(start * UNITS, 1.0),
+        b_eq=np.append(start * PLANAR_SCALE, 1.0),
         method="highs",
     )
     return -found.fun if found.status == 0 else np.nan
@@ -144,11 +144,11 @@ def test_a_cut_along_a_face_takes_all_of_a_hull_or_nothing(shift):
 def test_what_is_cut_through_the_origin_reaches_along_its_face_as_far_as_the_hull(points):
     """The origin is inside the whole hull, where nothing is in doubt, and on the part's face."""
     below = clipped_vertices(points)
-    along = np.random.default_rng(0).normal(size=(6, 3)) * (1.0, 0.0, 1.0) / UNITS
+    along = np.random.default_rng(0).normal(size=(6, 3)) * (1.0, 0.0, 1.0) / PLANAR_SCALE
     ways = np.vstack([along, -along])
     whole = distance_along(points, ways)
     for shift in ROUNDING:
-        moved = below + shift / UNITS
+        moved = below + shift / PLANAR_SCALE
         np.testing.assert_allclose(distance_along(moved, ways), whole, rtol=1e-7)
     # its highest vertices are on the plane
     height = below[:, 1]
@@ -172,8 +172,8 @@ def test_a_cut_holds_what_the_hull_holds_below_the_plane(points, offset, seed):
 @given(CLOUDS, st.integers(0, 1000))
 def test_reach_is_that_of_a_linear_program(points, seed):
     rng = np.random.default_rng(seed)
-    starts = 1.5 * rng.normal(size=(10, 3)) / UNITS
-    directions = rng.normal(size=(10, 3)) / UNITS
+    starts = 1.5 * rng.normal(size=(10, 3)) / PLANAR_SCALE
+    directions = rng.normal(size=(10, 3)) / PLANAR_SCALE
     expected = [farthest(points, s, d) for s, d in zip(starts, directions, strict=True)]
     np.testing.assert_allclose(
         distance_along(points, directions, starts), expected, rtol=1e-6, atol=1e-8
@@ -182,7 +182,7 @@ def test_reach_is_that_of_a_linear_program(points, seed):
 
 @given(CLOUDS, st.integers(0, 1000))
 def test_a_section_is_bounded_by_reaches_in_its_plane(points, seed):
-    direction = np.random.default_rng(seed).normal(size=3) / UNITS
+    direction = np.random.default_rng(seed).normal(size=3) / PLANAR_SCALE
     normal = np.cross(direction, (0.0, 1.0, 0.0))
     corners = section(points, normal)
     assert np.abs(corners @ normal).max() < 1e-9

@@ -11,7 +11,7 @@ import trimesh
 
 from hand_models import InvalidInputError
 from hand_models.rock import read_mesh, read_vertices
-from hand_models.scans import ENDINGS, read_scan
+from hand_models.scans import SCAN_ENDINGS, read_scan
 
 PLY = (
     "ply\nformat {kind} 1.0\n{more}element vertex {count}\nproperty float x\nproperty float y\n"
@@ -53,7 +53,7 @@ def test_the_texture_of_a_ply_is_not_opened(tmp_path):
     assert len(read_mesh(path)[1]) == len(ball().faces)
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", SCAN_ENDINGS)
 @pytest.mark.parametrize("kind", ["pipe", "folder", "device"])
 def test_what_may_never_end_is_refused(ending, kind, tmp_path):
     path = tmp_path / f"a{ending}"

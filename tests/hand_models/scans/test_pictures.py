@@ -25,7 +25,7 @@ def test_widths_of_holes_do_not_lie_on_each_other_nor_the_legend_on_the_rock(
 
     monkeypatch.setattr(pictures, "Figure", kept)
     corners = np.array([(x, y, 0.01 * x) for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
-    places = np.random.default_rng(0).uniform(-0.3, 0.3, (pictures.NAMED, 3))
+    places = np.random.default_rng(0).uniform(-0.3, 0.3, (12, 3))
     holes = tuple(Hole(0.2 - 0.01 * i, place) for i, place in enumerate(places))
     faces = np.array([(0, 1, 2), (1, 3, 2)])
     rock = ScannedRock(corners, faces, Pose(np.zeros(3), np.eye(3)), holes, 4, 0, 0.1)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hand_models import InvalidInputError
-from hand_models.scans import UPS, read_scan
+from hand_models.scans import UP_ROTATIONS, read_scan
 from tests.suite.helpers.scans import relief, wall, write_cloud, write_esri, write_geotiff
 
 CLOUD = wall(0.02)
@@ -140,13 +140,13 @@ def test_units(unit, size, tmp_path):
     np.testing.assert_allclose(read_scan(path, unit=unit).points, CLOUD, atol=1e-12)
 
 
-@pytest.mark.parametrize("up", UPS)
+@pytest.mark.parametrize("up", UP_ROTATIONS)
 def test_what_points_up_in_the_file_is_z(up, tmp_path):
     sign, axis = (-1.0 if up[0] == "-" else 1.0), "xyz".index(up[-1])
     scan = read_scan(write_cloud(tmp_path / "a.xyz", CLOUD), up=up, viewpoint=(1, 2, 3))
     np.testing.assert_allclose(scan.points[:, 2], sign * CLOUD[:, axis])
     assert scan.viewpoint[2] == sign * (1 + axis)
-    assert np.linalg.det(UPS[up]) == pytest.approx(1.0)
+    assert np.linalg.det(UP_ROTATIONS[up]) == pytest.approx(1.0)
 
 
 def test_a_width_is_that_of_the_longest_side(tmp_path):

@@ -4,32 +4,36 @@ import json
 import tempfile
 import tomllib
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from unittest.mock import patch
 
 from hand_models import experiments
+from hand_models.experiments.pulling import PULLING_SETTINGS
 from hand_models.studies import as_json, load_study, run_study
+from hand_models.studies.settings import STUDY_SETTINGS
 
 COARSE = {
-    "fig13": {"DIRECTIONS": 40, "PIECE_DIRECTIONS": 8},
-    "fig14": {"DIRECTIONS": 40},
-    "fig15": {"TENSIONS": 3, "RAYS": 100, "CUTS": 2, "STARTS": 1},
-    "fig16": {"POINTS": 3, "COARSE_POINTS": 2},
+    "fig13": {"fig13_pulls": 40, "fig13_piece_directions": 8},
+    "fig14": {"fig14_pulls": 40},
+    "fig15": {"fig15_tensions": 3, "fig15_rays": 100, "fig15_cuts": 2, "fig15_starts": 1},
+    "fig16": {"fig16_points": 3, "fig16_coarse_points": 2},
 }
-"""Numbers of the studies' modules."""
+"""Settings of the studies."""
 
-PER_AXIS = 20
-"""Poses along each axis of their searches."""
+COARSE_SEARCH = replace(PULLING_SETTINGS, poses_per_axis=20)
 
 
 @cache
 def studied(name):
     """Return a study's result, its files and the steps that it told."""
-    steps, coarse = [], COARSE.get(name)
+    steps, coarse = [], replace(STUDY_SETTINGS, **COARSE.get(name, {}))
     with (
-        patch.multiple(load_study(name), **coarse) if coarse else nullcontext(),
-        patch("hand_models.experiments.pulling.PER_AXIS", PER_AXIS),
+        patch.object(load_study(name), "STUDY_SETTINGS", coarse)
+        if name in COARSE
+        else nullcontext(),
+        patch("hand_models.experiments.pulling.PULLING_SETTINGS", COARSE_SEARCH),
     ):
         folder = Path(tempfile.mkdtemp()) / "new" / "folder"
         result, files = run_study(name, folder, lambda *step: steps.append(step))

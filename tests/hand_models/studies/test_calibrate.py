@@ -1,6 +1,7 @@
 """The calibration of the gripper: its data are met, by the recorded set and by every draw."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from hand_models.parameters import (
 )
 from hand_models.studies import calibrate
 from hand_models.studies.calibrate import as_draws, farthest_apart, global_search
+from hand_models.studies.settings import STUDY_SETTINGS
 
 FIT = GripperFit()
 DRAWS = Path(hand_models.__file__).parent / "parameters" / "draws.toml"
@@ -129,8 +131,14 @@ def test_a_search_goes_down_and_keeps_what_meets_the_data():
 
 @pytest.mark.slow
 def test_a_short_run_tells_residuals_numbers_sets_and_variants(monkeypatch):
-    for name, value in (("STARTS", 2), ("EVALUATIONS", 64), ("REFITS", 16), ("SETS", 4)):
-        monkeypatch.setattr(calibrate, name, value)
+    effort = replace(
+        STUDY_SETTINGS,
+        calibrate_starts=2,
+        calibrate_evaluations=64,
+        calibrate_refits=16,
+        calibrate_sets=4,
+    )
+    monkeypatch.setattr(calibrate, "STUDY_SETTINGS", effort)
     told = []
     result = calibrate.run(lambda done, total: told.append((done, total)), hand_table())
     assert told[-1][0] == told[-1][1]
@@ -143,7 +151,7 @@ def test_a_short_run_tells_residuals_numbers_sets_and_variants(monkeypatch):
         least, most = number["of_sets"]
         assert low - 1e-12 <= least <= most <= high + 1e-12
     assert [each["variant"] for each in result.data["variants"]] == [
-        words for words, _, _ in calibrate.VARIANTS
+        words for words, _, _ in calibrate.SEARCH_VARIANTS
     ]
     assert list(calibrate.plot(result)) == ["calibrate"]
     # what it prints is what draws.toml has

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
 from hand_models.compliance import Gripper, boundary, search_box
-from hand_models.experiments import UNITS, in_paper_signs
+from hand_models.experiments import PLANAR_SCALE, in_paper_signs
 from tests.hand_models.studies.runs import check_written, studied
 
 pytestmark = pytest.mark.slow
@@ -29,7 +29,7 @@ def test_the_extents_are_calibration_and_the_rest_is_not(study):
 def test_the_hull_shown_is_convex_cut_and_as_large_as_told(study):
     data = study[0].data
     shown = np.array(data["hull_vertices"])
-    assert len(ConvexHull(shown * UNITS).vertices) == len(shown)
+    assert len(ConvexHull(shown * PLANAR_SCALE).vertices) == len(shown)
     assert shown[:, 1].max() <= 1e-9
     assert data["extents"] == {
         "force_x": np.abs(shown[:, 0]).max(),
@@ -38,12 +38,12 @@ def test_the_hull_shown_is_convex_cut_and_as_large_as_told(study):
     }
     # inside of the cut and of the whole hull alike, for wrenches that pull off
     full = np.array(data["full_hull_vertices"])
-    part, whole = Delaunay(shown * UNITS), Delaunay(full * UNITS)
+    part, whole = Delaunay(shown * PLANAR_SCALE), Delaunay(full * PLANAR_SCALE)
     low, high = 1.2 * shown.min(axis=0), 1.2 * shown.max(axis=0)
     wrenches = np.random.default_rng(0).uniform(low, high, (2000, 3))
     wrenches = wrenches[wrenches[:, 1] < 0.0]
-    held = whole.find_simplex(wrenches * UNITS) >= 0
-    np.testing.assert_array_equal(part.find_simplex(wrenches * UNITS) >= 0, held)
+    held = whole.find_simplex(wrenches * PLANAR_SCALE) >= 0
+    np.testing.assert_array_equal(part.find_simplex(wrenches * PLANAR_SCALE) >= 0, held)
     assert 0 < held.sum() < len(held)
 
 
@@ -52,7 +52,7 @@ def test_it_is_skew_symmetric(study):
     assert study[0].data["asymmetry"] < 1e-9
     full = np.array(study[0].data["full_hull_vertices"])
     mirrored = full * (-1.0, 1.0, -1.0)
-    distance = np.linalg.norm((full[:, None] - mirrored) * UNITS, axis=2).min(axis=1)
+    distance = np.linalg.norm((full[:, None] - mirrored) * PLANAR_SCALE, axis=2).min(axis=1)
     assert distance.max() < 1e-6
 
 
@@ -61,17 +61,17 @@ def test_the_moment_has_the_papers_sign(study):
     data = study[0].data
     gripper = Gripper(data["diameter"], data["tension"])
     rays = boundary(gripper, search_box(gripper), 500)
-    full = Delaunay(1.05 * np.array(data["full_hull_vertices"]) * UNITS)
+    full = Delaunay(1.05 * np.array(data["full_hull_vertices"]) * PLANAR_SCALE)
     paper, ours = in_paper_signs(rays.wrenches), rays.wrenches[:, [0, 2, 4]]
-    assert (full.find_simplex(paper * UNITS) >= 0).mean() > 0.95
-    assert (full.find_simplex(ours * UNITS) >= 0).mean() < 0.95
+    assert (full.find_simplex(paper * PLANAR_SCALE) >= 0).mean() > 0.95
+    assert (full.find_simplex(ours * PLANAR_SCALE) >= 0).mean() < 0.95
 
 
 def test_straight_pulls_end_inside_the_hull(study):
     data = study[0].data
-    full = Delaunay(1.02 * np.array(data["full_hull_vertices"]) * UNITS)
+    full = Delaunay(1.02 * np.array(data["full_hull_vertices"]) * PLANAR_SCALE)
     wrenches = np.array(data["pulls"]["wrenches"])
-    assert (full.find_simplex(wrenches * UNITS) >= 0).all()
+    assert (full.find_simplex(wrenches * PLANAR_SCALE) >= 0).all()
     assert data["pulls"]["hull_over_pull"]["mean"] >= 1.0
 
 

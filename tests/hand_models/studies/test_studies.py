@@ -10,7 +10,7 @@ import pytest
 from hand_models import InvalidInputError
 from hand_models.experiments import PalmExperiment
 from hand_models.parameters import hand_table
-from hand_models.studies import STUDIES, load_study
+from hand_models.studies import STUDY_MODULES, load_study
 from service.commands.cli import run
 from tests.hand_models.studies.runs import check_written
 
@@ -157,7 +157,7 @@ def test_a_study_that_does_not_exist_is_refused_with_those_that_do(tmp_path, cap
     assert run(["study", "fig99", "-o", str(tmp_path / "out")]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1
-    assert all(name in line for name in (*STUDIES, "fig99"))
+    assert all(name in line for name in (*STUDY_MODULES, "fig99"))
     assert not (tmp_path / "out").exists()
 
 

@@ -18,7 +18,7 @@ import pytest
 from click.shell_completion import ShellComplete
 from rich.console import Console
 
-from hand_models.studies import STUDIES
+from hand_models.studies import STUDY_MODULES
 from hand_models.tile import surface_names
 from service.answering import planned
 from service.commands.cli import COMMANDS, crux, run
@@ -80,7 +80,7 @@ def test_names_of_commands_routes_and_studies_are_completed():
 
 
 def test_names_that_completion_knows_are_all_there_are():
-    assert (*STUDIES, MEASURE) == NAMES
+    assert (*STUDY_MODULES, MEASURE) == NAMES
     assert surface_names() == SURFACES
 
 
