@@ -10,18 +10,12 @@ from matplotlib.figure import Figure
 
 from hand_models.base import Array, whole_file
 from planner.capability import COMPONENTS, OTHERS, BodySection, BodySpace, Polygon
+from planner.pictures.settings import PICTURE_SETTINGS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["plot_body_space", "symbol_of"]
-
-HELD: Final = "tab:blue"
-GRAVITY: Final = "tab:red"
-ASKED: Final = "black"
-
-BELOW: Final[dict[str, Any]] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.11), "ncols": 2}
-"""Place of legends: beside what is drawn."""
 
 
 class _View(NamedTuple):
@@ -32,7 +26,7 @@ class _View(NamedTuple):
     xlabel: str
 
 
-VIEWS: Final = (
+ACCELERATION_VIEWS: Final = (
     _View(
         "accelerations, seen from behind the robot",
         np.array([0.0, -1.0, 0.0]),
@@ -59,8 +53,9 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
         PNG, PDF or SVG.
     title : str
     """
-    outlines = [_accelerations(space, view) for view in VIEWS] if space.accelerates else []
-    drawn = [(view, outline) for view, outline in zip(VIEWS, outlines, strict=False) if outline]
+    views = ACCELERATION_VIEWS if space.accelerates else ()
+    outlines = [_accelerations(space, view) for view in views]
+    drawn = [(view, outline) for view, outline in zip(views, outlines, strict=True) if outline]
     count = 1 + len(drawn)
     figure = Figure(figsize=(1.0 + 5.6 * count, 6.4), layout="constrained")
     panels = figure.subplots(1, count, squeeze=False)[0]
@@ -90,8 +85,9 @@ def symbol_of(axis: str) -> tuple[str, str]:
 def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     indices = [COMPONENTS.index(axis) for axis in section.axes]
     (across, across_unit), (up, up_unit) = map(symbol_of, section.axes)
+    held, gravity, asked = PICTURE_SETTINGS.held, PICTURE_SETTINGS.gravity, PICTURE_SETTINGS.asked
     if section.polygon is None:
-        axes.text(0.5, 0.5, "nothing is held", transform=axes.transAxes, ha="center", color=HELD)
+        axes.text(0.5, 0.5, "nothing is held", transform=axes.transAxes, ha="center", color=held)
     else:
         _draw_polygon(axes, section.polygon)
     beside = ", beside this plane" if section.others == "zero" else ""
@@ -100,12 +96,12 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     if weight is not None:
         place = weight[indices]
         if np.linalg.norm(place) > 0.0:
-            axes.plot(*np.vstack([np.zeros(2), place]).T, color=GRAVITY, linewidth=1.2)
+            axes.plot(*np.vstack([np.zeros(2), place]).T, color=gravity, linewidth=1.2)
         label = ("" if moves else "asked for: ") + "holds the weight at rest" + beside
-        axes.plot(*place, "o", color=GRAVITY, markersize=9, fillstyle="none", label=label)
+        axes.plot(*place, "o", color=gravity, markersize=9, fillstyle="none", label=label)
     if weight is None or moves:
         label = "asked for" + beside
-        axes.plot(*space.needed[indices], "x", color=ASKED, markersize=9, mew=2.0, label=label)
+        axes.plot(*space.needed[indices], "x", color=asked, markersize=9, mew=2.0, label=label)
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     axes.axvline(0.0, color="0.5", linewidth=0.8)
     axes.set(
@@ -116,7 +112,7 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     if across_unit == up_unit:
         axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, **BELOW)
+    _draw_legend(axes)
 
 
 def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Polygon) -> None:
@@ -128,29 +124,37 @@ def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Poly
         return np.array([view.across @ inside, inside[0]])
 
     gravity = flat(space.question.stance.gravity)
-    axes.plot(0.0, 0.0, "o", color=ASKED, markersize=5, label="at rest")
+    axes.plot(0.0, 0.0, "o", color=PICTURE_SETTINGS.asked, markersize=5, label="at rest")
     if np.linalg.norm(gravity) > 1e-3:
+        colour = PICTURE_SETTINGS.gravity
         axes.annotate("", tuple(gravity), (0.0, 0.0), arrowprops={
-            "arrowstyle": "-|>", "color": GRAVITY, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0,
+            "arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0,
         })  # fmt: skip
-        axes.plot([], [], color=GRAVITY, label="gravity")
+        axes.plot([], [], color=colour, label="gravity")
         axes.plot(*gravity, alpha=0.0)
     asked = flat(np.array(space.question.load.acceleration))
     if np.linalg.norm(asked) > 0.0:
-        axes.plot(*asked, "x", color=ASKED, markersize=9, mew=2.0, label="asked for")
+        style: dict[str, Any] = {"color": PICTURE_SETTINGS.asked, "markersize": 9, "mew": 2.0}
+        axes.plot(*asked, "x", label="asked for", **style)
     axes.set(title=view.title, xlabel=view.xlabel, ylabel="ahead, along x of B [m/s²]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, **BELOW)
+    _draw_legend(axes)
+
+
+def _draw_legend(axes: Axes) -> None:
+    """Draw a legend below the panel, beside what is drawn."""
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=2)
 
 
 def _draw_polygon(axes: Axes, polygon: Polygon) -> None:
     """Draw what is held, and the outline beyond which nothing is; a point as a point."""
+    colour = PICTURE_SETTINGS.held
     inner = np.vstack([polygon.inner, polygon.inner[:1]])
     outer = np.vstack([polygon.outer, polygon.outer[:1]])
     if len(polygon.inner) > 2:
-        axes.fill(*inner.T, color=HELD, alpha=0.3, linewidth=0.0, label="held")
+        axes.fill(*inner.T, color=colour, alpha=0.3, linewidth=0.0, label="held")
     else:
         marker = "s" if len(polygon.inner) == 1 else ""
-        axes.plot(*inner.T, color=HELD, linewidth=5.0, marker=marker, alpha=0.5, label="held")
-    axes.plot(*outer.T, color=HELD, linewidth=1.2, label="nothing is held beyond")
+        axes.plot(*inner.T, color=colour, linewidth=5.0, marker=marker, alpha=0.5, label="held")
+    axes.plot(*outer.T, color=colour, linewidth=1.2, label="nothing is held beyond")

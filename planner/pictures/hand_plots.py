@@ -25,6 +25,7 @@ from hand_models.sections import Section
 from hand_models.wrench_spaces import SCALE, WrenchSpace
 from planner.capability import COMPONENTS, SupportPoint, enclose
 from planner.pictures.body_plots import symbol_of
+from planner.pictures.settings import PICTURE_SETTINGS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,30 +33,13 @@ if TYPE_CHECKING:
 
 __all__ = ["direction_in_words", "draw_fingers", "draw_wrench_space", "plot_wrench_space"]
 
-CONTACTS: Final = {
+CONTACT_STYLES: Final = {
     "face": ("tab:green", "tile's face"),
     "edge": ("tab:orange", "tile's edge"),
     "frame": ("tab:purple", "bare frame"),
     "nail": ("tab:red", "fingernail"),
     "none": ("0.55", "no contact"),
 }
-ROCK: Final = "0.88"
-PALM: Final = "tab:brown"
-MM: Final = 1e3
-ARROW: Final = 32.0
-"""Length of the largest tile force in a picture [mm]."""
-
-MARGINS: Final = np.array([[62.0, 34.0], [30.0, 40.0]])
-"""Margins beside the fingers, before and behind, along and across them [mm]."""
-
-SHADES: Final = 15
-"""Largest number of shades of the rock's depth, each of 1 mm at least."""
-
-FLAT: Final = 1e-6
-"""A set narrower than this along an axis is drawn as a line [N] or [N·m]."""
-
-AROUND: Final = 0.19
-"""Half the side of the view from above [m]."""
 
 
 def plot_wrench_space(
@@ -141,16 +125,18 @@ def draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> N
     """
     loads = settled.tile_loads(tensions)
     largest = max(float(np.hypot(loads[:, 0], loads[:, 1]).max()), 1.0)
-    chains = MM * np.vstack([finger.chain for finger in settled.fingers])
-    limits = chains.min(axis=0) - MARGINS[0], chains.max(axis=0) + MARGINS[1]
+    # beside the fingers, before and behind, along and across them [mm]
+    before, behind = np.array([[62.0, 34.0], [30.0, 40.0]])
+    chains = 1e3 * np.vstack([finger.chain for finger in settled.fingers])
+    limits = chains.min(axis=0) - before, chains.max(axis=0) + behind
     limits[1][1] = max(limits[1][1], limits[0][1] + 130.0)
     # left over right, the inner finger beside the outer one
     for axes, name in zip(
         panels, ("inner_left", "outer_left", "inner_right", "outer_right"), strict=True
     ):
         _draw_finger(axes, settled, FINGERS.index(name), loads, largest, limits)
-    shown = [kind for kind in CONTACTS if any(tile.contact == kind for tile in settled.tiles)]
-    named = [(*CONTACTS[kind], 4) for kind in shown] + [(PALM, "palm", 3)]
+    shown = [kind for kind in CONTACT_STYLES if any(tile.contact == kind for tile in settled.tiles)]
+    named = [(*CONTACT_STYLES[kind], 4) for kind in shown] + [(PICTURE_SETTINGS.palm, "palm", 3)]
     handles = [Line2D([], [], color=c, label=label, linewidth=w) for c, label, w in named]
     panels[0].legend(handles=handles, loc="lower left", fontsize=8)
 
@@ -173,7 +159,7 @@ def _draw_finger(
     )
     if section is not None:
         _draw_rock(axes, section, low, high)
-    axes.plot(*MM * finger.chain.T, "o-", color="0.25", markersize=5, linewidth=2.0)
+    axes.plot(*1e3 * finger.chain.T, "o-", color="0.25", markersize=5, linewidth=2.0)
     _draw_base(axes, settled, index)
     rows = np.flatnonzero(settled.finger_of == index)
     tiles = dict(zip([settled.tiles[i].phalanx for i in rows], rows.tolist(), strict=True))
@@ -183,7 +169,7 @@ def _draw_finger(
         ]
         _draw_tile(axes, contact.kind, ends, linewidth=4, solid_capstyle="butt")
         if contact.kind != "none":
-            place = MM * np.array(contact.point(model.tile_height))
+            place = 1e3 * np.array(contact.point(model.tile_height))
             _draw_force(axes, place, contact.angle, loads[tiles[phalanx]], largest)
     if NAIL in tiles:
         row, angle = tiles[NAIL], float(settled.nail_angles[index])
@@ -192,11 +178,11 @@ def _draw_finger(
         _draw_tile(axes, kind, [finger.pin, finger.pin + reach], linewidth=3)
         if kind == NAIL:
             away = settled.positions[row] - frame.joint
-            place = MM * np.array([away @ frame.along, away[2]])
+            place = 1e3 * np.array([away @ frame.along, away[2]])
             _draw_force(axes, place, angle, loads[row], largest)
     axes.annotate(
         "",
-        (low[0] + 8.0 + ARROW, low[1] + 8.0),
+        (low[0] + 8.0 + PICTURE_SETTINGS.longest_force, low[1] + 8.0),
         (low[0] + 8.0, low[1] + 8.0),
         arrowprops={"arrowstyle": "-|>", "color": "tab:red"},
     )
@@ -216,14 +202,14 @@ def _draw_finger(
 
 def _draw_tile(axes: Axes, kind: str, ends: Sequence[ArrayLike], **style: Any) -> None:
     """Draw a tile or a nail, from end to end in (x, z) of F [m], in the colour of its contact."""
-    axes.plot(*(MM * np.array(ends)).T, color=CONTACTS[kind][0], **style)
+    axes.plot(*(1e3 * np.array(ends)).T, color=CONTACT_STYLES[kind][0], **style)
 
 
 def _draw_rock(axes: Axes, section: Section, low: Array, high: Array) -> None:
     s, t = (np.linspace(a, b, n) for a, b, n in zip(low, high, (110, 80), strict=True))
-    clearance = section.clearances((s + 1j * t[:, None]) / MM)
+    clearance = section.clearances((s + 1j * t[:, None]) / 1e3)
     if clearance.min() < 0.0:
-        axes.contourf(s, t, clearance, levels=[-np.inf, 0.0], colors=[ROCK])
+        axes.contourf(s, t, clearance, levels=[-np.inf, 0.0], colors=["0.88"])
         if clearance.max() > 0.0:
             axes.contour(s, t, clearance, levels=[0.0], colors=["0.4"], linewidths=1.0)
 
@@ -232,17 +218,20 @@ def _draw_base(axes: Axes, settled: SettledHand, index: int) -> None:
     """Draw the tile on an outer finger's base, or the palm behind an inner finger."""
     hand = settled.hand
     if FINGERS[index].startswith("inner"):
-        place = -MM * hand.inner_joint[[0, 2]]
-        half = MM * 0.5 * hand.palm_length
-        axes.plot(place[0] + np.array([-half, half]), [place[1]] * 2, color=PALM, lw=3)
+        place = -1e3 * hand.inner_joint[[0, 2]]
+        half = 1e3 * 0.5 * hand.palm_length
+        axes.plot(
+            place[0] + np.array([-half, half]), [place[1]] * 2, color=PICTURE_SETTINGS.palm, lw=3
+        )
         return
     tile = next(t for t, row in zip(settled.tiles, settled.finger_of, strict=True) if row == index)
-    middle = MM * (hand.base_tile_reach - hand.outer_reach)
-    half = MM * 0.5 * hand.finger.tile_length
-    height = MM * (hand.base_tile_surface - hand.outer_axis[2])
-    axes.plot([middle - half, middle + half], [height] * 2, color=CONTACTS[tile.contact][0], lw=4,
+    middle = 1e3 * (hand.base_tile_reach - hand.outer_reach)
+    half = 1e3 * 0.5 * hand.finger.tile_length
+    height = 1e3 * (hand.base_tile_surface - hand.outer_axis[2])
+    colour = CONTACT_STYLES[tile.contact][0]
+    axes.plot([middle - half, middle + half], [height] * 2, color=colour, lw=4,
               solid_capstyle="butt")  # fmt: skip
-    axes.plot([-MM * hand.outer_reach, 0.0], [0.0, 0.0], color="0.25", lw=2.0)
+    axes.plot([-1e3 * hand.outer_reach, 0.0], [0.0, 0.0], color="0.25", lw=2.0)
 
 
 def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: float) -> None:
@@ -250,7 +239,7 @@ def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: fl
     axes.plot(*place, "o", color="black", markersize=4, zorder=5)
     u = np.array([math.cos(angle), math.sin(angle)])
     force = -load[0] * u + load[1] * np.array([-u[1], u[0]])
-    end = place + ARROW * force / largest
+    end = place + PICTURE_SETTINGS.longest_force * force / largest
     if np.hypot(*force) > 0.02 * largest:
         axes.annotate(
             "", tuple(end), tuple(place),
@@ -281,31 +270,33 @@ def direction_in_words(along: Array) -> str:
 def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
     """Draw the rock's depth, the palm's tiles and the fingers in x and y of H."""
     hand, centre = settled.hand, np.array([0.03, 0.0])
-    x, y = (c + np.linspace(-AROUND, AROUND, 41) for c in centre)
+    around = 0.19  # half the side of the view [m]
+    x, y = (c + np.linspace(-around, around, 41) for c in centre)
     in_hold = settled.seating.pose.inverse()
     into_rock = in_hold.rotation[:, 2]
     depth = np.array(
         [[settled.hold.entry(in_hold.apply((a, b, 0.0)), into_rock) for b in y] for a in x]
     )
-    depth = MM * np.ma.masked_invalid(np.where(depth > 2.0 * AROUND, np.nan, depth))
+    depth = 1e3 * np.ma.masked_invalid(np.where(depth > 2.0 * around, np.nan, depth))
     if depth.count():
         low = math.floor(float(depth.min()))
-        step = max(1, math.ceil((float(depth.max()) - low) / SHADES))
-        levels = low + step * np.arange(SHADES + 1)
-        shades = axes.contourf(MM * y, MM * x, depth, levels=levels, cmap="Greys", alpha=0.6)
+        # 15 shades at most, each of a whole number of millimetres
+        step = max(1, math.ceil((float(depth.max()) - low) / 15))
+        levels = low + step * np.arange(15 + 1)
+        shades = axes.contourf(1e3 * y, 1e3 * x, depth, levels=levels, cmap="Greys", alpha=0.6)
         axes.figure.colorbar(
             shades, ax=axes, label="z of H of the rock [mm]", location="bottom", shrink=0.8
         )
-    size = MM * hand.palm_tile_size
+    size = 1e3 * hand.palm_tile_size
     for i, tile in enumerate(hand.palm_tiles):
-        corner = MM * tile[[1, 0]] - 0.5 * size[::-1]
-        colour = CONTACTS["face" if i in settled.palm.engaged else "none"][0]
+        corner = 1e3 * tile[[1, 0]] - 0.5 * size[::-1]
+        colour = CONTACT_STYLES["face" if i in settled.palm.engaged else "none"][0]
         axes.add_patch(Rectangle(tuple(corner), *size[::-1], facecolor=colour, alpha=0.6, ec="0.3"))
     frames = hand.frames(settled.grasp.outer_rotation)
     for name, frame, finger in zip(FINGERS, frames, settled.fingers, strict=True):
-        ends = MM * (frame.joint + np.outer([-0.06, 0.16], frame.along))
+        ends = 1e3 * (frame.joint + np.outer([-0.06, 0.16], frame.along))
         axes.plot(ends[:, 1], ends[:, 0], "--", color="tab:blue", lw=1.0)
-        places = MM * frame.joint + np.outer(MM * finger.chain[:, 0], frame.along)
+        places = 1e3 * frame.joint + np.outer(1e3 * finger.chain[:, 0], frame.along)
         axes.plot(places[:, 1], places[:, 0], "o-", color="0.25", markersize=4, lw=2.5)
         outward = places[-1] - places[0]
         axes.annotate(
@@ -320,13 +311,20 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0},
         )
     for tile, place in zip(settled.tiles, settled.positions, strict=True):
-        axes.plot(MM * place[1], MM * place[0], "o", color=CONTACTS[tile.contact][0], ms=6, mec="k")
+        axes.plot(
+            1e3 * place[1],
+            1e3 * place[0],
+            "o",
+            color=CONTACT_STYLES[tile.contact][0],
+            ms=6,
+            mec="k",
+        )
     axes.set(
         title="from the arm, into the rock; green palm tiles are engaged",
         xlabel="y of H [mm]",
         ylabel="x of H [mm]",
-        xlim=MM * (centre[1] + np.array([-AROUND, AROUND])),
-        ylim=MM * (centre[0] + np.array([-AROUND, AROUND])),
+        xlim=1e3 * (centre[1] + np.array([-around, around])),
+        ylim=1e3 * (centre[0] + np.array([-around, around])),
     )
     axes.title.set_fontsize(10)
     axes.set_aspect("equal", adjustable="box")
@@ -364,8 +362,10 @@ def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
         xlabel=f"{a} in H [{unit_a}]",
         ylabel=f"{b} in H [{unit_b}]",
     )
-    if np.ptp(points[:, 0]) < FLAT:
+    # a set narrower than this along an axis is drawn as a line [N] or [N·m]
+    flat = 1e-6
+    if np.ptp(points[:, 0]) < flat:
         axes.set_xlim(points[0, 0] - 1.0, points[0, 0] + 1.0)
-    if np.ptp(points[:, 1]) < FLAT:
+    if np.ptp(points[:, 1]) < flat:
         axes.set_ylim(points[0, 1] - 1.0, points[0, 1] + 1.0)
     axes.grid(alpha=0.3)

@@ -10,7 +10,7 @@ import math
 import textwrap
 from itertools import product
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -21,7 +21,7 @@ from mpl_toolkits.mplot3d import proj3d
 
 from hand_models.base import Array, whole_file
 from planner.pictures.plan_scene import (
-    UP,
+    WORLD_UP,
     Scene,
     ViewDirections,
     joint_utilisations,
@@ -29,20 +29,11 @@ from planner.pictures.plan_scene import (
     view_directions,
 )
 from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_spread, draw_tiles
-from planner.pictures.plan_views import COLOURS, UTILISATION, View, draw_scene
+from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, View, draw_scene
 from planner.question import Question
 from planner.result import Plan
 
 __all__ = ["draw_plan", "plot_plan"]
-
-SIZE: Final = (14.0, 8.0)
-"""Width and height of a picture [inch]."""
-
-BOTTOM: Final = 0.075
-"""Lower edge of the panels, over the picture's height."""
-
-TOP: Final = 0.875
-"""Upper edge of the panels, over the picture's height."""
 
 
 def plot_plan(plan: Plan, question: Question, path: Path) -> None:
@@ -66,16 +57,18 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     scene, seen = scene_of(plan, question), view_directions(question.stance)
     rows = sum(len(hand.fingers) for hand in plan.hands or ())
     joints = joint_utilisations(plan, question.stance)
+    # edges of the panels, over the picture's height
+    bottom, top = 0.075, 0.875
     # inches, of which a row of a table needs a tenth
-    needed = 0.105 * (rows + len(joints)) / (TOP - BOTTOM)
-    figure = Figure(figsize=(SIZE[0], max(SIZE[1], needed)))
+    needed = 0.105 * (rows + len(joints)) / (top - bottom)
+    figure = Figure(figsize=(14.0, max(8.0, needed)))
     FigureCanvasAgg(figure)  # which measures texts
-    places = {"bottom": BOTTOM, "top": TOP}
+    places = {"bottom": bottom, "top": top}
     under = 0.0
     if plan.spread is not None and plan.spread.load_factor is not None:
-        draw_spread(figure.add_axes((0.045, BOTTOM, 0.33, 0.11)), plan.spread, plan.load_factor)
+        draw_spread(figure.add_axes((0.045, bottom, 0.33, 0.11)), plan.spread, plan.load_factor)
         under = 0.3
-    space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=under, top=TOP)
+    space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=under, top=top)
     _draw_space(figure, space[0], scene, seen)
     sides = figure.add_gridspec(2, 1, left=0.435, right=0.665, hspace=0.3, **places)
     _draw_sides(figure.add_subplot(sides[0]), figure.add_subplot(sides[1]), scene, seen)
@@ -86,12 +79,12 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     if plan.hands:
         draw_tiles(figure.add_subplot(tables[0]), plan, question)
     else:
-        draw_shortfall(figure.add_axes((0.7, BOTTOM, 0.28, TOP - BOTTOM)), plan)
+        draw_shortfall(figure.add_axes((0.7, bottom, 0.28, top - bottom)), plan)
     if joints:
         draw_joints(figure.add_subplot(tables[1]), joints)
     if plan.hands:
         figure.colorbar(
-            ScalarMappable(UTILISATION, COLOURS),
+            ScalarMappable(UTILISATION_NORM, UTILISATION_COLOURS),
             cax=figure.add_axes((0.95, 0.3, 0.01, 0.4)),
             label="utilisation: load / capacity [1]",
             extend="max",
@@ -128,7 +121,7 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
     step = MaxNLocator(5).tick_values(0.0, float((high - low).max()))[1]
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MultipleLocator(step))
-    right = np.cross(seen.ahead, UP)
+    right = np.cross(seen.ahead, WORLD_UP)
     # less under a ceiling and on a floor, so that the body is seen between the hands
     aside = math.radians(12.0) if seen.steep else math.radians(32.0)
     camera = -math.cos(aside) * seen.ahead + math.sin(aside) * right
@@ -158,14 +151,15 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
 def _draw_sides(facing: Any, side: Any, scene: Scene, seen: ViewDirections) -> None:
     """Draw the scene facing the rock, and from the side."""
     ahead = "toward the rock" if seen.toward else "ahead"
-    _draw_side(side, scene, seen.ahead, UP, (ahead, "up"), "the side")
+    _draw_side(side, scene, seen.ahead, WORLD_UP, (ahead, "up"), "the side")
     if seen.steep:
         below = seen.into[2] > 0.0
-        right, seen_from = np.cross(UP if below else -UP, seen.ahead), "below" if below else "above"
+        right = np.cross(WORLD_UP if below else -WORLD_UP, seen.ahead)
+        seen_from = "below" if below else "above"
         _draw_side(facing, scene, right, seen.ahead, ("to the right", ahead), seen_from)
     else:
-        right = np.cross(seen.ahead, UP)
-        _draw_side(facing, scene, right, UP, ("to the right", "up"), "behind")
+        right = np.cross(seen.ahead, WORLD_UP)
+        _draw_side(facing, scene, right, WORLD_UP, ("to the right", "up"), "behind")
 
 
 def _draw_side(

@@ -21,7 +21,7 @@ from planner.question import HandOnHold, Question, Stance
 from planner.result import Plan
 
 __all__ = [
-    "UP",
+    "WORLD_UP",
     "Arrow",
     "Dots",
     "Label",
@@ -34,13 +34,7 @@ __all__ = [
     "view_directions",
 ]
 
-ROUND: Final = 10
-"""Points of half the outline of a capsule's end."""
-
-LEANING: Final = 0.3
-"""Horizontal part of a direction from which on it says where ahead is."""
-
-UP: Final = np.array([0.0, 0.0, 1.0])
+WORLD_UP: Final = np.array([0.0, 0.0, 1.0])
 """Upward direction in W; and z of a hand."""
 
 
@@ -184,13 +178,16 @@ def view_directions(stance: Stance) -> ViewDirections:
     into = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
     x, _, z = stance.body.rotation.T
     level = [
-        direction - (direction @ UP) * UP for direction in (into, -z, x, np.array([1.0, 0.0, 0.0]))
+        direction - (direction @ WORLD_UP) * WORLD_UP
+        for direction in (into, -z, x, np.array([1.0, 0.0, 0.0]))
     ]
-    chosen = next(i for i, v in enumerate(level) if np.linalg.norm(v) >= LEANING)
+    # horizontal part from which on a direction says where ahead is
+    enough = 0.3
+    chosen = next(i for i, v in enumerate(level) if np.linalg.norm(v) >= enough)
     ahead = level[chosen] / np.linalg.norm(level[chosen])
     length = float(np.linalg.norm(into))
-    into = into / length if length >= LEANING else ahead
-    return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ UP) >= 0.9))
+    into = into / length if length >= enough else ahead
+    return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ WORLD_UP) >= 0.9))
 
 
 def scene_of(plan: Plan, question: Question) -> Scene:
@@ -211,7 +208,7 @@ def scene_of(plan: Plan, question: Question) -> Scene:
         ]
         frames = kind.frames(known.grasp.outer_rotation)
         lines += [
-            Line("finger", into_world(frame.joint + finger.chain @ [frame.along, UP]))
+            Line("finger", into_world(frame.joint + finger.chain @ [frame.along, WORLD_UP]))
             for frame, finger in zip(frames, known.fingers, strict=True)
         ]
         dots.append(Dots("contact", into_world(known.positions[known.holding])))
@@ -308,10 +305,11 @@ def _body(plan: Plan, stance: Stance) -> list[Surface]:
 def _capsule(start: Array, end: Array, radius: float) -> Triangles:
     """Return a capsule's surface [m]."""
     length = float(np.linalg.norm(end - start))
-    along = (end - start) / length if length else UP
+    along = (end - start) / length if length else WORLD_UP
     aside = np.linalg.svd(along[None])[2][1]
     across = np.array([aside, np.cross(along, aside)])
-    turn, rise = np.linspace(0.0, 2.0 * np.pi, 2 * ROUND + 1), np.linspace(0.0, np.pi / 2.0, ROUND)
+    count = 10  # points of half the outline of an end
+    turn, rise = np.linspace(0.0, 2.0 * np.pi, 2 * count + 1), np.linspace(0.0, np.pi / 2.0, count)
     around = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
     half = np.sin(rise)[:, None, None] * around, np.cos(rise)[:, None, None] * along
     beyond, before = half[0] + half[1], (half[0] - half[1])[::-1]

@@ -5,37 +5,18 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from hand_models.base import Array
 from hand_models.hand import NAIL
 from planner.explanation import constraint_words
-from planner.pictures.plan_views import COLOURS, UTILISATION
+from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM
 from planner.question import Question
 from planner.result import MANY, Certificate, LimitName, Plan, Spread
 
 __all__ = ["draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
-
-PHALANX_COLUMNS: Final = ("base", "proximal", "middle", "distal")
-
-FIRST: Final = 24
-"""Largest number of lines that say what leaves no balance."""
-
-ENDLESS: Final = 999.0
-"""A utilisation that is written no more."""
-
-GAP: Final = 0.025
-"""Above and below a table, over the panel's height."""
-
-WRENCHES: Final = 0.26
-"""Height of the table of body wrenches, over the panel's."""
-
-BAND, BAR, NOMINAL, NEEDED = "0.88", "tab:blue", "black", "tab:red"
-"""Colours: from 5 to 95 %, the draws, the plan's own load factor, and 1."""
-
-SAID: Final[dict[str, Any]] = {"fontsize": 8, "ha": "left", "va": "top"}
 
 
 def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
@@ -48,7 +29,7 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
     body, cap = question.stance.robot.hand, question.limits.tendon_tension
     strength = body.maximum_tension if cap is None else min(cap, body.maximum_tension)
     clings = any(f.tiles[-1].phalanx == NAIL for hand in hands for f in hand.fingers)
-    columns = (*PHALANX_COLUMNS, NAIL) if clings else PHALANX_COLUMNS
+    columns = ("base", "proximal", "middle", "distal", *((NAIL,) if clings else ()))
     names: list[str] = []
     rows: list[list[float]] = []
     whole: list[tuple[float, float]] = []
@@ -95,7 +76,9 @@ def draw_joints(axes: Any, used: Mapping[str, Array]) -> None:
 def _draw_colours(axes: Any, values: Array, columns: Iterable[str], rows: Iterable[str]) -> None:
     """Draw numbers as colours; none where a number is NaN."""
     shown = np.ma.masked_invalid(values)
-    axes.imshow(shown, cmap=COLOURS, norm=UTILISATION, aspect="auto", interpolation="none")
+    axes.imshow(
+        shown, cmap=UTILISATION_COLOURS, norm=UTILISATION_NORM, aspect="auto", interpolation="none"
+    )
     axes.set_xticks(range(values.shape[1]), list(columns), fontsize=6.5)
     axes.set_yticks(range(values.shape[0]), list(rows), fontsize=7)
     axes.tick_params(length=0)
@@ -113,7 +96,7 @@ def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 
         if np.isfinite(value):
             colour = "white" if value > 1.0 else "black"
             text = f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
-            text = text if value < ENDLESS else f"{ENDLESS:.0f}+"
+            text = text if value < 999.0 else "999+"
             axes.text(first[1] + j, first[0] + i, text, color=colour, **style)
 
 
@@ -128,16 +111,19 @@ def draw_shortfall(axes: Any, plan: Plan) -> None:
     if proof is None:
         axes.text(0.5, 0.5, "no plan, no loads", ha="center", va="center")
         return
-    top = 1.0
+    style: dict[str, Any] = {"fontsize": 8, "ha": "left", "va": "top"}
+    # of the table of wrenches, and above and below it, over the panel's height
+    height, gap, top = 0.26, 0.025, 1.0
     if proof.shortfall is not None and proof.nearest is not None:
-        axes.text(0.0, 1.0, "body wrench in B, and the nearest that can be had", **SAID)
-        _write_wrenches(axes, np.column_stack([plan.body_wrench, proof.nearest, proof.shortfall]))
-        top -= WRENCHES + 2.0 * GAP
-    axes.text(0.0, top, "\n".join(_barriers(proof)), linespacing=1.5, **SAID)
+        axes.text(0.0, 1.0, "body wrench in B, and the nearest that can be had", **style)
+        wrenches = np.column_stack([plan.body_wrench, proof.nearest, proof.shortfall])
+        _write_wrenches(axes, wrenches, (0.0, 1.0 - gap - height, 0.9, height))
+        top -= height + 2.0 * gap
+    axes.text(0.0, top, "\n".join(_barriers(proof)), linespacing=1.5, **style)
 
 
-def _write_wrenches(axes: Any, values: Array) -> None:
-    """Write wrenches, shape (6, 3), as a table whose lines part the rows."""
+def _write_wrenches(axes: Any, values: Array, place: tuple[float, float, float, float]) -> None:
+    """Write wrenches, shape (6, 3), as a table at a place, whose lines part the rows."""
     words = [[f"{round(value, 1) + 0.0:.1f}" for value in row] for row in values]
     table = axes.table(
         [
@@ -150,10 +136,10 @@ def _write_wrenches(axes: Any, values: Array) -> None:
         ],
         colLabels=("", *("needed", "nearest", "missing")),
         edges="horizontal",
-        bbox=(0.0, 1.0 - GAP - WRENCHES, 0.9, WRENCHES),
+        bbox=place,
     )
     table.auto_set_font_size(False)
-    table.set_fontsize(SAID["fontsize"])
+    table.set_fontsize(8)
     for cell in table.get_celld().values():
         cell.set(edgecolor="0.7")
         cell.set_text_props(ha="right")
@@ -183,8 +169,9 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
             of = ", ".join(owner for owner in owners if owner)
             text = f"{words} ({of})" if of else words
             lines += textwrap.wrap(text, 64, initial_indent="    ", subsequent_indent="        ")
-    if len(lines) > FIRST:
-        lines[FIRST:] = ["…"]
+    most = 24  # lines that say what leaves no balance
+    if len(lines) > most:
+        lines[most:] = ["…"]
     return lines
 
 
@@ -204,11 +191,11 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
         return
     low, high = spread.load_factor.low, spread.load_factor.high
     ends = np.array([*factors, 1.0, *([] if nominal is None else [nominal])])
-    axes.axvspan(low, high, color=BAND, label="5 to 95 %" if len(factors) >= MANY else "all")
-    axes.hist(factors, np.linspace(ends.min(), ends.max(), 15 + 1), color=BAR)
-    axes.axvline(1.0, color=NEEDED, linestyle="--", label="needed")
+    axes.axvspan(low, high, color="0.88", label="5 to 95 %" if len(factors) >= MANY else "all")
+    axes.hist(factors, np.linspace(ends.min(), ends.max(), 15 + 1), color="tab:blue")
+    axes.axvline(1.0, color="tab:red", linestyle="--", label="needed")
     if nominal is not None:
-        axes.axvline(nominal, color=NOMINAL, label="nominal")
+        axes.axvline(nominal, color="black", label="nominal")
     said = f"holds in {spread.holds} of {spread.draws} draws"
     if spread.cap < 1.0:
         said += f" within {spread.cap:g}"

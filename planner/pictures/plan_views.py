@@ -16,67 +16,47 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.base import Array
 from planner.pictures.plan_scene import Scene
+from planner.pictures.settings import PICTURE_SETTINGS
 
-__all__ = ["COLOURS", "UTILISATION", "View", "draw_scene", "silhouette"]
+__all__ = ["UTILISATION_COLOURS", "UTILISATION_NORM", "View", "draw_scene", "silhouette"]
 
-COLOURS: Final = LinearSegmentedColormap.from_list(
+UTILISATION_COLOURS: Final = LinearSegmentedColormap.from_list(
     "load", ["#1a9850", "#e6a117", "#d73027"]
 ).with_extremes(over="#7b1fa2")
 """Colours of a utilisation; another one beyond 1."""
 
-UTILISATION: Final = Normalize(0.0, 1.0)
+UTILISATION_NORM: Final = Normalize(0.0, 1.0)
 
-GREYS: Final = (0.6, 0.92)
-"""Greys of rock along the light, and across it."""
-
-LIGHT: Final = np.array([-0.5, -0.3, 0.8])
-"""Direction from which light comes, in W."""
-
-LIMB: Final = "#4a6a8a"
-
-BODY: Final = (*to_rgb(LIMB), 0.16)
-"""Colour of the body, through which hands and rock are seen."""
-
-LOAD: Final = "tab:blue"
-
-OUTLINES: Final[dict[str, dict[str, Any]]] = {
+SCENE_STYLES: Final[dict[str, dict[str, Any]]] = {
+    # convex surfaces; hands and rock are seen through the body
     "palm": {"facecolor": "0.7", "edgecolor": "0.2", "linewidth": 1.0, "zorder": 2},
-    "link": {"facecolor": BODY, "edgecolor": "none", "linewidth": 0.5, "zorder": 4},
-    "body": {"facecolor": BODY, "edgecolor": LIMB, "linewidth": 0.5, "zorder": 4},
-}
-"""Styles of convex surfaces, by their kind."""
-
-LINES: Final[dict[str, dict[str, Any]]] = {
+    **{
+        kind: {
+            "facecolor": (*to_rgb(PICTURE_SETTINGS.limb), 0.16),
+            "edgecolor": edge,
+            "linewidth": 0.5,
+            "zorder": 4,
+        }
+        for kind, edge in (("link", "none"), ("body", PICTURE_SETTINGS.limb))
+    },
+    # lines
     "finger": {"color": "0.2", "linewidth": 1.5, "zorder": 3},
-    "limb": {"color": LIMB, "linewidth": 4.0, "solid_capstyle": "round", "zorder": 5},
-}
-
-DOTS: Final[dict[str, dict[str, Any]]] = {
+    "limb": {
+        "color": PICTURE_SETTINGS.limb,
+        "linewidth": 4.0,
+        "solid_capstyle": "round",
+        "zorder": 5,
+    },
+    # dots
     "contact": {"color": "black", "marker": ".", "ms": 4, "zorder": 3},
-    "joint": {"color": "white", "mec": LIMB, "marker": "o", "ms": 5, "zorder": 6},
-    "load": {"color": LOAD, "marker": "o", "ms": 8, "zorder": 6},
+    "joint": {"color": "white", "mec": PICTURE_SETTINGS.limb, "marker": "o", "ms": 5, "zorder": 6},
+    "load": {"color": PICTURE_SETTINGS.load, "marker": "o", "ms": 8, "zorder": 6},
     "origin": {"color": "black", "marker": "+", "ms": 10, "zorder": 6},
 }
-STEPS_ASIDE: Final = 10
-"""Most steps of a note to each side."""
+"""Styles of what a scene has, by kind."""
 
-STEPS_UP: Final = 8
-"""Most steps of a note up and down."""
-
-PADDING: Final = 1.0
-"""Space around a note [printer's points]."""
-
-MOVES: Final = np.array(
-    [
-        (float(i), float(j))
-        for i in range(-STEPS_ASIDE, STEPS_ASIDE + 1)
-        for j in range(-STEPS_UP, STEPS_UP + 1)
-    ]
-)
-"""Moves of a note that are tried, shape (n, 2), in steps."""
-
-FARNESS: Final = np.hypot(*MOVES.T)
-"""Lengths of these moves, shape (n,), in steps."""
+NOTE_MOVES: Final = np.array([(float(i), float(j)) for i in range(-10, 11) for j in range(-8, 9)])
+"""Moves of a note to the sides and up and down that are tried, shape (n, 2), in steps."""
 
 
 @dataclass(frozen=True)
@@ -127,8 +107,11 @@ class View:
             triangles = triangles[np.argsort(-(triangles @ self.look).mean(axis=1))]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         size = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
-        lit = np.abs(normals @ LIGHT) / (size * math.sqrt(LIGHT @ LIGHT))
-        shades = np.repeat(GREYS[0] + (GREYS[1] - GREYS[0]) * lit[:, None], 3, axis=1)
+        light = np.array([-0.5, -0.3, 0.8])  # from which it comes, in W
+        lit = np.abs(normals @ light) / (size * math.sqrt(light @ light))
+        # greys along the light, and across it
+        dark, bright = 0.6, 0.92
+        shades = np.repeat(dark + (bright - dark) * lit[:, None], 3, axis=1)
         self.fill(triangles, facecolors=shades, edgecolors=shades, linewidth=0.8, zorder=1)
 
     def arrow(self, start: Array, step: Array, colour: Any) -> tuple[Array, Array]:
@@ -165,7 +148,8 @@ class View:
 
     def note(self, text: str, spot: Array, shift: tuple[float, float], **style: Any) -> None:
         """Write next to a seen place (2,), shifted by so many printer's points."""
-        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": PADDING}
+        pad = PICTURE_SETTINGS.note_padding
+        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": pad}
         style = {"fontsize": 8, "ha": "center", "va": "center", "zorder": 8, "bbox": box, **style}
         where = (float(spot[0]), float(spot[1]))
         place = {"xytext": shift, "textcoords": "offset points", "annotation_clip": False}
@@ -188,8 +172,8 @@ class View:
             if not note.get_text():
                 continue
             box = note.get_window_extent(renderer)
-            shifts = 0.5 * box.height / (note.get_text().count("\n") + 1) * MOVES
-            moved = box.padded(PADDING * point).extents + np.tile(shifts, 2)
+            shifts = 0.5 * box.height / (note.get_text().count("\n") + 1) * NOTE_MOVES
+            moved = box.padded(PICTURE_SETTINGS.note_padding * point).extents + np.tile(shifts, 2)
             apart = (moved[:, None, :2] >= placed[:, 2:]) | (moved[:, None, 2:] <= placed[:, :2])
             free = apart.any(axis=2).all(axis=1)
             inside = (moved[:, :2] >= frame.min).all(axis=1) & (moved[:, 2:] <= frame.max).all(
@@ -197,7 +181,7 @@ class View:
             )
             under = (dots[None] > moved[:, None, :2]) & (dots[None] < moved[:, None, 2:])
             # in steps: a covered dot, leaving the frame, and lying on another note
-            costs = FARNESS + 0.6 * under.all(axis=2).sum(axis=1)
+            costs = np.hypot(*NOTE_MOVES.T) + 0.6 * under.all(axis=2).sum(axis=1)
             best = int(np.argmin(costs + 1e3 * (2.0 * ~free + ~inside)))
             note.xyann = tuple(np.add(note.xyann, shifts[best] / point))
             placed = np.vstack([placed, moved[best]])
@@ -217,22 +201,22 @@ class View:
 def draw_scene(view: View, scene: Scene) -> None:
     """Draw rock, hands, limbs, forces and names."""
     view.rock(np.concatenate([s.triangles for s in scene.surfaces if s.kind == "rock"]))
-    for kind, style in OUTLINES.items():
+    for kind in ("palm", "link", "body"):
         drawn = [s.vertices for s in scene.surfaces if s.kind == kind]
         outlines = [silhouette(vertices, view.look) for vertices in drawn]
         # of one length, the last corner as often as it takes
         corners = np.arange(max(map(len, outlines), default=0))
         alike = [each[np.minimum(corners, len(each) - 1)] for each in outlines]
-        view.fill(np.array(alike), **style)
+        view.fill(np.array(alike), **SCENE_STYLES[kind])
     for line in scene.lines:
-        view.line(line.points, **LINES[line.kind])
+        view.line(line.points, **SCENE_STYLES[line.kind])
     for dots in scene.dots:
         if dots.utilisations is None:
-            view.dots(dots.points, **DOTS[dots.kind])
+            view.dots(dots.points, **SCENE_STYLES[dots.kind])
             continue
         for i in np.argsort(dots.utilisations, kind="stable"):
-            colour = COLOURS(UTILISATION(dots.utilisations[i]))
-            style = DOTS[dots.kind] | {"color": colour, "mec": "0.2", "ms": 6}
+            colour = UTILISATION_COLOURS(UTILISATION_NORM(dots.utilisations[i]))
+            style = SCENE_STYLES[dots.kind] | {"color": colour, "mec": "0.2", "ms": 6}
             view.dots(dots.points[i : i + 1], **style)
     _write_names(view, scene)
     _draw_arrows(view, scene)
@@ -282,10 +266,11 @@ def _draw_arrows(view: View, scene: Scene) -> None:
     tips, texts = [], []
     for arrow in scene.arrows:
         known = arrow.utilisation
-        colour = LOAD if known is None else COLOURS(UTILISATION(known))
+        used = None if known is None else UTILISATION_COLOURS(UTILISATION_NORM(known))
+        colour = used or PICTURE_SETTINGS.load
         begin, tip = view.arrow(arrow.start, scene.scale * arrow.force, colour)
         if arrow.kind == "load":
-            view.beyond(arrow.text, tip, tip - begin, color=LOAD)
+            view.beyond(arrow.text, tip, tip - begin, color=PICTURE_SETTINGS.load)
             continue
         steps[tuple(tip)] = tip - begin
         tips.append(tip)

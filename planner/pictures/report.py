@@ -19,23 +19,6 @@ from planner.route import OutOfReach, RouteResult, RouteStage
 
 __all__ = ["draw_route", "summary", "write_report"]
 
-STAGE: Final = 0.32
-"""Width of a route's picture that a stage needs [inch]."""
-
-IN_BAR: Final[dict[str, Any]] = {
-    "rotation": 90,
-    "ha": "center",
-    "va": "top",
-    "weight": "bold",
-    "fontsize": 9,
-}
-"""Style of what is written in a bar, from its upper end."""
-
-ON_WHITE: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
-
-BAND: Final = "0.15"
-"""Colour of a spread."""
-
 PHASE_COLOURS: Final = {
     "start": "0.4",
     "shift": "tab:purple",
@@ -179,7 +162,8 @@ def _spread(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
 def draw_route(result: RouteResult) -> Figure:
     """Draw utilisation and load factor along a climb, with its crux, and their spread."""
     index = np.arange(len(result.plans))
-    wide = float(np.clip(STAGE * len(index), *(11.0, 60.0)))
+    stage_width = 0.32  # that a stage needs [inch]
+    wide = float(np.clip(stage_width * len(index), *(11.0, 60.0)))
     figure = Figure(figsize=(wide, 6.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     used = np.array([np.nan if p.utilisation is None else p.utilisation for p in result.plans])
@@ -189,14 +173,23 @@ def draw_route(result: RouteResult) -> Figure:
     height = min(float(np.nanmax([*used, *bands[0][1], cap])), 2.0) * 1.1
     colours = [PHASE_COLOURS[stage.phase] for stage in result.stages]
     upper.bar(index, np.nan_to_num(np.minimum(used, height)), color=colours)
+    # of what is written in a bar, from its upper end
+    in_bar: dict[str, Any] = {
+        "rotation": 90,
+        "ha": "center",
+        "va": "top",
+        "weight": "bold",
+        "fontsize": 9,
+    }
+    on_white: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
     for i in np.flatnonzero(used > height):
-        upper.text(i, 0.97 * height, f"{used[i]:.3g}", color="white", **IN_BAR)
+        upper.text(i, 0.97 * height, f"{used[i]:.3g}", color="white", **in_bar)
         upper.plot(
             [i - 0.5, i + 0.5], np.multiply((0.7, 0.73), height), color="white", linewidth=3.0
         )
     for i in index[np.isnan(used)]:
         upper.bar(i, height, color="none", edgecolor="tab:red", hatch="//")
-        upper.text(i, 0.97 * height, result.plans[i].status, bbox=ON_WHITE, **IN_BAR)
+        upper.text(i, 0.97 * height, result.plans[i].status, bbox=on_white, **in_bar)
     upper.axhline(cap, color="tab:red", label=f"limit {cap:g}")
     for phase, colour in PHASE_COLOURS.items():
         if any(stage.phase == phase for stage in result.stages):
@@ -210,7 +203,7 @@ def draw_route(result: RouteResult) -> Figure:
         textcoords="offset points",
         ha="center",
         weight="bold",
-        bbox=ON_WHITE,
+        bbox=on_white,
         arrowprops={"arrowstyle": "-|>"},
     )
     upper.set(
@@ -237,7 +230,7 @@ def draw_route(result: RouteResult) -> Figure:
         "start" if s.move == 0 else f"{s.move} {s.phase}\n{str(s.limb).replace('_', ' ')}"
         for s in result.stages
     ]
-    shown = slice(None, None, math.ceil(STAGE * len(index) / wide))
+    shown = slice(None, None, math.ceil(stage_width * len(index) / wide))
     lower.set_xticks(index[shown], labels[shown], rotation=90, fontsize=8)
     lower.set_xlim(-1.0, len(index))
     for axes in (upper, lower):
@@ -261,5 +254,5 @@ def _draw_band(axes: Any, band: Array, label: str) -> None:
     """Draw a spread along a climb, if there is one; also of a stage between two that have none."""
     if np.isfinite(band).any():
         index = np.arange(band.shape[1])
-        axes.fill_between(index, *band, color=BAND, alpha=0.25, linewidth=0.0, label=label)
-        axes.vlines(index, *band, color=BAND, linewidth=1.5)
+        axes.fill_between(index, *band, color="0.15", alpha=0.25, linewidth=0.0, label=label)
+        axes.vlines(index, *band, color="0.15", linewidth=1.5)

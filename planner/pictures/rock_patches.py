@@ -6,7 +6,6 @@ Every hold has a surface (`hand_models.rock.Hold.surface`), cut off at a box abo
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 from trimesh.intersections import slice_faces_plane
@@ -14,25 +13,13 @@ from trimesh.intersections import slice_faces_plane
 from hand_models.base import Array, Indices, Pose
 from hand_models.hand import SettledHand
 from hand_models.rock import Triangles, weld
+from planner.pictures.settings import PICTURE_SETTINGS
 
-__all__ = ["AROUND", "rock_patch"]
-
-AROUND: Final = 0.45
-"""Half the side of the box about the hand in which rock is drawn [m]."""
-
-MOST: Final = 3000
-"""Triangles of a mesh near a hand above which it is drawn coarsely."""
-
-COARSE: Final = 0.02
-"""Size of what is drawn of such a mesh [m]."""
+__all__ = ["rock_patch"]
 
 
-HERE: Final = np.zeros((1, 3))
-"""Place in H of a hand that is alone."""
-
-
-def rock_patch(settled: SettledHand, beside: Array = HERE) -> Array:
-    """Return the rock within ±`AROUND` of a hand along each axis of H, shape (n, 3, 3) [m].
+def rock_patch(settled: SettledHand, beside: Array | None = None) -> Array:
+    """Return the rock in a box about a hand, shape (n, 3, 3) [m].
 
     Triangles in H; none where the hold is farther away.
 
@@ -40,14 +27,17 @@ def rock_patch(settled: SettledHand, beside: Array = HERE) -> Array:
     ----------
     settled : SettledHand
     beside : ndarray, shape (n, 3), optional
-        Places in H of all hands on this rock, which is drawn so far beyond each.
+        Places in H of all hands on this rock, which is drawn so far beyond each; by default the
+        hand is alone.
     """
+    beside = np.zeros((1, 3)) if beside is None else beside
+    around = PICTURE_SETTINGS.rock_around
     in_hand = settled.seating.pose
     there = in_hand.inverse().apply(beside)
     # as far about each hand as the corners of a box are, however that is turned
-    reach = 2.0 * AROUND
+    reach = 2.0 * around
     vertices, faces = settled.hold.surface(there.min(axis=0) - reach, there.max(axis=0) + reach)
-    low, high = beside.min(axis=0) - AROUND, beside.max(axis=0) + AROUND
+    low, high = beside.min(axis=0) - around, beside.max(axis=0) + around
     near = _near(in_hand, vertices, faces, low, high)
     if not len(near.faces):
         return np.zeros((0, 3, 3))
@@ -66,9 +56,10 @@ def _near(in_hand: Pose, vertices: Array, faces: Indices, low: Array, high: Arra
     corners = moved[faces]
     near = (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
     found = Triangles(moved, faces[near])
-    if len(found.faces) > MOST:
+    if len(found.faces) > PICTURE_SETTINGS.rock_triangles:
         # the farther it goes, the coarser, but not as much
-        found = _coarse(found, COARSE * math.sqrt((high - low).max() / (2.0 * AROUND)))
+        farther = (high - low).max() / (2.0 * PICTURE_SETTINGS.rock_around)
+        found = _coarse(found, PICTURE_SETTINGS.rock_coarseness * math.sqrt(farther))
     return found
 
 

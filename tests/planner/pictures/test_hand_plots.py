@@ -14,6 +14,7 @@ from hand_models.compliance import CompliantHand, FloatingWrist
 from hand_models.fixed_wrist import wrench_space
 from hand_models.rock import Mesh, Profile
 from planner.pictures import hand_plots
+from planner.pictures.settings import PICTURE_SETTINGS
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import cylinder_mesh
 
@@ -91,7 +92,9 @@ def test_contacts_and_forces_are_drawn_where_they_are():
     tips = [np.array(note.xy) - np.array(note.xyann) for note in arrows[: len(rows)]]
     for tip, row in zip(tips, rows, strict=True):
         force = loads[row, 0] * settled.axes[row, 0] + loads[row, 1] * settled.axes[row, 1]
-        np.testing.assert_allclose(tip, hand_plots.ARROW * force[[0, 2]] / largest, atol=1e-9)
+        np.testing.assert_allclose(
+            tip, PICTURE_SETTINGS.longest_force * force[[0, 2]] / largest, atol=1e-9
+        )
 
 
 def test_a_floating_hand_is_drawn_with_the_loads_of_its_preload_at_rest(monkeypatch):

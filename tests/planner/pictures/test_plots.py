@@ -23,9 +23,10 @@ import planner
 from hand_models import Grasp, Plane, Sphere
 from hand_models.base import Pose
 from planner.explanation import constraint_words
-from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
+from planner.pictures import draw_plan, hand_plots, plot_plan
 from planner.pictures.plan_scene import scene_of, view_directions
-from planner.pictures.plan_views import BODY, COLOURS, LIMB, silhouette
+from planner.pictures.plan_views import SCENE_STYLES, UTILISATION_COLOURS, silhouette
+from planner.pictures.settings import PICTURE_SETTINGS
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.robots import RobotFile, robot_of
 from planner.solving import solve
@@ -122,7 +123,8 @@ def arrows(axes):
 
 
 def limb_lines(axes):
-    return [line for line in axes.lines if line.get_color() == LIMB and line.get_linewidth() == 4.0]
+    colour = SCENE_STYLES["limb"]["color"]
+    return [each for each in axes.lines if (each.get_color(), each.get_linewidth()) == (colour, 4)]
 
 
 def words(axes):
@@ -292,7 +294,7 @@ def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name
     ):
         np.testing.assert_allclose(arrow.start, hand.pose.position)
         np.testing.assert_allclose(arrow.force, -hand.pose.rotation @ planned.wrench[:3])
-        assert colour == COLOURS(planned.utilisation)
+        assert colour == UTILISATION_COLOURS(planned.utilisation)
         assert (colour == to_rgba("#7b1fa2")) == (name == "overloaded")
     # seen along −z of B: against its y, and along its x; the longest arrow is of half a metre
     turn = question.stance.body.rotation
@@ -328,7 +330,7 @@ def test_joints_have_the_colour_and_the_number_of_their_torque():
     facing, table = figure.axes[1], figure.axes[4]
     dots = [line.get_color() for line in facing.lines if line.get_markeredgecolor() == "0.2"]
     dots = [colour for colour in dots if colour != "0.2"]
-    want = [COLOURS(value) for limb in used for value in np.sort(used[limb])]
+    want = [UTILISATION_COLOURS(value) for limb in used for value in np.sort(used[limb])]
     assert dots == want
     assert words(table) == [f"{value:.2f}" for limb in used for value in used[limb]]
     assert table.get_title(loc="right").startswith("utilisation of each joint")
@@ -417,9 +419,9 @@ def test_many_hands_make_the_picture_taller():
     question, plan = answered("plain")
     limbs = [f"leg{i}" for i in range(16)]
     wide = replace(plan, hands=tuple(replace(plan.hands[0], limb=limb) for limb in limbs))
-    assert drawn("plain").get_size_inches()[1] == plan_plots.SIZE[1]
+    assert drawn("plain").get_size_inches()[1] == 8.0
     height = draw_plan(wide, question).get_size_inches()[1]
-    assert height * (plan_plots.TOP - plan_plots.BOTTOM) / 64 > 0.1
+    assert height * (0.875 - 0.075) / 64 > 0.1
 
 
 # The body ---------------------------------------------------------------------------------------
@@ -430,7 +432,8 @@ def outlines(axes):
     (found,) = (
         each
         for each in axes.collections
-        if np.allclose(each.get_facecolor()[0], BODY) and len(each.get_edgecolor())
+        if np.allclose(each.get_facecolor()[0], SCENE_STYLES["body"]["facecolor"])
+        and len(each.get_edgecolor())
     )
     return np.array([path.vertices[:-1] for path in found.get_paths()])
 
@@ -572,7 +575,7 @@ def test_what_is_drawn_of_a_finger_and_the_palm_is_in_the_legend():
     hand_plots.draw_fingers(panels, settled, np.full(4, settled.closing_tension))
     named = {line.get_color(): line.get_label() for line in panels[0].get_legend().get_lines()}
     bars = {line.get_color() for line in panels[0].lines if line.get_linewidth() in (3, 4)}
-    assert named[hand_plots.PALM] == "palm"
+    assert named[PICTURE_SETTINGS.palm] == "palm"
     assert bars <= set(named)
 
 

@@ -14,7 +14,8 @@ from hand_models.base import Pose
 from hand_models.rock import Mesh, Profile
 from hand_models.rock.profile import STRIPS
 from planner.pictures.plan_scene import scene_of
-from planner.pictures.rock_patches import AROUND, COARSE, MOST, rock_patch
+from planner.pictures.rock_patches import rock_patch
+from planner.pictures.settings import PICTURE_SETTINGS
 from planner.question import Question
 from planner.solving import solve
 from tests.suite.helpers.hands import HAND, ROCK
@@ -42,8 +43,8 @@ HOLDS = {
 def test_rock_is_drawn_where_it_is(name):
     settled = HAND.settle(HOLDS[name], ROCK, Grasp(math.pi if name == "log" else 0.5))
     patch = rock_patch(settled)
-    assert 0 < len(patch) < 2 * MOST
-    assert np.abs(patch).max() <= AROUND + 1e-9
+    assert 0 < len(patch) < 2 * PICTURE_SETTINGS.rock_triangles
+    assert np.abs(patch).max() <= PICTURE_SETTINGS.rock_around + 1e-9
     # in the hold's frame, every triangle has rock on one side, and begins there
     corners = settled.seating.pose.inverse().apply(patch.reshape(-1, 3)).reshape(-1, 3, 3)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -61,23 +62,23 @@ def test_rock_is_drawn_where_it_is(name):
 
 def test_a_fine_mesh_is_drawn_coarsely():
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.15)
-    assert len(ball.faces) > MOST
+    assert len(ball.faces) > PICTURE_SETTINGS.rock_triangles
     hold = Mesh(ball.vertices + np.array([0.0, 0.0, 0.15]), ball.faces)
     settled = HAND.settle(hold, ROCK, Grasp())
     patch = rock_patch(settled)
-    assert 100 < len(patch) < 2 * MOST
+    assert 100 < len(patch) < 2 * PICTURE_SETTINGS.rock_triangles
     centre = settled.seating.pose.apply((0.0, 0.0, 0.15))
     away = np.linalg.norm(patch.reshape(-1, 3) - centre, axis=1)
     # corners of a grid about points of the ball, and chords between them
-    assert away.max() <= 0.15 + COARSE * math.sqrt(0.75)
-    assert away.min() >= 0.15 - 2.0 * COARSE
+    assert away.max() <= 0.15 + PICTURE_SETTINGS.rock_coarseness * math.sqrt(0.75)
+    assert away.min() >= 0.15 - 2.0 * PICTURE_SETTINGS.rock_coarseness
 
 
 def test_so_much_rock_is_drawn_that_one_sees_what_it_is():
     # a log all around and longer than it is thick, a whole boulder, a wall beyond the hand
     log = HAND.settle(Cylinder(0.3), ROCK, Grasp(math.pi))
     width = np.ptp(rock_patch(log).reshape(-1, 3), axis=0)
-    np.testing.assert_allclose(width, [0.3, 2.0 * AROUND, 0.3], rtol=0.01)
+    np.testing.assert_allclose(width, [0.3, 2.0 * PICTURE_SETTINGS.rock_around, 0.3], rtol=0.01)
     assert width[1] > 2.0 * width[0]
     boulder = HAND.settle(Ellipsoid((0.3, 0.2, 0.12)), ROCK, Grasp(0.5))
     width = np.ptp(rock_patch(boulder).reshape(-1, 3), axis=0)
@@ -89,7 +90,7 @@ def test_so_much_rock_is_drawn_that_one_sees_what_it_is():
 def test_a_flat_wall_is_drawn_to_the_edge_of_the_box():
     patch = rock_patch(HAND.settle(Plane(), ROCK, Grasp()))
     area = np.linalg.norm(np.cross(patch[:, 1] - patch[:, 0], patch[:, 2] - patch[:, 0]), axis=1)
-    assert area.sum() / 2.0 == pytest.approx((2.0 * AROUND) ** 2, rel=1e-9)
+    assert area.sum() / 2.0 == pytest.approx((2.0 * PICTURE_SETTINGS.rock_around) ** 2, rel=1e-9)
 
 
 def test_a_scan_that_hands_share_is_drawn_once_and_whole():
