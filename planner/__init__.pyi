@@ -1,8 +1,8 @@
 from . import deadline as deadline
 from .advice import HAND_PATH as HAND_PATH, hand_path as hand_path
 from .capability import (
-    COMPONENTS as COMPONENTS,
-    OTHERS as OTHERS,
+    OTHER_COMPONENTS as OTHER_COMPONENTS,
+    WRENCH_COMPONENTS as WRENCH_COMPONENTS,
     BodySection as BodySection,
     BodySpace as BodySpace,
     End as End,

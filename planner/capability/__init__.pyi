@@ -1,6 +1,6 @@
 from .body_space import (
-    COMPONENTS as COMPONENTS,
-    OTHERS as OTHERS,
+    OTHER_COMPONENTS as OTHER_COMPONENTS,
+    WRENCH_COMPONENTS as WRENCH_COMPONENTS,
     BodySection as BodySection,
     BodySpace as BodySpace,
     End as End,

@@ -33,7 +33,7 @@ from planner.solving import plan
 
 __all__ = ["BodyPrograms", "End", "Motion", "size_of"]
 
-MISSING: Final = "it was known what the stance can hold"
+MISSING_RESULT: Final = "it was known what the stance can hold"
 """Result that is missing if a deadline comes first, in words."""
 
 
@@ -196,7 +196,7 @@ class BodyPrograms:
         """
         worst = 0.0
         for end in () if self.exact else ends:
-            deadline.check(MISSING)
+            deadline.check(MISSING_RESULT)
             there = self._hands.sets(replace(self._point, loads=end.loads)).spaces
             off = disagreements(self._hands, self._spaces, there, end.loads)
             worst = max([worst, *(each for each in off if np.isfinite(each))])
@@ -213,7 +213,7 @@ def _solved(
     SolverError
         If there is no answer that passes the checks; an `UnsupportedError` if it has no bound.
     """
-    deadline.check(MISSING)
+    deadline.check(MISSING_RESULT)
     unit = size_of(columns)
     B = np.vstack([columns / unit, np.zeros((len(data.wrench) - 6, columns.shape[1]))])
     K = None if K is None else [torque / unit for torque in K]
@@ -304,7 +304,7 @@ def _error(
 
 
 def _unsolved(outcome: Outcome) -> CruxError:
-    deadline.check(MISSING)
+    deadline.check(MISSING_RESULT)
     if outcome.status in programs.UNBOUNDED:
         return UnsupportedError(
             "what the hands hold has no bound some way: sets of floating wrists, taken about this "

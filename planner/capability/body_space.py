@@ -23,17 +23,25 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.wrench_spaces import SCALE
 from planner.capability.body_programs import BodyPrograms, End, size_of
-from planner.capability.polygon import MOST, Polygon, SupportPoint, enclose
+from planner.capability.polygon import POLYGON_SETTINGS, Polygon, SupportPoint, enclose
 from planner.programs import WRENCH_UNIT, Reached
 
-__all__ = ["COMPONENTS", "OTHERS", "BodySection", "BodySpace", "End", "Others", "checked_axes"]
+__all__ = [
+    "OTHER_COMPONENTS",
+    "WRENCH_COMPONENTS",
+    "BodySection",
+    "BodySpace",
+    "End",
+    "Others",
+    "checked_axes",
+]
 
-COMPONENTS: Final = ("fx", "fy", "fz", "mx", "my", "mz")
+WRENCH_COMPONENTS: Final = ("fx", "fy", "fz", "mx", "my", "mz")
 """Names of the components of a body wrench."""
 
 Others = Literal["needed", "zero", "free"]
 
-OTHERS: Final[dict[str, str]] = {
+OTHER_COMPONENTS: Final[dict[str, str]] = {
     "needed": "the others as asked for",
     "zero": "the others zero",
     "free": "whatever the others",
@@ -47,7 +55,7 @@ class BodySection(NamedTuple):
     Attributes
     ----------
     axes : tuple of (str, str)
-        Of `COMPONENTS`.
+        Of `WRENCH_COMPONENTS`.
     others : {'needed', 'zero', 'free'}
     polygon : Polygon or None
         [N, N·m]; its gap in scaled wrenches [N]. None where the plane misses the set.
@@ -107,7 +115,7 @@ class BodySpace(BodyPrograms):
         Parameters
         ----------
         axes : sequence of str, length 2
-            Two of `COMPONENTS`.
+            Two of `WRENCH_COMPONENTS`.
         others : {'needed', 'zero', 'free'}
             The other components: those of the wrench asked for, zero, or whatever they may be,
             which makes it a projection.
@@ -120,11 +128,11 @@ class BodySpace(BodyPrograms):
             If a program is not solved.
         """
         one, two = checked_axes(axes)
-        if others not in OTHERS:
+        if others not in OTHER_COMPONENTS:
             raise InvalidInputError(
-                f"unknown {others!r}; known are {', '.join(OTHERS)}", field="others"
+                f"unknown {others!r}; known are {', '.join(OTHER_COMPONENTS)}", field="others"
             )
-        plane = [COMPONENTS.index(one), COMPONENTS.index(two)]
+        plane = [WRENCH_COMPONENTS.index(one), WRENCH_COMPONENTS.index(two)]
         start = self.needed if others == "needed" else np.zeros(6)
         at = np.where(np.isin(np.arange(6), plane), 0.0, start)
         columns = np.eye(6) if others == "free" else np.eye(6)[:, plane]
@@ -189,7 +197,7 @@ class BodySpace(BodyPrograms):
         return None if found is None else self._end(found, float(found.t[0]))
 
     def acceleration_section(
-        self, one: ArrayLike, two: ArrayLike, most: int = MOST
+        self, one: ArrayLike, two: ArrayLike, most: int = POLYGON_SETTINGS.most_directions
     ) -> Polygon | None:
         """Return the accelerations that are held in the plane of two unit vectors of W [m/s²].
 
@@ -249,9 +257,10 @@ def checked_axes(axes: Sequence[str]) -> tuple[str, str]:
     if len(axes) != 2:
         raise InvalidInputError(f"two axes are needed, got {len(axes)}", field="axes")
     for i, axis in enumerate(axes):
-        if axis not in COMPONENTS:
+        if axis not in WRENCH_COMPONENTS:
             raise InvalidInputError(
-                f"unknown axis {axis!r}; known are {', '.join(COMPONENTS)}", field=f"axes[{i}]"
+                f"unknown axis {axis!r}; known are {', '.join(WRENCH_COMPONENTS)}",
+                field=f"axes[{i}]",
             )
     if axes[0] == axes[1]:
         raise InvalidInputError(

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -39,18 +39,6 @@ from planner.robots import robosimian
 from planner.solving import plan
 
 __all__ = ["MeasurementStudy", "measured", "widths"]
-
-ACCURACIES: Final = "measurements"
-"""Section of ``experiments.toml``."""
-
-ENDS: Final = (0.05, 0.95)
-"""Quantiles of the load factors that bound their interval."""
-
-ANGLES: Final = (0, 45, 90)
-"""Angles at which the gripper is pulled, from shear to pull-off [°]."""
-
-STEPS: Final = 11
-"""Number of steps on the way to a pull."""
 
 
 def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
@@ -94,7 +82,8 @@ def _on_gripper(draw: Draw, hand: ParameterTable, tile: Surface) -> dict[str, Ar
         for section, entries in draw.hand.sections.items()
     }
     table, experiment = gripper_table(own_hand(ParameterTable(kept), hand)), experiment_table()
-    found = {f"pull_{angle}": np.zeros(1) for angle in ANGLES}
+    angles = (0, 45, 90)  # of pulls, from shear to pull-off [°]
+    found = {f"pull_{angle}": np.zeros(1) for angle in angles}
     normals = np.zeros(3)
     try:
         gripper = Gripper(
@@ -103,11 +92,11 @@ def _on_gripper(draw: Draw, hand: ParameterTable, tile: Surface) -> dict[str, Ar
             tile,
             table,
         )
-        turns = np.radians(ANGLES)
+        turns = np.radians(angles)
         ways = np.column_stack([np.cos(turns), -np.sin(turns), np.zeros(len(turns))])
-        for angle, wrench in zip(ANGLES, pull(gripper, ways).wrenches, strict=True):
+        for angle, wrench in zip(angles, pull(gripper, ways).wrenches, strict=True):
             found[f"pull_{angle}"] = np.array([np.hypot(wrench[0], wrench[1])])
-        pulls = np.linspace(0.0, experiment.scalar("measured_gripper", "pull"), STEPS)
+        pulls = np.linspace(0.0, experiment.scalar("measured_gripper", "pull"), 11)
         poses = pulled_off_poses(gripper, pulls)
         normals = np.asarray(gripper.finger_loads(poses[-1:])[0].normals[0], dtype=float)
     except (EmptySetError, InvalidInputError):
@@ -147,7 +136,7 @@ def _weighted_width(weights: Array, factors: Array) -> float:
     order = factors.argsort(kind="stable")
     shares = weights[:, order].cumsum(axis=1)
     shares /= shares[:, -1:]
-    low, high = (factors[order][(shares < end - 1e-12).sum(axis=1)] for end in ENDS)
+    low, high = (factors[order][(shares < end - 1e-12).sum(axis=1)] for end in (0.05, 0.95))
     return float(np.mean(high - low))
 
 
@@ -219,9 +208,9 @@ class MeasurementStudy:
 
 def _accuracies() -> list[tuple[str, float, str]]:
     """Return what could be measured: name, accuracy and unit."""
-    section = experiment_table().sections[ACCURACIES]
+    section = experiment_table().sections["measurements"]
     return [
-        (name, experiment_table().positive(ACCURACIES, name), quantity.unit)
+        (name, experiment_table().positive("measurements", name), quantity.unit)
         for name, quantity in section.items()
     ]
 

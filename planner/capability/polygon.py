@@ -20,22 +20,19 @@ import numpy as np
 from hand_models.base import Array, SolverError
 from planner.result import LimitName
 
-__all__ = ["MOST", "Polygon", "SupportPoint", "enclose"]
+__all__ = ["POLYGON_SETTINGS", "Polygon", "SupportPoint", "enclose"]
 
-FIRST: Final = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-"""Directions that are asked for first."""
 
-TOLERANCE: Final = 3e-4
-"""Gap at which polygons count as one, where the set's sides along both axes are the units."""
+@dataclass(frozen=True, slots=True)
+class PolygonSettings:
+    """How many directions are asked for, and how near."""
 
-MOST: Final = 160
-"""Directions that are asked for at most."""
+    most_directions: int = 160
+    least_turn: float = 1e-7
+    """Between two directions [rad]; nearer, where their half-planes meet is all rounding."""
 
-ROUNDING: Final = 1e-6
-"""Distance that rounding may move points, relative to the longer side, or to 1 if that is more."""
 
-TURN: Final = 1e-7
-"""Least turn between two directions [rad]; nearer, where their half-planes meet is all rounding."""
+POLYGON_SETTINGS: Final = PolygonSettings()
 
 
 class SupportPoint(NamedTuple):
@@ -86,7 +83,9 @@ class Polygon:
         return Polygon(self.inner * units, self.outer * units, self.gap, self.limiting)
 
 
-def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) -> Polygon | None:
+def enclose(
+    touching: Callable[[Array], SupportPoint | None], most: int = POLYGON_SETTINGS.most_directions
+) -> Polygon | None:
     """Return the polygons of a set; None if it is empty.
 
     Parameters
@@ -101,19 +100,23 @@ def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) 
     SolverError
         If the set is empty in one direction and not in another.
     """
-    first = touching(FIRST[0])
+    ways = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    first = touching(ways[0])
     if first is None:
         return None
-    sides = [first, *(_asked(touching, normal) for normal in FIRST[1:])]
+    sides = [first, *(_asked(touching, normal) for normal in ways[1:])]
     lengths = np.array([sides[i].reach + sides[i + 2].reach for i in (0, 1)])
-    slack = ROUNDING * max(1.0, float(lengths.max()))
-    units = np.maximum(lengths, slack / TOLERANCE)
+    # by which rounding may move points
+    slack = 1e-6 * max(1.0, float(lengths.max()))
+    # gap at which polygons count as one, where the set's sides along both axes are the units
+    tolerance = 3e-4
+    units = np.maximum(lengths, slack / tolerance)
     gaps = [_open_gap(a, b, units) for a, b in pairwise([*sides, sides[0]])]
     while len(sides) < most:
         i = int(np.argmax(gaps))
         before, after = sides[i], sides[(i + 1) % len(sides)]
         normal = _between(before, after)
-        if normal is None or gaps[i] <= TOLERANCE:
+        if normal is None or gaps[i] <= tolerance:
             break
         side = _asked(touching, normal)
         sides.insert(i + 1, side)
@@ -140,7 +143,7 @@ def _asked(touching: Callable[[Array], SupportPoint | None], normal: Array) -> S
 def _corner(a: SupportPoint, b: SupportPoint) -> Array:
     """Return where the borders of two half-planes meet, shape (2,)."""
     turn = _cross(a.normal, b.normal)
-    if turn < TURN:
+    if turn < POLYGON_SETTINGS.least_turn:
         return a.point
     # along a's border from its point, to b's
     along = np.array([-a.normal[1], a.normal[0]])
@@ -155,7 +158,8 @@ def _between(a: SupportPoint, b: SupportPoint) -> Array | None:
         length = float(np.linalg.norm(way))
         if length > 0.0:
             normal = way / length
-            if min(_cross(a.normal, normal), _cross(normal, b.normal)) > TURN:
+            turn = min(_cross(a.normal, normal), _cross(normal, b.normal))
+            if turn > POLYGON_SETTINGS.least_turn:
                 return normal
     return None
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
@@ -19,9 +18,6 @@ from hand_models.compliance import (
 )
 
 __all__ = ["Survey", "survey"]
-
-PROMISING: Final = 0.5
-"""Share of the farthest wrench of a search from which another way of carrying is tried, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +79,8 @@ def _end(wrist: FloatingWrist, found: WristSearch, direction: Array) -> Farthest
     best: Farthest | None = None
     for (drags, presses), mode in PALM_MODES.items():
         those = np.flatnonzero((carries == (drags, presses)).all(axis=1))
-        if not len(those) or reach[those].max() < PROMISING * reach.max():
+        # a way of carrying whose farthest wrench is less than half as far is not tried
+        if not len(those) or reach[those].max() < 0.5 * reach.max():
             continue
         start = found.poses[those[int(reach[those].argmax())]]
         try:

@@ -54,7 +54,7 @@ Unfinished = Literal[
     "advice",
 ]
 
-UNFINISHED: Final[dict[Unfinished, str]] = {
+UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
     "least_utilisation": "it was proven that no plan uses less",
     "tie_break": "the one of least effort was found of the plans that use as little",
     "wrists": "the search for the poses of the floating wrists ended",
@@ -166,7 +166,7 @@ def late(name: Unfinished) -> tuple[Unfinished, ...]:
 
 def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:
     """Say what came too late for a deadline [s], and what the answer is therefore."""
-    missing = ", before ".join(UNFINISHED[name] for name in names)
+    missing = ", before ".join(UNFINISHED_RESULTS[name] for name in names)
     sentence = f"the deadline of {seconds:g} s came before {missing}"
     if "least_effort" in names:
         sentence += "; the plan is one of less utilisation and more effort"

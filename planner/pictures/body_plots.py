@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hand_models.base import Array, whole_file
-from planner.capability import COMPONENTS, OTHERS, BodySection, BodySpace, Polygon
+from planner.capability import OTHER_COMPONENTS, WRENCH_COMPONENTS, BodySection, BodySpace, Polygon
 from planner.pictures.settings import PICTURE_SETTINGS
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def symbol_of(axis: str) -> tuple[str, str]:
 
 
 def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
-    indices = [COMPONENTS.index(axis) for axis in section.axes]
+    indices = [WRENCH_COMPONENTS.index(axis) for axis in section.axes]
     (across, across_unit), (up, up_unit) = map(symbol_of, section.axes)
     held, gravity, asked = PICTURE_SETTINGS.held, PICTURE_SETTINGS.gravity, PICTURE_SETTINGS.asked
     if section.polygon is None:
@@ -105,7 +105,7 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     axes.axvline(0.0, color="0.5", linewidth=0.8)
     axes.set(
-        title=f"body wrenches, {OTHERS[section.others]}",
+        title=f"body wrenches, {OTHER_COMPONENTS[section.others]}",
         xlabel=f"{across} of the rock on the robot, in B [{across_unit}]",
         ylabel=f"{up} of the rock on the robot, in B [{up_unit}]",
     )

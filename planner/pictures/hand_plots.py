@@ -23,7 +23,7 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
 from hand_models.wrench_spaces import SCALE, WrenchSpace
-from planner.capability import COMPONENTS, SupportPoint, enclose
+from planner.capability import WRENCH_COMPONENTS, SupportPoint, enclose
 from planner.pictures.body_plots import symbol_of
 from planner.pictures.settings import PICTURE_SETTINGS
 
@@ -356,7 +356,7 @@ def _draw_projection(axes: Axes, points: Array, i: int, j: int) -> None:
     axes.plot(*np.vstack([outline, outline[:1]]).T, color="tab:blue")
     axes.axhline(0.0, color="0.5", linewidth=0.8)
     axes.axvline(0.0, color="0.5", linewidth=0.8)
-    (a, unit_a), (b, unit_b) = symbol_of(COMPONENTS[i]), symbol_of(COMPONENTS[j])
+    (a, unit_a), (b, unit_b) = symbol_of(WRENCH_COMPONENTS[i]), symbol_of(WRENCH_COMPONENTS[j])
     axes.set(
         title=f"all wrenches on the rock, in {a} and {b}",
         xlabel=f"{a} in H [{unit_a}]",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from typing import Literal
 
 from msgspec import structs
 
@@ -36,19 +36,6 @@ Phase = Literal["start", "shift", "lift", "place"]
 
 JointAngles = Array | Literal["solve"]
 """Joint angles of a limb [rad]; ``solve`` if they are to be found."""
-
-LEAST_KNOWN: Final[tuple[LoadFactorStatus, ...]] = (
-    "none",
-    "not_finished",
-    "not_asked",
-    "at_least",
-    "found",
-    "unbounded",
-)
-"""Statuses of load factors. That of the least of several stages is the first that any stage has."""
-
-WORSE: Final = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
-"""Statuses of stages, each worse than the one before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +161,9 @@ class RouteResult:
     @property
     def status(self) -> str:
         """Status of the stage that is worst off; ``optimal`` where every stage is."""
-        return max((p.status for p in self.plans), key=WORSE.index)
+        # each worse than the one before
+        order = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
+        return max((p.status for p in self.plans), key=order.index)
 
     @property
     def feasible(self) -> bool:
@@ -201,7 +190,10 @@ class RouteResult:
     def load_factor_status(self) -> LoadFactorStatus:
         """Status of the least load factor of all stages: found, or why not."""
         found = {p.load_factor_status for p in self.plans}
-        return next(status for status in LEAST_KNOWN if status in found)
+        # that of the least is the first of these that any stage has
+        order: tuple[LoadFactorStatus, ...]
+        order = ("none", "not_finished", "not_asked", "at_least", "found", "unbounded")
+        return next(status for status in order if status in found)
 
     @property
     def crux(self) -> int:

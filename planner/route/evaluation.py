@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Final
 
 from hand_models.base import CruxError, InvalidInputError, within
 from planner.prepare import settle_hand
@@ -16,9 +15,6 @@ from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_r
 from planner.solving import plan
 
 __all__ = ["evaluate"]
-
-WORTH_A_PROCESS: Final = 100
-"""Stages below this many are planned faster here than in processes that must first start."""
 
 
 def evaluate(
@@ -44,7 +40,8 @@ def evaluate(
     """
     todo = tuple(stages(route))
     if workers is None:
-        workers = cores() if len(todo) >= WORTH_A_PROCESS else 1
+        # fewer stages are planned faster here than in processes that must first start
+        workers = cores() if len(todo) >= 100 else 1
     plans: dict[int, Plan | OutOfReach] = {}
     for i, answer in _answers(todo, min(workers, len(todo))):
         if isinstance(answer, InvalidInputError):

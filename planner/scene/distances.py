@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,18 +14,6 @@ from planner.scene.scene import Scene
 from planner.scene.solids import Solid, capsule_solids, distance_between, hand_solids, rock_solids
 
 __all__ = ["body_clearance", "clearance", "link_findings"]
-
-TOUCHING: Final = 0.02
-"""Largest depth of links in rock or in each other that is not odd: capsules are rough [m]."""
-
-BODY: Final = "body"
-"""Name, in messages and distances, of what no joint moves."""
-
-NO_JOINTS: Final = "links: the joints are not known; give stance.joints, or 'solve'"
-"""Why no link is measured."""
-
-NO_BODY: Final = "body: the robot's file has no capsules of it"
-"""Why the body is not."""
 
 
 class _Pairs(NamedTuple):
@@ -63,10 +51,10 @@ def clearance(scene: Scene, angles: Mapping[str, Array] | None) -> Clearance:
         Of every limb [rad]; None where they are not known: then links are not measured.
     """
     hands, rocks, body = hand_solids(scene), rock_solids(scene), _body(scene)
-    unchecked = [] if body else [NO_BODY]
+    unchecked = [] if body else ["body: the robot's file has no capsules of it"]
     of_links: dict[str, Distance | None] = {}
     if angles is None:
-        unchecked.append(NO_JOINTS)
+        unchecked.append("links: the joints are not known; give stance.joints, or 'solve'")
     else:
         links = _links(scene, angles)
         of_links["link_rock"] = _least(scene, _with_rock(scene, links[len(body) :], rocks))
@@ -161,14 +149,14 @@ def _link_finding(
 
 def _body(scene: Scene) -> tuple[Solid, ...]:
     ends, radii = scene.stance.robot.body_capsules
-    return capsule_solids([BODY] * len(ends), ends, radii)
+    return capsule_solids(["body"] * len(ends), ends, radii)
 
 
 def _links(scene: Scene, angles: Mapping[str, Array]) -> tuple[Solid, ...]:
     """Return capsules of the body and all links, in the order of the robot's."""
     robot = scene.stance.robot
     named = zip(robot.capsules.names, robot.capsules.limbs, strict=True)
-    names = [BODY if limb is None else name for name, limb in named]
+    names = ["body" if limb is None else name for name, limb in named]
     radii = robot.capsules.radii
     solids = capsule_solids(names, robot.placed_capsules(angles), radii)
     assumed = (radii * robot.capsules.assumed).tolist()
@@ -242,9 +230,10 @@ def _along(robot: Robot) -> Array:
 
 def _inside(pairs: _Pairs) -> Iterator[_Near]:
     """Yield pairs that are in each other."""
-    for i, j in pairs.which[pairs.least < -TOUCHING].tolist():
+    rough = 0.02  # depth that is not odd, as capsules are rough [m]
+    for i, j in pairs.which[pairs.least < -rough].tolist():
         near = _measured(pairs, i, j)
-        if near.distance < -TOUCHING:
+        if near.distance < -rough:
             yield near
 
 

@@ -23,44 +23,7 @@ from planner.scene.solids import capsule_solids, distance_between, hand_solids
 
 __all__ = ["findings"]
 
-BACK: Final = 0.5
-"""Cosine between z of H and the body's back from which on a hand points out of that: 60°."""
-
-AGREED: Final = 0.3
-"""Length of the mean of z of all H from which on it shows where a body's belly is."""
-
-BEHIND: Final = 0.05
-"""Largest distance of the body's origin on the rock's side of a palm that points out of its back
-[m]."""
-
-BEYOND: Final = 0.1
-"""The same of palms that point out of its belly, of all hands: two logs on either side may be a
-little above it [m]."""
-
-BELLY: Final = -0.7
-"""Cosine between z of H and its back up to which a hand points out of the body's belly: 134°. Hands
-that hug a boulder point sideways."""
-
-IN_ROCK: Final = 0.05
-"""Largest depth of the body in rock: its capsules, and rock far from a hand, are rough [m]."""
-
-DEEP: Final = 0.2
-"""Depth in a ball, a boulder or a log at which the body's origin cannot be [m]."""
-
-DOWN: Final = -0.8
-"""Cosine between a hand's fingers and up from which on they point down: 143°."""
-
-CROSSED: Final = 0.25
-"""Gain in distance of two hands to their shoulders with their limbs exchanged, over the robot's
-reach, from which on they count as crossed."""
-
-SAME_PLACE: Final = 1e-3
-"""Distance of two hands that cannot be, if they are also turned alike [m]."""
-
-SAME_TURN: Final = 1e-3
-"""Largest difference of entries of the axes of such hands."""
-
-QUATERNION: Final = "is its quaternion [x, y, z, w]?"
+QUATERNION_SLIP: Final = "is its quaternion [x, y, z, w]?"
 """The likely slip of what is turned."""
 
 
@@ -75,8 +38,10 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
     """
     along = _back(scene) @ scene.axes[:, :, 2].T
     above = -np.einsum("nx,nx->n", scene.places, scene.axes[:, :, 2])
-    back = along > BACK
-    away = back & (above > BEHIND)
+    # a hand points out of the body's back within 60° of it; a palm that does has the body behind it
+    # if B's origin is that far on the rock's side [m]
+    back = along > 0.5
+    away = back & (above > 0.05)
     return (
         *_out_of_reach(scene),
         *_palms(scene, away, above),
@@ -96,7 +61,8 @@ def _back(scene: Scene) -> Array:
         return known
     total = scene.axes[:, :, 2].sum(axis=0)
     size = float(np.linalg.norm(total))
-    return -total / size if size > AGREED * len(scene.axes) else np.zeros(3)
+    # the mean of all z of H shows where the belly is if they agree so far
+    return -total / size if size > 0.3 * len(scene.axes) else np.zeros(3)
 
 
 def _of_hand(index: int, entry: str) -> str:
@@ -130,7 +96,7 @@ def _palms(scene: Scene, away: NDArray[np.bool_], above: Array) -> Iterator[Find
         message = (
             f"{scene.hands[i].limb}: the palm faces away from its rock, the body is "
             f"{above[i]:.2g} m on the side that z of H points to, which is into the rock: "
-            f"{QUATERNION}"
+            f"{QUATERNION_SLIP}"
         )
         yield Finding("palm_away", _of_hand(i, "pose.orientation"), message, float(above[i]), "m")
 
@@ -141,7 +107,7 @@ def _reversed(scene: Scene, back: NDArray[np.bool_], along: Array) -> Iterator[F
         value = float(along.mean())
         message = (
             "the body is the wrong way round, z of all hands, into their rock, points out of its "
-            f"back: {QUATERNION}"
+            f"back: {QUATERNION_SLIP}"
         )
         yield Finding("body_reversed", "stance.body.orientation", message, value, "1")
 
@@ -150,11 +116,14 @@ def _in_rock(
     scene: Scene, away: NDArray[np.bool_], above: Array, along: Array
 ) -> Iterator[Finding]:
     """Yield a body that is in rock, or behind all of it."""
+    rough = 0.05  # depth that is not odd, as capsules and rock far from a hand are rough [m]
     asked = np.flatnonzero(~away).tolist()
     deepest = dict(zip(asked, _depths(scene, asked), strict=True))
-    found = {scene.hands[i].limb: deep for i, deep in deepest.items() if deep > IN_ROCK}
+    found = {scene.hands[i].limb: deep for i, deep in deepest.items() if deep > rough}
     where = "in the rock"
-    if not found and above.min() > BEYOND and along.max() < BELLY:
+    # of logs on either side the body may be a little above [m]; palms point out of its belly from
+    # 134° to its back on: hands that hug a boulder point sideways
+    if not found and above.min() > 0.1 and along.max() < -0.7:
         where = "behind the rock"
         found = {hand.limb: up for hand, up in zip(scene.hands, above.tolist(), strict=True)}
     if found:
@@ -173,6 +142,7 @@ def _depths(scene: Scene, hands: Sequence[int]) -> list[float]:
     Rock that is not smooth is slow to query, and gives the depth along z, not the least: of such
     only how deep B's origin is.
     """
+    deepest = 0.2  # in a ball, a boulder or a log, at which B's origin cannot be [m]
     points, radii = _body_points(*scene.stance.robot.body_capsules)
     smooth = [i for i in hands if scene.swept[i] is not None]
     found = {}
@@ -181,10 +151,10 @@ def _depths(scene: Scene, hands: Sequence[int]) -> list[float]:
         for i, origin in zip(smooth, deep[:, 0].tolist(), strict=True):
             hand, shape = scene.hands[i], scene.swept[i]
             # an edge's rock has no end
-            if origin > DEEP and shape is not None and not shape.sine:
+            if origin > deepest and shape is not None and not shape.sine:
                 raise InvalidInputError(
                     f"the body's origin is {origin:.2g} m deep in the rock of {hand.limb}; "
-                    f"up to {DEEP:g} m is taken for a rough shape",
+                    f"up to {deepest:g} m is taken for a rough shape",
                     field="stance.body.position",
                 )
         found = dict(zip(smooth, (deep + radii).max(axis=1).tolist(), strict=True))
@@ -218,7 +188,8 @@ def _overlapping(scene: Scene) -> Iterator[Finding]:
             names = f"{scene.hands[one].limb} and {scene.hands[other].limb}"
             off = np.linalg.norm(scene.places[i] - scene.places[j])
             turned = np.abs(scene.axes[i] - scene.axes[j]).max()
-            if off <= SAME_PLACE and turned <= SAME_TURN:
+            # [m], and the largest difference of entries of the axes
+            if off <= 1e-3 and turned <= 1e-3:
                 raise InvalidInputError(f"{names} are in one and the same place", field=field)
             message = (
                 f"{names} overlap, their palms are {-gap:.2g} m in each other: is the same hold "
@@ -260,7 +231,8 @@ def _crossed(scene: Scene) -> Iterator[Finding]:
     away = np.linalg.norm(scene.shoulders[:, None] - scene.places[None], axis=2)
     own = np.diag(away)
     gain = own[:, None] + own[None] - away - away.T
-    least = CROSSED * scene.stance.robot.reach
+    # gain in distance to the shoulders from which on limbs count as crossed
+    least = 0.25 * scene.stance.robot.reach
     while gain.max() > least:
         i, j = _in_order(scene, *np.unravel_index(gain.argmax(), gain.shape))
         nearer = float(gain[i, j])
@@ -290,13 +262,14 @@ def _gravity(scene: Scene) -> Iterator[Finding]:
     fingers = scene.axes[:, :, 0] @ up
     # in a pinch the outer fingers pull the other way
     alike = np.array([math.cos(hand.grasp.outer_rotation) > 0.0 for hand in scene.hands])
-    down = alike & (fingers < DOWN)
-    if upward and (fingers < DOWN).all():
+    low = fingers < -0.8  # by more than 143° from up
+    down = alike & low
+    if upward and low.all():
         return
     for i in np.flatnonzero(down).tolist():
         message = (
             f"{scene.hands[i].limb}: its fingers point down, so that they can only pull the body "
-            f"down: x of H is along the inner fingers; {QUATERNION}"
+            f"down: x of H is along the inner fingers; {QUATERNION_SLIP}"
         )
         field = _of_hand(i, "pose.orientation")
         yield Finding("fingers_down", field, message, float(fingers[i]), "1")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -13,6 +14,23 @@ from hand_models.sections import Swept
 from planner.question import HandOnHold, Stance
 
 __all__ = ["Scene", "scene_of", "smooth_depths"]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneSettings:
+    """Bounds of what is usual in a scene, and how far rock goes."""
+
+    in_thousands: float = 1.0 / 300.0
+    """Part of what is usual up to which a number is taken for one in thousands, such as kN or t."""
+    in_thousandths: float = 100.0
+    """Multiple of it from which on it is taken for one in thousandths, such as g or N·mm."""
+    widest: float = 20.0
+    """Largest width of a hold, or lever of a moment, in multiples of the limbs' reach."""
+    rock_length: float = 4.0
+    """Length of rock that is drawn out, or along faces of an edge, from its crest [m]."""
+
+
+SCENE_SETTINGS: Final = SceneSettings()
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,20 +15,14 @@ import numpy as np
 from hand_models.base import Array, BoundedStore, Indices, Pose
 from hand_models.rock import Hold
 from hand_models.sections import Swept
-from planner.scene.scene import Scene
+from planner.scene.scene import SCENE_SETTINGS, Scene
 
 __all__ = ["Solid", "capsule_solids", "distance_between", "hand_solids", "rock_solids"]
 
-FAR: Final = 4.0
-"""Length of rock that is drawn out, or along faces of an edge, from its crest [m]."""
-
-KEPT: Final[BoundedStore[Hold, Any]] = BoundedStore("rock as shapes", 64)
+ROCK_SHAPES: Final[BoundedStore[Hold, Any]] = BoundedStore("rock as shapes", 64)
 """Shapes of holds that were asked for last."""
 
-TURN: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Axes of a log, which `coal` has along z, in a hold's frame, which has it along y."""
-
-REQUEST: Final = coal.DistanceRequest(True)
+DISTANCE_REQUEST: Final = coal.DistanceRequest(True)
 """Nearest points are wanted, too."""
 
 
@@ -93,7 +87,7 @@ def rock_solids(scene: Scene) -> tuple[Solid, ...]:
     """Return the rock of every hand."""
     found = []
     for hand, rock in zip(scene.hands, scene.rocks, strict=True):
-        shape, centre = KEPT.get(hand.hold, partial(_rock, hand.hold))
+        shape, centre = ROCK_SHAPES.get(hand.hold, partial(_rock, hand.hold))
         place = rock.inverse() @ centre
         found.append(
             Solid(
@@ -113,7 +107,7 @@ def _rock(hold: Hold) -> tuple[Any, Pose]:
     A smooth hold's is exact where `coal` has such a shape; of any other the triangles of its
     surface.
     """
-    swept = hold.swept
+    swept, far = hold.swept, SCENE_SETTINGS.rock_length
     if swept is not None:
         scales = np.array([swept.scale_x, swept.scale_y, swept.scale_z])
         centre = np.array([0.0, 0.0, swept.depth])
@@ -127,17 +121,19 @@ def _rock(hold: Hold) -> tuple[Any, Pose]:
             return coal.Sphere(size[0]) if alike else coal.Ellipsoid(*size), Pose(centre, np.eye(3))
         if swept.scale_x == swept.scale_z:
             radius = swept.radius / swept.scale_x
-            return coal.Cylinder(radius, 2.0 * FAR), Pose(centre, TURN)
-    return _surface(*hold.surface(np.full(3, -FAR), np.full(3, FAR))), Pose.identity()
+            # `coal` has a log along z, a hold's frame has it along y
+            turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+            return coal.Cylinder(radius, 2.0 * far), Pose(centre, turn)
+    return _surface(*hold.surface(np.full(3, -far), np.full(3, far))), Pose.identity()
 
 
 def _wedge(edge: Swept) -> Any:
     """Return an edge's rock: all within the fillet's radius of a sharp one."""
-    radius = edge.radius
-    aside, deep = FAR * edge.sine, radius + FAR * edge.cosine
+    radius, far = edge.radius, SCENE_SETTINGS.rock_length
+    aside, deep = far * edge.sine, radius + far * edge.cosine
     section = [(0.0, radius), (aside, deep), (-aside, deep)]
     points = coal.StdVec_Vec3s()
-    points.extend([np.array([x, y, z]) for x, z in section for y in (-FAR, FAR)])
+    points.extend([np.array([x, y, z]) for x, z in section for y in (-far, far)])
     shape = coal.ConvexBase.convexHull(points, True, "Qt")
     shape.setSweptSphereRadius(radius)
     return shape
@@ -159,5 +155,7 @@ def distance_between(first: Solid, second: Solid) -> tuple[float, Sequence[Array
     And the nearest points of both, in B [m].
     """
     result = coal.DistanceResult()
-    away = coal.distance(first.shape, first.place, second.shape, second.place, REQUEST, result)
+    away = coal.distance(
+        first.shape, first.place, second.shape, second.place, DISTANCE_REQUEST, result
+    )
     return float(away), (result.getNearestPoint1(), result.getNearestPoint2())

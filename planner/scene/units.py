@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Final
 
 import numpy as np
 
@@ -20,64 +19,9 @@ from hand_models.tile import Surface, surface_names
 from planner.question import Question, Stance
 from planner.result import Finding
 from planner.robots import Robot, scene_number
+from planner.scene.scene import SCENE_SETTINGS
 
 __all__ = ["unit_findings", "wrench_findings"]
-
-UNIT: Final = "unit"
-"""The kind of all these findings."""
-
-THOUSANDTH: Final = 1.0 / 300.0
-"""Part of what is usual up to which a number is taken for one in thousands, such as kN or t."""
-
-THOUSANDS: Final = 100.0
-"""Multiple of what is usual from which on a number is taken for one in thousandths, such as g or
-N·mm."""
-
-ABOUT: Final = 2.5
-"""Factor that a body wrench in kN may be off the robot's weight: it may carry and accelerate."""
-
-NEAR: Final = 1.25
-"""The same of one in kgf, which is only a tenth of it."""
-
-UPRIGHT: Final = 0.94
-"""Cosine between a body wrench's force and up from which on it holds the robot's weight: 20°."""
-
-ONE_G: Final = 0.02
-"""Largest distance of the size of gravity from 1 to be one in g [m/s²]."""
-
-WIDE: Final = 20.0
-"""Largest width of a hold, or lever of a moment, in multiples of the limbs' reach."""
-
-FAR_OUT: Final = 2.0
-"""Largest distance of a centre of mass from the body's origin, in multiples of the limbs' reach."""
-
-HEAVY: Final = 5.0
-"""Largest payload, in multiples of the robot's weight: 10 kg in g are far more."""
-
-LONG: Final = 100.0
-"""Largest length of a limb, in palms."""
-
-SHORT: Final = 0.2
-"""Least length of a limb, in palms."""
-
-LIGHT: Final = 0.2
-"""Least weight of the links of a robot, as part of that of one hand."""
-
-STRONG: Final = 4.0
-"""Largest strength of a tile, in multiples of the strongest preset's: a hand's pull-off is five
-times it."""
-
-WEAK: Final = 0.01
-"""Least strength of a tile, as part of the weakest preset's."""
-
-MIGHTY: Final = 50.0
-"""Largest torque of a joint, in multiples of the robot's weight times its limbs' reach."""
-
-FEEBLE: Final = 1e-3
-"""Least torque of the strongest joint of a limb, as part of the same."""
-
-NONE: Final = 0.01
-"""Least tension above zero, as part of what tendons hold."""
 
 
 def unit_findings(question: Question) -> tuple[Finding, ...]:
@@ -112,7 +56,7 @@ def wrench_findings(question: Question) -> tuple[Finding, ...]:
 
 def _finding(field: str, message: str, value: float, unit: str, whose: str = "") -> Finding:
     """Return a finding whose message begins with whose number it is: a limb's, else the field's."""
-    return Finding(UNIT, field, f"{whose or field}: {message}", value, unit)
+    return Finding("unit", field, f"{whose or field}: {message}", value, unit)
 
 
 # What the body weighs -----------------------------------------------------------------------------
@@ -123,26 +67,29 @@ def _wrench(stance: Stance, wrench: Array) -> Iterator[Finding]:
     gravity = float(np.linalg.norm(stance.gravity))
     force, moment = (float(np.linalg.norm(part)) for part in wrench.reshape(2, 3))
     weight, on_earth = robot.mass * gravity, robot.mass * scene_number("usual", "standard_gravity")
-    if force > THOUSANDS * on_earth:
+    if force > SCENE_SETTINGS.in_thousandths * on_earth:
         message = f"a force of {force:.3g} N is {force / on_earth:.3g} times the robot's weight"
         yield _finding(field, f"{message} on the Earth: is it in N?", force, "N")
     elif weight and force:
         up = float(-stance.gravity @ (stance.body.rotation @ wrench[:3])) / (gravity * force)
-        unit = _force_unit(force / weight) if up > UPRIGHT and force != 1.0 else None
+        # within 20° of up it holds the robot's weight
+        unit = _force_unit(force / weight) if up > 0.94 and force != 1.0 else None
         if unit is not None:
             message = f"it holds up {force:.3g} N, the robot weighs {weight:.4g} N"
             yield _finding(field, f"{message}: is it in N, or in {unit}?", force, "N")
     lever = max(force, on_earth)
-    if moment > WIDE * robot.reach * lever:
+    if moment > SCENE_SETTINGS.widest * robot.reach * lever:
         message = f"a moment of {moment:.3g} N·m is that of {lever:.4g} N at {moment / lever:.3g} m"
         yield _finding(field, f"{message}: is it in N·m?", moment, "N·m")
 
 
 def _force_unit(part: float) -> str | None:
     """Return the unit in which a force that is such a part of the weight would be the weight."""
+    # each with the factor that it may be off, as a body may carry and accelerate; a number in kgf is
+    # only a tenth of that in N, and has to be nearer
     for unit, newtons, off in (
-        ("kN", 1e3, ABOUT),
-        ("kgf", scene_number("usual", "standard_gravity"), NEAR),
+        ("kN", 1e3, 2.5),
+        ("kgf", scene_number("usual", "standard_gravity"), 1.25),
     ):
         if 1.0 / off <= part * newtons <= off:
             return unit
@@ -151,9 +98,10 @@ def _force_unit(part: float) -> str | None:
 
 def _load(question: Question) -> Iterator[Finding]:
     load, robot = question.load, question.stance.robot
+    farthest = 2.0 * robot.reach  # of a centre of mass [m]
     if load.mass is not None:
         part = load.mass / robot.mass
-        if not THOUSANDTH < part < THOUSANDS:
+        if not SCENE_SETTINGS.in_thousands < part < SCENE_SETTINGS.in_thousandths:
             message = (
                 f"{load.mass:.4g} kg are {part:.2g} times what the robot weighs, {robot.mass:.4g} "
                 "kg: is it in kg?"
@@ -161,7 +109,7 @@ def _load(question: Question) -> Iterator[Finding]:
             yield _finding("load.mass", message, load.mass, "kg")
     if load.com is not None:
         away = math.hypot(*load.com)
-        if away > FAR_OUT * robot.reach:
+        if away > farthest:
             message = (
                 f"it is {away:.3g} m from the body's origin, and limbs reach {robot.reach:.2g} m: "
                 "is it in m, in B?"
@@ -169,14 +117,14 @@ def _load(question: Question) -> Iterator[Finding]:
             yield _finding("load.com", message, away, "m")
     for i, payload in enumerate(load.payloads):
         field, part = f"load.payloads[{i}]", payload.mass / robot.mass
-        if part > HEAVY:
+        if part > 5.0:  # 10 kg in g are far more
             message = (
                 f"{payload.mass:.4g} kg are {part:.2g} times what the robot weighs, "
                 f"{robot.mass:.4g} kg: is it in kg?"
             )
             yield _finding(f"{field}.mass", message, payload.mass, "kg")
         away = math.hypot(*payload.com)
-        if away > FAR_OUT * robot.reach:
+        if away > farthest:
             message = (
                 f"it is {away:.3g} m from the origin of what carries it, and limbs reach "
                 f"{robot.reach:.2g} m: is it in m, in that frame?"
@@ -195,7 +143,7 @@ def _load(question: Question) -> Iterator[Finding]:
 
 def _gravity(stance: Stance) -> Iterator[Finding]:
     size, most = float(np.linalg.norm(stance.gravity)), scene_number("usual", "strongest_gravity")
-    if abs(size - 1.0) <= ONE_G:
+    if abs(size - 1.0) <= 0.02:  # [m/s²]: in g, all but 1
         message = f"it is {size:.3g} m/s², as on no body that is climbed: is it in m/s², or in g?"
         yield _finding("stance.gravity", message, size, "m/s²")
     elif size > most:
@@ -207,7 +155,8 @@ def _robot(robot: Robot) -> Iterator[Finding]:
     field, hand = "stance.robot", robot.hand
     stone = scene_number("usual", "rock_density") * 4.0 / 3.0 * math.pi * robot.reach**3
     links = robot.mass - len(robot.limbs) * hand.mass
-    if not SHORT * hand.palm_length <= robot.reach <= LONG * hand.palm_length:
+    # shorter or longer limbs, in palms, are no climber's
+    if not 0.2 * hand.palm_length <= robot.reach <= 100.0 * hand.palm_length:
         message = (
             f"the robot's limbs reach {robot.reach:.3g} m, and a palm is {hand.palm_length:.2g} m "
             "long: are the lengths of its URDF in m?"
@@ -219,7 +168,7 @@ def _robot(robot: Robot) -> Iterator[Finding]:
             f"reach, {robot.reach:.2g} m: are the masses of its URDF in kg?"
         )
         yield _finding(field, message, robot.mass, "kg")
-    elif links < LIGHT * hand.mass:
+    elif links < 0.2 * hand.mass:
         message = (
             f"the robot's links weigh {links:.3g} kg together, one hand {hand.mass:.3g} kg: are "
             "the masses of its URDF in kg?"
@@ -234,7 +183,8 @@ def _surfaces(stance: Stance) -> Iterator[Finding]:
     weakest, strongest = _presets()
     for i, hand in enumerate(stance.hands):
         strength = hand.surface.shear_limit
-        if WEAK * weakest < strength < STRONG * strongest:
+        # a hand's pull-off is five times the strongest preset's
+        if 0.01 * weakest < strength < 4.0 * strongest:
             continue
         slip = "of a tile, or of a whole hand" if strength > strongest else "in N"
         message = (
@@ -252,7 +202,7 @@ def _presets() -> tuple[float, float]:
 
 
 def _holds(stance: Stance) -> Iterator[Finding]:
-    most = WIDE * stance.robot.reach
+    most = SCENE_SETTINGS.widest * stance.robot.reach
     for i, hand in enumerate(stance.hands):
         name, size = _width(hand.hold)
         if size > most:
@@ -278,8 +228,9 @@ def _width(hold: Hold) -> tuple[str, float]:
 def _tensions(question: Question) -> Iterator[Finding]:
     stance = question.stance
     most, closing = stance.robot.hand.maximum_tension, stance.robot.hand.closing_tension
+    nothing = 0.01  # of what tendons hold or close with
     cap = question.limits.tendon_tension
-    if cap is not None and cap < NONE * most:
+    if cap is not None and cap < nothing * most:
         message = f"{cap:.3g} N is next to nothing of the {most:.4g} N that a tendon holds"
         yield _finding("limits.tendon_tension", f"{message}: is it in N?", cap, "N")
     given = [(f"present.{limb}", each) for limb, each in question.present.items()]
@@ -296,7 +247,7 @@ def _tensions(question: Question) -> Iterator[Finding]:
             yield _finding(field, message, tension, "N", hand.limb)
     for field, tensions in given:
         largest = float(np.max(tensions))
-        if largest > 2.0 * most or 0.0 < largest < NONE * closing:
+        if largest > 2.0 * most or 0.0 < largest < nothing * closing:
             message = (
                 f"the largest is {largest:.4g} N, tendons hold {most:.4g} N and close with "
                 f"{closing:.3g} N: are they in N?"
@@ -312,7 +263,7 @@ def _caps(question: Question) -> Iterator[Finding]:
             [given] if isinstance(given, float | int) else [end for pair in given for end in pair]
         )
         least = min(abs(end) for end in ends if end)
-        if least < THOUSANDTH * held:
+        if least < SCENE_SETTINGS.in_thousands * held:
             message = (
                 f"{least:.3g} N is next to nothing of the {held:.3g} N that a hand holds: "
                 "is it in N?"
@@ -324,7 +275,7 @@ def _hand_wrenches(stance: Stance) -> Iterator[Finding]:
     held = stance.robot.hand.structure.hand_load
     for i, hand in enumerate(stance.hands):
         force = max((abs(each) for each in (hand.wrench or ())[:3] if each), default=0.0)
-        if 0.0 < force < THOUSANDTH * held:
+        if 0.0 < force < SCENE_SETTINGS.in_thousands * held:
             message = (
                 f"the largest force that it is to exert is {force:.3g} N, and a hand holds "
                 f"{held:.3g} N: is it in N, or in kN?"
@@ -341,7 +292,8 @@ def _joints(question: Question) -> Iterator[Finding]:
     for limb, chain in robot.chains.items():
         given = own.get(limb) if isinstance(own, Mapping) else own
         most = _largest(chain.torque_limits if given is None else given, chain.sliding)
-        if most is None or FEEBLE * usual <= most <= MIGHTY * usual:
+        # a strongest joint outside these is no robot's of that weight
+        if most is None or 1e-3 * usual <= most <= 50.0 * usual:
             continue
         field = "stance.robot"
         if given is not None:

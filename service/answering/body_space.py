@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from planner import COMPONENTS, BodySection, BodySpace, End, Time
+from planner import WRENCH_COMPONENTS, BodySection, BodySpace, End, Time
 from service import replies
 from service.answering.answers import finite, placed_poses
 from service.answering.own_models import ROBOTS, Robots
@@ -65,7 +65,7 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
     space = BodySpace(asked)
     modelled = time.perf_counter()
     section = space.section(request.axes, request.others)
-    ways = _ways(COMPONENTS, np.eye(6))
+    ways = _ways(WRENCH_COMPONENTS, np.eye(6))
     extents = {name: space.support(way) for name, way in ways.items()}
     error = space.linearisation_error([end for end in extents.values() if end is not None])
     capability = {

@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from planner import COMPONENTS, OTHERS
+from planner import OTHER_COMPONENTS, WRENCH_COMPONENTS
 from service import replies
 from service.replies import BodySpaceReply
 from service.tables.layout import in_colour, name, number, print_rows, print_warnings, text, unit_of
@@ -37,7 +37,8 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     out.print(reply.reason)
     print_warnings(reply.warnings, out)
     asked = ", ".join(
-        f"{axis} {value:z.1f}" for axis, value in zip(COMPONENTS, reply.body_wrench, strict=True)
+        f"{axis} {value:z.1f}"
+        for axis, value in zip(WRENCH_COMPONENTS, reply.body_wrench, strict=True)
     )
     out.print(f"body wrench asked for (in B): {asked} [N, N·m]")
     axis = name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}")
@@ -52,7 +53,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
 
 def _print_section(section: replies.BodySection, out: Console) -> None:
     """Print the size of a plane's part that is held."""
-    plane = f"plane of {' and '.join(section.axes)}, {OTHERS[section.others]}"
+    plane = f"plane of {' and '.join(section.axes)}, {OTHER_COMPONENTS[section.others]}"
     if not section.inner or section.gap is None:
         out.print(f"{plane}: nothing is held")
         return

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 
 from hand_models.base import InvalidInputError
 from hand_models.tile import Surface
-from planner.capability import COMPONENTS, BodySpace
+from planner.capability import WRENCH_COMPONENTS, BodySpace
 from planner.prepare import hand_space, posture
 from planner.programs import SLACK
 from planner.question import ForceCap, Limits, Load, Question
@@ -127,8 +127,8 @@ def test_support_and_capability_are_those_of_highs(seed):
 @pytest.mark.parametrize("seed", [8, 15])
 def test_the_set_is_between_its_polygons(seed, others):
     space, rng = random_space(seed), np.random.default_rng(seed)
-    axes = [COMPONENTS[i] for i in sorted(rng.permutation(6)[:2])]
-    plane = [COMPONENTS.index(axis) for axis in axes]
+    axes = [WRENCH_COMPONENTS[i] for i in sorted(rng.permutation(6)[:2])]
+    plane = [WRENCH_COMPONENTS.index(axis) for axis in axes]
     columns = np.eye(6) if others == "free" else np.eye(6)[:, plane]
     at = space.needed * (others == "needed")
     at[plane] = 0.0
@@ -457,9 +457,9 @@ def test_a_reply_says_what_the_planner_says():
     assert (reply.exact, reply.linearisation_error, reply.warnings) == (True, 0.0, [])
     assert reply.error == reply.linearisation_error
     np.testing.assert_allclose(reply.body_wrench, space.needed)
-    assert set(reply.capability) == {sign + axis for axis in COMPONENTS for sign in "+-"}
+    assert set(reply.capability) == {sign + axis for axis in WRENCH_COMPONENTS for sign in "+-"}
     for name, end in reply.capability.items():
-        way = float(name[0] + "1") * np.eye(6)[COMPONENTS.index(name[1:])]
+        way = float(name[0] + "1") * np.eye(6)[WRENCH_COMPONENTS.index(name[1:])]
         assert end.extent == pytest.approx(space.support(way).reach)
         assert end.more == pytest.approx(space.more(way).reach)
         pure = space.pure(way)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from planner import plan
-from planner.deadline.clock import UNFINISHED
+from planner.deadline.clock import UNFINISHED_RESULTS
 from planner.result import LimitName, Plan
 from service import Planners
 from service.answering import dispatch
@@ -92,7 +92,7 @@ def largest(answer: Plan) -> Plan:
         ),
         reason="the rock is “too” smooth: " + ", ".join(names),
         warnings=tuple(names * 10),
-        unfinished=tuple(UNFINISHED),
+        unfinished=tuple(UNFINISHED_RESULTS),
     )
 
 
