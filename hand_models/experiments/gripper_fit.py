@@ -201,13 +201,14 @@ class GripperFit:
             raise SolverError(f"no pose of the gripper balances a pull of {pull:g} N")
         loads, _ = gripper.finger_loads(poses)
         held = self.wrenches(gripper, fine=fine)
+        # of F_x and M_y, and of F_x and −F_z
         along_z = edge(held[:, [0, 2]], self._edge_at)
         down = held[:, [0, 1]] * (1.0, -1.0)
         side = -edge(down, np.array([settings.scalar("fig13", "side_force_x")]))
         strengths = np.hypot(held[:, 0], held[:, 1]), np.abs(held[:, 2])
         best = [held[strength.argmax()] for strength in strengths]
         off = float(np.abs(along_z - self._edge).mean())
-        arms = [wrench[2] / wrench[0] for wrench in best]
+        arms = [moment / force_x for force_x, _, moment in best]
         lines = np.hstack([loads.shears, loads.normals]).ravel()
         return np.array([*lines, *extents(held), *along_z, off, *side, *arms])
 

@@ -305,7 +305,7 @@ def as_draws(data: Mapping[str, Any]) -> str:
     entry("valley", [each["valley"] for each in sets], "1", "which start of the search led there")
     # of the gripper's set, what the hand has as well
     of_hand = {
-        "finger": {"pulley_radii[1]": "m", "pulley_radii[2]": "m"},
+        "finger": {"pulley_radii[1]": "m", "pulley_radii[2]": "m"},  # middle and distal
         "tile": {
             **{f"engagement[{i}]": "1" for i in range(3)},
             **{f"contact_stiffness[{i}]": "N/m" for i in range(3)},

@@ -57,9 +57,10 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         start, end = (steps * i // len(cases) for i in (done, done + 1))
         surfaces.append(_surface(conditions, hand, part(progress, start, end, steps)))
     progress(steps, steps)
-    text = StudyText("fig14")
-    _check_failures(text, *surfaces[:2])
-    _check_planes(text, surfaces[:2], table)
+    # the two diameters with the same tension come first
+    text, of_diameters = StudyText("fig14"), surfaces[:2]
+    _check_failures(text, *of_diameters)
+    _check_planes(text, of_diameters, table)
     _check_sizes(text, *surfaces)
     return text.result({"phalanges": PHALANGES, "surfaces": surfaces})
 
@@ -214,7 +215,8 @@ def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any])
 def plot(result: StudyResult) -> dict[str, Figure]:
     """Draw the failures over the wrench spaces, and what planes of loading hold."""
     surfaces = result.data["surfaces"]
-    return {"fig14": _draw_failures(surfaces[:2]), "fig14_planes": _draw_planes(surfaces)}
+    of_diameters = surfaces[:2]
+    return {"fig14": _draw_failures(of_diameters), "fig14_planes": _draw_planes(surfaces)}
 
 
 def _name(surface: dict[str, Any]) -> str:

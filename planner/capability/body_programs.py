@@ -164,7 +164,9 @@ class BodyPrograms:
         cap : float, optional
             The utilisation to go up to; the question's by default.
         """
-        data = self.data.turned(np.concatenate([start / WRENCH_UNIT, self.data.wrench[6:]]))
+        # after the body wrench come the wrenches of hands that are given, which stay
+        of_hands = self.data.wrench[6:]
+        data = self.data.turned(np.concatenate([start / WRENCH_UNIT, of_hands]))
         return _solved(data, goal, columns, self.cap if cap is None else cap)
 
     def accelerated(self, goal: Array, ways: Array) -> Reached | None:
@@ -266,6 +268,7 @@ def _motion(question: Question, where: Posture | None, point: LinearisationPoint
     """
     if question.body_wrench is not None:
         return None
+    # components: three linear, and three angular where they are known
     count = 6 if where is not None and question.load.com is None else 3
     found = []
     for x, y, z, *turning in np.vstack([np.zeros(6), np.eye(6)[:count]]).tolist():

@@ -57,14 +57,14 @@ def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
     """
     numbers, surfaces = own_hand(draw.hand, hand), own_surfaces(draw.surfaces)
     tile, rock = (Surface.named(name, surfaces) for name in ("sandpaper-36", "rock"))
-    radii = numbers.vector("finger", "pulley_radii")
+    _, middle, distal = numbers.vector("finger", "pulley_radii")
     closing = numbers.scalar("tendon", "closing_tension")
     single = {
         "tile_on_sandpaper": tile.shear_limit,
         "tile_on_rock": rock.shear_limit,
         "tile_at_45": float(tile.strength(np.pi / 4)),
-        "middle_radius": radii[1],
-        "distal_radius": radii[2],
+        "middle_radius": middle,
+        "distal_radius": distal,
         "seated_contact": numbers.scalar("finger", "seated_contact"),
     }
     return {

@@ -85,8 +85,8 @@ def _wrench(stance: Stance, wrench: Array) -> Iterator[Finding]:
 
 def _force_unit(part: float) -> str | None:
     """Return the unit in which a force that is such a part of the weight would be the weight."""
-    # each with the factor that it may be off, as a body may carry and accelerate; a number in kgf is
-    # only a tenth of that in N, and has to be nearer
+    # each with the factor that it may be off, as a body may carry and accelerate; a number in kgf
+    # is only a tenth of that in N, and has to be nearer
     for unit, newtons, off in (
         ("kN", 1e3, 2.5),
         ("kgf", scene_number("usual", "standard_gravity"), 1.25),
