@@ -223,7 +223,7 @@ def demo(picture: Path, own: options.Own, as_json: bool) -> int:
         try:
             reply = client.plan(request)
         except wire.ServiceError as error:
-            if error.kind != wire.UNREACHABLE:
+            if error.kind != "unreachable":
                 raise
             tables.remark(f"planned without joints: {error.message}")
             stance = msgspec.structs.replace(request.stance, joints=None)

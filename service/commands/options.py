@@ -175,7 +175,7 @@ class Workers(NamedTuple):
     def place(self, plans: int) -> tuple[str, int | None]:
         """Return where work of so many plans is done, and the number of workers."""
         if self.dask is not None:
-            return (bulk.LOCAL if self.dask == "local" else self.dask), self.workers
+            return (bulk.LOCAL_CLUSTER if self.dask == "local" else self.dask), self.workers
         count = processes.worth(plans, self.workers)
         return ("here", None) if count == 1 else ("processes", count)
 

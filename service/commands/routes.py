@@ -202,7 +202,7 @@ def _many(
         workers=workers,
         robot=own.robot,
         explain=False if wanted.unexplained else None,
-        kind=wire.ROUTE,
+        kind=wire.ServiceName.ROUTE,
     )
     answer_rest(routes, answers, sink, file, "planning routes", "routes")
     elapsed = perf_counter() - begun

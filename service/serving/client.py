@@ -37,18 +37,12 @@ from service.requests import (
 from service.serving.config import TIMEOUT, open_session, patient
 from service.serving.names import digest
 from service.wire import (
-    ALIVE,
-    BODY_SPACE,
-    CLIENTS,
     DEFAULT_ROBOT,
-    PLAN,
-    SET_POINTS,
-    STREAM,
-    WRENCH_SPACE,
     Format,
     MalformedError,
     NoServiceError,
     ServiceError,
+    ServiceName,
     ServiceTimeout,
     check_size,
     service_key,
@@ -119,8 +113,8 @@ class CruxClient:
             self._session = where
         # by these a service gives each client its turn, and knows who has gone
         self._asked = itertools.count()
-        self._source = self._session.declare_querier(service_key(robot, PLAN))
-        here = service_key(robot, f"{CLIENTS}/{self._session.info.zid()}")
+        self._source = self._session.declare_querier(service_key(robot, ServiceName.PLAN))
+        here = service_key(robot, f"{ServiceName.CLIENTS}/{self._session.info.zid()}")
         self._here = self._session.liveliness().declare_token(here)
         # and by this that nobody else asks in its name
         self._secret = secrets.token_bytes(SECRET)
@@ -154,7 +148,7 @@ class CruxClient:
             if sample.kind == zenoh.SampleKind.PUT:
                 there.set()
 
-        key, taken = service_key(self.robot, ALIVE), Callback(seen, indirect=False)
+        key, taken = service_key(self.robot, ServiceName.ALIVE), Callback(seen, indirect=False)
         tokens = self._session.liveliness().declare_subscriber(key, taken, history=True)
         try:
             if not there.wait(max(wait - (time.monotonic() - begun), 0.0)):
@@ -197,26 +191,26 @@ class CruxClient:
         LimitError
             If the request has too many bytes.
         """
-        received = self._ask(PLAN, request)
+        received = self._ask(ServiceName.PLAN, request)
         if Format.is_labelled(str(received.encoding), BriefPlanReply):
             return _read(received, BriefPlanReply)
         return _read(received, PlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Return one hand's wrench space; raises what `plan` raises."""
-        return _read(self._ask(WRENCH_SPACE, request), WrenchSpaceReply)
+        return _read(self._ask(ServiceName.WRENCH_SPACE, request), WrenchSpaceReply)
 
     def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
         """Return what a stance can hold; raises what `plan` raises."""
-        return _read(self._ask(BODY_SPACE, request), BodySpaceReply)
+        return _read(self._ask(ServiceName.BODY_SPACE, request), BodySpaceReply)
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance for set-points; raises what `plan` raises."""
-        return _read(self._ask(STREAM, request), StreamReply)
+        return _read(self._ask(ServiceName.STREAM, request), StreamReply)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
         """Return a stream's set-points for a body wrench; raises what `plan` raises."""
-        return _read(self._ask(SET_POINTS, request), SetPointsReply)
+        return _read(self._ask(ServiceName.SET_POINTS, request), SetPointsReply)
 
     def _ask(self, name: str, request: Query) -> zenoh.Sample:
         """Return the reply that is no error; raise what `plan` raises."""

@@ -31,7 +31,7 @@ from service.serving.question import Question, client_of, take
 from service.serving.shares import Shares
 from service.serving.waiting import Costs, Kind, Waiting
 from service.serving.watch import State, Watch
-from service.wire import PLAN, STREAM, Answer, Format, LostError, encode_error
+from service.wire import Answer, Format, LostError, ServiceName, encode_error
 
 __all__ = ["Dispatcher"]
 
@@ -286,7 +286,7 @@ class Dispatcher:
     def _give(self, lane: Lane[Job, Answer], question: Question) -> None:
         question.begun = time.perf_counter()
         self._crew.work[lane] = question
-        rehearsal = question.name == STREAM and not question.rehearsed
+        rehearsal = question.name == ServiceName.STREAM and not question.rehearsed
         lane.give(question.job(question.begun, rehearsal))
 
     def _drop(self, client: str, token: bool) -> None:
@@ -323,9 +323,9 @@ class Dispatcher:
         assert asked is not None
         cost = done.cost or done.seconds
         self._shares.charge(asked.place, cost)
-        if asked.name == PLAN and asked.stance is not None:
+        if asked.name == ServiceName.PLAN and asked.stance is not None:
             self._costs.took(asked.stance, lane.station, cost)
-        if asked.name == STREAM and not asked.rehearsed and done.good:
+        if asked.name == ServiceName.STREAM and not asked.rehearsed and done.good:
             asked.rehearsed = True
             self._put(Kind.DECLARED, asked)
         elif not asked.replied:

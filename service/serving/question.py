@@ -9,16 +9,15 @@ import msgspec
 import zenoh
 
 from hand_models.base import CruxError, LimitError
-from service.answering import SERVICES
+from service.answering import SERVICES_BY_NAME
 from service.processes import Job
 from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE
 from service.wire import (
-    BODY_SPACE,
     LARGEST_ERROR,
-    WRENCH_SPACE,
     Answer,
     Format,
     MalformedError,
+    ServiceName,
     check_size,
     encode_error,
 )
@@ -162,7 +161,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
                 )
             secret = attached.to_bytes()
         if given is not None:
-            check_size(len(given), SERVICES[name].request)
+            check_size(len(given), SERVICES_BY_NAME[name].request)
             payload = given.to_bytes()
     except LimitError as error:
         fault = error
@@ -175,7 +174,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
         payload=payload,
         encoding="" if query.encoding is None else str(query.encoding),
         seconds=longest,
-        dear=name in (WRENCH_SPACE, BODY_SPACE) or len(payload) > LARGE,
+        dear=name in (ServiceName.WRENCH_SPACE, ServiceName.BODY_SPACE) or len(payload) > LARGE,
         fault=fault,
         secret=secret,
     )

@@ -16,13 +16,13 @@ from zenoh.handlers import Callback
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from planner import Make, RobotFile, cores
-from service.answering import SERVICES, robots_of
+from service.answering import SERVICES_BY_NAME, robots_of
 from service.processes import Job, answering
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving.config import close_at_once
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, Answer, service_key
+from service.wire import Answer, ServiceName, service_key
 
 __all__ = ["MEMORY", "PlanService"]
 
@@ -94,9 +94,11 @@ class PlanService:
                 field="seconds",
             )
         (self.robot,) = robots_of(robot)
-        self.keys = tuple(service_key(self.robot, name) for name in SERVICES)
-        self.operators = tuple(service_key(self.robot, name) for name in (HEALTH, METRICS))
-        self._alive = service_key(self.robot, ALIVE)
+        self.keys = tuple(service_key(self.robot, name) for name in SERVICES_BY_NAME)
+        self.operators = tuple(
+            service_key(self.robot, name) for name in (ServiceName.HEALTH, ServiceName.METRICS)
+        )
+        self._alive = service_key(self.robot, ServiceName.ALIVE)
         self._session = session
         made = make or partial(answering, robot, hand)
         crew = Crew(made, count, memory)
@@ -158,7 +160,7 @@ class PlanService:
         self._until_the_end(self._session.declare_queryable(key, taker, complete=True))
 
     def _client_key(self, name: str) -> str:
-        return service_key(self.robot, f"{CLIENTS}/{name}")
+        return service_key(self.robot, f"{ServiceName.CLIENTS}/{name}")
 
     def _transport(self, event: zenoh.TransportEvent) -> None:
         name = str(event.transport.zid)

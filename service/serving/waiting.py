@@ -21,7 +21,7 @@ from cachetools import LRUCache
 
 from service.serving.question import LARGE, Question
 from service.serving.shares import DEAR, LAST, Shares
-from service.wire import PLAN, SET_POINTS
+from service.wire import ServiceName
 
 __all__ = ["Costs", "Kind", "Waiting"]
 
@@ -92,11 +92,11 @@ class Costs:
 
     def kind(self, question: Question) -> Kind:
         """Return the queue in which a question is to wait."""
-        if question.name == SET_POINTS:
+        if question.name == ServiceName.SET_POINTS:
             return Kind.SET_POINTS
         if question.dear:
             return Kind.DEAR
-        if question.name == PLAN and self.is_short(question.stance):
+        if question.name == ServiceName.PLAN and self.is_short(question.stance):
             return Kind.SHORT
         dear = self._shares.is_dear(question.place) and not self._is_cheap(question.stance)
         return Kind.DEAR if dear else Kind.OTHER

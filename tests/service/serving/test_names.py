@@ -11,7 +11,7 @@ import zenoh
 
 from service.serving import CruxClient, open_session, zenoh_config
 from service.serving.waiting import EACH
-from service.wire import CLIENTS, service_key
+from service.wire import ServiceName, service_key
 from tests.service.serving.test_dispatcher import LONG, PLAN, Site, all_up, kind, result, until
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.served import client_config
@@ -79,7 +79,7 @@ def other(site: Site) -> Iterator[Asker]:
 
 
 def test_a_token_of_another_ends_no_question(site: Site, victim: Asker, other: Asker) -> None:
-    key = service_key("robosimian", f"{CLIENTS}/{victim.name}")
+    key = service_key("robosimian", f"{ServiceName.CLIENTS}/{victim.name}")
     operator = site.client()
     with until(site) as go_on:
         held = [victim.send(go_on) for _ in range(2)]
