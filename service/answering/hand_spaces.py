@@ -23,7 +23,7 @@ from service.answering.answers import (
 )
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.stances import stance
-from service.replies import AXES, WrenchSpaceReply
+from service.replies import WRENCH_AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest
 
 __all__ = ["wrench_space"]
@@ -74,7 +74,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = BUNDLED_ROBOTS) -
     if "robust" in (request.want or ()):
         if hand.palm is not None:
             raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
-        both_ways = np.vstack([np.eye(len(AXES)), -np.eye(len(AXES))])
+        both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
         reply.robust = _robust(robustness(asked.robot.hand, settled, both_ways))
     reply.closing = _closings(settled)
     return reply
@@ -137,7 +137,7 @@ def _robust(found: Robustness) -> replies.RobustCapability:
 
 
 def _by_side(reaches: Array) -> dict[str, float | None]:
-    sides = (f"{sign}{axis}" for sign in "+-" for axis in AXES)
+    sides = (f"{sign}{axis}" for sign in "+-" for axis in WRENCH_AXES)
     return dict(zip(sides, map(finite, reaches), strict=True))
 
 
@@ -224,7 +224,7 @@ def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
 
 def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
     reaches = {}
-    for axis, direction in zip(AXES, np.eye(len(AXES)), strict=True):
+    for axis, direction in zip(WRENCH_AXES, np.eye(len(WRENCH_AXES)), strict=True):
         deadline.check("it was known how far the hand's set reaches")
         ends = space.capability(direction)
         low, high = (None, None) if ends is None else (-float(ends[0]), float(ends[1]))

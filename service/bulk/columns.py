@@ -14,7 +14,7 @@ import msgspec
 from hand_models.base import InvalidInputError
 from hand_models.hand import FINGERS
 from planner import LimitName
-from service.replies import AXES, ErrorDetail
+from service.replies import WRENCH_AXES, ErrorDetail
 
 __all__ = ["Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
 
@@ -43,7 +43,7 @@ class Column(NamedTuple):
 
     @property
     def is_index(self) -> bool:
-        """Whether it is the column that every table begins with."""
+        """True for the column that every table begins with."""
         return self.name == "index"
 
 
@@ -73,7 +73,7 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
         for i, finger in enumerate(FINGERS):
             name = f"{limb}_{finger}_tension_N"
             yield Column(name, "float", "N", "tension of its tendon", (*hand, "tensions", i))
-        for i, axis in enumerate(AXES):
+        for i, axis in enumerate(WRENCH_AXES):
             unit = "N" if axis.startswith("f") else "N·m"
             name = f"{limb}_{axis}_{unit.replace('·', '')}"
             meaning = f"{axis} of the hand's wrench on the rock, in its own frame"
