@@ -66,7 +66,8 @@ def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explo
         for name, way in ways.items()
     }
     linear = _accelerations(space, _ways("xyz", np.eye(3)))
-    turning = _accelerations(space, _ways("xyz", np.eye(6)[3:])) if space.turns else None
+    about_axes = np.eye(6)[3:]
+    turning = _accelerations(space, _ways("xyz", about_axes)) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
     ended = time.perf_counter()
     found = space.plan
@@ -145,6 +146,7 @@ def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
     end = space.acceleration(way) if space.accelerates else None
     if end is None:
         return None
+    # a way has three components, or six of which the last three turn
     return replies.Acceleration(
         direction=way[-3:].tolist(),
         acceleration=max(end.reach, 0.0),

@@ -312,7 +312,7 @@ def _print_rock(
         ("steps", *_sizes("higher", [each.height for each in made.steps], hole)),
     ]
     if not made.outliers:
-        del rows[2]
+        rows = [row for row in rows if row[0] != "outliers"]
     if tables.verbosity() >= 0:
         tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
     out.print(f"pose {_pose(made.pose)}", soft_wrap=True)

@@ -240,7 +240,7 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
                 yield {name: value or None for name, value in row.items()}
     else:
         columns = bulk.route_columns()
-        names = [column.name for column in columns[1:]]
+        names = [column.name for column in columns if not column.is_index]
         with file.open("rb") as lines:
             for line in lines:
                 yield dict(zip(names, bulk.row_of(line, columns).values, strict=True))

@@ -325,13 +325,13 @@ class Dispatcher:
         for lane, asked in list(self._pool.work.items()):
             if asked is None or lane not in self._pool.work:
                 continue
-            ends = self._pool.ends(lane)
-            if ends[0] > now:
+            late, ends = self._pool.ends(lane)
+            if late > now:
                 continue
             if not asked.replied:
                 missing = "there was an answer, and its work was broken off"
                 self._replies.refuse(asked, DeadlineError(asked.seconds, missing))
-            if ends[1] <= now:
+            if ends <= now:
                 self._shares.ended_process(asked.place, now - asked.begun)
                 self._end_process(lane.handle, "did not stop at a deadline")
 

@@ -177,6 +177,7 @@ class Paths:
 
     def _own_unit(self, steps: Steps) -> tuple[str, ...]:
         """Return the unit that an entry of a hand names itself."""
+        # stance.hand.SECTION.ENTRY.value
         entry = _at(self.document, steps[:4]) if steps[:2] == ("stance", "hand") else None
         unit = entry.get("unit") if isinstance(entry, dict) else None
         return (unit,) if isinstance(unit, str) and steps[4:5] == ("value",) else ()
