@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from service.answering import handle
-from service.wire import PLAN
+from service.wire import ServiceName
 from tests.suite.helpers.requests import wall_request
 
 OWN = ("hand_models.", "planner.", "service.")
@@ -66,7 +66,7 @@ def plan_on(diameter: float, watch: Watch) -> None:
     watch.clear()
     sys.setprofile(watch)
     try:
-        answer = handle(PLAN, payload)
+        answer = handle(ServiceName.PLAN, payload)
     finally:
         sys.setprofile(None)
     assert answer.status == "optimal", answer

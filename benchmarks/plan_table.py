@@ -33,7 +33,7 @@ from planner.question import Question
 from planner.solving import plan
 from service.answering import dispatch
 from service.answering.questions import question
-from service.wire import PLAN
+from service.wire import ServiceName
 
 __all__ = ["plan_tables"]
 
@@ -157,7 +157,7 @@ def _plans(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
             "sets": lambda k: sets(questions[k]),
             "seen": lambda k: sets(rivals.stances[k % FEW].question),
             "again": lambda k: plan(rivals.stances[k % FEW].question),
-            "bytes": lambda k: dispatch.handle(PLAN, payloads[k]),
+            "bytes": lambda k: dispatch.handle(ServiceName.PLAN, payloads[k]),
             "extras": lambda k: plan(wanting[k]),
         },
         rounds,

@@ -16,7 +16,7 @@ from planner.streaming.stream_stance import StreamStance
 from service.answering import Streams, dispatch
 from service.replies import SetPointsReply, StreamReply
 from service.requests import SetPointsRequest
-from service.wire import SET_POINTS, STREAM
+from service.wire import ServiceName
 from tests.suite.helpers.requests import stream_request
 from tests.suite.helpers.stances import ask, on_wall
 
@@ -36,7 +36,9 @@ WRENCHES = [CENTRE + k * STEP for k in (-8, -5, -2, 1, 4, 7)]
 def test_set_points_as_messages(benchmark):
     """Without the way over zenoh."""
     known = Streams()
-    declared = dispatch.handle(STREAM, msgspec.json.encode(stream_request()), streams=known)
+    declared = dispatch.handle(
+        ServiceName.STREAM, msgspec.json.encode(stream_request()), streams=known
+    )
     reply = msgspec.json.decode(declared.payload, type=StreamReply)
     centre = np.array(reply.body_wrench)
     payloads = cycle(
@@ -46,7 +48,9 @@ def test_set_points_as_messages(benchmark):
         for k in (-0.3, -0.1, 0.1, 0.3)
     )
     payloads = cycle([next(payloads) for _ in range(4)])
-    answer = benchmark(lambda: dispatch.handle(SET_POINTS, next(payloads), streams=known))
+    answer = benchmark(
+        lambda: dispatch.handle(ServiceName.SET_POINTS, next(payloads), streams=known)
+    )
     known.close()
     assert msgspec.json.decode(answer.payload, type=SetPointsReply).source == "interpolated"
 

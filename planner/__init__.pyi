@@ -30,10 +30,10 @@ from .prepare import (
     settle_each as settle_each,
 )
 from .processes import (
-    Lane as Lane,
     Lost as Lost,
     Make as Make,
-    Station as Station,
+    PriorityLane as PriorityLane,
+    WorkerHandle as WorkerHandle,
     Workers as Workers,
     cores as cores,
     resident as resident,

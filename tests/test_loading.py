@@ -10,7 +10,7 @@ import sys
 import click
 import pytest
 
-from service.commands.cli import COMMANDS, crux
+from service.commands.cli import COMMANDS_BY_NAME, crux
 from tests.suite.helpers.checkout import ROOT
 
 HEAVY = ("scipy", "trimesh", "cvxpy", "pinocchio", "matplotlib")
@@ -86,12 +86,12 @@ def test_a_process_of_the_service_has_all_of_it_before_the_first_question() -> N
 
 
 def test_what_is_told_of_a_command_is_how_its_own_help_begins() -> None:
-    for name in COMMANDS:
+    for name in COMMANDS_BY_NAME:
         with click.Context(crux) as context:
             command = crux.get_command(context, name)
         assert command is not None
         assert command.name == name
-        assert COMMANDS[name].words == command.get_short_help_str(1000)
+        assert COMMANDS_BY_NAME[name].words == command.get_short_help_str(1000)
 
 
 def test_threads_may_be_the_first_to_solve() -> None:

@@ -11,7 +11,7 @@ import msgspec
 
 from generation.tables import table
 from hand_models.parameters import Quantity
-from service.wire.json_schema import MESSAGES, schema
+from service.wire.json_schema import MESSAGE_KINDS, schema
 
 __all__ = ["anchor", "message_page"]
 
@@ -47,7 +47,7 @@ def message_page() -> str:
     """Return the page."""
     told = schema()
     parts, words = told["$defs"], dict(_words())
-    wholes = [kind.__name__ for kind in MESSAGES]
+    wholes = [kind.__name__ for kind in MESSAGE_KINDS]
     text = [BEGINNING]
     for heading, names in (
         ("Whole messages", wholes),
@@ -60,7 +60,7 @@ def message_page() -> str:
 
 def _words() -> Iterator[tuple[str, str]]:
     """Yield what the docstring of each part says beyond its first sentence."""
-    seen = msgspec.inspect.multi_type_info((*MESSAGES, Quantity))
+    seen = msgspec.inspect.multi_type_info((*MESSAGE_KINDS, Quantity))
     structs: dict[str, list[type]] = {}
     stack: list[Any] = list(seen)
     while stack:

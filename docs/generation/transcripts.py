@@ -14,7 +14,7 @@ import zenoh
 from generation.messages import anchor
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import most_bytes, schema, service_key
-from service.wire.json_schema import MESSAGES
+from service.wire.json_schema import MESSAGE_KINDS
 
 __all__ = ["key_pages"]
 
@@ -31,7 +31,7 @@ ENCODINGS: Final = {"json": "application/json", "msgpack": "application/msgpack"
 TIMEOUT: Final = 60.0
 """Of a question, of which the first waits for processes that start [s]."""
 
-KINDS: Final = {kind.__name__: kind for kind in MESSAGES}
+KINDS: Final = {kind.__name__: kind for kind in MESSAGE_KINDS}
 
 
 class _Key(NamedTuple):

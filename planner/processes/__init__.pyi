@@ -1,7 +1,7 @@
-from .stations import (
-    Lane as Lane,
+from .worker_handles import (
     Make as Make,
-    Station as Station,
+    PriorityLane as PriorityLane,
+    WorkerHandle as WorkerHandle,
     resident as resident,
     starting_children as starting_children,
 )

@@ -17,7 +17,7 @@ from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
 from cachetools import LRUCache
 
 from hand_models.base import CruxError
-from planner.processes.stations import Lane, Make, Station
+from planner.processes.worker_handles import Make, PriorityLane, WorkerHandle
 
 __all__ = ["Lost", "Workers", "cores"]
 
@@ -86,7 +86,7 @@ class Workers(Generic[T, R]):
     ----------
     width : int
         How many processes.
-    hands : dict of Lane to dict
+    hands : dict of PriorityLane to dict
         Tasks that each process has by their numbers, the one in work first; of those processes
         that have been started and are not known to have died.
     failed_starts : int
@@ -95,10 +95,10 @@ class Workers(Generic[T, R]):
 
     def __init__(self, make: Make[T, R], count: int) -> None:
         self._make, self.width = make, count
-        self.hands: dict[Lane[T, R], dict[int, _Task[T]]] = {}
+        self.hands: dict[PriorityLane[T, R], dict[int, _Task[T]]] = {}
         self.failed_starts = 0
         self._queue: deque[_Task[T]] = deque()
-        self._knows: LRUCache[Hashable, Lane[T, R]] = LRUCache(KNOWN)
+        self._knows: LRUCache[Hashable, PriorityLane[T, R]] = LRUCache(KNOWN)
         self._unborn = ""
         """Reason of the last failed start."""
 
@@ -157,7 +157,7 @@ class Workers(Generic[T, R]):
         ready = wait(list(lanes))
         return [each for pipe in ready for each in self._take(lanes[cast(Connection, pipe)])]
 
-    def _take(self, lane: Lane[T, R]) -> list[tuple[int, R | Lost]]:
+    def _take(self, lane: PriorityLane[T, R]) -> list[tuple[int, R | Lost]]:
         """Return what a process has done, if anything; of one that has died, what is lost.
 
         What it had in work goes first in the queue again, once, and all else that it had.
@@ -179,7 +179,7 @@ class Workers(Generic[T, R]):
         del self.hands[lane][number]
         return [(number, done)]
 
-    def _chosen(self, lane: Lane[T, R]) -> _Task[T]:
+    def _chosen(self, lane: PriorityLane[T, R]) -> _Task[T]:
         """Take what a process gets next: what it knows, or else nobody, or else what is first."""
         knows = [self._knows.get(task.about) for task in self._queue] if self._knows else []
         i = next((knows.index(one) for one in (lane, None) if one in knows), 0)
@@ -193,11 +193,11 @@ class Workers(Generic[T, R]):
         """Start processes in place of those that have died."""
         while len(self.hands) < self.width and self.failed_starts < STARTS:
             try:
-                station = Station(self._make)
+                handle = WorkerHandle(self._make)
             except OSError as error:
                 self._miss(f"processes do not start: {error.strerror or error}")
             else:
-                self.hands[station.lanes[0]] = {}
+                self.hands[handle.lanes[0]] = {}
 
     def _miss(self, why: str) -> None:
         """Count a process that could not be started, or died before it was ready."""
@@ -206,17 +206,17 @@ class Workers(Generic[T, R]):
         if self.failed_starts == STARTS:
             log.warning(why)
 
-    def _remove_dead(self, lane: Lane[T, R]) -> str:
+    def _remove_dead(self, lane: PriorityLane[T, R]) -> str:
         """Remove a process that has died, and return how it died."""
         how = f"a worker {self._remove(lane, dead=True)}"
         if not lane.ready:
             # before a process is ready, only the program's own start-up runs in it
-            hint = NO_GUARD if lane.station.process.exitcode == UNCAUGHT else ""
+            hint = NO_GUARD if lane.handle.process.exitcode == UNCAUGHT else ""
             self._miss(f"processes do not start: {how}{hint}")
         return how
 
-    def _remove(self, lane: Lane[T, R], *, dead: bool = False) -> str:
+    def _remove(self, lane: PriorityLane[T, R], *, dead: bool = False) -> str:
         del self.hands[lane]
         for about in [about for about, one in self._knows.items() if one is lane]:
             del self._knows[about]
-        return lane.station.kill(dead=dead)
+        return lane.handle.kill(dead=dead)

@@ -2,7 +2,7 @@ from .advice_requests import advised as advised, rewritten as rewritten
 from .answers import Planned as Planned
 from .body_space import explore as explore
 from .dispatch import (
-    SERVICES as SERVICES,
+    SERVICES_BY_NAME as SERVICES_BY_NAME,
     handle as handle,
     plan as plan,
     planned as planned,

@@ -5,28 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 import numpy as np
+from msgspec import UNSET
 from msgspec.structs import replace
 
 from planner import HAND_PATH, Advice, hand_path
 from service.requests import PlanRequest
 
 __all__ = ["advised", "rewritten"]
-
-ABSENT: Final = object()
-"""Value of a field that is absent."""
-
-ROUNDED: Final = 1e-9
-"""Tolerance for equal numbers, relative for numbers above 1: the rounding of a pose that was moved
-there and back."""
-
-LISTS: Final = (list, tuple)
-
-ORIENTATION: Final = "orientation"
-"""Name of the fields whose four numbers are normalised when they are read."""
 
 
 def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
@@ -87,12 +76,13 @@ def _rewritten(text: msgspec.Raw, before: Any, after: Any) -> Any:
             name: part for name, part in given.items() if name in after or name not in before
         }
         for name, value in after.items():
-            was = before.get(name, ABSENT)
+            was = before.get(name, UNSET)
             stays[name] = given.get(name, value)
-            if name in given and not (name == ORIENTATION and _is_turned_by_nothing(was, value)):
+            # the four numbers of an orientation are normalised when they are read
+            if name in given and not (name == "orientation" and _is_turned_by_nothing(was, value)):
                 stays[name] = _rewritten(given[name], was, value)
         return stays
-    if isinstance(before, LISTS) and isinstance(after, LISTS) and before:
+    if isinstance(before, list | tuple) and isinstance(after, list | tuple) and before:
         parts = msgspec.json.decode(text, type=list[msgspec.Raw])
         made_of = [(_most_like(before, each, i), each) for i, each in enumerate(after)]
         return [_rewritten(parts[j], before[j], each) for j, each in made_of]
@@ -101,13 +91,14 @@ def _rewritten(text: msgspec.Raw, before: Any, after: Any) -> Any:
 
 def _is_rounded(before: Any, after: float) -> bool:
     """Return True if two numbers differ by rounding alone."""
-    return isinstance(before, float) and abs(after - before) <= ROUNDED * max(1.0, abs(before))
+    # relative for numbers above 1: the rounding of a pose that was moved there and back
+    return isinstance(before, float) and abs(after - before) <= 1e-9 * max(1.0, abs(before))
 
 
 def _is_turned_by_nothing(before: Sequence[float], after: Sequence[float]) -> bool:
     """Return True if two quaternions are the same rotation up to rounding."""
     was, now = (np.array(each) / math.hypot(*each) for each in (before, after))
-    return bool(min(abs(was - now).max(), abs(was + now).max()) <= ROUNDED)
+    return any(all(map(_is_rounded, was.tolist(), same.tolist())) for same in (now, -now))
 
 
 def _most_like(before: Sequence[Any], one: Any, place: int) -> int:

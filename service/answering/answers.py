@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -30,10 +30,7 @@ __all__ = [
     "wrist_reply",
 ]
 
-T = TypeVar("T")
-
-LONGEST: Final = 120
-"""Most bytes of a reason with set-points, whose reply has to be small."""
+PartT = TypeVar("PartT")
 
 
 class Planned(NamedTuple):
@@ -122,7 +119,7 @@ def _certificate(proof: Certificate, model: bool) -> replies.Certificate:
     return replace(found, wrench_spaces={limb: wrench_set_reply(each) for limb, each in spaces})
 
 
-def as_lists(part: Struct, kind: type[T]) -> T:
+def as_lists(part: Struct, kind: type[PartT]) -> PartT:
     """Return a struct over arrays as the same struct over lists."""
     return msgspec.convert(msgspec.to_builtins(part, enc_hook=_listed_number), kind)
 
@@ -183,7 +180,8 @@ def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
 
 def cut_reason(reason: str) -> str:
     """Return a sentence; only the beginning of a long one."""
-    short = reason.encode()[:LONGEST].decode(errors="ignore")
+    # at most 120 bytes: replies with set-points have to be small
+    short = reason.encode()[:120].decode(errors="ignore")
     return reason if short == reason else f"{short[:-3]}…"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,19 +12,12 @@ from hand_models.base import Array, InvalidInputError
 from planner import WRENCH_COMPONENTS, BodySection, BodySpace, End, Time
 from service import replies
 from service.answering.answers import finite, placed_poses
-from service.answering.own_models import ROBOTS, Robots
+from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
 from service.requests import BodySpaceRequest, PlanRequest
 
 __all__ = ["Explored", "explore"]
-
-APPROXIMATE: Final = (
-    "floating wrists: what their hands hold is linearised where the plan puts them; at the extents "
-    "the exact model differs by up to {:.1f} N (moments over 0.1 m)"
-)
-NO_LOAD: Final = "no accelerations: a body wrench does not determine the mass; give a load instead"
-NOT_AT_REST: Final = "no accelerations: the body cannot be held at rest"
 
 
 class Explored(NamedTuple):
@@ -35,7 +28,7 @@ class Explored(NamedTuple):
     reply: BodySpaceReply
 
 
-def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
+def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explored:
     """Answer a body-space request.
 
     Parameters
@@ -73,7 +66,8 @@ def explore(request: BodySpaceRequest, robots: Robots = ROBOTS) -> Explored:
         for name, way in ways.items()
     }
     linear = _accelerations(space, _ways("xyz", np.eye(3)))
-    turning = _accelerations(space, _ways("xyz", np.eye(6)[3:])) if space.turns else None
+    about_axes = np.eye(6)[3:]
+    turning = _accelerations(space, _ways("xyz", about_axes)) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
     ended = time.perf_counter()
     found = space.plan
@@ -152,6 +146,7 @@ def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
     end = space.acceleration(way) if space.accelerates else None
     if end is None:
         return None
+    # a way has three components, or six of which the last three turn
     return replies.Acceleration(
         direction=way[-3:].tolist(),
         acceleration=max(end.reach, 0.0),
@@ -161,6 +156,11 @@ def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
 
 def _warnings(space: BodySpace, moves: bool, error: float) -> Iterator[str]:
     if not space.exact:
-        yield APPROXIMATE.format(error)
-    if not moves:
-        yield NOT_AT_REST if space.accelerates else NO_LOAD
+        yield (
+            "floating wrists: what their hands hold is linearised where the plan puts them; at the "
+            f"extents the exact model differs by up to {error:.1f} N (moments over 0.1 m)"
+        )
+    if not moves and space.accelerates:
+        yield "no accelerations: the body cannot be held at rest"
+    elif not moves:
+        yield "no accelerations: a body wrench does not determine the mass; give a load instead"

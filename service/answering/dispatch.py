@@ -14,10 +14,10 @@ from hand_models.parameters import ParameterTable
 from planner import DeadlineError, deadline
 from service.answering.answers import Planned, plan_reply
 from service.answering.mesh_files import MeshFiles
-from service.answering.own_models import ROBOTS, Robots, over_default
+from service.answering.own_models import BUNDLED_ROBOTS, Robots, over_default
 from service.answering.questions import climb, question
 from service.answering.reply_sizes import fitted
-from service.answering.streams import STREAMS, Streams
+from service.answering.streams import LOCAL_STREAMS, Streams
 from service.replies import BriefPlanReply, PlanReply, Reply, StreamReply
 from service.requests import (
     BodySpaceRequest,
@@ -30,15 +30,10 @@ from service.requests import (
     WrenchSpaceRequest,
 )
 from service.wire import (
-    BODY_SPACE,
-    PLAN,
     REQUEST_KINDS,
-    ROUTE,
-    SET_POINTS,
-    STREAM,
-    WRENCH_SPACE,
     Answer,
     Format,
+    ServiceName,
     decode_request,
     encode_error,
     identifier,
@@ -46,7 +41,7 @@ from service.wire import (
 )
 
 __all__ = [
-    "SERVICES",
+    "SERVICES_BY_NAME",
     "handle",
     "plan",
     "planned",
@@ -56,7 +51,7 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 
-def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlanReply:
+def plan(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> PlanReply | BriefPlanReply:
     """Answer a plan request.
 
     Parameters
@@ -73,7 +68,7 @@ def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlan
     return planned(request, robots).reply
 
 
-def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
+def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
     """Answer a plan request as `plan` does, and keep the question and the plan."""
     detail = request.detail or "full"
     if detail != "full":
@@ -125,17 +120,18 @@ class _Service(NamedTuple):
     answer: Callable[[Any, Robots, Streams], Reply | Planned]
 
 
-SERVICES: Final[dict[str, _Service]] = {
-    PLAN: _Service(PlanRequest, lambda asked, robots, _: planned(asked, robots)),
-    WRENCH_SPACE: _Service(WrenchSpaceRequest, _wrench_space),
-    BODY_SPACE: _Service(BodySpaceRequest, _body_space),
-    STREAM: _Service(StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)),
-    SET_POINTS: _Service(SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)),
+SERVICES_BY_NAME: Final[dict[str, _Service]] = {
+    ServiceName.PLAN: _Service(PlanRequest, lambda asked, robots, _: planned(asked, robots)),
+    ServiceName.WRENCH_SPACE: _Service(WrenchSpaceRequest, _wrench_space),
+    ServiceName.BODY_SPACE: _Service(BodySpaceRequest, _body_space),
+    ServiceName.STREAM: _Service(
+        StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)
+    ),
+    ServiceName.SET_POINTS: _Service(
+        SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)
+    ),
 }
 """Services over zenoh, by the last part of the key."""
-
-BULK: Final = SERVICES | {ROUTE: _Service(RouteRequest, _climb)}
-"""Services of bulk work, which also has routes."""
 
 
 def handle(
@@ -143,10 +139,10 @@ def handle(
     payload: bytes,
     encoding: str = "",
     hand: ParameterTable | None = None,
-    robots: Robots = ROBOTS,
+    robots: Robots = BUNDLED_ROBOTS,
     *,
     started: float | None = None,
-    streams: Streams = STREAMS,
+    streams: Streams = LOCAL_STREAMS,
     files: MeshFiles | None = None,
     revised: Callable[[Any], Any] | None = None,
 ) -> Answer:
@@ -155,7 +151,7 @@ def handle(
     Parameters
     ----------
     key : str
-        Key that ends in the name of one of `SERVICES`, or of `BULK`.
+        Key that ends in the name of one of `SERVICES_BY_NAME`, or in ``route``.
     payload : bytes
     encoding : str, optional
         Zenoh's name of it; the answer's is of the same format.
@@ -186,7 +182,11 @@ def handle(
 
     try:
         form = Format.named(encoding)
-        service = BULK[key.rpartition("/")[2]]
+        name = key.rpartition("/")[2]
+        # only bulk work has routes
+        service = (
+            _Service(RouteRequest, _climb) if name == ServiceName.ROUTE else SERVICES_BY_NAME[name]
+        )
         kind = service.request
         request: Any = decode_request(payload, kind, form)
         if files is not None:

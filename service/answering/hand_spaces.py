@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,35 +21,17 @@ from service.answering.answers import (
     wrench_set_reply,
     wrist_reply,
 )
-from service.answering.own_models import ROBOTS, Robots
+from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.stances import stance
-from service.replies import AXES, WrenchSpaceReply
+from service.replies import WRENCH_AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest
 
 __all__ = ["wrench_space"]
 
-V = TypeVar("V")
-
-KNOWN: Final = "the hand's wrench space was known"
-REACH: Final = "it was known how far the hand's set reaches"
-"""Step that an exceeded deadline prevents, for its message."""
-
-MOST: Final = 30_000
-"""Most candidates for the vertices or the half-spaces of one set: less than a second's work, and
-some megabytes of reply."""
-
-LESS: Final = 'take fewer half_planes of its surface, or "lateral": false in its grasp'
-
-MOST_ROWS: Final = 600
-"""Most rows of a hand that is closed anew at each sampled place: 16 half-planes have 535."""
-
-SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
-"""Names of both directions along each axis, in the order of `BOTH_WAYS`."""
-
-BOTH_WAYS: Final = np.vstack([np.eye(len(AXES)), -np.eye(len(AXES))])
+View = TypeVar("View")
 
 
-def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> WrenchSpaceReply:
+def wrench_space(request: WrenchSpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchSpaceReply:
     """Answer a wrench-space request; parameters as for `plan`.
 
     Raises
@@ -58,10 +40,11 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         If the request is impossible, or would cost too much.
     """
     asked = stance(request.stance, robots)
-    deadline.check(KNOWN)
+    step = "the hand's wrench space was known"
+    deadline.check(step)
     hand = resting_hand(asked, request.limb)
     settled = hand.settled
-    deadline.check(KNOWN)
+    deadline.check(step)
     wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
     named = wrench_set_reply(hand.space)
     reply = WrenchSpaceReply(
@@ -91,7 +74,8 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     if "robust" in (request.want or ()):
         if hand.palm is not None:
             raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
-        reply.robust = _robust(robustness(asked.robot.hand, settled, BOTH_WAYS))
+        both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
+        reply.robust = _robust(robustness(asked.robot.hand, settled, both_ways))
     reply.closing = _closings(settled)
     return reply
 
@@ -153,7 +137,8 @@ def _robust(found: Robustness) -> replies.RobustCapability:
 
 
 def _by_side(reaches: Array) -> dict[str, float | None]:
-    return dict(zip(SIDES, map(finite, reaches), strict=True))
+    sides = (f"{sign}{axis}" for sign in "+-" for axis in WRENCH_AXES)
+    return dict(zip(sides, map(finite, reaches), strict=True))
 
 
 def _add_views(
@@ -167,37 +152,44 @@ def _add_views(
     space : WrenchSpace
     want : sequence of SpaceWant, optional
         Vertices and half-spaces that are not among them are left out. By default both are
-        included if `MOST` allows.
+        included if they do not cost too much.
 
     Raises
     ------
     InvalidInputError
         If something is wanted twice.
     LimitError
-        If a wanted view would take more than `MOST`.
+        If a wanted view would cost too much.
     SolverError
         If a view could not be computed.
     """
     for i, name in enumerate(want or ()):
         if name in (want or ())[:i]:
             raise InvalidInputError(f"{name} is given twice", field=f"want[{i}]")
-    if "robust" in (want or ()) and len(space.rows) > MOST_ROWS:
+    less = 'take fewer half_planes of its surface, or "lateral": false in its grasp'
+    # candidates for one view: less than a second's work, and some megabytes of reply
+    most = 30_000
+    # the hand is closed anew at each sampled place; 16 half-planes have 535 rows
+    most_rows = 600
+    if "robust" in (want or ()) and len(space.rows) > most_rows:
         raise LimitError(
-            f"robust: {len(space.rows)} rows at each place are too many (at most {MOST_ROWS}); "
-            f"{LESS}, or leave it out",
+            f"robust: {len(space.rows)} rows at each place are too many (at most {most_rows}); "
+            f"{less}, or leave it out",
             field="want",
         )
 
-    def view(name: SpaceWant, candidates: Callable[[], int], found: Callable[[], V]) -> V | None:
+    def view(
+        name: SpaceWant, candidates: Callable[[], int], found: Callable[[], View]
+    ) -> View | None:
         """Return a view if it is wanted; one that costs too much is refused, or left out."""
         if want is not None and name not in want:
             return None
         try:
-            if (size := candidates()) > MOST:
-                raise LimitError(f"{size} candidates to go through are too many (at most {MOST})")
+            if (size := candidates()) > most:
+                raise LimitError(f"{size} candidates to go through are too many (at most {most})")
             return found()
         except LimitError as error:
-            why = f"{error.message}; {LESS}"
+            why = f"{error.message}; {less}"
         if want is not None:
             raise LimitError(f"{name}: {why}, or leave it out", field="want")
         reply.warnings = [*reply.warnings, f"{name} left out: {why}"]
@@ -219,7 +211,7 @@ def _add_views(
 
 
 def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
-    deadline.check(REACH)
+    deadline.check("it was known how far the hand's set reaches")
     faces = space.half_spaces()
     return replies.HalfSpaces(
         normals=faces.normals.tolist(),
@@ -232,8 +224,8 @@ def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
 
 def _capability(space: WrenchSpace) -> dict[str, replies.AxisCapability]:
     reaches = {}
-    for axis, direction in zip(AXES, np.eye(len(AXES)), strict=True):
-        deadline.check(REACH)
+    for axis, direction in zip(WRENCH_AXES, np.eye(len(WRENCH_AXES)), strict=True):
+        deadline.check("it was known how far the hand's set reaches")
         ends = space.capability(direction)
         low, high = (None, None) if ends is None else (-float(ends[0]), float(ends[1]))
         for sign, pure, way in (("+", high, direction), ("-", low, -direction)):

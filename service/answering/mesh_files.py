@@ -6,7 +6,7 @@ import os
 from collections.abc import Hashable
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import TypeVar
 
 import msgspec
 
@@ -16,12 +16,9 @@ from service.requests import Hand, Hold, Mesh, PlanRequest, Request, RouteReques
 
 __all__ = ["MeshFiles"]
 
-H = TypeVar("H", bound=Hand)
-K = TypeVar("K", bound=Hold)
-R = TypeVar("R", bound=Request)
-
-KEPT: Final = 8
-"""Number of files whose triangles are cached, those used last."""
+HandT = TypeVar("HandT", bound=Hand)
+HoldT = TypeVar("HoldT", bound=Hold)
+RequestT = TypeVar("RequestT", bound=Request)
 
 
 class MeshFiles:
@@ -35,9 +32,9 @@ class MeshFiles:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._read: BoundedStore[Hashable, Mesh] = BoundedStore("mesh files", KEPT)
+        self._read: BoundedStore[Hashable, Mesh] = BoundedStore("mesh files", 8)
 
-    def whole(self, request: R) -> R:
+    def whole(self, request: RequestT) -> RequestT:
         """Return a request with vertices and faces in place of the files that it names.
 
         Raises
@@ -71,7 +68,7 @@ class MeshFiles:
         """
         replace = msgspec.structs.replace
 
-        def renamed(hold: K, before: Hold) -> K:
+        def renamed(hold: HoldT, before: Hold) -> HoldT:
             if not isinstance(hold, Mesh) or not isinstance(before, Mesh) or before.file is None:
                 return hold
             file = before.file
@@ -87,13 +84,13 @@ class MeshFiles:
         ]
         return replace(request, stance=replace(stance, rocks=rocks, hands=hands))
 
-    def _hands(self, hands: list[H], path: str) -> list[H]:
+    def _hands(self, hands: list[HandT], path: str) -> list[HandT]:
         return [
             msgspec.structs.replace(hand, hold=self._filled(hand.hold, f"{path}[{i}].hold"))
             for i, hand in enumerate(hands)
         ]
 
-    def _filled(self, hold: K, path: str) -> K:
+    def _filled(self, hold: HoldT, path: str) -> HoldT:
         if not isinstance(hold, Mesh) or hold.file is None:
             return hold
         with within(path):

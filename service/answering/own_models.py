@@ -32,7 +32,7 @@ from service.requests import (
 from service.wire import DEFAULT_ROBOT
 
 __all__ = [
-    "ROBOTS",
+    "BUNDLED_ROBOTS",
     "Builder",
     "Robots",
     "builder_of",
@@ -45,8 +45,9 @@ __all__ = [
     "with_robot",
 ]
 
-R = TypeVar(
-    "R", bound=PlanRequest | WrenchSpaceRequest | BodySpaceRequest | StreamRequest | RouteRequest
+RequestT = TypeVar(
+    "RequestT",
+    bound=PlanRequest | WrenchSpaceRequest | BodySpaceRequest | StreamRequest | RouteRequest,
 )
 
 Builder = Callable[[ParameterTable | None], Robot]
@@ -55,7 +56,7 @@ Builder = Callable[[ParameterTable | None], Robot]
 Robots = Mapping[str, Builder]
 """Robots of stances, by name; the first is the default."""
 
-ROBOTS: Final[Robots] = {DEFAULT_ROBOT: robosimian}
+BUNDLED_ROBOTS: Final[Robots] = {DEFAULT_ROBOT: robosimian}
 """Bundled robots."""
 
 
@@ -96,14 +97,14 @@ def read_draws(path: Path) -> list[Draw]:
     return found
 
 
-def with_hand(request: R, own: ParameterTable | None) -> R:
+def with_hand(request: RequestT, own: ParameterTable | None) -> RequestT:
     """Return a request for a hand with these entries, over those that it names itself."""
     if own is None:
         return request
     return _asking_for(request, request.stance.hand or {}, _entries(own))
 
 
-def over_default(request: R, default: ParameterTable | None) -> R:
+def over_default(request: RequestT, default: ParameterTable | None) -> RequestT:
     """Return a request whose missing entries of the hand are the service's defaults."""
     if default is None:
         return request
@@ -116,7 +117,7 @@ def _entries(own: ParameterTable) -> dict[str, dict[str, Any]]:
     return entries
 
 
-def _asking_for(request: R, low: Mapping[str, Any], high: Mapping[str, Any]) -> R:
+def _asking_for(request: RequestT, low: Mapping[str, Any], high: Mapping[str, Any]) -> RequestT:
     """Return a request with the entries of two hands; the second's replace the first's."""
     hand = {**low, **high}
     for section in low.keys() & high.keys():
@@ -142,7 +143,7 @@ def read_robot(path: Path) -> RobotFile:
 
 def robots_of(file: RobotFile | None) -> Robots:
     """Return the robots that are planned for: that of a file alone, or those that are bundled."""
-    return ROBOTS if file is None else {file.name: partial(robot_of, file)}
+    return BUNDLED_ROBOTS if file is None else {file.name: partial(robot_of, file)}
 
 
 def builder_of(name: str | None, robots: Robots) -> Builder:
@@ -161,7 +162,7 @@ def builder_of(name: str | None, robots: Robots) -> Builder:
     return robots[chosen]
 
 
-def with_robot(request: R, file: RobotFile | None) -> R:
+def with_robot(request: RequestT, file: RobotFile | None) -> RequestT:
     """Return a request for the robot of a file.
 
     Raises

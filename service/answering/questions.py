@@ -11,7 +11,7 @@ from hand_models.base import InvalidInputError, within
 from hand_models.parameters import Draw, own_draw
 from planner import Load, Question
 from service import requests
-from service.answering.own_models import ROBOTS, Robots
+from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.stances import (
     array_of,
     hands_on_rocks,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["climb", "question", "route"]
 
 
-def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
+def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Question:
     """Return the planner's question of a plan request.
 
     Parameters
@@ -59,7 +59,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
     )
 
 
-def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
+def route(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Route:
     """Return the climb of a route file; parameters as for `question`.
 
     Raises
@@ -96,7 +96,7 @@ def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
     return tuple(found) or None
 
 
-def climb(request: requests.RouteRequest, robots: Robots = ROBOTS) -> RouteReply:
+def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> RouteReply:
     """Answer a route, in this process alone.
 
     Parameters

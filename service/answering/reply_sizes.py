@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any
 
 from msgspec import NODEFAULT, UNSET
 from msgspec.structs import fields, replace
@@ -16,15 +16,6 @@ from service.requests import Detail, PlanRequest, Query, Request, SetPointsReque
 from service.wire import Format
 
 __all__ = ["fitted"]
-
-DETAILS: Final[tuple[Detail, ...]] = ("full", "hands", "set_points")
-"""Details of a reply, from the most to the least."""
-
-WANTED: Final = ("spread", "advice", "robust", "clearance", "prices", "vertices", "half_spaces")
-"""Fields of replies that are included for a ``want`` of the same name."""
-
-ALONG: Final = "along"
-"""Field that is included for a request's ``directions``."""
 
 
 def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Reply, bytes]:
@@ -51,7 +42,7 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
         return reply, payload
     sizes = {}
     given = request.detail if isinstance(request, PlanRequest | SetPointsRequest) else None
-    for detail, smaller in _with_less_detail(found, given or DETAILS[0]):
+    for detail, smaller in _with_less_detail(found, given or "full"):
         part = form.encode(smaller)
         if given is None and len(part) <= most:
             return smaller, part
@@ -68,10 +59,11 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
 def _with_less_detail(found: Reply | Planned, given: Detail) -> Iterator[tuple[Detail, Reply]]:
     """Yield the replies of less detail, from the most to the least."""
     if isinstance(found, Planned):
-        for detail in DETAILS[DETAILS.index(given) + 1 :]:
+        details: tuple[Detail, ...] = ("full", "hands", "set_points")
+        for detail in details[details.index(given) + 1 :]:
             yield detail, found.in_detail(detail).reply
-    elif isinstance(found, SetPointsReply) and given != DETAILS[-1]:
-        yield DETAILS[-1], brief_set_points(found)
+    elif isinstance(found, SetPointsReply) and given != "set_points":
+        yield "set_points", brief_set_points(found)
 
 
 def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
@@ -79,16 +71,17 @@ def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
 
     ``bare``: the reply without the model, or the same reply if it has no model.
     """
+    wanted = {"spread", "advice", "robust", "clearance", "prices", "vertices", "half_spaces"}
     blank: dict[str, Any] = {
         field.name: None if field.default is NODEFAULT else field.default
         for field in fields(reply)
-        if field.name in (*WANTED, ALONG)
+        if field.name in wanted or field.name == "along"
     }
     there = [name for name in blank if getattr(reply, name) not in (None, UNSET, [])]
     if bare is not reply:
         yield "without model in want", bare
     for name in there:
-        words = "without directions" if name == ALONG else f"without {name} in want"
+        words = "without directions" if name == "along" else f"without {name} in want"
         yield words, replace(reply, **{name: blank[name]})
     if len(there) + (bare is not reply) > 1:
         yield "without all of these", replace(bare, **{name: blank[name] for name in there})

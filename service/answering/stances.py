@@ -20,36 +20,18 @@ from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
 from planner import EARTH, HandOnHold, Stance, settle_each
 from service import requests
-from service.answering.own_models import ROBOTS, Robots, builder_of
+from service.answering.own_models import BUNDLED_ROBOTS, Robots, builder_of
 
 __all__ = ["Rocks", "array_of", "hands_on_rocks", "joints_of", "poses_of", "stance", "with_rocks"]
 
-VERTICAL: Final = (0.0, 0.0, 1.0)
-"""Direction up, in W."""
-
-MOST_HALF_PLANES: Final = 256
-"""Most half-planes of all hands of a stance: four with 64 have some 7500 rows in a program."""
-
-FLOATING: Final = 4
-"""Factor of a floating hand's half-planes: its plan is found in several rounds."""
-
-MOST_POINTS: Final = 40_000
-"""Most points of the outlines of all hands of a stance, some 0.1 ms each."""
-
-MOST_TURNED: Final = 4.0 * math.pi
-"""Largest valid angle of a wrist [rad]: beyond two turns, it is likely to be in degrees."""
-
-KEPT: Final = 8
-"""Number of cached meshes, those used last; hands settled on a mesh are cached with it."""
-
-MESHES: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests", KEPT)
-"""Cache of meshes, by everything that they are built of."""
+MESHES_OF_REQUESTS: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests", 8)
+"""Cache of meshes, by everything that they are built of, with the hands settled on each."""
 
 Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
 """Rocks of a stance by name, each with its frame in W if that is given."""
 
 
-def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
+def stance(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> Stance:
     """Return the stance of a request.
 
     Parameters
@@ -66,7 +48,7 @@ def stance(message: requests.Stance, robots: Robots = ROBOTS) -> Stance:
     return with_rocks(message, robots)[0]
 
 
-def with_rocks(message: requests.Stance, robots: Robots = ROBOTS) -> tuple[Stance, Rocks]:
+def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tuple[Stance, Rocks]:
     """Return the stance of a request, and its rocks by name; otherwise as `stance`."""
     with within("stance"):
         _check_costs(message)
@@ -228,15 +210,17 @@ def array_of(values: Sequence[float] | None) -> Array | None:
 def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
     """Return the pose on a rock at which a hand is seated, in the rock's frame."""
     up = place.up
-    if abs(place.wrist_angle) > MOST_TURNED:
+    # [rad] beyond two turns, an angle is likely to be in degrees
+    largest = 4.0 * math.pi
+    if abs(place.wrist_angle) > largest:
         raise InvalidInputError(
-            f"must be within ±{MOST_TURNED:.4g} rad, two turns, got {place.wrist_angle:g}: is it "
+            f"must be within ±{largest:.4g} rad, two turns, got {place.wrist_angle:g}: is it "
             "in rad?",
             field="place.wrist_angle",
         )
     if place.frame == "world":
         from_world = rock_pose.inverse()
-        axes, point, up = from_world.rotation, from_world.apply(place.point), up or VERTICAL
+        axes, point, up = from_world.rotation, from_world.apply(place.point), up or (0.0, 0.0, 1.0)
     else:
         axes, point, up = np.eye(3), np.array(place.point), up or UP
     with within("place"):
@@ -330,7 +314,7 @@ def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Me
         raise InvalidInputError("missing", field=missing)
     vertices, faces = message.vertices, message.faces
     key = blake2b(msgspec.msgpack.encode((vertices, faces))).digest(), numbers, anywhere
-    return MESHES.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))
+    return MESHES_OF_REQUESTS.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))
 
 
 # Costs --------------------------------------------------------------------------------------------
@@ -344,17 +328,25 @@ def _check_costs(stance: requests.Stance) -> None:
     LimitError
         The field is relative to the stance.
     """
-    planes = sum(map(_half_planes, stance.hands))
-    if planes > MOST_HALF_PLANES:
+    # a floating hand's plan is found in several rounds
+    rounds = 4
+    # four hands with 64 half-planes have some 7500 rows in a program
+    most_planes = 256
+    planes = sum(
+        (rounds if hand.wrist == "floating" else 1) * _half_planes(hand) for hand in stance.hands
+    )
+    if planes > most_planes:
         raise LimitError(
             f"half_planes of all hands are {planes} together, those of a floating hand counted "
-            f"{FLOATING} times; at most {MOST_HALF_PLANES} are worked with",
+            f"{rounds} times; at most {most_planes} are worked with",
             field="hands",
         )
     points = sum(_points(hand.hold, stance.rocks) for hand in stance.hands)
-    if points > MOST_POINTS:
+    # some 0.1 ms for each point of an outline
+    most_points = 40_000
+    if points > most_points:
         raise LimitError(
-            f"profiles of all hands have {points} points together; at most {MOST_POINTS} are "
+            f"profiles of all hands have {points} points together; at most {most_points} are "
             "worked with",
             field="hands",
         )
@@ -362,7 +354,7 @@ def _check_costs(stance: requests.Stance) -> None:
 
 def _half_planes(hand: requests.Hand) -> int:
     given = hand.surface.half_planes if isinstance(hand.surface, requests.Surface) else None
-    return (FLOATING if hand.wrist == "floating" else 1) * (given or 1)
+    return given or 1
 
 
 def _points(hold: requests.Hold, rocks: dict[str, requests.Rock]) -> int:

@@ -13,20 +13,13 @@ from msgspec.structs import replace
 from hand_models.base import InvalidInputError, UnsupportedError
 from planner import SetPoints, WrenchStream, deadline
 from service.answering.answers import cut_reason, finite, placed_poses
-from service.answering.own_models import ROBOTS, Robots
+from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
 from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest
 from service.wire import Format
 
-__all__ = ["KEPT", "STREAMS", "Streams", "brief_set_points", "opened", "set_points_reply"]
-
-FIRST: Final = "the plans about the first body wrench were there"
-"""Step that an exceeded deadline prevents, for its message."""
-
-KEPT: Final = 16
-"""Most streams of a service; beyond it, the client with most streams loses the one that was used
-longest ago."""
+__all__ = ["LOCAL_STREAMS", "Streams", "brief_set_points", "opened", "set_points_reply"]
 
 
 class _Kept(NamedTuple):
@@ -36,7 +29,7 @@ class _Kept(NamedTuple):
     owner: str
 
 
-def opened(request: StreamRequest, robots: Robots = ROBOTS) -> WrenchStream:
+def opened(request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchStream:
     """Return the stream that a request declares, for the caller to close.
 
     Parameters
@@ -75,9 +68,15 @@ class Streams:
         Client that declares the streams.
     among : Streams, optional
         Streams to share: the client can use all of them, and owns those that it declares.
+
+    Attributes
+    ----------
+    most : int
+        Most streams; beyond it, the client with most loses the one that was used longest ago.
     """
 
     def __init__(self, owner: str = "", among: Streams | None = None) -> None:
+        self.most = 16
         self._owner = owner
         self._lock: threading.Lock = threading.Lock() if among is None else among._lock
         self._kept: OrderedDict[str, _Kept] = OrderedDict() if among is None else among._kept
@@ -86,15 +85,16 @@ class Streams:
         """Return the same streams for a client."""
         return Streams(owner, self)
 
-    def declare(self, request: StreamRequest, robots: Robots = ROBOTS) -> StreamReply:
+    def declare(self, request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> StreamReply:
         """Answer a declaration; parameters and errors as of `opened`."""
         start = time.perf_counter()
         stream, identifier = opened(request, robots), uuid.uuid4().hex
         try:
             # with fewer plans, later set-points would not be the same
-            deadline.check(FIRST)
+            step = "the plans about the first body wrench were there"
+            deadline.check(step)
             first = stream.set_points(stream.first)
-            deadline.check(FIRST)
+            deadline.check(step)
             named = zip(stream.limbs, map(list, stream.columns), strict=True)
             reply = StreamReply(
                 id=request.id,
@@ -116,7 +116,7 @@ class Streams:
             raise
         with self._lock:
             self._kept[identifier] = _Kept(stream, self._owner)
-            gone = self._taken_out() if len(self._kept) > KEPT else None
+            gone = self._taken_out() if len(self._kept) > self.most else None
         if gone is not None:
             gone.close()
         return reply
@@ -146,8 +146,8 @@ class Streams:
                 self._kept.move_to_end(request.stream)
         if kept is None:
             raise InvalidInputError(
-                f"no stream {request.stream!r}: declare one; the last {KEPT} that were used are "
-                "kept",
+                f"no stream {request.stream!r}: declare one; the last {self.most} that were used "
+                "are kept",
                 field="stream",
             )
         stream = kept.stream
@@ -236,5 +236,5 @@ def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
     )
 
 
-STREAMS: Final = Streams()
+LOCAL_STREAMS: Final = Streams()
 """Streams of this process that belong to no service."""

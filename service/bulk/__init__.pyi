@@ -12,15 +12,13 @@ from .columns import (
 )
 from .evaluation import Question as Question, answered as answered, evaluate as evaluate
 from .exports import (
-    CSV as CSV,
-    PARQUET as PARQUET,
     exporter_at as exporter_at,
     write_csv as write_csv,
 )
 from .headers import Header as Header, digest_of as digest_of, new_header as new_header
 from .lines import Asked as Asked, Lines as Lines
 from .pools import (
-    LOCAL as LOCAL,
+    LOCAL_CLUSTER as LOCAL_CLUSTER,
     check_address as check_address,
     pool_on as pool_on,
     whole_number as whole_number,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import pickle
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
@@ -19,22 +20,44 @@ import msgspec
 from hand_models.base import DISTRIBUTION, BoundedStore, CruxError, installed_version
 from hand_models.parameters import ParameterTable
 from service.requests import PlanRequest, RouteRequest
-from service.wire import PLAN, Answer, Format, MalformedError
+from service.wire import Answer, Format, MalformedError, ServiceName
 
 if TYPE_CHECKING:
     from planner import RobotFile
 
-__all__ = ["About", "Setting", "about", "answer_chunk", "grouped", "own_versions"]
-
-SETTINGS: Final = 4
-"""Settings whose models and files a process keeps."""
-
-PACKAGES: Final = (DISTRIBUTION, "numpy", "scipy", "clarabel")
-"""Packages on whose versions the last digits of answers depend."""
-
-NOTHING: Final = msgspec.Raw(b"null")
+__all__ = [
+    "BULK_SETTINGS",
+    "About",
+    "BulkSettings",
+    "Setting",
+    "about",
+    "answer_chunk",
+    "grouped",
+    "own_versions",
+]
 
 Answerer = Callable[[bytes], Answer]
+
+
+@dataclass(frozen=True, slots=True)
+class BulkSettings:
+    """Sizes and times of bulk work."""
+
+    most_questions: int = 64
+    """Most questions in a chunk: what is tried again where its process has died."""
+    most_bytes: int = 2**22
+    """Most bytes of a chunk of several questions, and of a window for each process."""
+    window: int = 2
+    """Chunks for each process that are made of questions that came together."""
+    windows_ahead: int = 3
+    """Such windows that may be ahead of the question whose answer is due."""
+    scheduler_timeout: float = 15.0
+    """Wait for a Dask scheduler, for its first worker, or for a result to come over [s]."""
+    check_interval: float = 1.0
+    """Between checks that the scheduler is still there, while no result comes [s]."""
+
+
+BULK_SETTINGS: Final = BulkSettings()
 
 
 class Setting(NamedTuple):
@@ -55,9 +78,9 @@ class Setting(NamedTuple):
     brief : bool
         Whether only what a table shows is asked for.
     versions : dict of str to str or None, or None
-        Versions of `PACKAGES` at the asking process; None where the same installation answers.
+        Versions of packages at the asking process; None where the same installation answers.
     kind : str
-        Kind of all questions: `service.wire.PLAN` or `ROUTE`.
+        Kind of all questions: `ServiceName.PLAN` or `ServiceName.ROUTE`.
     make : callable or None
         Called once in each process; returns what answers questions that are of neither kind.
     """
@@ -69,13 +92,13 @@ class Setting(NamedTuple):
     explain: bool | None = None
     brief: bool = False
     versions: dict[str, str | None] | None = None
-    kind: str = PLAN
+    kind: str = ServiceName.PLAN
     make: Callable[[], Answerer] | None = None
 
 
 def own_versions() -> dict[str, str | None]:
-    """Return the versions of `PACKAGES`."""
-    return {name: installed_version(name) for name in PACKAGES}
+    """Return the versions of the packages on which the last digits of answers depend."""
+    return {name: installed_version(name) for name in (DISTRIBUTION, "numpy", "scipy", "clarabel")}
 
 
 def answer_chunk(setting: bytes, chunk: list[bytes]) -> list[Answer]:
@@ -96,13 +119,13 @@ def answer_chunk(setting: bytes, chunk: list[bytes]) -> list[Answer]:
     Raises
     ------
     CruxError
-        If other versions of `PACKAGES` ask than are to answer.
+        If other versions of packages ask than are to answer.
     """
     answer = _answerers.get(setting, partial(_answerer, setting))
     return [answer(payload) for payload in chunk]
 
 
-_answerers: BoundedStore[bytes, Answerer] = BoundedStore("bulk settings", SETTINGS)
+_answerers: BoundedStore[bytes, Answerer] = BoundedStore("bulk settings", 4)
 
 
 def _answerer(pickled: bytes) -> Answerer:
@@ -137,7 +160,7 @@ def _answerer(pickled: bytes) -> Answerer:
 
 def _check_versions(there: dict[str, str | None]) -> None:
     here = own_versions()
-    other = [name for name in PACKAGES if there.get(name) != here[name]]
+    other = [name for name in here if there.get(name) != here[name]]
     if other:
         listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
         raise CruxError(
@@ -178,13 +201,13 @@ class About(NamedTuple):
 
 
 class _Hand(msgspec.Struct):
-    hold: msgspec.Raw = NOTHING
+    hold: msgspec.Raw = msgspec.Raw(b"null")
 
 
 class _Stance(msgspec.Struct):
     hands: list[msgspec.Raw] = []
-    rocks: msgspec.Raw = NOTHING
-    hand: msgspec.Raw = NOTHING
+    rocks: msgspec.Raw = msgspec.Raw(b"null")
+    hand: msgspec.Raw = msgspec.Raw(b"null")
 
 
 class _Request(msgspec.Struct):

@@ -7,30 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import FINGERS
 from planner import LimitName
-from service.replies import AXES, ErrorDetail
+from service.replies import WRENCH_AXES, ErrorDetail
 
-__all__ = ["INDEX", "Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
+__all__ = ["Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
 
 Kind = Literal["int", "float", "bool", "text"]
-
-INDEX: Final = "index"
-"""The column that every table begins with."""
-
-EXPLAINED: Final = ("irreducible", "sufficient")
-"""Columns that need an explanation."""
-
-FACTOR: Final = "found, at_least; or why there is none: unbounded, none, not_asked, not_finished"
-"""Meaning of the column about what is known of a load factor."""
-
-BETWEEN: Final = "; "
-"""Separator of the parts of a text that has several."""
 
 
 class Column(NamedTuple):
@@ -53,6 +41,11 @@ class Column(NamedTuple):
     meaning: str
     path: tuple[str | int, ...] = ()
 
+    @property
+    def is_index(self) -> bool:
+        """True for the column that every table begins with."""
+        return self.name == "index"
+
 
 class Row(msgspec.Struct):
     """Row of a table for one answer: the chosen values, and always its status and error."""
@@ -71,9 +64,7 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
     yield from _asked()
     yield Column("status", "text", "", "of the plan; empty for an error")
     yield Column("utilisation", "float", "1", "the largest of any limit")
-    yield Column("load_factor", "float", "1", "where the request wants it, and it is bounded")
-    yield Column("load_factor_unbounded", "bool", "", "whether there is no end to it")
-    yield Column("load_factor_status", "text", "", FACTOR)
+    yield from _load_factor("where the request wants it, and it is bounded", "it")
     yield from _limiting()
     yield Column("verified", "bool", "", "whether the plan has passed its independent check")
     for limb in limbs:
@@ -82,15 +73,15 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
         for i, finger in enumerate(FINGERS):
             name = f"{limb}_{finger}_tension_N"
             yield Column(name, "float", "N", "tension of its tendon", (*hand, "tensions", i))
-        for i, axis in enumerate(AXES):
+        for i, axis in enumerate(WRENCH_AXES):
             unit = "N" if axis.startswith("f") else "N·m"
             name = f"{limb}_{axis}_{unit.replace('·', '')}"
             meaning = f"{axis} of the hand's wrench on the rock, in its own frame"
             yield Column(name, "float", unit, meaning, (*hand, "wrench", i))
-    yield Column("warnings", "text", "", f"with {BETWEEN!r} between them")
+    yield Column("warnings", "text", "", "with '; ' between them")
     if explained:
-        yield Column(EXPLAINED[0], "text", "", "limits that together leave no plan")
-        yield Column(EXPLAINED[1], "text", "", "those of them of which one less would do")
+        yield Column("irreducible", "text", "", "limits that together leave no plan")
+        yield Column("sufficient", "text", "", "those of them of which one less would do")
     yield from _failed()
 
 
@@ -111,17 +102,22 @@ def _route_columns() -> Iterator[Column]:
         meaning = f"the crux's {part}, {what}"
         yield Column(f"crux_{part}", "text", "", meaning, ("hardest", part))
     yield Column("utilisation", "float", "1", "of the crux: the largest of any limit")
-    yield Column("load_factor", "float", "1", "the least of all stages, where it is bounded")
-    yield Column("load_factor_unbounded", "bool", "", "whether there is no end to any of them")
-    yield Column("load_factor_status", "text", "", FACTOR)
+    yield from _load_factor("the least of all stages, where it is bounded", "any of them")
     yield from _limiting()
-    yield Column("warnings", "text", "", f"with {BETWEEN!r} between them")
+    yield Column("warnings", "text", "", "with '; ' between them")
     yield from _failed()
 
 
 def _asked() -> Iterator[Column]:
-    yield Column(INDEX, "int", "1", "of the request, from zero; blank lines do not count")
+    yield Column("index", "int", "1", "of the request, from zero; blank lines do not count")
     yield Column("id", "text", "", "the request's")
+
+
+def _load_factor(meaning: str, which: str) -> Iterator[Column]:
+    yield Column("load_factor", "float", "1", meaning)
+    yield Column("load_factor_unbounded", "bool", "", f"whether there is no end to {which}")
+    meaning = "found, at_least; or why there is none: unbounded, none, not_asked, not_finished"
+    yield Column("load_factor_status", "text", "", meaning)
 
 
 def _limiting() -> Iterator[Column]:
@@ -160,7 +156,7 @@ def chosen_columns(
     names = [name.strip() for name in wanted.split(",")]
     for name in names:
         if not any(fnmatchcase(column.name, name) for column in known):
-            hint = "; it needs --explain" if name in EXPLAINED else ""
+            hint = "; it needs --explain" if name in {"irreducible", "sufficient"} else ""
             listed = ", ".join(column.name for column in known)
             raise InvalidInputError(
                 f"no column {name!r}{hint}; valid are {listed}", field="columns"
@@ -168,7 +164,7 @@ def chosen_columns(
     return tuple(
         column
         for column in known
-        if column.name == INDEX or any(fnmatchcase(column.name, name) for name in names)
+        if column.is_index or any(fnmatchcase(column.name, name) for name in names)
     )
 
 
@@ -178,7 +174,7 @@ def row_of(payload: bytes, columns: Sequence[Column]) -> Row:
     error = reply.get("error")
     values = _readable(reply)
     return Row(
-        [_at(values, column.path or (column.name,)) for column in columns if column.name != INDEX],
+        [_at(values, column.path or (column.name,)) for column in columns if not column.is_index],
         reply.get("status"),
         None if error is None else msgspec.convert(error, ErrorDetail),
     )
@@ -187,7 +183,7 @@ def row_of(payload: bytes, columns: Sequence[Column]) -> Row:
 def _readable(reply: dict[str, Any]) -> dict[str, Any]:
     """Return a reply with its hands by limb, its hardest stage, and lists of words as texts."""
     found = reply | {"hands": {}, "stages": None}
-    found["warnings"] = BETWEEN.join(reply.get("warnings") or ()) or None
+    found["warnings"] = "; ".join(reply.get("warnings") or ()) or None
     if reply.get("status") is not None:
         found["load_factor_unbounded"] = bool(reply.get("load_factor_unbounded"))
     for hand in reply.get("hands") or ():
@@ -197,9 +193,9 @@ def _readable(reply: dict[str, Any]) -> dict[str, Any]:
     crux, stages = reply.get("crux"), reply.get("stages")
     if crux is not None and stages:
         found |= {"stages": len(stages), "hardest": stages[crux]}
-    for name in EXPLAINED:
+    for name in ("irreducible", "sufficient"):
         limits = (reply.get("certificate") or {}).get(name)
-        found[name] = None if limits is None else BETWEEN.join(map(_spoken, limits))
+        found[name] = None if limits is None else "; ".join(map(_spoken, limits))
     return found
 
 

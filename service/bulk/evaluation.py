@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting, about, grouped
-from service.bulk.pools import LARGEST, Here, Pool, pool_on
+from service.bulk.chunks import BULK_SETTINGS, Setting, about, grouped
+from service.bulk.pools import Here, Pool, pool_on
 from service.requests import PlanRequest, RouteRequest
-from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
+from service.wire import (
+    Answer,
+    Format,
+    LostError,
+    MalformedError,
+    ServiceName,
+    encode_error,
+    identifier,
+)
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -19,18 +27,6 @@ if TYPE_CHECKING:
     from planner import RobotFile
 
 __all__ = ["Question", "answered", "evaluate"]
-
-PACE: Final = 0.5
-"""Aimed duration of a chunk [s]: long against the cost of sending it, short against any wait."""
-
-WINDOW: Final = 2
-"""Chunks for each process that are made of questions that came together."""
-
-AHEAD: Final = 3
-"""Such windows that may be ahead of the question whose answer is due."""
-
-BYTES: Final = 2**22
-"""Most bytes of a chunk of several questions, and of those ahead for each process and window."""
 
 Question = bytes | PlanRequest | RouteRequest | Answer
 
@@ -46,7 +42,7 @@ def evaluate(
     form: Format = Format.JSON,
     explain: bool | None = None,
     brief: bool = False,
-    kind: str = PLAN,
+    kind: str = ServiceName.PLAN,
 ) -> Generator[Answer, None, None]:
     """Answer any number of plan requests or routes, in order, errors in their places.
 
@@ -156,18 +152,19 @@ class _Work:
         self.early: dict[int, Answer] = {}
         self.chunks: dict[int, _Chunk] = {}
         self._asked = self._put = self._bytes = 0
-        self._largest = 1 if isinstance(pool, Here) else LARGEST
+        self._largest = 1 if isinstance(pool, Here) else BULK_SETTINGS.most_questions
         self._together = 1
         """Questions in a chunk."""
 
     def take_more(self, following: int) -> None:
         """Give out chunks of new questions, while not too many are ahead of one that is due."""
         width = self._pool.width
-        count, most = self._together * width * WINDOW, width * BYTES
+        count = self._together * width * BULK_SETTINGS.window
+        most, ahead = width * BULK_SETTINGS.most_bytes, BULK_SETTINGS.windows_ahead - 1
         while (
             not self.ended
-            and self._asked - following <= (AHEAD - 1) * count
-            and self._bytes <= (AHEAD - 1) * most
+            and self._asked - following <= ahead * count
+            and self._bytes <= ahead * most
         ):
             self._give_all(self._window(count, most))
 
@@ -213,7 +210,8 @@ class _Work:
         for k in grouped(abouts):
             place, payload = window[k]
             size += len(payload)
-            if chunk.places and (len(chunk.places) == self._together or size > BYTES):
+            full = len(chunk.places) == self._together or size > BULK_SETTINGS.most_bytes
+            if chunk.places and full:
                 self._give(chunk, rock)
                 chunk, size = _Chunk([], []), len(payload)
             chunk.places.append(place)
@@ -231,7 +229,9 @@ class _Work:
     def _learn(self, answers: list[Answer]) -> None:
         """Let chunks be as large as is worth it, at most twice as large as before."""
         each = sum(answer.seconds for answer in answers) / len(answers)
-        best = int(PACE / max(each, 1e-6))
+        # [s] long against the cost of sending a chunk, short against any wait
+        duration = 0.5
+        best = int(duration / max(each, 1e-6))
         self._together = max(1, min(best, 2 * self._together, self._largest))
 
 

@@ -6,18 +6,12 @@ import csv
 from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from hand_models.base import InvalidInputError, to_install, whole_file
-from service.bulk.columns import INDEX, Column
+from service.bulk.columns import Column
 
-__all__ = ["CSV", "PARQUET", "exporter_at", "write_csv"]
-
-CSV: Final = ".csv"
-PARQUET: Final = ".parquet"
-
-ROWS: Final = 4096
-"""Rows that are in memory at a time: a row group of Parquet."""
+__all__ = ["exporter_at", "write_csv"]
 
 Exporter = Callable[[Path, Sequence[Column], Iterable[list[Any]]], None]
 """Writes rows with these columns at a path; `OSError` where that cannot be."""
@@ -31,7 +25,7 @@ def exporter_at(path: Path) -> Exporter | None:
     InvalidInputError
         If it cannot be written, or a folder is there.
     """
-    exporter = {CSV: write_csv, PARQUET: _write_parquet}.get(path.suffix.lower())
+    exporter = {".csv": write_csv, ".parquet": _write_parquet}.get(path.suffix.lower())
     if exporter is _write_parquet:
         try:
             import pyarrow.parquet  # noqa: F401
@@ -64,14 +58,15 @@ def _write_parquet(path: Path, columns: Sequence[Column], rows: Iterable[list[An
         pa.field(
             each.name,
             types[each.kind],
-            nullable=each.name != INDEX,
+            nullable=not each.is_index,
             metadata={"unit": each.unit, "meaning": each.meaning},
         )
         for each in columns
     ]
     schema, left = pa.schema(fields), iter(rows)
     with whole_file(path) as part, parquet.ParquetWriter(part, schema) as file:
-        while group := list(islice(left, ROWS)):
+        # rows that are in memory at a time: a row group of Parquet
+        while group := list(islice(left, 4096)):
             values = zip(*group, strict=True)
             arrays = [pa.array(each, f.type) for each, f in zip(values, schema, strict=True)]
             file.write_table(pa.Table.from_arrays(arrays, schema=schema))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
@@ -14,22 +14,14 @@ from hand_models.parameters import ParameterTable
 from planner import RobotFile
 from service.bulk.columns import Column
 
-__all__ = ["HEADER", "RESUME", "Header", "digest_of", "new_header"]
-
-RESUME: Final = "--resume"
-
-HEADER: Final = b'{"crux":'
-"""First bytes of the lines of a table."""
-
-DIGESTS: Final = ("hand", "robot", "stance")
-"""Names of inputs of which a header has only a digest."""
+__all__ = ["Header", "digest_of", "new_header"]
 
 
 class Header(msgspec.Struct):
     """First line of a table: the work that its rows belong to.
 
     ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``: other
-    inputs of the work, by name; of those in `DIGESTS` a `digest_of`.
+    inputs of the work, by name; of a stance a `digest_of`.
     """
 
     crux: str | None
@@ -46,16 +38,18 @@ class Header(msgspec.Struct):
             there = msgspec.json.decode(before, type=Header)
         except (msgspec.DecodeError, UnicodeDecodeError):
             raise InvalidInputError(
-                f"{path}: no table that a batch has written, or a sweep", field=RESUME
+                f"{path}: no table that a batch has written, or a sweep", field="--resume"
             ) from None
         known, wanted = there._compared(), self._compared()
         for name in dict.fromkeys([*known, *wanted]):
             values = known.get(name), wanted.get(name)
             if values[0] != values[1]:
-                which = "" if name in DIGESTS else f" ({values[0]!r}, now {values[1]!r})"
+                # of a few inputs, there is only a digest
+                digest = name in {"hand", "robot", "stance"}
+                which = "" if digest else f" ({values[0]!r}, now {values[1]!r})"
                 raise InvalidInputError(
                     f"{path}: was begun with another {name}{which}; begin anew without it",
-                    field=RESUME,
+                    field="--resume",
                 )
 
     def _compared(self) -> dict[str, Any]:

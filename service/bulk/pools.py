@@ -16,34 +16,18 @@ from urllib.parse import urlsplit
 
 from hand_models.base import CruxError, InvalidInputError, to_install
 from planner import Lost, Workers, cores, starting_children
-from service.bulk.chunks import Setting, answer_chunk, own_versions
+from service.bulk.chunks import BULK_SETTINGS, Setting, answer_chunk, own_versions
 from service.wire import Answer
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-__all__ = ["LARGEST", "LOCAL", "Here", "Pool", "check_address", "pool_on", "whole_number"]
+__all__ = ["LOCAL_CLUSTER", "Here", "Pool", "check_address", "pool_on", "whole_number"]
 
 log = logging.getLogger(__name__)
 
-LARGEST: Final = 64
-"""Most questions in a chunk: what is tried again where its process has died."""
-
-LOCAL: Final = "dask:local"
+LOCAL_CLUSTER: Final = "dask:local"
 """A cluster of this machine's own, for as long as the work lasts."""
-
-PATIENCE: Final = 15.0
-"""How long to wait for a scheduler, for its first worker, or for a result to come over [s]."""
-
-LOOK: Final = 1.0
-"""Interval of checks that the scheduler is still there, while no result comes [s]."""
-
-ALONE: Final = 5
-"""Checks in a row that find no worker, before a warning is logged."""
-
-ALLOWED: Final = 3
-"""Deaths of workers after which Dask tries a chunk no more, as it is by default
-(``distributed.scheduler.allowed-failures``)."""
 
 
 class Pool(Protocol):
@@ -159,7 +143,7 @@ def check_address(address: object) -> None:
         good = False
     if not good:
         raise InvalidInputError(
-            f"{text!r} is no place to work at; valid are processes, here, {LOCAL}, "
+            f"{text!r} is no place to work at; valid are processes, here, {LOCAL_CLUSTER}, "
             "tcp://HOST:PORT of a Dask scheduler, or its client",
             field="on",
         )
@@ -171,7 +155,7 @@ class DaskPool:
     Parameters
     ----------
     on : str or Client
-        `LOCAL`, a scheduler's address, or a client.
+        `LOCAL_CLUSTER`, a scheduler's address, or a client.
     workers : int or None
         Of a cluster of this machine's own.
     setting : bytes
@@ -191,7 +175,7 @@ class DaskPool:
                 f"needs distributed, which is not installed: {to_install('dask')}", field="dask"
             ) from None
         self._own = not isinstance(on, distributed.Client)
-        if self._own and on != LOCAL:
+        if self._own and on != LOCAL_CLUSTER:
             check_address(on)
             if workers is not None:
                 raise InvalidInputError(
@@ -206,13 +190,14 @@ class DaskPool:
     def __enter__(self) -> Self:
         try:
             self._client: Client = self._stack.enter_context(self._connected())
-            self._client.wait_for_workers(1, timeout=PATIENCE)
+            self._client.wait_for_workers(1, timeout=BULK_SETTINGS.scheduler_timeout)
         except BaseException as error:
             self._stack.close()
             if isinstance(error, OSError | TimeoutError):
                 raise CruxError(
                     f"no Dask scheduler with a worker answers at {self._on} within "
-                    f"{PATIENCE:g} s; start them with: dask scheduler, dask worker ADDRESS"
+                    f"{BULK_SETTINGS.scheduler_timeout:g} s; start them with: dask scheduler, dask "
+                    "worker ADDRESS"
                 ) from None
             raise
         self._address = self._client.scheduler.address
@@ -228,7 +213,7 @@ class DaskPool:
             if name.split(".")[0] == "distributed":
                 logging.getLogger(name).setLevel(logging.CRITICAL)
         where: Any = self._on
-        if where == LOCAL:
+        if where == LOCAL_CLUSTER:
             # a shell sends Ctrl-C to all of them, and each worker would print its traceback
             with starting_children(signal.SIGINT):
                 where = LocalCluster(
@@ -238,7 +223,7 @@ class DaskPool:
                     silence_logs=logging.CRITICAL,
                 )
             self._stack.enter_context(where)
-        return Client(where, timeout=PATIENCE, set_as_default=False)
+        return Client(where, timeout=BULK_SETTINGS.scheduler_timeout, set_as_default=False)
 
     def __exit__(self, *error: object) -> None:
         if self._client.status == "running":
@@ -276,7 +261,7 @@ class DaskPool:
             if self._client.status != "running":
                 raise self._gone()
             try:
-                number, future = self._done.get(timeout=LOOK)
+                number, future = self._done.get(timeout=BULK_SETTINGS.check_interval)
             except Empty:
                 self._warn_if_alone()
                 continue
@@ -299,7 +284,8 @@ class DaskPool:
         """Say once that there is no worker to wait for."""
         with suppress(OSError):
             self._alone = 0 if self._client.nthreads() else self._alone + 1
-        if self._alone == ALONE:
+        # a warning after so many checks in a row, as workers come and go
+        if self._alone == 5:
             log.warning(
                 "the Dask scheduler at %s has no worker left: waiting for one; start it with: dask "
                 "worker %s, or break off with Ctrl-C, and go on later with --resume",
@@ -314,13 +300,14 @@ class DaskPool:
         from distributed import KilledWorker
 
         if future.status == "finished":
-            answers: list[Answer] = future.result(timeout=PATIENCE)
+            answers: list[Answer] = future.result(timeout=BULK_SETTINGS.scheduler_timeout)
             return answers
         if future.cancelled():
             raise self._gone()
-        error = future.exception(timeout=PATIENCE)
+        error = future.exception(timeout=BULK_SETTINGS.scheduler_timeout)
         if isinstance(error, KilledWorker):
-            return Lost(f"{ALLOWED + 1} Dask workers died of it")
+            # distributed.scheduler.allowed-failures is 3 by default
+            return Lost("4 Dask workers died of it")
         if isinstance(error, MemoryError):
             return Lost("a Dask worker had no memory for it")
         if isinstance(error, CruxError):

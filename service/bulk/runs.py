@@ -14,27 +14,21 @@ from hashlib import blake2b
 from io import FileIO
 from itertools import islice
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
 from hand_models.base import InvalidInputError
 from planner import Time
-from service.bulk.columns import INDEX, Column, Row, row_of
+from service.bulk.columns import Column, Row, row_of
 from service.bulk.exports import exporter_at
-from service.bulk.headers import HEADER, RESUME, Header
+from service.bulk.headers import Header
 from service.bulk.lines import Asked
 from service.bulk.tally import Tally
 from service.replies import ErrorDetail
 from service.wire import Format, identifier
 
 __all__ = ["ReplyLines", "Run", "TableLines"]
-
-REPLY: Final = b'{"v":1,'
-"""How each line of replies begins."""
-
-OLD_MANIFESTS: Final = ("{}.manifest.json", "{}/_manifest.json")
-"""Files of versions before runs were lines."""
 
 
 class _Outcome(NamedTuple):
@@ -128,15 +122,17 @@ class Run(ABC):
                 raise InvalidInputError(
                     f"{file} has {count} replies, and there are {asked.count} requests; "
                     "is it of another batch?",
-                    field=RESUME,
+                    field="--resume",
                 )
             for number, question in enumerate(islice(asked, count), start=1 + heads):
                 outcome = self._read_line(stream.readline(), question, f"{file}, line {number}")
                 self.tally.add(*outcome)
             kept = stream.tell()
             last = stream.readline()
-        if last and not heads and not last.startswith(REPLY[: len(last)]):
-            raise InvalidInputError(f"{file}: its end is of no reply", field=RESUME)
+        # each line of replies begins so
+        reply = b'{"v":1,'
+        if last and not heads and not last.startswith(reply[: len(last)]):
+            raise InvalidInputError(f"{file}: its end is of no reply", field="--resume")
         return kept
 
 
@@ -195,16 +191,16 @@ class ReplyLines(Run):
         try:
             reply = msgspec.json.decode(line, type=_Reply)
         except (msgspec.DecodeError, UnicodeDecodeError):
-            raise InvalidInputError(f"{where}: no reply", field=RESUME) from None
+            raise InvalidInputError(f"{where}: no reply", field="--resume") from None
         name = identifier(question, Format.JSON)
         if reply.id != name:
             raise InvalidInputError(
                 f"{where}: answers {reply.id!r}, and the request is {name!r}; "
                 "is it of another batch?",
-                field=RESUME,
+                field="--resume",
             )
         if reply.status is None and reply.error is None:
-            raise InvalidInputError(f"{where}: no reply", field=RESUME)
+            raise InvalidInputError(f"{where}: no reply", field="--resume")
         return reply.outcome
 
 
@@ -239,7 +235,7 @@ class TableLines(Run):
         export = exporter_at(table)
         assert export is not None
         self._table, self._described, self._export = table, columns, export
-        self._numbered = columns[0].name == INDEX
+        self._numbered = columns[0].is_index
         file = table.with_name(f"{table.name}.jsonl")
         if file.exists():
             self._check_own(file, resume)
@@ -251,25 +247,27 @@ class TableLines(Run):
     def _check_own(file: Path, resume: bool) -> None:
         """Refuse to write over lines that are no table's."""
         with file.open("rb") as stream:
-            first = stream.read(len(HEADER))
-        if not HEADER.startswith(first):
+            first = stream.read(8)
+        # an unfinished table may have less of its header
+        if not b'{"crux":'.startswith(first):
             raise InvalidInputError(
                 f"{file}: no table that a batch has written, or a sweep",
-                field=RESUME if resume else "-o",
+                field="--resume" if resume else "-o",
             )
 
     @staticmethod
     def _refuse_other(table: Path) -> None:
         """Refuse to go on with a table that has no lines beside it."""
-        if any(Path(name.format(table)).exists() for name in OLD_MANIFESTS):
+        # versions before runs were lines had a manifest
+        if Path(f"{table}.manifest.json").exists() or (table / "_manifest.json").exists():
             raise InvalidInputError(
                 f"{table}: was begun by an older version, and cannot be gone on with; begin anew "
                 "without it",
-                field=RESUME,
+                field="--resume",
             )
         if table.exists():
             raise InvalidInputError(
-                f"{table}: no table that a batch has written, or a sweep", field=RESUME
+                f"{table}: no table that a batch has written, or a sweep", field="--resume"
             )
 
     def row(self, payload: bytes) -> Row:
@@ -309,12 +307,12 @@ class TableLines(Run):
         except (msgspec.DecodeError, UnicodeDecodeError):
             whole = False
         if not whole:
-            raise InvalidInputError(f"{where}: no row of this table", field=RESUME)
+            raise InvalidInputError(f"{where}: no row of this table", field="--resume")
         if row.asked != _digest(question):
             raise InvalidInputError(
                 f"{where}: its rows answer other requests than those given now; "
                 "is it of another batch?",
-                field=RESUME,
+                field="--resume",
             )
         return _Outcome(row.status, row.error)
 

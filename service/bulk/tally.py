@@ -5,16 +5,11 @@ from __future__ import annotations
 import statistics
 from array import array
 from collections import Counter, defaultdict
-from typing import Final
 
 from service.replies import ErrorDetail
 from service.wire import REQUEST_KINDS
 
 __all__ = ["Tally"]
-
-
-NAMED: Final = 5
-"""Most questions with bad input whose places are kept, after the first."""
 
 
 class Tally:
@@ -30,7 +25,7 @@ class Tally:
     bad, first_bad : int, (int, ErrorDetail) or None
         Errors that are their requests' fault; the index and error of the first.
     further_bad : list of int
-        Indices of those after the first, `NAMED` at most.
+        Indices of those after the first, five at most.
     """
 
     def __init__(self) -> None:
@@ -51,7 +46,7 @@ class Tally:
                 self.bad += 1
                 if self.first_bad is None:
                     self.first_bad = self.count, error
-                elif len(self.further_bad) < NAMED:
+                elif len(self.further_bad) < 5:
                     self.further_bad.append(self.count)
         elif status is not None:
             self.statuses[status] += 1

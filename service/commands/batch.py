@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final
+from typing import Any
 
 import click
 
@@ -21,9 +21,6 @@ from service import bulk, processes, tables, wire
 from service.commands import options
 
 __all__ = ["answer_rest", "batch", "complain", "exit_status", "new_run", "writing_answers"]
-
-WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables.DONE)
-"""Exit statuses, worst first: a batch has the worst of its requests'."""
 
 
 @click.command()
@@ -290,13 +287,20 @@ def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
         tables.note(f"{where(index)}: {field}{error.message}{more}")
 
 
-def exit_status(tally: bulk.Tally, statuses: Mapping[str, int] = tables.EXIT_STATUS) -> int:
+def exit_status(tally: bulk.Tally) -> int:
     """Return the worst of what the requests alone would have, by their statuses."""
-    found = [statuses.get(status, tables.FAILED) for status in tally.statuses]
+    status = tables.ExitStatus
+    found = [status.of(each) for each in tally.statuses]
     found += [
-        tables.BAD_INPUT if kind in wire.REQUEST_KINDS else tables.FAILED for kind in tally.kinds
+        status.BAD_INPUT if kind in wire.REQUEST_KINDS else status.FAILED for kind in tally.kinds
     ]
-    return min(found, key=WORST_FIRST.index, default=tables.DONE)
+    worst_first = (status.FAILED, status.BAD_INPUT, status.OVERLOADED, status.DONE)
+    return min(found, key=worst_first.index, default=status.DONE)
+
+
+def _counts(tally: bulk.Tally) -> dict[str, int]:
+    statuses = ("optimal", "overloaded", "infeasible", "failed")
+    return {status: tally.statuses[status] for status in statuses}
 
 
 def _summary(tally: bulk.Tally, elapsed: float) -> dict[str, object]:
@@ -304,7 +308,7 @@ def _summary(tally: bulk.Tally, elapsed: float) -> dict[str, object]:
     return {
         "v": 1,
         "requests": tally.count,
-        **{status: tally.statuses[status] for status in (*tables.EXIT_STATUS, "failed")},
+        **_counts(tally),
         "errors": dict(tally.kinds),
         "time": {"median": middle, "longest": longest, "elapsed": elapsed},
     }
@@ -314,8 +318,8 @@ def _print(tally: bulk.Tally, before: int, elapsed: float, file: Path | None) ->
 
     out = tables.console()
     rows: list[tuple[object, ...]] = [
-        (status, tally.statuses[status], *tally.middle_and_longest(status))
-        for status in (*tables.EXIT_STATUS, "failed")
+        (status, count, *tally.middle_and_longest(status))
+        for status, count in _counts(tally).items()
     ]
     rows += [(f"error: {kind}", count, None, None) for kind, count in sorted(tally.kinds.items())]
     columns = (

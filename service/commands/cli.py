@@ -19,16 +19,9 @@ from typing import Any, Final, NamedTuple
 import click
 
 from hand_models.base import DISTRIBUTION
+from service.tables.command_line import VERBOSITY_KEY, ExitStatus
 
-__all__ = ["COMMANDS", "crux", "run"]
-
-NAME: Final = "crux"
-
-BAD_INPUT: Final = 2
-FAILED: Final = 1
-
-VERBOSITY: Final = "crux.verbosity"
-"""Key in a context's ``meta``; `service.tables.verbosity` reads it."""
+__all__ = ["COMMANDS_BY_NAME", "crux", "run"]
 
 
 class Entry(NamedTuple):
@@ -38,7 +31,7 @@ class Entry(NamedTuple):
     words: str
 
 
-COMMANDS: Final = {
+COMMANDS_BY_NAME: Final = {
     "batch": Entry(
         "batch",
         "Answer many plan requests: one a line in, one reply, row or error out, in order.",
@@ -88,7 +81,7 @@ COMMANDS: Final = {
 
 def _verbosity(context: click.Context, option: click.Parameter, given: bool) -> None:
     if given:
-        context.meta[VERBOSITY] = 1 if option.name == "verbose" else -1
+        context.meta[VERBOSITY_KEY] = 1 if option.name == "verbose" else -1
 
 
 def _say_more_or_less(command: click.Command) -> click.Command:
@@ -116,12 +109,12 @@ class Commands(click.Group):
     """Group of the commands; each is loaded when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(COMMANDS)
+        return sorted(COMMANDS_BY_NAME)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
+        if cmd_name not in COMMANDS_BY_NAME:
             return None
-        module = import_module(f"service.commands.{COMMANDS[cmd_name].module}")
+        module = import_module(f"service.commands.{COMMANDS_BY_NAME[cmd_name].module}")
         command: click.Command = getattr(module, cmd_name.replace("-", "_"))
         if not any(option.name == "verbose" for option in command.params):
             _say_more_or_less(command)
@@ -134,18 +127,23 @@ class Commands(click.Group):
             return super().invoke(ctx)
         finally:
             # a service writes to its log only; nobody may read standard error
-            if ctx.meta.get(VERBOSITY, 0) > 0 and ctx.invoked_subcommand != "serve":
+            if ctx.meta.get(VERBOSITY_KEY, 0) > 0 and ctx.invoked_subcommand != "serve":
                 took, used = time.perf_counter() - start, time.process_time() - used
                 times = f"took {took:.2f} s, {used:.2f} s of this process's time"
-                click.echo(f"{NAME}: {times}", err=True)
+                click.echo(f"crux: {times}", err=True)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write what each command does, without loading it."""
-        limit = formatter.width - 6 - max(map(len, COMMANDS))
+        limit = formatter.width - 6 - max(map(len, COMMANDS_BY_NAME))
         with formatter.section("Commands"):
             formatter.write_dl(
                 [
-                    (name, click.Command(name, help=COMMANDS[name].words).get_short_help_str(limit))
+                    (
+                        name,
+                        click.Command(name, help=COMMANDS_BY_NAME[name].words).get_short_help_str(
+                            limit
+                        ),
+                    )
                     for name in self.list_commands(ctx)
                 ]
             )
@@ -157,29 +155,31 @@ class Commands(click.Group):
         from click.shell_completion import CompletionItem
 
         names = [name for name in self.list_commands(ctx) if name.startswith(incomplete)]
-        commands = [CompletionItem(name, help=COMMANDS[name].words) for name in names]
+        commands = [CompletionItem(name, help=COMMANDS_BY_NAME[name].words) for name in names]
         return commands + click.Command.shell_complete(self, ctx, incomplete)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, and return its exit status."""
     try:
-        status = crux.main(args=arguments, prog_name=NAME, standalone_mode=False)
+        status = crux.main(args=arguments, prog_name="crux", standalone_mode=False)
         sys.stdout.flush()
         return status if isinstance(status, int) else 0
     except click.ClickException as error:
-        return _complain(error.format_message().rstrip(".") + _hint(error), BAD_INPUT)
+        return _complain(error.format_message().rstrip(".") + _hint(error), ExitStatus.BAD_INPUT)
     except click.Abort:
-        return _complain("interrupted", FAILED)
+        return _complain("interrupted", ExitStatus.FAILED)
     except BrokenPipeError:
         # nobody reads any more
         _drop_output()
-        return FAILED
+        return ExitStatus.FAILED
     except OSError as error:
         if error.filename is not None:
-            return _complain(str(error), FAILED)
+            return _complain(str(error), ExitStatus.FAILED)
         _drop_output()
-        return _complain(f"cannot write standard output: {error.strerror or error}", FAILED)
+        return _complain(
+            f"cannot write standard output: {error.strerror or error}", ExitStatus.FAILED
+        )
     except Exception as error:
         return _complain(str(error), _status_of(error))
 
@@ -192,7 +192,7 @@ def _status_of(error: Exception) -> int:
     if not isinstance(error, CruxError):
         raise error
     bad = isinstance(error, InvalidInputError) or error.kind in REQUEST_KINDS
-    return BAD_INPUT if bad else FAILED
+    return ExitStatus.BAD_INPUT if bad else ExitStatus.FAILED
 
 
 def _drop_output() -> None:
@@ -201,7 +201,7 @@ def _drop_output() -> None:
 
 
 def _complain(message: str, status: int) -> int:
-    click.echo(f"{NAME}: {' '.join(message.split())}", err=True)
+    click.echo(f"crux: {' '.join(message.split())}", err=True)
     return status
 
 
@@ -209,7 +209,7 @@ def _hint(error: click.ClickException) -> str:
     """Return which command's help to read after a usage error; empty after any other error."""
     if not isinstance(error, click.UsageError):
         return ""
-    name = NAME if error.ctx is None else error.ctx.command_path
+    name = "crux" if error.ctx is None else error.ctx.command_path
     return f"; see {name} --help"
 
 

@@ -8,7 +8,7 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 import msgspec
@@ -29,38 +29,13 @@ if TYPE_CHECKING:
 
 __all__ = ["holds"]
 
-SHOWN: Final = 10
-"""Number of holds that are printed."""
-
-LEAST: Final = 0.1
-"""Least force that counts as holding something [N]."""
-
-REASONS: Final = 3
-"""Number of printed reasons for which hands cannot be at places."""
-
-OUTPUT: Final = ".json"
-
-MOST: Final = 100_000
-"""Most places that are tried: some four hours of one core, forty times that with seat best."""
-
-PLANS: Final = 15
-"""Plans that take as long as one trial; decides whether workers are worth it."""
-
-DEAR: Final = 40
-"""Trials that take as long as one with a search for the seat."""
-
-DEGREE: Final = 180.0 / math.pi
-
-UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
-"""Units in the file."""
-
 
 @click.command()
 @click.argument("rock", type=click.Path(path_type=Path))
 @click.option(
     "-o",
     "--output",
-    type=options.OutputFile(OUTPUT),
+    type=options.OutputFile(".json"),
     required=True,
     metavar="JSON",
     help="Where the holds go, the best first, in metres and radians.",
@@ -100,7 +75,7 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 @click.option(
     "--robust",
     type=click.IntRange(0),
-    default=SHOWN,
+    default=10,
     show_default=True,
     metavar="N",
     help="Of the best N tell also what is left where the hand is a little elsewhere.",
@@ -138,6 +113,8 @@ def holds(
     numbers = parameters.hand_table() if hand is None else parameters.own_hand(hand)
     mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
     radius = 0.5 * numbers.scalar("palm", "length")
+    # some four hours of one core, forty times that with seat best
+    most = 100_000
     with tables.progress("laying the grid") as report:
         trials = fixed_wrist.grid_of_trials(
             mesh,
@@ -145,7 +122,7 @@ def holds(
             angles,
             tuple(dict.fromkeys(rotations)),
             radius=radius,
-            most=MOST,
+            most=most,
             report=report,
         )
     if not trials:
@@ -162,7 +139,8 @@ def holds(
     scattered: dict[int, Outcome] = {}
     best: list[int] = []
     broken: processes.Interrupted | CruxError | None = None
-    on, count = parallel.place(PLANS * (DEAR if seat == "best" else 1) * len(trials))
+    # a trial takes as long as 15 plans, and with a search for the seat 40 times that
+    on, count = parallel.place(15 * (40 if seat == "best" else 1) * len(trials))
     try:
         with processes.HoldTrials(mesh, surface, numbers, seat=seat, on=on, workers=count) as tried:
             _keep(f"trying {len(trials):,} places", trials, tried.each(trials), outcomes)
@@ -184,7 +162,7 @@ def holds(
     result = {
         "v": 1,
         "rock": str(rock),
-        "units": UNITS,
+        "units": {"length": "m", "angle": "rad", "force": "N"},
         "trials": len(trials),
         "tried": len(outcomes),
         "refused": refused.total(),
@@ -230,10 +208,12 @@ def _keep(
 
 def _sorted(outcomes: Mapping[int, Outcome]) -> list[tuple[int, fixed_wrist.FoundHold]]:
     """Return indices and holds of trials that hold something, the largest pull-off first."""
+    # [N] a smaller force is nothing
+    least = 0.1
     pairs = [
         (i, each)
         for i, each in sorted(outcomes.items())
-        if not isinstance(each, InvalidInputError) and each.support.max() >= LEAST
+        if not isinstance(each, InvalidInputError) and each.support.max() >= least
     ]
     return sorted(pairs, key=lambda pair: -pair[1].support[0])
 
@@ -302,11 +282,16 @@ def _draw(
         [point for point in dict.fromkeys(t.point for t in trials) if point not in most]
     )
     points, values = np.array(list(most)).reshape(-1, 3), np.array(list(most.values()))
-    best = [each.pose for _, each in found[:SHOWN]]
+    best = [each.pose for _, each in _shown(found)]
     with tables.writing(path):
         plot_holds(
             mesh.triangles, points, values, none.reshape(-1, 3), best, path, f"holds on {name}"
         )
+
+
+def _shown(found: list[Pair]) -> list[Pair]:
+    """Return the best holds: those that are printed, and drawn."""
+    return found[:10]
 
 
 def _finite(value: float) -> str:
@@ -325,17 +310,18 @@ def _print(
     from hand_models.fixed_wrist import AT_BORDER
     from service.tables import name
 
+    degree = 180.0 / math.pi
     columns = (
         name("x, y, z mm", "0.point", lambda at: ", ".join(f"{1e3 * x:z.0f}" for x in at)),
-        tables.number("wrist °", "0.wrist_angle", ".0f", scale=DEGREE),
-        tables.number("outer °", "0.outer_rotation", ".0f", scale=DEGREE),
+        tables.number("wrist °", "0.wrist_angle", ".0f", scale=degree),
+        tables.number("outer °", "0.outer_rotation", ".0f", scale=degree),
         tables.number("pull N", "1.support.0", "z.1f"),
         tables.number("alone", "1.pure", _finite),
         tables.number("shear N", lambda row: row[1].support[1:].min(), "z.1f"),
         tables.number("9 in 10", "1.tenth.0", _finite),
         tables.number("99 in 100", "1.hundredth.0", _finite),
     )
-    tables.print_rows(found[:SHOWN], columns, out)
+    tables.print_rows(_shown(found), columns, out)
     points = len({trial.point for trial in trials})
     pulled = sum(each.support[0] > 0.0 for _, each in found)
     out.print(
@@ -350,6 +336,6 @@ def _print(
             else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
         )
     tables.print_warnings(oddities, out)
-    for reason, count in refused.most_common(REASONS):
+    for reason, count in refused.most_common(3):
         out.print(f"{count:,} refused: {reason}")
     out.print(f"{output} (in m, rad, N)", soft_wrap=True)

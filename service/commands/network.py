@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 import msgspec
@@ -21,24 +21,13 @@ if TYPE_CHECKING:
 
 __all__ = ["demo", "query", "schema", "serve"]
 
-LEVELS: Final = {-1: logging.ERROR, 0: logging.WARNING, 1: logging.INFO}
-"""Log level by verbosity; with 1 there is one line for each question."""
-
-PATIENCE: Final = 120.0
-"""Timeout of the demo for its own service, also on a busy machine [s]."""
-
-ZENOH_THREADS: Final = (
-    "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
-)
-"""Default of the environment variable ``ZENOH_RUNTIME``."""
-
-DEMO_STANCE: Final = "wall-300-joints"
-
 
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a click command zenoh's flags, and pass it their ``config``."""
 
-    @click.option("-m", "--mode", type=click.Choice(serving.MODES), help="Zenoh session mode.")
+    @click.option(
+        "-m", "--mode", type=click.Choice(serving.SESSION_MODES), help="Zenoh session mode."
+    )
     @click.option("-e", "--connect", multiple=True, metavar="ENDPOINT", help="Connect to it.")
     @click.option("-l", "--listen", multiple=True, metavar="ENDPOINT", help="Listen on it.")
     @click.option(
@@ -97,12 +86,15 @@ def serve(
     """
     stop = _StopSignal()
     # a client that does not read blocks one of these threads while zenoh waits for it
-    os.environ.setdefault("ZENOH_RUNTIME", ZENOH_THREADS)
+    threads = "(rx: (worker_threads: 4), net: (worker_threads: 4), tx: (worker_threads: 4))"
+    os.environ.setdefault("ZENOH_RUNTIME", threads)
 
     handler = serving.LogThread()
     form = logging.Formatter("crux: %(levelname)s: %(message)s")
     handler.setFormatter(serving.JsonLines() if log_format == "json" else form)
-    logging.basicConfig(handlers=[handler], level=LEVELS[tables.verbosity()])
+    # with verbosity 1 there is one line for each question
+    levels = {-1: logging.ERROR, 0: logging.WARNING, 1: logging.INFO}
+    logging.basicConfig(handlers=[handler], level=levels[tables.verbosity()])
     serving.start_zenoh_log()
     serving.closed(config)
     endpoints = serving.listening(config)
@@ -199,7 +191,7 @@ def query(
     "-o",
     "--output",
     "picture",
-    type=options.OutputFile(*options.PICTURES),
+    type=options.OutputFile(*options.PICTURE_ENDINGS),
     default="crux-demo.png",
     show_default=True,
     metavar="FILE",
@@ -212,18 +204,19 @@ def demo(picture: Path, own: options.Own, as_json: bool) -> int:
 
     A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
     """
-    request = options.with_extras(own.asked(stances.read_request(DEMO_STANCE)))
+    request = options.with_extras(own.asked(stances.read_request("wall-300-joints")))
     serving.start_zenoh_log()
     config = serving.zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with (
         serving.open_session(config) as session,
         serving.PlanService(session, own.robot, workers=1) as service,
     ):
-        client = serving.CruxClient(session, service.robot, timeout=PATIENCE)
+        # [s] its own service answers, also on a busy machine
+        client = serving.CruxClient(session, service.robot, timeout=120.0)
         try:
             reply = client.plan(request)
         except wire.ServiceError as error:
-            if error.kind != wire.UNREACHABLE:
+            if error.kind != "unreachable":
                 raise
             tables.remark(f"planned without joints: {error.message}")
             stance = msgspec.structs.replace(request.stance, joints=None)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
 __all__ = [
-    "PICTURES",
+    "PICTURE_ENDINGS",
     "FiniteRange",
     "OutputFile",
     "Own",
@@ -46,18 +46,10 @@ __all__ = [
     "workers_options",
 ]
 
-R = TypeVar("R", requests.PlanRequest, requests.RouteRequest)
+RequestT = TypeVar("RequestT", requests.PlanRequest, requests.RouteRequest)
 Command = Callable[..., Any]
 
-PICTURES: Final = (".png", ".pdf", ".svg")
-TABLES: Final = (".csv", ".parquet", ".json", ".jsonl")
-HAND_FILE: Final = ".toml"
-EXTRAS: Final[tuple[planner.Want, ...]] = ("load_factor", "prices")
-"""Extras that the command line asks for besides the plan."""
-
-LONGEST: Final = 1e6
-"""Longest wait [s]; also the longest deadline of a request."""
-
+PICTURE_ENDINGS: Final = (".png", ".pdf", ".svg")
 
 # Types of values ----------------------------------------------------------------------------------
 
@@ -85,7 +77,7 @@ class OutputFile(click.Path):
     """
 
     def __init__(self, *endings: str) -> None:
-        super().__init__(path_type=Path, dir_okay=endings == PICTURES)
+        super().__init__(path_type=Path, dir_okay=endings == PICTURE_ENDINGS)
         self._endings = endings
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
@@ -156,7 +148,7 @@ class Own(NamedTuple):
     hand: ParameterTable | None
     robot: planner.RobotFile | None
 
-    def asked(self, request: R) -> R:
+    def asked(self, request: RequestT) -> RequestT:
         """Return a request for this hand and this robot."""
         return answering.with_robot(answering.with_hand(request, self.hand), self.robot)
 
@@ -175,7 +167,7 @@ class Workers(NamedTuple):
     def place(self, plans: int) -> tuple[str, int | None]:
         """Return where work of so many plans is done, and the number of workers."""
         if self.dask is not None:
-            return (bulk.LOCAL if self.dask == "local" else self.dask), self.workers
+            return (bulk.LOCAL_CLUSTER if self.dask == "local" else self.dask), self.workers
         count = processes.worth(plans, self.workers)
         return ("here", None) if count == 1 else ("processes", count)
 
@@ -187,7 +179,7 @@ class Wanted(NamedTuple):
     draws: list[requests.Draw] | None
     unexplained: bool
 
-    def of(self, request: R) -> R:
+    def of(self, request: RequestT) -> RequestT:
         """Return a request with these options."""
         more: dict[str, Any] = {"draws": self.draws} if self.draws else {}
         if self.spread or self.draws:
@@ -204,7 +196,7 @@ def with_extras(
 
     ``whole``: true for a reply in full detail, as a person reads it.
     """
-    want = dict.fromkeys([*request.want, *EXTRAS, *further])
+    want = dict.fromkeys([*request.want, "load_factor", "prices", *further])
     more = {"detail": "full", "max_reply_bytes": None} if whole else {}
     return msgspec.structs.replace(request, want=list(want), **more)
 
@@ -217,7 +209,7 @@ def _read_hand(
         return None
     if len(paths) > 1:
         raise click.BadParameter(f"one FILE at most, got {', '.join(map(str, paths))}")
-    if paths[0].suffix != HAND_FILE and not paths[0].exists():
+    if paths[0].suffix != ".toml" and not paths[0].exists():
         raise click.BadParameter(
             f"{paths[0]}: no such file; a FILE with numbers of a hand is wanted, not a LIMB"
         )
@@ -229,11 +221,11 @@ def _limb_and_hand(
     context: click.Context, option: click.Parameter, given: tuple[str, ...]
 ) -> tuple[str, ParameterTable | None]:
     """Return the limb, which the contract calls a hand, and the numbers of a hand's file."""
-    files = tuple(Path(value) for value in given if value.endswith(HAND_FILE))
-    limbs = [value for value in given if not value.endswith(HAND_FILE)]
+    files = tuple(Path(value) for value in given if value.endswith(".toml"))
+    limbs = [value for value in given if not value.endswith(".toml")]
     if len(limbs) != 1 or len(files) > 1:
         raise click.BadParameter(
-            f"one LIMB and at most one FILE that ends in {HAND_FILE}, got {', '.join(given)}"
+            f"one LIMB and at most one FILE that ends in .toml, got {', '.join(given)}"
         )
     return limbs[0], _read_hand(context, option, files)
 
@@ -253,7 +245,8 @@ def _check_dask(_: click.Context, __: click.Parameter, address: str | None) -> s
 
 def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
     """Refuse a folder with the file ending of a table or a picture."""
-    if path.suffix.lower() in (*TABLES, *PICTURES) and not path.is_dir():
+    tables = (".csv", ".parquet", ".json", ".jsonl")
+    if path.suffix.lower() in (*tables, *PICTURE_ENDINGS) and not path.is_dir():
         raise click.BadParameter(f"{path}: names a folder, into which several files go")
     return path
 
@@ -340,12 +333,13 @@ wanted_options = asked_for(Wanted, "wanted", draws_option, explain_option)
 
 timeout_option = click.option(
     "--timeout",
-    type=FiniteRange(0.01, LONGEST),
-    help=f"[s]; by default {serving.TIMEOUT:g}, or what the deadline of the request takes.",
+    type=FiniteRange(0.01, 1e6),
+    help=f"[s]; by default {serving.SERVING_SETTINGS.client_timeout:g}, or what the deadline of "
+    "the request takes.",
 )
 wait_option = click.option(
     "--wait",
-    type=FiniteRange(0.0, LONGEST),
+    type=FiniteRange(0.0, 1e6),
     metavar="SECONDS",
     help="Wait so long for a service that is not there yet.",
 )
@@ -369,7 +363,9 @@ workers_options = asked_for(
 
 def plot_option(text: str) -> Callable[[Command], Command]:
     """Return an option that names a picture, which is passed on as ``picture``."""
-    return click.option("--plot", "picture", type=OutputFile(*PICTURES), metavar="FILE", help=text)
+    return click.option(
+        "--plot", "picture", type=OutputFile(*PICTURE_ENDINGS), metavar="FILE", help=text
+    )
 
 
 def folder_option(text: str) -> Callable[[Command], Command]:

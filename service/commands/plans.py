@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 from time import perf_counter
-from typing import Final
 
 import click
 import msgspec
@@ -16,12 +15,6 @@ from service import answering, replies, requests, tables
 from service.commands import options, stances
 
 __all__ = ["plan"]
-
-OVER: Final = ("overloaded", "infeasible")
-"""Statuses of stances that do not hold."""
-
-ADVICE_SECONDS: Final = 30.0
-"""Timeout of advice that nobody asked for, if a request has no deadline [s]."""
 
 
 @click.command()
@@ -84,9 +77,9 @@ def plan(
             tables.draw_plan(answer, picture)
     if not as_json:
         _print(answer, bare, brief)
-        if advised or (not brief and answer.reply.status in OVER):
-            # with --advice the search has no timeout of its own
-            seconds = None if advised else ADVICE_SECONDS
+        if advised or (not brief and not _holds(answer)):
+            # [s] with --advice the search has no timeout of its own
+            seconds = None if advised else 30.0
             started = None if request.deadline is None else begun
             with planner.deadline.within(request.deadline or seconds, started=started):
                 answer = _with_advice(answer, brief)
@@ -101,7 +94,7 @@ def plan(
         tables.say(msgspec.to_builtins(answer.reply) | without)
     else:
         _print_files(written, answer.reply)
-    return tables.EXIT_STATUS.get(answer.reply.status, tables.FAILED)
+    return tables.ExitStatus.of(answer.reply.status)
 
 
 def _print(answer: answering.Planned, without_palm: replies.PlanReply | None, brief: bool) -> None:
@@ -112,9 +105,14 @@ def _print(answer: answering.Planned, without_palm: replies.PlanReply | None, br
     sys.stdout.flush()
 
 
+def _holds(answer: answering.Planned) -> bool:
+    """Return whether a stance holds, as far as is known."""
+    return answer.reply.status not in {"overloaded", "infeasible"}
+
+
 def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
     """Search for advice that makes a stance hold, or hold more, and print it."""
-    better = "hold" if answer.reply.status in OVER else "be better"
+    better = "be better" if _holds(answer) else "hold"
     with tables.working(f"looking for what would {better}"):
         found = answering.with_advice(answer)
     assert isinstance(found.reply, replies.PlanReply)  # as a person is given

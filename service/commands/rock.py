@@ -20,22 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["rock"]
 
-OUTPUT: Final = ".ply"
-
-NUMBERS: Final = parameters.scan_table()
-
-STEEP: Final = 0.9
-"""Vertical component of the view above which the rock is ground or a roof."""
-
-NAMED: Final = 5
-"""Number of holes whose width is printed, and of steps whose height is."""
-
-PLACE: Final = 6
-ORIENTATION: Final = 7
-"""Decimals of a printed pose; a point at 10 m is then off by some micrometres."""
-
-BULK: Final = (1.0, 99.0)
-"""Percentiles that bound the rock if a few stray points reach farther."""
+SCAN_NUMBERS: Final = parameters.scan_table()
 
 
 def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[float, ...] | None:
@@ -57,7 +42,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     "-o",
     "--output",
     "output",
-    type=options.OutputFile(OUTPUT),
+    type=options.OutputFile(".ply"),
     required=True,
     metavar="PLY",
     help="Where the triangles go.",
@@ -111,12 +96,12 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     "--spacing",
     type=float,
     help="Keep one point a square of that side across the view [m]; by default half the points' "
-    f"median distance, or as much more as leaves {NUMBERS.scalar('mesh', 'vertices'):,.0f}.",
+    f"median distance, or as much more as leaves {SCAN_NUMBERS.scalar('mesh', 'vertices'):,.0f}.",
 )
 @click.option(
     "--hole",
     type=float,
-    default=NUMBERS.scalar("mesh", "hole"),
+    default=SCAN_NUMBERS.scalar("mesh", "hole"),
     show_default=True,
     help="The widest hole, and the highest step, that is bridged [m].",
 )
@@ -130,7 +115,8 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
 @click.option(
     "--neighbours",
     type=int,
-    help=f"Whose mean distance that is; by default {NUMBERS.scalar('outliers', 'neighbours'):g}.",
+    help="Whose mean distance that is; by default "
+    f"{SCAN_NUMBERS.scalar('outliers', 'neighbours'):g}.",
 )
 @options.plot_option("Draw the rock there, as the scanner saw it.")
 @options.json_option
@@ -174,7 +160,9 @@ def rock(
         tables.say(_summary(made) | assumptions | {"warnings": warnings, "file": str(output)})
         return
     closed = scan.faces is not None and scan.shown() is None
-    if assumed and not closed and abs(float(made.pose.rotation[2, 2])) >= STEEP:
+    # the vertical component of the view
+    steep = abs(float(made.pose.rotation[2, 2])) >= 0.9
+    if assumed and not closed and steep:
         warnings.insert(
             0,
             f"with {reading['up']} up this is ground, or a roof; of a wall that was seen along "
@@ -228,8 +216,8 @@ def _warnings(
             "the triangles showed their backs to that view, and were turned over: is it meant?"
         )
     open_ = len(made.holes) + len(made.steps)
-    pieces = made.covered < NUMBERS.scalar("mesh", "least_covered")
-    if pieces or open_ > NUMBERS.scalar("mesh", "many_holes"):
+    pieces = made.covered < SCAN_NUMBERS.scalar("mesh", "least_covered")
+    if pieces or open_ > SCAN_NUMBERS.scalar("mesh", "many_holes"):
         found.append(
             f"{open_} holes and steps, and gaps over {100.0 * (1.0 - made.covered):.0f} % of the "
             f"outline, leave hands little to hold{_advice(scan, made, hole, spacing)}"
@@ -239,7 +227,7 @@ def _warnings(
         "out cells that have no height"
         for each in made.filled
     ]
-    if not made.filled and made.extent.max() > NUMBERS.scalar("scan", "largest"):
+    if not made.filled and made.extent.max() > SCAN_NUMBERS.scalar("scan", "largest"):
         found.append(_why_large(made))
     if small := scans.too_small(float(made.extent.max()), reading["unit"]):
         found.append(small)
@@ -250,7 +238,7 @@ def _far_away(pose: Pose) -> Iterator[str]:
     """Yield advice about a pose that no request may have, as in map coordinates."""
     import numpy as np
 
-    farthest = NUMBERS.scalar("scan", "farthest")
+    farthest = SCAN_NUMBERS.scalar("scan", "farthest")
     place = pose.position
     if np.abs(place).max() <= farthest:
         return
@@ -269,7 +257,7 @@ def _advice(scan: scans.Scan, made: scans.ScannedRock, hole: float, spacing: flo
         return ": fill them where the triangles were made"
     found = scans.remedy(scan, made, hole, spacing=spacing)
     if found is None:
-        widest = NUMBERS.scalar("mesh", "widest_bridge")
+        widest = SCAN_NUMBERS.scalar("mesh", "widest_bridge")
         return (
             f"; neither dropping stray points nor a --hole up to {widest:g}, nor both, helps: "
             "rock is to be scanned more closely, or from another side"
@@ -284,11 +272,13 @@ def _why_large(made: scans.ScannedRock) -> str:
     """Return in words why the rock may be larger than a hold may be."""
     import numpy as np
 
-    size, largest = float(made.extent.max()), NUMBERS.scalar("scan", "largest")
-    bulk = float(np.ptp(np.percentile(made.vertices, BULK, axis=0), axis=0).max())
+    # a few stray points may reach farther
+    low, high = 1.0, 99.0
+    size, largest = float(made.extent.max()), SCAN_NUMBERS.scalar("scan", "largest")
+    bulk = float(np.ptp(np.percentile(made.vertices, (low, high), axis=0), axis=0).max())
     if bulk <= largest:
         return (
-            f"{size:.4g} m across, and a hold may be {largest:g} m; {BULK[1] - BULK[0]:g} in a "
+            f"{size:.4g} m across, and a hold may be {largest:g} m; {high - low:g} in a "
             f"hundred points are within {bulk:.3g} m: drop the stray ones (--std-ratio)"
         )
     return scans.too_large(size)
@@ -322,7 +312,7 @@ def _print_rock(
         ("steps", *_sizes("higher", [each.height for each in made.steps], hole)),
     ]
     if not made.outliers:
-        del rows[2]
+        rows = [row for row in rows if row[0] != "outliers"]
     if tables.verbosity() >= 0:
         tables.print_rows(rows, tables.in_order([""], [""], [""]), out, heads=False)
     out.print(f"pose {_pose(made.pose)}", soft_wrap=True)
@@ -332,15 +322,17 @@ def _print_rock(
 
 def _sizes(what: str, sizes: list[float], hole: float) -> tuple[str, str]:
     """Return how many holes or steps there are, and how large the first of them."""
-    named = ", ".join(f"{1e3 * size:.0f}" for size in sizes[:NAMED])
-    more = ", …" if len(sizes) > NAMED else ""
+    most = 5
+    named = ", ".join(f"{1e3 * size:.0f}" for size in sizes[:most])
+    more = ", …" if len(sizes) > most else ""
     return str(len(sizes)), f"{what} than {1e3 * hole:g} mm" + (
         f": {named}{more} mm" if named else ""
     )
 
 
 def _pose(pose: Pose) -> str:
-    place, turn = _numbers(pose.position, PLACE), _numbers(pose.quaternion(), ORIENTATION)
+    # so many decimals that a point at 10 m is off by some micrometres
+    place, turn = _numbers(pose.position, 6), _numbers(pose.quaternion(), 7)
     return f'{{"position": [{place}], "orientation": [{turn}]}}'
 
 

@@ -22,21 +22,7 @@ from service.commands.batch import answer_rest, complain, exit_status, new_run
 
 __all__ = ["route"]
 
-LINES, CSV, PARQUET = ENDINGS = (".jsonl", ".csv", ".parquet")
-LISTED: Final = " or ".join(ENDINGS)
-
-STATUSES: Final = tables.EXIT_STATUS | {"unreachable": tables.OVERLOADED}
-
-PLANS: Final = 50
-"""Plans that take as long as one route; decides whether workers are worth it."""
-
-LONGEST: Final = 256
-"""Most characters of an ``id``."""
-
-CRUX: Final = ("crux_phase", "crux_limb")
-
-SHOWN: Final = 100
-"""Number of routes that a person is shown."""
+LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 
 
 @click.command()
@@ -48,7 +34,7 @@ SHOWN: Final = 100
     required=True,
     metavar="DIR",
     help="Where the table, the picture and the summary of one route go; or of any number of routes "
-    f"a file that ends in {LISTED}: the replies, one a line, or a table.",
+    f"a file that ends in {LISTED_ENDINGS}: the replies, one a line, or a table.",
 )
 @click.option(
     "--resume",
@@ -77,18 +63,18 @@ def route(
 
     Exit status of many: the worst of theirs, as of crux batch.
     """
-    if output.suffix.lower() in ENDINGS:
+    if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
                 raise InvalidInputError("is for one route: needs -o DIR", field=option)
         return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
     if len(routes) > 1 or Path(routes[0]).is_dir():
         raise InvalidInputError(
-            f"{output}: many routes need a file that ends in {LISTED}", field="-o"
+            f"{output}: many routes need a file that ends in {LISTED_ENDINGS}", field="-o"
         )
     for option, given in (("--resume", resume), ("--dask", parallel.dask is not None)):
         if given:
-            raise InvalidInputError(f"needs -o FILE that ends in {LISTED}", field=option)
+            raise InvalidInputError(f"needs -o FILE that ends in {LISTED_ENDINGS}", field=option)
     if output.exists() and not output.is_dir():
         raise InvalidInputError(f"{output}: is no folder", field="-o")
     request = wanted.of(own.asked(stances.read_route(routes[0])))
@@ -117,7 +103,7 @@ def _one(
         )
     else:
         tables.print_route(result, files, tables.console())
-    return STATUSES.get(result.status, tables.FAILED)
+    return tables.ExitStatus.of(result.status)
 
 
 class _Routes:
@@ -154,7 +140,8 @@ class _Routes:
     def questions(self) -> Iterator[bytes | wire.Answer]:
         """Yield routes, or the errors of their files."""
         for name in self.names:
-            known = name[-LONGEST:]
+            # an id has 256 characters at most
+            known = name[-256:]
             try:
                 request = self._own.asked(stances.read_route(name))
                 request = msgspec.structs.replace(request, id=request.id or known)
@@ -189,20 +176,21 @@ def _many(
         raise InvalidInputError(f"{file}: is one of the routes", field="-o")
     tables.write_alone(file)
     begun = perf_counter()
-    if file.suffix.lower() == LINES and file.exists() and not file.is_file():
+    if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
         raise InvalidInputError(f"{file}: is no file", field="-o")
     sink = new_run(
         file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )
     before = sink.tally.count
-    on, workers = parallel.place(PLANS * (routes.count - before))
+    # a route takes as long as 50 plans
+    on, workers = parallel.place(50 * (routes.count - before))
     answers = partial(
         bulk.evaluate,
         on=on,
         workers=workers,
         robot=own.robot,
         explain=False if wanted.unexplained else None,
-        kind=wire.ROUTE,
+        kind=wire.ServiceName.ROUTE,
     )
     answer_rest(routes, answers, sink, file, "planning routes", "routes")
     elapsed = perf_counter() - begun
@@ -212,7 +200,7 @@ def _many(
         tables.say({"v": 1, "routes": routes.count, **counts, "file": str(file)})
     else:
         _print(file, routes, before, elapsed)
-    return exit_status(sink.tally, STATUSES)
+    return exit_status(sink.tally)
 
 
 def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
@@ -220,19 +208,21 @@ def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
     from service.tables import name
 
     out = tables.console()
+    crux = ("crux_phase", "crux_limb")
     columns = (
         name("status", lambda row: row["status"] or f"error: {row['error_kind']}"),
-        name("crux", lambda row: " ".join(filter(None, map(row.get, CRUX))) or None),
+        name("crux", lambda row: " ".join(filter(None, map(row.get, crux))) or None),
         tables.number("move", "crux_move"),
         tables.number("util", "utilisation", lambda value: f"{float(value):.2f}"),
         tables.number("load factor", "load_factor", lambda value: f"{float(value):.2f}"),
         tables.text("route"),
     )
     if tables.verbosity() >= 0:
-        named = zip(routes.names, islice(_rows(file), SHOWN), strict=False)
+        most = 100
+        named = zip(routes.names, islice(_rows(file), most), strict=False)
         tables.print_rows([row | {"route": route} for route, row in named], columns, out)
-        if routes.count > SHOWN:
-            out.print(f"and {routes.count - SHOWN} more", markup=False)
+        if routes.count > most:
+            out.print(f"and {routes.count - most} more", markup=False)
     known = f", {before} were answered before" if before else ""
     out.print(f"{routes.count - before} routes in {elapsed:.1f} s{known}", markup=False)
     out.print(f"written: {file}", markup=False, soft_wrap=True)
@@ -240,17 +230,17 @@ def _print(file: Path, routes: _Routes, before: int, elapsed: float) -> None:
 
 def _rows(file: Path) -> Iterator[dict[str, Any]]:
     """Yield each route's row of a file of any form."""
-    if file.suffix.lower() == PARQUET:
+    if file.suffix.lower() == ".parquet":
         from pyarrow import parquet
 
         yield from parquet.read_table(file).to_pylist()
-    elif file.suffix.lower() == CSV:
+    elif file.suffix.lower() == ".csv":
         with file.open(newline="", encoding="utf-8") as stream:
             for row in csv.DictReader(stream):
                 yield {name: value or None for name, value in row.items()}
     else:
         columns = bulk.route_columns()
-        names = [column.name for column in columns[1:]]
+        names = [column.name for column in columns if not column.is_index]
         with file.open("rb") as lines:
             for line in lines:
                 yield dict(zip(names, bulk.row_of(line, columns).values, strict=True))

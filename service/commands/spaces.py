@@ -82,7 +82,7 @@ def wrench_space(
             tables.print_robust(reply.robust, tables.console())
         if found is not None:
             tables.print_survey(found, tables.console())
-    return tables.DONE if reply.capability else tables.OVERLOADED
+    return tables.ExitStatus.DONE if reply.capability else tables.ExitStatus.OVERLOADED
 
 
 def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[requests.Axis]:
@@ -149,4 +149,4 @@ def body_space(
         tables.say(found.reply)
     else:
         tables.print_body_space(found.reply, tables.console())
-    return tables.EXIT_STATUS.get(found.reply.status, tables.FAILED)
+    return tables.ExitStatus.of(found.reply.status)

@@ -10,7 +10,7 @@ from codecs import BOM_UTF8
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Final, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import msgspec
 
@@ -19,13 +19,10 @@ from service import answering, requests, wire
 
 __all__ = ["Given", "bundled", "limbs_of", "read_request", "read_route", "read_with_text"]
 
-LIMBS: Final = ("front_right", "rear_right", "rear_left", "front_left")
-"""Limbs of the bundled robot."""
-
-R = TypeVar("R", bound=requests.Request)
+RequestT = TypeVar("RequestT", bound=requests.Request)
 
 
-class Given(NamedTuple, Generic[R]):
+class Given(NamedTuple, Generic[RequestT]):
     """A request as it was written.
 
     Attributes
@@ -38,7 +35,7 @@ class Given(NamedTuple, Generic[R]):
     """
 
     text: bytes
-    request: R
+    request: RequestT
     files: answering.MeshFiles | None
 
 
@@ -85,7 +82,7 @@ def limbs_of(source: str | None) -> tuple[str, ...]:
         asked = msgspec.json.decode(path.read_bytes())
         return tuple(str(hand["limb"]) for hand in asked["stance"]["hands"])
     except (OSError, msgspec.DecodeError, LookupError, TypeError):
-        return LIMBS
+        return ("front_right", "rear_right", "rear_left", "front_left")
 
 
 def _text(path: Path) -> bytes:
@@ -98,7 +95,9 @@ def _folder(kind: type[requests.Request]) -> Traversable:
     return folder / "routes" if kind is requests.RouteRequest else folder
 
 
-def _read(source: str, kind: type[R], field: str, noun: str) -> tuple[R, Given[R]]:
+def _read(
+    source: str, kind: type[RequestT], field: str, noun: str
+) -> tuple[RequestT, Given[RequestT]]:
     if source == "-":
         return _decoded(sys.stdin.buffer.read(), kind, Path())
     path = Path(source)
@@ -117,7 +116,7 @@ def _read(source: str, kind: type[R], field: str, noun: str) -> tuple[R, Given[R
     )
 
 
-def _decoded(text: bytes, kind: type[R], folder: Path) -> tuple[R, Given[R]]:
+def _decoded(text: bytes, kind: type[RequestT], folder: Path) -> tuple[RequestT, Given[RequestT]]:
     """Return a request with its scans and its text; its files are relative to a folder."""
     files = answering.MeshFiles(folder)
     request = wire.decode_request(text, kind)

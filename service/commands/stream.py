@@ -6,7 +6,6 @@ import sys
 import textwrap
 import time
 from collections.abc import Sequence
-from typing import Final
 
 import click
 import msgspec
@@ -17,15 +16,6 @@ from service import answering, replies, requests, tables, wire
 from service.commands import options, stances
 
 __all__ = ["stream"]
-
-WORST_FIRST: Final = (tables.BAD_INPUT, tables.FAILED, tables.OVERLOADED, tables.DONE)
-"""Exit statuses, worst first: a stream has the worst of its lines'."""
-
-WIDTH: Final = 100
-"""Most characters of a line."""
-
-HANDS_A_LINE: Final = 4
-"""Hands whose tensions fit in one line."""
 
 
 @click.command()
@@ -55,7 +45,9 @@ def stream(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
             "standard input has the body wrenches; name a file or a bundled stance", field="STANCE"
         )
     request = _declared(own.asked(stances.read_request(stance)), radius)
-    worst = tables.DONE
+    status = tables.ExitStatus
+    worst_first = (status.BAD_INPUT, status.FAILED, status.OVERLOADED, status.DONE)
+    worst = status.DONE
     with answering.opened(request, own.robots) as source:
         if not as_json:
             _say_columns(source)
@@ -66,7 +58,7 @@ def stream(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
             try:
                 points = source.set_points(_body_wrench(line))
             except InvalidInputError as error:
-                worst = tables.BAD_INPUT
+                worst = status.BAD_INPUT
                 if as_json:
                     tables.say(_refused(error, number))
                 else:
@@ -77,8 +69,7 @@ def stream(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
                 tables.say(reply)
             else:
                 _say_line(reply)
-            statuses = (worst, tables.EXIT_STATUS.get(reply.status, tables.FAILED))
-            worst = min(statuses, key=WORST_FIRST.index)
+            worst = min(worst, status.of(reply.status), key=worst_first.index)
     return worst
 
 
@@ -133,8 +124,9 @@ def _say_columns(stream: planner.WrenchStream) -> None:
 
 def _say_cells(head: str, cells: Sequence[str]) -> None:
     """Write the cells of the hands after the head, in as few lines as fit."""
-    for k in range(0, len(cells), HANDS_A_LINE):
-        row = "".join(f" {cell:<15}" for cell in cells[k : k + HANDS_A_LINE])
+    # of four hands
+    for k in range(0, len(cells), 4):
+        row = "".join(f" {cell:<15}" for cell in cells[k : k + 4])
         click.echo(f"{head if k == 0 else ' ' * len(head)}{row}".rstrip())
 
 
@@ -142,7 +134,7 @@ def _say_line(reply: replies.SetPointsReply) -> None:
     """Write set-points in one line: each hand's four tensions, in whole newtons."""
     if reply.hands is None or reply.utilisation is None or reply.gap is None:
         head = f"{reply.status:<10} {'-':>6} {'-':>5} {reply.source:<12} "
-        reason = textwrap.wrap(reply.reason or "", WIDTH - len(head))
+        reason = textwrap.wrap(reply.reason or "", width=100 - len(head))
         click.echo(head + f"\n{' ' * len(head)}".join(reason))
         return
     _say_cells(

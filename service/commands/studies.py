@@ -21,15 +21,9 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
 
-__all__ = ["MEASURE", "NAMES", "SURFACES", "study"]
+__all__ = ["STUDY_NAMES", "SURFACE_NAMES", "study"]
 
-SWEEP: Final = "sweep"
-"""The one study that takes options."""
-
-MEASURE: Final = "measure"
-"""The study that asks the planner, and so is not among those of one hand."""
-
-NAMES: Final = (
+STUDY_NAMES: Final = (
     "fig06",
     "fig07",
     "fig10",
@@ -39,15 +33,13 @@ NAMES: Final = (
     "fig15",
     "fig16",
     "calibrate",
-    SWEEP,
-    MEASURE,
+    "sweep",
+    "measure",
 )
 """Names of all studies; repeated here so that completion need not load them."""
 
-SURFACES: Final = ("sandpaper-36", "concrete-fine", "concrete-coarse", "rock")
+SURFACE_NAMES: Final = ("sandpaper-36", "concrete-fine", "concrete-coarse", "rock")
 """Names of the bundled surfaces; repeated here for the same reason."""
-
-AXIS: Final = "SECTION.NAME[i]=LOW:HIGH:N"
 
 
 def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
@@ -59,13 +51,14 @@ def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
         If a study other than the sweep is given options.
     """
     given = {key: value for key, value in wanted.items() if value not in (None, ())}
-    if name not in NAMES:
-        raise InvalidInputError(f"{name!r}: valid are {', '.join(NAMES)}", field="NAME")
-    if name != SWEEP or not given:
+    if name not in STUDY_NAMES:
+        raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDY_NAMES)}", field="NAME")
+    if name != "sweep" or not given:
         if given:
             option = "--measure" if "measures" in given else f"--{min(given)}"
-            raise InvalidInputError(f"only the study {SWEEP} takes it, not {name}", field=option)
-        return _measurements() if name == MEASURE else name
+            raise InvalidInputError(f"only the study sweep takes it, not {name}", field=option)
+        # it asks the planner, and so is not among those of one hand
+        return _measurements() if name == "measure" else name
 
     from hand_models import experiments
 
@@ -88,18 +81,20 @@ def _measurements() -> studies.Study:
     return planner.MeasurementStudy(fixed)
 
 
-@click.command(epilog=f"NAME is one of {', '.join(NAMES)}.")
-@click.argument("name", shell_complete=options.beginning_so(NAMES))
+@click.command(epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
+@click.argument("name", shell_complete=options.beginning_so(STUDY_NAMES))
 @options.folder_option("Where result.json and the pictures go.")
 @click.option(
     "--x",
-    metavar=AXIS,
+    metavar="SECTION.NAME[i]=LOW:HIGH:N",
     help="Of a sweep: a number of the gripper's, [i] if it is one of a list, and N values "
     "from LOW to HIGH in SI units, such as finger.pulley_radii[1]=0.001:0.005:21; by "
     "default Fig. 16's.",
 )
 @click.option(
-    "--y", metavar=AXIS, help="Of a sweep: the other number, as --x; by default Fig. 16's."
+    "--y",
+    metavar="SECTION.NAME[i]=LOW:HIGH:N",
+    help="Of a sweep: the other number, as --x; by default Fig. 16's.",
 )
 @click.option("--diameter", type=float, help="Of a sweep: of the rock [m]; by default Fig. 16's A.")
 @click.option(
@@ -108,7 +103,7 @@ def _measurements() -> studies.Study:
 @click.option(
     "--surface",
     metavar="NAME",
-    help=f"Of a sweep: {', '.join(SURFACES)}; by default that of Fig. 16.",
+    help=f"Of a sweep: {', '.join(SURFACE_NAMES)}; by default that of Fig. 16.",
 )
 @click.option(
     "--measure",

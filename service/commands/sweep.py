@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
 
 import click
 from click.core import ParameterSource
@@ -14,9 +13,6 @@ from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
 
 __all__ = ["sweep"]
-
-TABLE: Final = "sweep.csv"
-PICTURE: Final = "sweep.png"
 
 
 @click.command()
@@ -44,7 +40,7 @@ PICTURE: Final = "sweep.png"
 @click.option(
     "--tolerance",
     type=options.FiniteRange(1e-9, 0.5),
-    default=sweeping.TOLERANCE,
+    default=sweeping.BORDER_TOLERANCE,
     show_default=True,
     help="Of where it stops holding, if one number varies: a share of the range.",
 )
@@ -100,7 +96,7 @@ def sweep(
             design.places_of(pair)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
-    table, picture = folder / TABLE, folder / PICTURE
+    table, picture = folder / "sweep.csv", folder / "sweep.png"
     tables.write_alone(table, folder)
     with writing_answers(table):
         sink = sweeping.PointRows(request, design, seed or 0, table, resume, *own)
@@ -128,8 +124,8 @@ def sweep(
 def _status(result: sweeping.Sweep) -> int:
     """Return the exit status, and print the first error if no point can be answered."""
     if not all(row.answered for row in result.rows):
-        return tables.FAILED
+        return tables.ExitStatus.FAILED
     if all(row.error is not None for row in result.rows):
         tables.note(f"no point can be answered: {result.rows[0].complaint}")
-        return tables.BAD_INPUT
-    return tables.DONE
+        return tables.ExitStatus.BAD_INPUT
+    return tables.ExitStatus.DONE

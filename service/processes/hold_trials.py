@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
@@ -23,16 +23,6 @@ if TYPE_CHECKING:
     from hand_models.rock import Mesh
 
 __all__ = ["HoldTrials"]
-
-TOGETHER: Final = 128
-"""Trials that are closed in one batch, at most: some fingers take ten times as long as most, and so
-do the batches that they are in, whatever else is in these."""
-
-FORM: Final = Format.MSGPACK
-"""Format of errors."""
-
-PICKLED: Final = "application/python-serialized-object"
-"""Zenoh's name of how trials and what comes of them travel."""
 
 
 Found = Generator[tuple[int, "FoundHold | InvalidInputError"], None, None]
@@ -90,11 +80,14 @@ class HoldTrials:
         found : FoundHold or InvalidInputError
             An error in place of a hand that cannot be there, or whose process died.
         """
-        # one that is searched for, or scattered, is many already
-        most = TOGETHER if self._seat == "rest" and not robust else 1
+        # one that is searched for, or scattered, is many already; some fingers take ten times as
+        # long as most, and so do the batches that they are in
+        most = 128 if self._seat == "rest" and not robust else 1
         batches = _batches(trials, most, self._pool.width)
         payloads = (pickle.dumps(([trials[i] for i in batch], robust)) for batch in batches)
-        for batch, answer in zip(batches, answered(payloads, self._pool, FORM), strict=True):
+        for batch, answer in zip(
+            batches, answered(payloads, self._pool, Format.MSGPACK), strict=True
+        ):
             yield from zip(batch, _outcomes(answer, len(batch)), strict=True)
 
 
@@ -112,7 +105,7 @@ def _batches(trials: Sequence[Trial], most: int, width: int) -> list[list[int]]:
 def _outcomes(answer: Answer, count: int) -> list[Any]:
     """Return what has come of so many trials; errors where they are lost."""
     if not answer.good:
-        error = FORM.decode(answer.payload, ErrorReply).error
+        error = Format.MSGPACK.decode(answer.payload, ErrorReply).error
         return [InvalidInputError(error.message)] * count
     found: list[Any] = pickle.loads(answer.payload)
     return found
@@ -132,6 +125,7 @@ def _trying(
         start = time.perf_counter()
         trials, robust = pickle.loads(payload)
         found = try_holds(hand, rock, surface_there, trials, seat=seat, robust=robust)
-        return Answer(pickle.dumps(found), PICKLED, seconds=time.perf_counter() - start)
+        encoding = "application/python-serialized-object"
+        return Answer(pickle.dumps(found), encoding, seconds=time.perf_counter() - start)
 
     return answer

@@ -13,18 +13,7 @@ from typing import Final
 
 __all__ = ["Interrupted", "interruptible", "kill_children"]
 
-SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
-
-GRACE: Final = 5.0
-"""How long a command that is interrupted may take to keep what is done, and to end [s]."""
-
-STATUS: Final = 1
-"""Exit status of a command that is interrupted."""
-
-IMPORTING: Final = "<frozen importlib._bootstrap>"
-"""File name of the frames below a module that is being imported."""
-
-SHOW_CURSOR: Final = "\x1b[?25h"
+ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interrupted(BaseException):
@@ -34,7 +23,7 @@ class Interrupted(BaseException):
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Answer signals while the work lasts; afterwards they end this process at once."""
-    for number in SIGNALS:
+    for number in ENDING_SIGNALS:
         # one that is ignored is not for this process
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _interrupt)
@@ -43,21 +32,22 @@ def interruptible() -> Iterator[None]:
         yield
     except Interrupted as error:
         _report(str(error))
-        sys.exit(STATUS)
+        sys.exit(1)
     finally:
-        for number in SIGNALS:
+        for number in ENDING_SIGNALS:
             if signal.getsignal(number) == _interrupt:
                 signal.signal(number, _end)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
     """Answer the first signal: let the command end by itself, but not for ever."""
-    for each in SIGNALS:
+    for each in ENDING_SIGNALS:
         signal.signal(each, _end)
     if _importing(frame):
         # extension modules turn what is raised into errors of their own, or print it
         _end()
-    timer = threading.Timer(GRACE, _end)
+    # [s] to keep what is done, and to end
+    timer = threading.Timer(5.0, _end)
     timer.daemon = True
     timer.start()
     raise Interrupted
@@ -65,7 +55,8 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 def _importing(frame: FrameType | None) -> bool:
     while frame is not None:
-        if frame.f_code.co_filename == IMPORTING:
+        # the file of the frames below a module that is being imported
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
             return True
         frame = frame.f_back
     return False
@@ -76,10 +67,11 @@ def _end(number: int = 0, frame: FrameType | None = None) -> None:
     try:
         kill_children()
         if os.isatty(2):
-            os.write(2, SHOW_CURSOR.encode())
+            # show the cursor
+            os.write(2, b"\x1b[?25h")
         _report("")
     finally:
-        os._exit(STATUS)
+        os._exit(1)
 
 
 def kill_children() -> None:

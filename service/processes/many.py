@@ -9,7 +9,7 @@ import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Self
 
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
@@ -23,12 +23,6 @@ if TYPE_CHECKING:
     from planner import RobotFile
 
 __all__ = ["Planners", "plan_many", "worth"]
-
-FORM: Final = Format.MSGPACK
-"""Format in which requests and replies travel."""
-
-WORTH_A_PROCESS: Final = 500
-"""Requests below this many are planned faster here than in processes that must first start."""
 
 
 class Planners:
@@ -61,7 +55,7 @@ class Planners:
         folder: Path | None = None,
     ) -> None:
         count = cores() if workers is None else whole_number(workers)
-        setting = Setting(robot, hand, folder, FORM)
+        setting = Setting(robot, hand, folder, Format.MSGPACK)
         self._pool = pool_on("here" if count == 1 else "processes", count, setting)
         self._closed = False
 
@@ -89,7 +83,7 @@ class Planners:
             raise InvalidInputError("is closed; enter another, or this one again", field="planners")
         answers = []
         try:
-            for answer in answered(requests, self._pool, FORM):
+            for answer in answered(requests, self._pool, Format.MSGPACK):
                 answers.append(answer)
                 if progress is not None:
                     progress(len(answers), len(requests))
@@ -145,7 +139,8 @@ def worth(count: int, workers: int | None = None) -> int:
     """
     if workers is not None:
         return min(whole_number(workers), max(1, count))
-    return cores() if count >= WORTH_A_PROCESS else 1
+    # fewer are planned faster here than in processes that must first start
+    return cores() if count >= 500 else 1
 
 
 @contextmanager
@@ -161,8 +156,9 @@ def _no_collection() -> Iterator[None]:
 
 
 def _decoded(answer: Answer) -> PlanReply | BriefPlanReply | ErrorReply:
+    form = Format.MSGPACK
     if not answer.good:
-        return FORM.decode(answer.payload, ErrorReply)
-    if FORM.is_labelled(answer.encoding, BriefPlanReply):
-        return FORM.decode(answer.payload, BriefPlanReply)
-    return FORM.decode(answer.payload, PlanReply)
+        return form.decode(answer.payload, ErrorReply)
+    if form.is_labelled(answer.encoding, BriefPlanReply):
+        return form.decode(answer.payload, BriefPlanReply)
+    return form.decode(answer.payload, PlanReply)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
 from importlib import import_module
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from service.wire import Answer
@@ -15,16 +15,6 @@ if TYPE_CHECKING:
     from planner import RobotFile
 
 __all__ = ["Job", "answering"]
-
-LATER: Final = (
-    "cvxpy",
-    "scipy.linalg",
-    "scipy.optimize",
-    "scipy.spatial",
-    "scipy.stats",
-    "trimesh",
-)
-"""Modules that a single plan loads only when it needs them; a service imports them at its start."""
 
 
 class Job(NamedTuple):
@@ -69,7 +59,9 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     from planner import deadline
     from service.answering import Streams, handle, robots_of
 
-    for name in LATER:
+    # a single plan loads these only when it needs them
+    scipy = ("linalg", "optimize", "spatial", "stats")
+    for name in ("cvxpy", *(f"scipy.{part}" for part in scipy), "trimesh"):
         import_module(name)
     robots = robots_of(robot)
     streams = Streams()

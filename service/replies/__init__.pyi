@@ -11,7 +11,7 @@ from .plan import (
     StreamReply as StreamReply,
 )
 from .reply import (
-    AXES as AXES,
+    WRENCH_AXES as WRENCH_AXES,
     ErrorDetail as ErrorDetail,
     ErrorReply as ErrorReply,
     Generator as Generator,

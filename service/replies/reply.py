@@ -12,7 +12,7 @@ from typing import Final, Literal
 from msgspec import UNSET, Struct, UnsetType
 
 __all__ = [
-    "AXES",
+    "WRENCH_AXES",
     "ErrorDetail",
     "ErrorReply",
     "Generator",
@@ -29,7 +29,7 @@ __all__ = [
     "Wrist",
 ]
 
-AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
+WRENCH_AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
 """Components of a wrench, and keys of a capability after their signs."""
 
 Vector = list[float]

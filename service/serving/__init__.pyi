@@ -1,7 +1,6 @@
 from .client import CruxClient as CruxClient
 from .config import (
-    MODES as MODES,
-    TIMEOUT as TIMEOUT,
+    SESSION_MODES as SESSION_MODES,
     closed as closed,
     ended_in_time as ended_in_time,
     exposed as exposed,
@@ -12,3 +11,4 @@ from .config import (
 )
 from .log_lines import JsonLines as JsonLines, LogThread as LogThread
 from .server import PlanService as PlanService
+from .settings import SERVING_SETTINGS as SERVING_SETTINGS

@@ -7,7 +7,7 @@ import secrets
 import threading
 import time
 from queue import SimpleQueue
-from typing import Final, Self, TypeVar
+from typing import Self, TypeVar
 
 import msgspec
 import zenoh
@@ -34,21 +34,16 @@ from service.requests import (
     StreamRequest,
     WrenchSpaceRequest,
 )
-from service.serving.config import TIMEOUT, open_session, patient
+from service.serving.config import open_session, patient
 from service.serving.names import digest
+from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
-    ALIVE,
-    BODY_SPACE,
-    CLIENTS,
     DEFAULT_ROBOT,
-    PLAN,
-    SET_POINTS,
-    STREAM,
-    WRENCH_SPACE,
     Format,
     MalformedError,
     NoServiceError,
     ServiceError,
+    ServiceName,
     ServiceTimeout,
     check_size,
     service_key,
@@ -56,18 +51,7 @@ from service.wire import (
 
 __all__ = ["CruxClient"]
 
-R = TypeVar("R", bound=Reply)
-
-IN_TIME: Final = 0.9
-"""Part of a client's time in which a question without a deadline is to be answered."""
-
-START_ONE: Final = "start one with `crux serve` where this session reaches it"
-
-SECRET: Final = 16
-"""Bytes of what a client's queries carry to prove whose they are."""
-
-SECOND_TRY_AFTER: Final = 0.3
-"""Pause before an empty answer is believed: a service that has just come back needs it [s]."""
+ReplyT = TypeVar("ReplyT", bound=Reply)
 
 
 class CruxClient:
@@ -119,11 +103,11 @@ class CruxClient:
             self._session = where
         # by these a service gives each client its turn, and knows who has gone
         self._asked = itertools.count()
-        self._source = self._session.declare_querier(service_key(robot, PLAN))
-        here = service_key(robot, f"{CLIENTS}/{self._session.info.zid()}")
+        self._source = self._session.declare_querier(service_key(robot, ServiceName.PLAN))
+        here = service_key(robot, f"{ServiceName.CLIENTS}/{self._session.info.zid()}")
         self._here = self._session.liveliness().declare_token(here)
         # and by this that nobody else asks in its name
-        self._secret = secrets.token_bytes(SECRET)
+        self._secret = secrets.token_bytes(16)
         proof = digest(self._secret)
 
         def prove(query: zenoh.Query) -> None:
@@ -143,7 +127,9 @@ class CruxClient:
             return open_session(config if wait is None else patient(config, wait))
         except NoServiceError as error:
             if wait is None:
-                raise NoServiceError(f"{error}; {START_ONE}, or wait for it (--wait)") from None
+                raise NoServiceError(
+                    f"{error}; {_how_to_start()}, or wait for it (--wait)"
+                ) from None
             raise self._not_come(wait, f" ({error})") from None
 
     def _await(self, wait: float, begun: float) -> None:
@@ -154,7 +140,7 @@ class CruxClient:
             if sample.kind == zenoh.SampleKind.PUT:
                 there.set()
 
-        key, taken = service_key(self.robot, ALIVE), Callback(seen, indirect=False)
+        key, taken = service_key(self.robot, ServiceName.ALIVE), Callback(seen, indirect=False)
         tokens = self._session.liveliness().declare_subscriber(key, taken, history=True)
         try:
             if not there.wait(max(wait - (time.monotonic() - begun), 0.0)):
@@ -163,7 +149,9 @@ class CruxClient:
             tokens.undeclare()
 
     def _not_come(self, wait: float, why: str = "") -> NoServiceError:
-        return NoServiceError(f"no service of {self.robot} within {wait:g} s{why}; {START_ONE}")
+        return NoServiceError(
+            f"no service of {self.robot} within {wait:g} s{why}; {_how_to_start()}"
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -197,43 +185,46 @@ class CruxClient:
         LimitError
             If the request has too many bytes.
         """
-        received = self._ask(PLAN, request)
+        received = self._ask(ServiceName.PLAN, request)
         if Format.is_labelled(str(received.encoding), BriefPlanReply):
             return _read(received, BriefPlanReply)
         return _read(received, PlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
         """Return one hand's wrench space; raises what `plan` raises."""
-        return _read(self._ask(WRENCH_SPACE, request), WrenchSpaceReply)
+        return _read(self._ask(ServiceName.WRENCH_SPACE, request), WrenchSpaceReply)
 
     def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
         """Return what a stance can hold; raises what `plan` raises."""
-        return _read(self._ask(BODY_SPACE, request), BodySpaceReply)
+        return _read(self._ask(ServiceName.BODY_SPACE, request), BodySpaceReply)
 
     def stream(self, request: StreamRequest) -> StreamReply:
         """Declare a stance for set-points; raises what `plan` raises."""
-        return _read(self._ask(STREAM, request), StreamReply)
+        return _read(self._ask(ServiceName.STREAM, request), StreamReply)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
         """Return a stream's set-points for a body wrench; raises what `plan` raises."""
-        return _read(self._ask(SET_POINTS, request), SetPointsReply)
+        return _read(self._ask(ServiceName.SET_POINTS, request), SetPointsReply)
 
     def _ask(self, name: str, request: Query) -> zenoh.Sample:
         """Return the reply that is no error; raise what `plan` raises."""
         key, waits = service_key(self.robot, name), self.timeout
+        # of the time that the client waits, for the answer
+        part = 0.9
         if waits is None:
-            waits = max(TIMEOUT, (request.deadline or 0.0) / IN_TIME)
+            waits = max(SERVING_SETTINGS.client_timeout, (request.deadline or 0.0) / part)
         if request.deadline is None:
             # nobody waits for an answer that comes later
-            own = min(IN_TIME * waits, LONGEST_DEADLINE)
+            own = min(part * waits, LONGEST_DEADLINE)
             request = msgspec.structs.replace(request, deadline=own)
         reply = self._get(key, request, waits)
         if reply is None:
-            time.sleep(SECOND_TRY_AFTER)
+            # [s] a service that has just come back needs it
+            time.sleep(0.3)
             reply = self._get(key, request, waits)
         if reply is None:
             raise NoServiceError(
-                f"no service answers at {key}; {START_ONE}, or wait for it (--wait)"
+                f"no service answers at {key}; {_how_to_start()}, or wait for it (--wait)"
             )
         if reply.ok is not None:
             return reply.ok
@@ -275,7 +266,11 @@ class CruxClient:
         return error
 
 
-def _read(received: zenoh.Sample | zenoh.ReplyError, kind: type[R]) -> R:
+def _how_to_start() -> str:
+    return "start one with `crux serve` where this session reaches it"
+
+
+def _read(received: zenoh.Sample | zenoh.ReplyError, kind: type[ReplyT]) -> ReplyT:
     try:
         return Format.named(str(received.encoding)).decode(received.payload.to_bytes(), kind)
     except (MalformedError, msgspec.ValidationError) as error:

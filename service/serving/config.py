@@ -24,8 +24,7 @@ from hand_models.base import InvalidInputError
 from service.wire import LARGEST_REQUEST, NoServiceError
 
 __all__ = [
-    "MODES",
-    "TIMEOUT",
+    "SESSION_MODES",
     "closed",
     "ended_in_time",
     "exposed",
@@ -38,71 +37,35 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
-TIMEOUT: Final = 10.0
-"""How long a client waits at least by default [s]."""
+SESSION_MODES: Final = ("peer", "client", "router")
 
-CLOSES: Final = 0.5
-"""How long a session may take to close [s]."""
 
-MODES: Final = ("peer", "client", "router")
-
-LOOPBACK: Final = "127.0.0.1"
-
-ROUTER_PORT: Final = 7447
-"""Port on which zenoh's routers listen by default."""
-
-PORTS: Final = {"tcp": socket.SOCK_STREAM, "tls": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}
-"""Protocols with ports, and how one is probed."""
-
-RETRIES: Final = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
-"""How often it is tried to connect to who is waited for."""
-
-EXAMPLE: Final = "tcp/127.0.0.1:7447"
-"""Example of an endpoint."""
-
-SHOWN: Final = 60
-"""Most characters of an input that a message repeats."""
-
-LARGEST_MESSAGE: Final = LARGEST_REQUEST + 2**20
-"""Bytes of a message that is taken in: a request, what it is sent with, and some to spare. Zenoh's
-own limit is 1 GiB, of which a session keeps every byte."""
-
-CLIENT_READS: Final = 1_000_000
-"""How long a message waits for a client that takes nothing [µs]; then a reply is given up, and for
-what cannot be given up, such as a declaration, the link is closed. In it a link of 1 Mbit/s takes a
-batch. Zenoh's own 5 s hold up what others need."""
-
-REPLY_LEAVES: Final = 5_000_000
-"""How long all further parts of a large reply wait for its client in sum [µs]. Beyond the 2 to 4 MB
-that the system takes at once, a link of 10 Mbit/s takes 6 MB in it."""
-
-QUEUES: Final = "transport/link/tx/queue/congestion_control"
-
-OWN: Final[dict[str, object]] = {
-    "transport/link/rx/max_message_size": LARGEST_MESSAGE,
-    # a reply is sent as its query came, which is the client's choice; this makes it ours
-    "qos/network": [
-        {
-            "messages": ["query"],
-            "key_exprs": ["**/crux/**"],
-            "flows": ["ingress"],
-            "overwrite": {"congestion_control": "drop"},
-        }
-    ],
-    f"{QUEUES}/drop/wait_before_drop": CLIENT_READS,
-    f"{QUEUES}/drop/max_wait_before_drop_fragments": REPLY_LEAVES,
-    f"{QUEUES}/block/wait_before_close": CLIENT_READS,
-}
-"""Settings that are not zenoh's own, where a file does not say otherwise."""
-
-DESCRIPTORS: Final = "/dev/fd"
-"""Folder with the numbers of this process's open files."""
-
-NO_LINGER: Final = struct.pack("ii", 0, 0)
-
-STANDARD_OUTPUT: Final = 1
-STANDARD_ERROR: Final = 2
-"""File descriptors."""
+def own_settings() -> dict[str, object]:
+    """Return the settings that are not zenoh's own, where a file does not say otherwise."""
+    queue = "transport/link/tx/queue/congestion_control"
+    # [µs] a message waits so long for a client that takes nothing; then a reply is given up, and
+    # for what cannot be given up, such as a declaration, the link is closed. In it a link of
+    # 1 Mbit/s takes a batch. Zenoh's own 5 s hold up what others need
+    client_reads = 1_000_000
+    return {
+        # a request, what it is sent with, and some to spare; zenoh's own limit is 1 GiB, of which a
+        # session keeps every byte
+        "transport/link/rx/max_message_size": LARGEST_REQUEST + 2**20,
+        # a reply is sent as its query came, which is the client's choice; this makes it ours
+        "qos/network": [
+            {
+                "messages": ["query"],
+                "key_exprs": ["**/crux/**"],
+                "flows": ["ingress"],
+                "overwrite": {"congestion_control": "drop"},
+            }
+        ],
+        f"{queue}/drop/wait_before_drop": client_reads,
+        # [µs] all further parts of a large reply wait so long in sum. Beyond the 2 to 4 MB that the
+        # system takes at once, a link of 10 Mbit/s takes 6 MB in it
+        f"{queue}/drop/max_wait_before_drop_fragments": 5_000_000,
+        f"{queue}/block/wait_before_close": client_reads,
+    }
 
 
 def zenoh_config(
@@ -134,7 +97,7 @@ def zenoh_config(
         If zenoh does not accept a part of it.
     """
     config, plain = _read(file), zenoh.Config()
-    for key, own in OWN.items():
+    for key, own in own_settings().items():
         if config.get_json(key) == plain.get_json(key):
             _insert(config, key, _json(own), key)
     # queries through shared memory can be dropped unseen (zenoh issue 2628)
@@ -172,7 +135,8 @@ def patient(config: zenoh.Config, seconds: float) -> zenoh.Config:
     """
     copy = zenoh.Config.from_json5(str(config))
     if msgspec.json.decode(copy.get_json("connect/retry")) is None:
-        copy.insert_json5("connect/retry", _json(RETRIES))
+        retries = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+        copy.insert_json5("connect/retry", _json(retries))
     if msgspec.json.decode(copy.get_json("mode")) == "client":
         # others go on looking while they are open
         for key in ("connect/timeout_ms", "scouting/timeout"):
@@ -215,7 +179,8 @@ def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
             closed.set()
 
         threading.Thread(target=close, name="crux-close", daemon=True).start()
-        if not closed.wait(CLOSES) and done:
+        # [s] a session may take so long to close
+        if not closed.wait(timeout=0.5) and done:
             logging.shutdown()
             sys.stdout.flush()
             os._exit(0)
@@ -228,13 +193,15 @@ def close_at_once() -> None:
     and under locks that all its links need (zenoh issues 1101 and 2718). Without that the system
     goes on sending what is left, and nobody waits.
     """
-    for name in os.listdir(DESCRIPTORS):
+    no_linger = struct.pack("ii", 0, 0)
+    # the numbers of this process's open files
+    for name in os.listdir("/dev/fd"):
         with suppress(OSError):
             # what is no socket is refused here
             link = socket.socket(fileno=int(name))
             try:
                 if link.type == socket.SOCK_STREAM and link.family in (AF_INET, AF_INET6):
-                    link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGER)
+                    link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_linger)
             finally:
                 # it stays open: it is another's
                 link.detach()
@@ -245,7 +212,7 @@ def listening(config: zenoh.Config) -> list[str]:
     endpoints = msgspec.json.decode(config.get_json("listen/endpoints"))
     if isinstance(endpoints, dict):
         mode = msgspec.json.decode(config.get_json("mode"))
-        endpoints = endpoints.get(mode or MODES[0], [])
+        endpoints = endpoints.get(mode or SESSION_MODES[0], [])
     return [str(endpoint) for endpoint in endpoints]
 
 
@@ -260,10 +227,11 @@ def closed(config: zenoh.Config) -> None:
     if mode == "client":
         return
     if unsaid:
-        port = ROUTER_PORT if mode == "router" else 0
-        _insert(config, "listen/endpoints", _json([f"tcp/{LOOPBACK}:{port}"]), "--listen")
+        # zenoh's routers listen on 7447 by default
+        port, loopback = 7447 if mode == "router" else 0, "127.0.0.1"
+        _insert(config, "listen/endpoints", _json([f"tcp/{loopback}:{port}"]), "--listen")
         if msgspec.json.decode(config.get_json("scouting/multicast"))["interface"] is None:
-            _insert(config, "scouting/multicast/interface", _json(LOOPBACK), "--listen")
+            _insert(config, "scouting/multicast/interface", _json(loopback), "--listen")
     endpoints = [_with_port(endpoint) for endpoint in listening(config)]
     _insert(config, "listen/endpoints", _json(endpoints), "--listen")
 
@@ -277,10 +245,11 @@ def _with_port(endpoint: str) -> str:
     """Return an endpoint whose port is no longer the system's to choose."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
-    if protocol not in PORTS or port != "0":
+    if protocol not in {"tcp", "tls", "udp"} or port != "0":
         return endpoint
     family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
-    with socket.socket(family, PORTS[protocol]) as probe:
+    kind = socket.SOCK_DGRAM if protocol == "udp" else socket.SOCK_STREAM
+    with socket.socket(family, kind) as probe:
         probe.bind((host.strip("[]"), 0))
         return f"{protocol}/{host}:{probe.getsockname()[1]}"
 
@@ -300,8 +269,9 @@ def start_zenoh_log() -> None:
     of standard error, and only Python goes on writing to the real one.
     """
     sys.stdout.flush()
-    results = os.dup(STANDARD_OUTPUT)
-    os.dup2(STANDARD_ERROR, STANDARD_OUTPUT)
+    standard_output, standard_error = 1, 2
+    results = os.dup(standard_output)
+    os.dup2(standard_error, standard_output)
     sys.stdout = os.fdopen(results, "w", encoding=sys.stdout.encoding)
     zenoh.init_log_from_env_or("error")
 
@@ -347,7 +317,7 @@ def _must_be_endpoint(endpoint: str, flag: str) -> None:
             problem = f"{port!r} is no port"
     if problem is not None:
         raise InvalidInputError(
-            f"{_shown(endpoint)} is no endpoint ({problem}); valid is such as {EXAMPLE}",
+            f"{_shown(endpoint)} is no endpoint ({problem}); valid is such as tcp/127.0.0.1:7447",
             field=flag,
         )
 
@@ -377,4 +347,5 @@ def _complaint(error: Exception) -> str:
 
 def _shown(text: str) -> str:
     """Return what was given, not too long."""
-    return repr(text) if len(text) <= SHOWN else f"{text[:SHOWN]!r}…"
+    most = 60
+    return repr(text) if len(text) <= most else f"{text[:most]!r}…"

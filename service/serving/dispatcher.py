@@ -17,51 +17,34 @@ from functools import partial
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from queue import Empty, SimpleQueue
-from typing import Final, cast
+from typing import cast
 
 import zenoh
 
 from hand_models.base import CruxError
-from planner import DeadlineError, Lane, Station
+from planner import DeadlineError, PriorityLane, WorkerHandle
 from service.processes import Job
-from service.serving.crew import Crew
-from service.serving.mail import Replies, Sender, reply_to
+from service.serving.monitor import ServiceMonitor, State
 from service.serving.names import Names
 from service.serving.question import Question, client_of, take
+from service.serving.reply_sender import Replies, SharedQueue, reply_to
+from service.serving.settings import SERVING_SETTINGS
 from service.serving.shares import Shares
 from service.serving.waiting import Costs, Kind, Waiting
-from service.serving.watch import State, Watch
-from service.wire import PLAN, STREAM, Answer, Format, LostError, encode_error
+from service.serving.worker_pool import WorkerPool
+from service.wire import Answer, Format, LostError, ServiceName, encode_error
 
 __all__ = ["Dispatcher"]
 
 log = logging.getLogger(__name__)
 
-FAILED_STARTS: Final = 3
-"""Processes in a row that may die before they are ready, when a service starts."""
-
-STOPS: Final = 2.0
-"""How long the end of the service waits for questions in work [s]."""
-
-QUIET: Final = 0.2
-"""Time without a new question before the service ends [s]: those on their way get a reply."""
-
-STATE_TIMEOUT: Final = 1.0
-"""Timeout of another thread that asks what the service does [s]."""
-
-AWAKE: Final = 0.1
-"""Interval at which the wait for the start wakes up [s]."""
-
-AT_ONCE: Final = 32
-"""Most events that are taken in before processes are looked at again."""
-
 
 class Dispatcher:
-    """Hands questions to processes, and their answers to the mail, in a thread of its own.
+    """Hands questions to processes, and their answers to clients, in a thread of its own.
 
     Parameters
     ----------
-    crew : Crew
+    pool : WorkerPool
         With 2 processes or more, questions that may take long leave one to others.
     seconds : float
         The deadline of a question that names none [s].
@@ -72,20 +55,20 @@ class Dispatcher:
 
     Attributes
     ----------
-    watch : Watch
+    monitor : ServiceMonitor
         Records what happens.
     """
 
     def __init__(
         self,
-        crew: Crew,
+        pool: WorkerPool,
         seconds: float,
         robot: str,
         inquire: Callable[[str], None] | None = None,
     ) -> None:
-        self._crew, self._seconds, self._inquire = crew, seconds, inquire
-        self.watch = Watch(robot, self._state)
-        self._replies = Replies(self.watch)
+        self._pool, self._seconds, self._inquire = pool, seconds, inquire
+        self.monitor = ServiceMonitor(robot, self._state)
+        self._replies = Replies(self.monitor)
         self._names, self._shares = Names(), Shares()
         self._costs = Costs(self._shares)
         self._waiting = Waiting(self._shares)
@@ -108,9 +91,9 @@ class Dispatcher:
         """
         self._thread.start()
         # now and then awake for signals, which may come in another thread
-        while not self._started.wait(AWAKE):
+        while not self._started.wait(timeout=0.1):
             continue
-        if not self._crew.up:
+        if not self._pool.up:
             self.stop()
             self.close()
             raise LostError("the processes that answer do not live to be ready; the log says how")
@@ -122,7 +105,7 @@ class Dispatcher:
     def look(self, make_answer: Callable[[], Answer], query: zenoh.Query, key: str) -> None:
         """Take an operator's query; returns at once."""
         client = client_of(query)
-        known = client if client in self._names.linked else Sender.OPERATORS
+        known = client if client in self._names.linked else SharedQueue.OPERATORS
         self._replies.later(known, partial(reply_to, query, key, make_answer))
 
     def linked(self, client: str) -> None:
@@ -170,7 +153,7 @@ class Dispatcher:
     def _run(self) -> None:
         while not self._ended():
             self._guarded(self._step)
-        self._crew.end()
+        self._pool.end()
 
     def _guarded(self, step: Callable[[], None]) -> None:
         """Do a step; log its exception, so that it ends nothing else."""
@@ -181,15 +164,15 @@ class Dispatcher:
 
     def _step(self) -> None:
         if self._stops_at is None:
-            self._crew.start_worker()
+            self._pool.start_worker()
             self._deal()
-        pipes = self._crew.pipes
+        pipes = self._pool.pipes
         ready = wait([self._woken, *pipes], self._pause())
         for pipe in ready:
             if (
                 pipe is not self._woken
                 # not of a process whose end another lane has reported meanwhile
-                and (lane := pipes[cast(Connection, pipe)]).station in self._crew.stations
+                and (lane := pipes[cast(Connection, pipe)]).handle in self._pool.handles
             ):
                 self._take_back(lane)
         if self._woken in ready:
@@ -198,7 +181,7 @@ class Dispatcher:
                 self._deal()
             self._take_in()
         self._end_overdue()
-        if self._crew.up or self._crew.failed_starts >= FAILED_STARTS:
+        if self._pool.up or self._pool.failed_starts >= SERVING_SETTINGS.failed_starts:
             self._started.set()
 
     def _take_in(self) -> None:
@@ -207,7 +190,8 @@ class Dispatcher:
             self._woken.recv_bytes()
         with self._bell:
             self._rung = False
-        for _ in range(AT_ONCE):
+        # most events that are taken in before processes are looked at again
+        for _ in range(32):
             try:
                 event = self._inbox.get_nowait()
             except Empty:
@@ -219,13 +203,13 @@ class Dispatcher:
         """Return how long there is nothing to do unless something comes [s]."""
         now = time.perf_counter()
         times = [self._waiting.first_deadline()]
-        for lane, asked in self._crew.work.items():
+        for lane, asked in self._pool.work.items():
             if asked is not None:
-                late, ends = self._crew.ends(lane)
+                late, ends = self._pool.ends(lane)
                 times.append(ends if asked.replied else late)
         ending = self._stops_at
         held = now + self._waiting.held()
-        own = [self._crew.rests_until, held] if ending is None else [ending, self._quiet_from]
+        own = [self._pool.rests_until, held] if ending is None else [ending, self._quiet_from]
         times += [each for each in own if each > now]
         least = min(times)
         return None if least == math.inf else max(least - now, 0.0)
@@ -239,25 +223,25 @@ class Dispatcher:
             log.exception("a query at %s cannot be read", key)
             unread = CruxError("the service could not read the query; its log says why")
             answer = encode_error(unread, Format.JSON, kind="internal")
-            self._replies.later(Sender.UNREAD, partial(reply_to, query, key, lambda: answer))
+            self._replies.later(SharedQueue.UNREAD, partial(reply_to, query, key, lambda: answer))
             return
         if self._stops_at is not None:
             self._replies.ending(question)
-            self._quiet_from = time.perf_counter() + QUIET
+            self._quiet_from = time.perf_counter() + SERVING_SETTINGS.quiet_time
             return
         if question.fault is not None:
             self._replies.refuse(question, question.fault)
             return
         question.place = self._names.place(question.client, question.secret)
         if self._inquire and self._names.is_to_prove(question.client, question.secret):
-            self._replies.later(Sender.INQUIRIES, partial(self._inquire, question.client))
+            self._replies.later(SharedQueue.INQUIRIES, partial(self._inquire, question.client))
         self._shares.asks(question.place)
         self._put(self._costs.kind(question), question)
 
     def _put(self, kind: Kind, question: Question) -> None:
         """Let a question wait; refuse the one that then has no room as busy."""
         if refused := self._waiting.put(kind, question):
-            self._replies.busy(refused, len(self._waiting) / self._crew.workers)
+            self._replies.busy(refused, len(self._waiting) / self._pool.workers)
 
     def _prove(self, client: str, proof: bytes) -> None:
         self._names.proven(client, proof)
@@ -267,26 +251,26 @@ class Dispatcher:
 
     def _deal(self) -> None:
         """Give lanes that have nothing to do the questions whose turn it is."""
-        idle = self._crew.idle()
-        others = [lane for lane in idle if not self._crew.has_streams(lane)]
-        while others and (question := self._waiting.next(dear=self._crew.takes_dear())):
+        idle = self._pool.idle()
+        others = [lane for lane in idle if not self._pool.has_streams(lane)]
+        while others and (question := self._waiting.next(dear=self._pool.takes_dear())):
             knows, stance = self._costs.knows, question.stance
-            knowing = [lane for lane in others if knows(lane.station, stance)]
+            knowing = [lane for lane in others if knows(lane.handle, stance)]
             lane = (knowing or others)[0]
             others.remove(lane)
             self._give(lane, question)
         for lane in idle:
-            if not self._crew.has_streams(lane):
+            if not self._pool.has_streams(lane):
                 continue
             short = (Kind.DECLARED, Kind.SHORT)
-            kinds = (Kind.SET_POINTS,) if self._crew.is_for_set_points(lane) else short
+            kinds = (Kind.SET_POINTS,) if self._pool.is_for_set_points(lane) else short
             if question := self._waiting.take(*kinds):
                 self._give(lane, question)
 
-    def _give(self, lane: Lane[Job, Answer], question: Question) -> None:
+    def _give(self, lane: PriorityLane[Job, Answer], question: Question) -> None:
         question.begun = time.perf_counter()
-        self._crew.work[lane] = question
-        rehearsal = question.name == STREAM and not question.rehearsed
+        self._pool.work[lane] = question
+        rehearsal = question.name == ServiceName.STREAM and not question.rehearsed
         lane.give(question.job(question.begun, rehearsal))
 
     def _drop(self, client: str, token: bool) -> None:
@@ -301,72 +285,72 @@ class Dispatcher:
 
     # answers -------------------------------------------------------------------------------------
 
-    def _take_back(self, lane: Lane[Job, Answer]) -> None:
+    def _take_back(self, lane: PriorityLane[Job, Answer]) -> None:
         try:
             done = lane.take()
         except EOFError:
             rest = "nothing else was lost with it"
-            if self._crew.has_streams(lane):
+            if self._pool.has_streams(lane):
                 rest = "the streams are lost with it; declare them again"
-            how, left = self._end_process(lane.station)
+            how, left = self._end_process(lane.handle)
             for question in left:
                 self._shares.ended_process(question.place, time.perf_counter() - question.begun)
                 lost = LostError(f"the process that worked on it {how}; {rest}")
                 self._replies.refuse(question, lost)
             return
         if done is None:
-            self._crew.came_up(lane.station)
-            self._shares.start = self._crew.start or self._shares.start
+            self._pool.came_up(lane.handle)
+            self._shares.start = self._pool.start or self._shares.start
             return
-        asked = self._crew.work[lane]
-        self._crew.work[lane] = None
+        asked = self._pool.work[lane]
+        self._pool.work[lane] = None
         assert asked is not None
         cost = done.cost or done.seconds
         self._shares.charge(asked.place, cost)
-        if asked.name == PLAN and asked.stance is not None:
-            self._costs.took(asked.stance, lane.station, cost)
-        if asked.name == STREAM and not asked.rehearsed and done.good:
+        if asked.name == ServiceName.PLAN and asked.stance is not None:
+            self._costs.took(asked.stance, lane.handle, cost)
+        if asked.name == ServiceName.STREAM and not asked.rehearsed and done.good:
             asked.rehearsed = True
             self._put(Kind.DECLARED, asked)
         elif not asked.replied:
             self._replies.reply(asked, done)
-        if self._crew.has_grown(lane):
-            self._end_process(lane.station, "had grown too large")
+        if self._pool.has_grown(lane):
+            self._end_process(lane.handle, "had grown too large")
 
     def _end_overdue(self) -> None:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
         for question in self._waiting.remove(lambda each: each.deadline <= now):
             self._replies.refuse(question, DeadlineError(question.seconds, "it was its turn"))
-        for lane, asked in list(self._crew.work.items()):
-            if asked is None or lane not in self._crew.work:
+        for lane, asked in list(self._pool.work.items()):
+            if asked is None or lane not in self._pool.work:
                 continue
-            ends = self._crew.ends(lane)
-            if ends[0] > now:
+            late, ends = self._pool.ends(lane)
+            if late > now:
                 continue
             if not asked.replied:
                 missing = "there was an answer, and its work was broken off"
                 self._replies.refuse(asked, DeadlineError(asked.seconds, missing))
-            if ends[1] <= now:
+            if ends <= now:
                 self._shares.ended_process(asked.place, now - asked.begun)
-                self._end_process(lane.station, "did not stop at a deadline")
+                self._end_process(lane.handle, "did not stop at a deadline")
 
     def _end_process(
-        self, station: Station[Job, Answer], why: str | None = None
+        self, handle: WorkerHandle[Job, Answer], why: str | None = None
     ) -> tuple[str, list[Question]]:
-        """End a process, which another replaces; as `Crew.stop_worker`."""
-        how, left = self._crew.stop_worker(station, dead=why is None)
-        self.watch.ended(station.process.pid, why or how)
+        """End a process, which another replaces; as `WorkerPool.stop_worker`."""
+        how, left = self._pool.stop_worker(handle, dead=why is None)
+        self.monitor.ended(handle.process.pid, why or how)
         return how, left
 
     def _state(self) -> State:
         """Return what the service does, to whatever thread."""
         if threading.current_thread() is self._thread or not self._thread.is_alive():
-            return State(self._crew.states(), self._waiting.counts())
+            return State(self._pool.states(), self._waiting.counts())
         found: SimpleQueue[State] = SimpleQueue()
         self._post(lambda: found.put(self._state()))
         try:
-            return found.get(timeout=STATE_TIMEOUT)
+            return found.get(timeout=1.0)
         except Empty:
             return State([], {})
 
@@ -374,14 +358,16 @@ class Dispatcher:
 
     def _end(self) -> None:
         now = time.perf_counter()
-        self._stops_at, self._quiet_from = now + STOPS, now + QUIET
+        self._quiet_from = now + SERVING_SETTINGS.quiet_time
+        # [s] questions in work are waited for so long
+        self._stops_at = now + 2.0
         for question in self._waiting.remove(lambda _: True):
             self._replies.ending(question)
 
     def _ended(self) -> bool:
         if self._stops_at is None:
             return False
-        left, now = self._crew.left(), time.perf_counter()
+        left, now = self._pool.left(), time.perf_counter()
         if (left or now < self._quiet_from) and now < self._stops_at:
             return False
         lost = LostError("the service ended before there was an answer")

@@ -8,17 +8,8 @@ import os
 import threading
 from contextlib import suppress
 from queue import Full, Queue
-from typing import Final
 
 __all__ = ["JsonLines", "LogThread"]
-
-STDERR: Final = 2
-
-LINES: Final = 10_000
-"""Lines that wait to be written; further ones are left out, and counted."""
-
-LAST: Final = 0.5
-"""How long the end waits for those that are left [s]."""
 
 
 class LogThread(logging.Handler):
@@ -29,7 +20,8 @@ class LogThread(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__()
-        self._lines: Queue[str | None] = Queue(LINES)
+        # further lines that wait to be written are left out, and counted
+        self._lines: Queue[str | None] = Queue(10_000)
         self._left_out = 0
         self._thread = threading.Thread(target=self._run, name="crux-log", daemon=True)
         self._thread.start()
@@ -44,7 +36,7 @@ class LogThread(logging.Handler):
         """Wait a little for the lines that are left."""
         with suppress(Full):
             self._lines.put_nowait(None)
-        self._thread.join(LAST)
+        self._thread.join(timeout=0.5)
         super().close()
 
     def _run(self) -> None:
@@ -60,7 +52,7 @@ class LogThread(logging.Handler):
         # not sys.stderr: the interpreter cannot end while a thread is at work on that
         with suppress(OSError):
             while data:
-                data = data[os.write(STDERR, data) :]
+                data = data[os.write(2, data) :]
 
 
 class JsonLines(logging.Formatter):

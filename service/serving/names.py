@@ -10,23 +10,12 @@ from __future__ import annotations
 
 import hashlib
 import time
-from typing import Final
 
 from cachetools import LRUCache, TTLCache
 
-__all__ = ["SHARED", "Names", "digest"]
+from service.serving.settings import SERVING_SETTINGS
 
-SHARED: Final = ""
-"""The place of all clients that cannot be distinguished."""
-
-KEPT: Final = 4096
-"""Names whose digests are remembered, those that were asked about last."""
-
-PROOFS: Final = 16
-"""Digests of one name: a session may have several clients."""
-
-PAUSE: Final = 1.0
-"""How long a name's digest is not asked for again [s]."""
+__all__ = ["Names", "digest"]
 
 
 def digest(secret: bytes) -> bytes:
@@ -45,16 +34,20 @@ class Names:
 
     def __init__(self) -> None:
         self.linked: set[str] = set()
-        self._proofs: LRUCache[str, set[bytes]] = LRUCache(KEPT)
-        # made-up names are to push out no proven ones
-        self._asked: TTLCache[str, bool] = TTLCache(KEPT, PAUSE, timer=time.perf_counter)
+        most = SERVING_SETTINGS.remembered
+        self._proofs: LRUCache[str, set[bytes]] = LRUCache(most)
+        # made-up names are to push out no proven ones; a digest is asked for once a second
+        self._asked: TTLCache[str, bool] = TTLCache(most, ttl=1.0, timer=time.perf_counter)
 
     def place(self, name: str, secret: bytes) -> str:
-        """Return the place of a query that carries a name, and perhaps a secret."""
+        """Return the place of a query that carries a name, and perhaps a secret.
+
+        All clients that cannot be distinguished share the place ``""``.
+        """
         proofs = self._proofs.get(name)
         if proofs is not None:
-            return name if digest(secret) in proofs else SHARED
-        return name if name in self.linked else SHARED
+            return name if digest(secret) in proofs else ""
+        return name if name in self.linked else ""
 
     def is_to_prove(self, name: str, secret: bytes) -> bool:
         """Return whether the session of a name is to be asked for its digest now."""
@@ -68,7 +61,8 @@ class Names:
     def proven(self, name: str, proof: bytes) -> None:
         """Take a digest that the session of a name has sent."""
         proofs = self._proofs.setdefault(name, set())
-        if len(proofs) < PROOFS:
+        # a session may have several clients
+        if len(proofs) < 16:
             proofs.add(proof)
 
     def has_proof(self, name: str) -> bool:

@@ -3,42 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 import zenoh
 
 from hand_models.base import CruxError, LimitError
-from service.answering import SERVICES
+from service.answering import SERVICES_BY_NAME
 from service.processes import Job
 from service.requests import LEAST_REPLY_BYTES, LONGEST_DEADLINE
+from service.serving.settings import SERVING_SETTINGS
 from service.wire import (
-    BODY_SPACE,
     LARGEST_ERROR,
-    WRENCH_SPACE,
     Answer,
     Format,
     MalformedError,
+    ServiceName,
     check_size,
     encode_error,
 )
 
-__all__ = ["LARGE", "Question", "client_of", "take"]
-
-READ: Final = 2**20
-"""Most bytes of a payload that is read before its turn; a process reads larger ones."""
-
-LARGE: Final = 2**18
-"""Bytes beyond which a payload is large: it may take long, and its bytes count while it waits."""
-
-DEAR: Final = ("robust", "spread", "advice")
-"""Extras that take many plans."""
-
-ATTACHED: Final = 2**12
-"""Most bytes of a query's attachment, which is held as long as the query."""
-
-SMALL: Final = 2**12
-"""Most bytes of a field that is read before its turn; a process reads longer ones, too."""
+__all__ = ["Question", "client_of", "take"]
 
 
 class _Head(msgspec.Struct):
@@ -154,15 +139,16 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
     name = key.rpartition("/")[2]
     try:
         if attached is not None:
-            if len(attached) > ATTACHED:
+            most = SERVING_SETTINGS.most_attached
+            if len(attached) > most:
                 raise LimitError(
-                    f"the query's attachment has {len(attached)} bytes; {ATTACHED} at most, send "
+                    f"the query's attachment has {len(attached)} bytes; {most} at most, send "
                     "what is asked as its payload",
                     field="attachment",
                 )
             secret = attached.to_bytes()
         if given is not None:
-            check_size(len(given), SERVICES[name].request)
+            check_size(len(given), SERVICES_BY_NAME[name].request)
             payload = given.to_bytes()
     except LimitError as error:
         fault = error
@@ -175,11 +161,13 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
         payload=payload,
         encoding="" if query.encoding is None else str(query.encoding),
         seconds=longest,
-        dear=name in (WRENCH_SPACE, BODY_SPACE) or len(payload) > LARGE,
+        dear=name in (ServiceName.WRENCH_SPACE, ServiceName.BODY_SPACE)
+        or len(payload) > SERVING_SETTINGS.large_payload,
         fault=fault,
         secret=secret,
     )
-    if len(payload) <= READ:
+    # a process reads larger ones
+    if len(payload) <= 2**20:
         _read(question)
     return question
 
@@ -198,8 +186,9 @@ def _read(question: Question) -> None:
     # what no request may have is refused by its process, in the service's own time
     if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
-    many = isinstance(want, list) and any(each in want for each in DEAR)
-    unread = len(bytes(head.want)) > SMALL
+    # these take many plans
+    many = isinstance(want, list) and any(each in want for each in ("robust", "spread", "advice"))
+    unread = _is_long(head.want)
     question.dear = question.dear or many or unread
     most = _value(head.max_reply_bytes, question.form)
     if isinstance(most, int) and most >= LEAST_REPLY_BYTES:
@@ -207,13 +196,17 @@ def _read(question: Question) -> None:
     question.stance = hash(bytes(head.stance)) if bytes(head.stance) else None
 
 
+def _is_long(field: msgspec.Raw) -> bool:
+    """Return whether a field is too long to be read before its turn; a process reads it, too."""
+    return len(bytes(field)) > 2**12
+
+
 def _value(field: msgspec.Raw, form: Format) -> Any:
     """Return what a field says; None where that is long, or nothing."""
-    data = bytes(field)
-    if not 0 < len(data) <= SMALL:
+    if not bytes(field) or _is_long(field):
         return None
     try:
-        return form.decode(data, Any)
+        return form.decode(bytes(field), Any)
     except (MalformedError, msgspec.ValidationError):
         # its process reports a field that cannot be read
         return None

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from typing import Any, Final, Self
+from typing import Any, Self
 
 import zenoh
 from zenoh.handlers import Callback
@@ -16,24 +16,16 @@ from zenoh.handlers import Callback
 from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from planner import Make, RobotFile, cores
-from service.answering import SERVICES, robots_of
+from service.answering import SERVICES_BY_NAME, robots_of
 from service.processes import Job, answering
 from service.requests import DEFAULT_DEADLINE, LONGEST_DEADLINE
 from service.serving.config import close_at_once
-from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.wire import ALIVE, CLIENTS, HEALTH, METRICS, Answer, service_key
+from service.serving.settings import SERVING_SETTINGS
+from service.serving.worker_pool import WorkerPool
+from service.wire import Answer, ServiceName, service_key
 
-__all__ = ["MEMORY", "PlanService"]
-
-SEARCH: Final = 1.0
-"""How long another service of the same robot is looked for at most [s]."""
-
-MEMORY: Final = 2 * 2**30
-"""Bytes that a process may have by default, where the system can keep it to them."""
-
-FEWEST: Final = 2
-"""Fewest processes by default, even on one core: what takes long leaves one to others."""
+__all__ = ["PlanService"]
 
 
 class PlanService:
@@ -55,7 +47,7 @@ class PlanService:
     seconds : float, optional
         Deadline of a question that names none [s].
     memory : int, optional
-        Bytes that each process may have.
+        Bytes that each process may have, where the system can keep it to them.
     make : callable, optional
         What answers in each process, in place of the planner; it is pickled.
 
@@ -82,10 +74,11 @@ class PlanService:
         *,
         workers: int | None = None,
         seconds: float = DEFAULT_DEADLINE,
-        memory: int = MEMORY,
+        memory: int = 2 * 2**30,
         make: Make[Job, Answer] | None = None,
     ) -> None:
-        count = max(FEWEST, cores()) if workers is None else workers
+        # even on one core, what takes long leaves a process to others
+        count = max(2, cores()) if workers is None else workers
         if count < 1:
             raise InvalidInputError(f"must be 1 at least, got {count}", field="workers")
         if not 0.0 < seconds <= LONGEST_DEADLINE:
@@ -94,19 +87,23 @@ class PlanService:
                 field="seconds",
             )
         (self.robot,) = robots_of(robot)
-        self.keys = tuple(service_key(self.robot, name) for name in SERVICES)
-        self.operators = tuple(service_key(self.robot, name) for name in (HEALTH, METRICS))
-        self._alive = service_key(self.robot, ALIVE)
+        self.keys = tuple(service_key(self.robot, name) for name in SERVICES_BY_NAME)
+        self.operators = tuple(
+            service_key(self.robot, name) for name in (ServiceName.HEALTH, ServiceName.METRICS)
+        )
+        self._alive = service_key(self.robot, ServiceName.ALIVE)
         self._session = session
         made = make or partial(answering, robot, hand)
-        crew = Crew(made, count, memory)
-        self._dispatcher = Dispatcher(crew, seconds, self.robot, self._inquire)
-        self._watch = self._dispatcher.watch
+        pool = WorkerPool(made, count, memory)
+        self._dispatcher = Dispatcher(pool, seconds, self.robot, self._inquire)
+        self._monitor = self._dispatcher.monitor
         self._open = ExitStack()
 
     def has_rival(self) -> bool:
         """Say whether another service answers for the robot; to be asked before entering."""
-        replies = self._session.liveliness().get(self._alive, timeout=SEARCH)
+        replies = self._session.liveliness().get(
+            self._alive, timeout=SERVING_SETTINGS.search_timeout
+        )
         return any(reply.ok is not None for reply in replies)
 
     def serve_metrics(self, port: int) -> None:
@@ -118,7 +115,7 @@ class PlanService:
             If the port cannot be had.
         """
         try:
-            self._watch.serve(port)
+            self._monitor.serve(port)
         except OSError as error:
             raise InvalidInputError(f"{port}: {error.strerror}", field="--metrics-port") from None
 
@@ -128,7 +125,7 @@ class PlanService:
         for key in self.keys:
             self._declare(key, self._dispatcher.ask)
         health, metrics = self.operators
-        for key, make_answer in ((health, self._watch.health), (metrics, self._watch.metrics)):
+        for key, make_answer in ((health, self._monitor.health), (metrics, self._monitor.metrics)):
             self._declare(key, partial(self._dispatcher.look, make_answer))
         # clients in this process need no link
         self._dispatcher.linked(str(self._session.info.zid()))
@@ -158,7 +155,7 @@ class PlanService:
         self._until_the_end(self._session.declare_queryable(key, taker, complete=True))
 
     def _client_key(self, name: str) -> str:
-        return service_key(self.robot, f"{CLIENTS}/{name}")
+        return service_key(self.robot, f"{ServiceName.CLIENTS}/{name}")
 
     def _transport(self, event: zenoh.TransportEvent) -> None:
         name = str(event.transport.zid)
@@ -174,7 +171,9 @@ class PlanService:
             return
         name = str(sample.key_expr).rpartition("/")[2]
         # the one that has gone may be another session's of the same key
-        left = self._session.liveliness().get(self._client_key(name), timeout=SEARCH)
+        left = self._session.liveliness().get(
+            self._client_key(name), timeout=SERVING_SETTINGS.search_timeout
+        )
         if not any(reply.ok is not None for reply in left):
             self._dispatcher.gone(name, token=True)
 
@@ -192,5 +191,5 @@ class PlanService:
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             congestion_control=zenoh.CongestionControl.DROP,
-            timeout=SEARCH,
+            timeout=SERVING_SETTINGS.search_timeout,
         )

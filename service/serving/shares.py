@@ -13,28 +13,10 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Final
+
+from service.serving.settings import SERVING_SETTINGS
 
 __all__ = ["Shares"]
-
-KEPT: Final = 4096
-"""Places that are remembered, those that asked last."""
-
-LAST: Final = 20
-"""Costs that are remembered of each."""
-
-DEAR: Final = 0.1
-"""A place whose questions cost more leaves the last process to others [s]."""
-
-START: Final = 3.0
-"""How long a process takes to start, before any has been seen to [s]."""
-
-PAYS: Final = 4.0
-"""A place that has ended a process waits for this many times what it takes to start one, so that
-starting takes no more than a fifth of a core from the others."""
-
-ACTIVE: Final = 10.0
-"""How long after its last question a place counts as one that others are to leave time to [s]."""
 
 
 @dataclass
@@ -54,7 +36,9 @@ class _Place:
     """
 
     spent: float
-    costs: deque[float] = field(default_factory=lambda: deque(maxlen=LAST))
+    costs: deque[float] = field(
+        default_factory=lambda: deque(maxlen=SERVING_SETTINGS.remembered_costs)
+    )
     asked: float = -math.inf
     held_until: float = -math.inf
 
@@ -69,14 +53,15 @@ class Shares:
     """
 
     def __init__(self) -> None:
-        self.start = START
+        # before any has been seen to start
+        self.start = 3.0
         self._places: OrderedDict[str, _Place] = OrderedDict()
         self._level = 0.0
 
     def _of(self, place: str) -> _Place:
         """Return what is remembered of a place, from now on if nothing is."""
         found = self._places.setdefault(place, _Place(self._level))
-        if len(self._places) > KEPT:
+        if len(self._places) > SERVING_SETTINGS.remembered:
             self._places.popitem(last=False)
         return found
 
@@ -105,7 +90,8 @@ class Shares:
         self.charge(place, seconds)
         known = self._of(place)
         known.spent += self.start
-        known.held_until = time.perf_counter() + PAYS * self.start
+        waits = SERVING_SETTINGS.starts_waited * self.start
+        known.held_until = time.perf_counter() + waits
 
     def gone(self, place: str) -> None:
         """Take note that a place will not ask again soon."""
@@ -131,11 +117,12 @@ class Shares:
             return 0.0
         others = (each.asked for name, each in self._places.items() if name != place)
         # where nobody else asks, nobody is kept waiting
-        return max(min(known.held_until, max(others, default=-math.inf) + ACTIVE) - now, 0.0)
+        active_until = max(others, default=-math.inf) + SERVING_SETTINGS.active_time
+        return max(min(known.held_until, active_until) - now, 0.0)
 
     def is_dear(self, place: str) -> bool:
         """Return whether a place's questions cost much."""
         known = self._places.get(place)
         if known is None or not known.costs:
             return False
-        return statistics.median(known.costs) > DEAR
+        return statistics.median(known.costs) > SERVING_SETTINGS.dear_cost

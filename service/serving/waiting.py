@@ -14,38 +14,16 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from enum import Enum
 from itertools import chain
-from typing import Final
 from weakref import WeakSet
 
 from cachetools import LRUCache
 
-from service.serving.question import LARGE, Question
-from service.serving.shares import DEAR, LAST, Shares
-from service.wire import PLAN, SET_POINTS
+from service.serving.question import Question
+from service.serving.settings import SERVING_SETTINGS
+from service.serving.shares import Shares
+from service.wire import ServiceName
 
 __all__ = ["Costs", "Kind", "Waiting"]
-
-EACH: Final = 32
-"""Questions of one client that wait in a queue; further ones are refused as busy."""
-
-ALL: Final = 256
-"""Questions of all clients that wait in a queue; beyond it the place that has most loses its last
-one."""
-
-HELD: Final = 2**28
-"""Bytes of all large questions that wait."""
-
-SHARE: Final = 2**26
-"""Bytes of those of one place, unless it is one question."""
-
-KEPT: Final = 4096
-"""Stances that are remembered, those that were asked about last."""
-
-SHORT: Final = 0.05
-"""A question about a known stance that costs no more may use the lane that nothing delays [s]."""
-
-SOON: Final = 0.3
-"""Largest cost of such a stance when it was new [s]: that lane's process has to prepare it, too."""
 
 
 class Kind(Enum):
@@ -67,8 +45,9 @@ class _Stance:
 
     def __init__(self) -> None:
         self.known_to: WeakSet[object] = WeakSet()
-        self.new: deque[float] = deque(maxlen=LAST)
-        self.again: deque[float] = deque(maxlen=LAST)
+        most = SERVING_SETTINGS.remembered_costs
+        self.new: deque[float] = deque(maxlen=most)
+        self.again: deque[float] = deque(maxlen=most)
 
 
 class Costs:
@@ -82,7 +61,7 @@ class Costs:
 
     def __init__(self, shares: Shares) -> None:
         self._shares = shares
-        self._stances: LRUCache[int | None, _Stance] = LRUCache(KEPT)
+        self._stances: LRUCache[int | None, _Stance] = LRUCache(SERVING_SETTINGS.remembered)
 
     def took(self, stance: int, process: object, seconds: float) -> None:
         """Remember what an answer about a stance has cost in a process [s]."""
@@ -92,11 +71,11 @@ class Costs:
 
     def kind(self, question: Question) -> Kind:
         """Return the queue in which a question is to wait."""
-        if question.name == SET_POINTS:
+        if question.name == ServiceName.SET_POINTS:
             return Kind.SET_POINTS
         if question.dear:
             return Kind.DEAR
-        if question.name == PLAN and self.is_short(question.stance):
+        if question.name == ServiceName.PLAN and self.is_short(question.stance):
             return Kind.SHORT
         dear = self._shares.is_dear(question.place) and not self._is_cheap(question.stance)
         return Kind.DEAR if dear else Kind.OTHER
@@ -106,12 +85,16 @@ class Costs:
         seen = self._stances.get(stance)
         if seen is None or not seen.again:
             return False
-        return statistics.median(seen.again) <= SHORT and statistics.median_low(seen.new) <= SOON
+        # [s] its costs, also when it was new: the process that nothing delays prepares it, too
+        short, new = 0.05, 0.3
+        return statistics.median(seen.again) <= short and statistics.median_low(seen.new) <= new
 
     def _is_cheap(self, stance: int | None) -> bool:
         """Return whether questions about a stance have cost little so far."""
         seen = self._stances.get(stance)
-        return seen is not None and statistics.median(seen.again or seen.new) <= DEAR
+        if seen is None:
+            return False
+        return statistics.median(seen.again or seen.new) <= SERVING_SETTINGS.dear_cost
 
     def knows(self, process: object, stance: int | None) -> bool:
         """Return whether a process knows a stance."""
@@ -147,24 +130,27 @@ class Waiting:
 
     def _fits(self, question: Question) -> bool:
         """Return whether there is room for a question; bytes are limited only for large ones."""
-        size = len(question.payload)
-        if size <= LARGE:
+        size, large = len(question.payload), SERVING_SETTINGS.large_payload
+        if size <= large:
             return True
         held: Counter[str] = Counter()
         for each in self:
-            if len(each.payload) > LARGE:
+            if len(each.payload) > large:
                 held[each.place] += len(each.payload)
         own = held[question.place]
-        return not held or ((not own or own + size <= SHARE) and held.total() + size <= HELD)
+        fits = held.total() + size <= SERVING_SETTINGS.waiting_bytes
+        fits_own = not own or own + size <= SERVING_SETTINGS.waiting_bytes_of_place
+        return not held or (fits_own and fits)
 
     def put(self, kind: Kind, question: Question) -> Question | None:
         """Let a question wait; return the one that has no room then: this one, or another's."""
         queue = self._queues[kind]
         clients = Counter((each.place, each.client) for each in queue)
-        if clients[question.place, question.client] >= EACH or not self._fits(question):
+        own_count = clients[question.place, question.client]
+        if own_count >= SERVING_SETTINGS.waiting_of_client or not self._fits(question):
             return question
         removed = None
-        if len(queue) >= ALL:
+        if len(queue) >= SERVING_SETTINGS.waiting_in_queue:
             places = Counter(each.place for each in queue)
             most, count = places.most_common(1)[0]
             if count <= places[question.place] + 1:

@@ -12,9 +12,9 @@ import msgspec
 from service.sweeping.design import Design
 from service.sweeping.rows import Row
 
-__all__ = ["TOLERANCE", "Border", "Held", "borders", "held"]
+__all__ = ["BORDER_TOLERANCE", "Border", "Held", "borders", "held"]
 
-TOLERANCE: Final = 1e-3
+BORDER_TOLERANCE: Final = 1e-3
 """Tolerance of a border, over the range that varies."""
 
 

@@ -7,7 +7,7 @@ import math
 import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Self
 
 import msgspec
 import numpy as np
@@ -25,10 +25,6 @@ __all__ = ["Design", "Point"]
 
 Point = tuple[Value, ...]
 """A value of each variation."""
-
-MOST_POINTS: Final = 100_000
-
-CAP: Final[Steps] = ("limits", "utilisation")
 
 
 @dataclass(frozen=True)
@@ -89,8 +85,9 @@ class Design:
         if not variations:
             raise InvalidInputError("something must vary", field="variations")
         count = math.prod(len(each.values) for each in variations) if samples is None else samples
-        if not 1 <= count <= MOST_POINTS:
-            raise LimitError(f"{count:,} points; from 1 to {MOST_POINTS:,} are asked at once")
+        most = 100_000
+        if not 1 <= count <= most:
+            raise LimitError(f"{count:,} points; from 1 to {most:,} are asked at once")
         asked = msgspec.structs.replace(
             request,
             detail="hands",
@@ -169,7 +166,8 @@ class Design:
     def cap(self, point: Point) -> float:
         """Return the utilisation up to which a point holds."""
         for target, value in zip(self.targets, point, strict=True):
-            if target.steps == (CAP,) and isinstance(value, (int, float)):
+            is_cap = target.steps == (("limits", "utilisation"),)
+            if is_cap and isinstance(value, (int, float)):
                 return float(value)
         return float(self._paths.document["limits"]["utilisation"])
 

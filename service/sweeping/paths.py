@@ -25,26 +25,8 @@ __all__ = ["Paths", "Steps", "Target", "put"]
 Steps = tuple[str | int, ...]
 """Keys and indices from the document to a value."""
 
-EVERY: Final = "*"
-"""All entries of a list or an object."""
-
-FIXED: Final = frozenset(
-    {"v", "id", "deadline", "max_reply_bytes", "confidence", "detail", "want", "draws", "explain"}
-)
-"""Fields of a request that are no part of what is asked about."""
-
-FORCES: Final = ("pull_off_limit", "lateral_limit", "shear_scatter")
-"""Numbers of a preset that its parameter file gives over its shear limit."""
-
-HANDS: Final[Steps] = ("stance", "hands")
-BY_LIMB: Final[tuple[Steps, ...]] = (
-    ("stance", "joints"),
-    ("limits", "joint_torque"),
-    ("limits", "per_hand"),
-    ("present",),
-)
-KEYED: Final = (inspect.StructType, inspect.DictType)
-LISTED: Final = (inspect.ListType, inspect.TupleType, inspect.VarTupleType)
+KEYED_TYPES: Final = (inspect.StructType, inspect.DictType)
+LISTED_TYPES: Final = (inspect.ListType, inspect.TupleType, inspect.VarTupleType)
 
 
 class Target(NamedTuple):
@@ -108,7 +90,10 @@ class Paths:
         for name in names:
             found = [each for end in found for each in self._entered(path, name, *end)]
         for steps, places in found:
-            if all(isinstance(each.kind, (*KEYED, *LISTED, inspect.NoneType)) for each in places):
+            if all(
+                isinstance(each.kind, (*KEYED_TYPES, *LISTED_TYPES, inspect.NoneType))
+                for each in places
+            ):
                 known = ", ".join(self._listed(steps, places, _at(self.document, steps)))
                 more = f"; give one of its entries: {known}" if known else ""
                 raise InvalidInputError(f"is no number or word{more}", field=path)
@@ -126,7 +111,8 @@ class Paths:
         for steps, name in self.presets.items():
             preset = Preset.named(name)
             share = _at(self.document, steps)["shear_limit"] / preset.shear_limit
-            for key in FORCES:
+            # its parameter file gives these over its shear limit
+            for key in ("pull_off_limit", "lateral_limit", "shear_scatter"):
                 if (*steps, key) not in given:
                     put(self.document, (*steps, key), share * getattr(preset, key))
 
@@ -143,7 +129,7 @@ class Paths:
                 f"{words} has no entries in the request; give there what is to vary", field=path
             )
         free = any(isinstance(each.kind, inspect.DictType) for each in places)
-        several = [EVERY] if free or isinstance(value, list) else []
+        several = ["*"] if free or isinstance(value, list) else []
         known: dict[str, str | int] = {key: key for key in listed}
         if isinstance(value, list):
             known = {
@@ -167,7 +153,7 @@ class Paths:
         """Return the value that a path leads through; put there, if it is left out."""
         value = _at(self.document, steps)
         kinds = [each.kind for each in places]
-        if value is None and any(isinstance(kind, KEYED) for kind in kinds):
+        if value is None and any(isinstance(kind, KEYED_TYPES) for kind in kinds):
             value = next(
                 (_default(each) for each in kinds if isinstance(each, inspect.StructType)), {}
             )
@@ -179,7 +165,9 @@ class Paths:
         if isinstance(value, (dict, list)):
             return value
         words = self._words(steps)
-        if value is None and any(isinstance(kind, (*LISTED, inspect.AnyType)) for kind in kinds):
+        if value is None and any(
+            isinstance(kind, (*LISTED_TYPES, inspect.AnyType)) for kind in kinds
+        ):
             raise InvalidInputError(
                 f"{words} has no value in the request, of which an entry could vary: give it there",
                 field=path,
@@ -189,6 +177,7 @@ class Paths:
 
     def _own_unit(self, steps: Steps) -> tuple[str, ...]:
         """Return the unit that an entry of a hand names itself."""
+        # stance.hand.SECTION.ENTRY.value
         entry = _at(self.document, steps[:4]) if steps[:2] == ("stance", "hand") else None
         unit = entry.get("unit") if isinstance(entry, dict) else None
         return (unit,) if isinstance(unit, str) and steps[4:5] == ("value",) else ()
@@ -197,19 +186,28 @@ class Paths:
         """Return the names that are valid one step further."""
         limbs = [hand["limb"] for hand in self.document["stance"]["hands"]]
         if isinstance(value, list):
-            return limbs if steps == HANDS else [str(i) for i in range(len(value))]
+            return limbs if steps == ("stance", "hands") else [str(i) for i in range(len(value))]
         for each in places:
             if isinstance(each.kind, inspect.StructType):
                 names = field_names(place.kind for place in _meant(places, value))
-                return [name for name in names if steps or name not in FIXED]
+                # fields of a request that are no part of what is asked about
+                fixed = {"v", "id", "deadline", "max_reply_bytes", "confidence", "detail", "want"}
+                fixed |= {"draws", "explain"}
+                return [name for name in names if steps or name not in fixed]
             if isinstance(each.kind, inspect.TupleType):
                 return [str(i) for i in range(len(each.kind.item_types))]
-        return list(dict.fromkeys([*(limbs if steps in BY_LIMB else ()), *(value or ())]))
+        by_limb: set[Steps] = {
+            ("stance", "joints"),
+            ("limits", "joint_torque"),
+            ("limits", "per_hand"),
+            ("present",),
+        }
+        return list(dict.fromkeys([*(limbs if steps in by_limb else ()), *(value or ())]))
 
     def _words(self, steps: Steps) -> str:
         """Return steps as a caller writes them."""
         words = [str(step) for step in steps]
-        if steps[:2] == HANDS and len(steps) > 2:
+        if steps[:2] == ("stance", "hands") and len(steps) > 2:
             words[2] = _at(self.document, steps[:3])["limb"]
         return ".".join(words[1:] if words[1:] and words[0] == "stance" else words) or "a request"
 
@@ -268,6 +266,6 @@ def _meant(places: list[Place], value: Any) -> list[Place]:
         another = isinstance(value, dict) and any(
             key and value.get(key) != name for key, name in tag.items()
         )
-        if not another and isinstance(kind, (*KEYED, *LISTED, inspect.AnyType)):
+        if not another and isinstance(kind, (*KEYED_TYPES, *LISTED_TYPES, inspect.AnyType)):
             found.append(place)
     return found

@@ -22,27 +22,11 @@ from service.sweeping.variation import Value, word_of
 
 __all__ = ["plot_sweep"]
 
-PANELS: Final = 6
-"""Most panels of a figure: values of a third variable, evenly chosen."""
-
-COLUMNS: Final = 3
-
-TOP: Final = 0.97
-"""Height, in axes, of marks of points without a utilisation."""
-
-SCALE: Final = "RdBu_r"
-"""Colours: blue where it holds, white at the cap, red beyond."""
-
-LEAST, LESS_RED, MOST = 0.5, 1.5, 2.0
-"""Ends of the colour scale, over the cap: at least from the first to the second, and at most to the
-last; what is beyond is as red as that."""
-
-MARKED: Final = 600
-"""Most points of a map that has a dot at each."""
-
-LIMIT: Final[dict[str, Any]] = {"color": "tab:red", "linestyle": "--", "linewidth": 1.0}
-STOP: Final[dict[str, Any]] = {"color": "0.3", "linestyle": ":", "linewidth": 1.2}
-BORDER: Final[dict[str, Any]] = {"colors": "black", "linewidths": 1.8}
+LINE_STYLES: Final[dict[str, dict[str, Any]]] = {
+    "cap": {"color": "tab:red", "linestyle": "--", "linewidth": 1.0},
+    "stop": {"color": "0.3", "linestyle": ":", "linewidth": 1.2},
+    "border": {"colors": "black", "linewidths": 1.8},
+}
 
 Columns = dict[str, Any]
 """Arrays over the rows that are drawn: state, holds, utilisation, load factor, margin, x, y."""
@@ -58,7 +42,7 @@ class Look(NamedTuple):
     hatch: str = ""
 
 
-LOOKS: Final[dict[State, Look]] = {
+STATE_LOOKS: Final[dict[State, Look]] = {
     "holds": Look("o", "tab:blue", "holds"),
     "overloaded": Look("s", "tab:red", "overloaded"),
     "infeasible": Look("x", "0.35", "infeasible: nothing balances the body", "0.75", "////"),
@@ -195,7 +179,7 @@ def _markers(rows: Sequence[Row], colour: str | None = None) -> list[Any]:
     """Return the legend of the states that there are, in their colours or in one."""
     return [
         Line2D([], [], ls="", marker=look.marker, color=colour or look.colour, label=look.words)
-        for state, look in LOOKS.items()
+        for state, look in STATE_LOOKS.items()
         if any(row.state == state for row in rows)
     ]
 
@@ -206,7 +190,7 @@ def _markers(rows: Sequence[Row], colour: str | None = None) -> list[Any]:
 def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int]) -> Figure:
     """Draw numbers over variations, each in a panel, as a curve for each value of a series."""
     curves = panels[0][1] != panels[-1][1]
-    columns, size = (1, (7.2, 2.5)) if curves else (min(COLUMNS, len(panels)), (4.0, 3.4))
+    columns, size = (1, (7.2, 2.5)) if curves else (min(3, len(panels)), (4.0, 3.4))
     figure, every = _figure(len(panels), size, columns, sharex=curves, sharey=not curves)
     design, caps = sweep.design, {row.cap for row in sweep.rows}
     values = design.variations[series[0]].values if series else (None,)
@@ -217,9 +201,9 @@ def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int
             colour = f"C{k}" if series else None
             _draw_curve(axes, _columns(rows, side), name, colour, curves and not side.words)
         for limit in (1.0,) if name == "load factor" else caps if len(caps) == 1 else ():
-            axes.axhline(limit, **LIMIT)
+            axes.axhline(limit, **LINE_STYLES["cap"])
         for border in sweep.borders:
-            axes.axvline(border.holds, **STOP)
+            axes.axvline(border.holds, **LINE_STYLES["stop"])
         axes.set_ylabel(f"{name} [1]")
         axes.grid(alpha=0.3)
         axes.margins(y=0.12)
@@ -230,10 +214,12 @@ def _plots(sweep: Sweep, panels: Sequence[tuple[int, str]], series: Sequence[int
     handles = [Line2D([], [], color=f"C{k}", label=word_of(value)) for k, value in lines]
     handles += _markers(sweep.rows, "0.3" if series else None)
     if len(caps) == 1:
-        handles.append(Line2D([], [], **LIMIT, label=f"cap on the utilisation: {caps.pop():g}"))
+        handles.append(
+            Line2D([], [], **LINE_STYLES["cap"], label=f"cap on the utilisation: {caps.pop():g}")
+        )
     for border in sweep.borders:
         words = f"stops holding at {border.holds:.4g} {border.unit or ''}".strip()
-        handles.append(Line2D([], [], **STOP, label=words))
+        handles.append(Line2D([], [], **LINE_STYLES["stop"], label=words))
     _legend(figure, handles, design.labels[series[0]] if series else None)
     return figure
 
@@ -243,9 +229,11 @@ def _draw_curve(axes: Any, drawn: Columns, name: str, colour: str | None, line: 
     order = np.argsort(drawn["x"], kind="stable")
     if line:
         axes.plot(drawn["x"][order], drawn[name][order], color=colour or "C0")
-    for state, look in LOOKS.items():
+    for state, look in STATE_LOOKS.items():
         there = drawn["state"] == state
-        heights = np.full(there.sum(), TOP) if look.hatch else drawn[name][there]
+        # in axes, for points without a utilisation
+        top = 0.97
+        heights = np.full(there.sum(), top) if look.hatch else drawn[name][there]
         across = axes.get_xaxis_transform() if look.hatch else axes.transData
         style = {"color": colour or look.colour, "markersize": 4, "transform": across}
         axes.plot(drawn["x"][there], heights, look.marker, **style)
@@ -261,8 +249,9 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
     values: list[Value] = [None]
     if others:
         given = Side(sweep, others[0]).values
-        values = [given[round(i)] for i in np.linspace(0, len(given) - 1, min(len(given), PANELS))]
-    columns = min(COLUMNS, math.ceil(math.sqrt(len(values))))
+        # six panels at most, and so three side by side
+        values = [given[round(i)] for i in np.linspace(0, len(given) - 1, min(len(given), 6))]
+    columns = math.ceil(math.sqrt(len(values)))
     size = (4.4, 3.9) if others else (7.4, 4.8)
     figure, every = _figure(len(values), size, columns, sharex=True, sharey=True)
     groups = [
@@ -295,14 +284,19 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
     return figure
 
 
-def _colours(rows: Sequence[Row]) -> tuple[TwoSlopeNorm, str]:
-    """Return the scale of utilisations, the cap in its middle, and whether some are beyond it."""
+def _colours(rows: Sequence[Row]) -> tuple[dict[str, Any], str]:
+    """Return the scale of utilisations, the cap in its middle, and whether some are beyond it.
+
+    It is blue where it holds, white at the cap, and red beyond.
+    """
     used = [row.utilisation for row in rows if row.utilisation is not None]
     caps = {row.cap for row in rows}
     cap = caps.pop() if len(caps) == 1 else 1.0
     low, high = min(used, default=0.0), max(used, default=cap)
-    top = max(min(high, MOST * cap), LESS_RED * cap)
-    return TwoSlopeNorm(cap, min(low, LEAST * cap), top), "max" if high > top else "neither"
+    # at least from 0.5 to 1.5 caps, and at most to 2: what is beyond is as red as that
+    top = max(min(high, 2.0 * cap), 1.5 * cap)
+    norm = TwoSlopeNorm(cap, min(low, 0.5 * cap), top)
+    return {"cmap": "RdBu_r", "norm": norm}, "max" if high > top else "neither"
 
 
 def _map_handles(rows: Sequence[Row]) -> list[Any]:
@@ -315,14 +309,14 @@ def _map_handles(rows: Sequence[Row]) -> list[Any]:
     states = {row.state for row in rows}
     return handles + [
         Patch(facecolor=look.fill, edgecolor="0.4", hatch=look.hatch, label=look.words)
-        for state, look in LOOKS.items()
+        for state, look in STATE_LOOKS.items()
         if look.hatch and state in states
     ]
 
 
-def _draw_map(axes: Any, x: Side, y: Side, drawn: Columns, colours: TwoSlopeNorm) -> Any:
+def _draw_map(axes: Any, x: Side, y: Side, drawn: Columns, colours: dict[str, Any]) -> Any:
     """Draw cells, the worst on top, and the border of those that hold; return the cells."""
-    names = list(LOOKS)
+    names = list(STATE_LOOKS)
     rank = [names.index(state) for state in drawn["state"]]
     order: Any = np.lexsort((np.nan_to_num(drawn["margin"]), rank))
     cells = np.zeros((len(y.places), len(x.places)), int)
@@ -330,19 +324,20 @@ def _draw_map(axes: Any, x: Side, y: Side, drawn: Columns, colours: TwoSlopeNorm
     cells[places[0][order], places[1][order]] = order  # the last, and worst, stays
     states, margins = drawn["state"][cells], np.ma.masked_invalid(drawn["margin"][cells])
     used = np.ma.masked_invalid(drawn["utilisation"][cells])
-    mesh = axes.pcolormesh(x.edges, y.edges, used, cmap=SCALE, norm=colours)
-    for state in (state for state in names if (states == state).any() and LOOKS[state].hatch):
-        there, look = np.ma.masked_where(states != state, np.ones(states.shape)), LOOKS[state]
+    mesh = axes.pcolormesh(x.edges, y.edges, used, **colours)
+    for state in (state for state in names if (states == state).any() and STATE_LOOKS[state].hatch):
+        there, look = np.ma.masked_where(states != state, np.ones(states.shape)), STATE_LOOKS[state]
         style = {"hatch": look.hatch, "cmap": ListedColormap([look.fill]), "edgecolor": "0.4"}
         axes.pcolor(x.edges, y.edges, there, linewidth=0.0, **style)
     known = ~np.ma.getmaskarray(margins)
     if x.words or y.words or not (known.any() and margins.min() < 1.0 < margins.max()):
         known[:] = False
     else:
-        axes.contour(x.places, y.places, margins, levels=[1.0], **BORDER)
+        axes.contour(x.places, y.places, margins, levels=[1.0], **LINE_STYLES["border"])
     edges = _edges_of_holding(states, known, x.edges, y.edges)
-    axes.add_collection(LineCollection(edges, **BORDER))
-    if cells.size <= MARKED:
+    axes.add_collection(LineCollection(edges, **LINE_STYLES["border"]))
+    # a larger map has no dot at each point
+    if cells.size <= 600:
         spots = np.meshgrid(x.places, y.places)
         axes.plot(*map(np.ravel, spots), ".", color="0.3", markersize=2.5, clip_on=False)
     for side, name in ((x, "xlim"), (y, "ylim")):
@@ -367,17 +362,17 @@ def _edges_of_holding(states: Any, known: Any, across: Array, up: Array) -> list
     ]
 
 
-def _draw_samples(axes: Any, x: Side, y: Side, drawn: Columns, colours: TwoSlopeNorm) -> Any:
+def _draw_samples(axes: Any, x: Side, y: Side, drawn: Columns, colours: dict[str, Any]) -> Any:
     """Draw samples in the colours of their utilisations; return what a colour bar is of."""
     shown = None
     axes.grid(alpha=0.3)
-    for state, look in LOOKS.items():
+    for state, look in STATE_LOOKS.items():
         there = drawn["state"] == state
         places = drawn["x"][there], drawn["y"][there]
         if look.hatch:
             axes.scatter(*places, marker=look.marker, color=look.colour, s=36)
         elif there.any():
-            style = {"cmap": SCALE, "norm": colours, "edgecolor": "0.3", "linewidth": 0.6}
+            style = {**colours, "edgecolor": "0.3", "linewidth": 0.6}
             used = drawn["utilisation"][there]
             shown = axes.scatter(*places, c=used, marker=look.marker, s=40, **style)
     return shown

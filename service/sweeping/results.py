@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
@@ -13,7 +13,7 @@ from hand_models.base import InvalidInputError
 from hand_models.parameters import ParameterTable
 from service.bulk import write_csv
 from service.requests import PlanRequest
-from service.sweeping.border import TOLERANCE, Border, borders
+from service.sweeping.border import BORDER_TOLERANCE, Border, borders
 from service.sweeping.design import Design
 from service.sweeping.rows import Row, asking, columns_of, rows_at
 from service.sweeping.variation import Variation
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from planner import RobotFile
 
 __all__ = ["Sweep", "sweep", "with_borders"]
-
-STATUSES: Final = ("optimal", "overloaded", "infeasible", "failed", "error")
 
 
 class Sweep(NamedTuple):
@@ -49,7 +47,8 @@ class Sweep(NamedTuple):
     def counts(self) -> dict[str, int]:
         """Number of points of each status."""
         found = Counter(row.status for row in self.rows)
-        return {status: found[status] for status in STATUSES}
+        statuses = ("optimal", "overloaded", "infeasible", "failed", "error")
+        return {status: found[status] for status in statuses}
 
     @property
     def extremes(self) -> tuple[Row, ...]:
@@ -128,7 +127,7 @@ def sweep(
     hand: ParameterTable | None = None,
     robot: RobotFile | None = None,
     progress: Callable[[int, int], None] | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = BORDER_TOLERANCE,
 ) -> Sweep:
     """Return the results of plans while fields of a request vary.
 

@@ -12,7 +12,7 @@ import msgspec
 from hand_models.parameters import ParameterTable
 from planner import LimitName
 from service import bulk
-from service.bulk import LOCAL, Column, TableLines, evaluate
+from service.bulk import LOCAL_CLUSTER, Column, TableLines, evaluate
 from service.processes import worth
 from service.replies import ErrorDetail
 from service.requests import PlanRequest
@@ -32,19 +32,13 @@ Ask = Callable[[Iterable[bytes]], Generator[Answer, None, None]]
 
 State = Literal["holds", "overloaded", "infeasible", "error"]
 
-STATES: Final[dict[str, State]] = {
-    "optimal": "holds",
-    "overloaded": "overloaded",
-    "infeasible": "infeasible",
-}
+LIMIT_PARTS: Final = ("limb", "finger", "phalanx", "joint", "limit")
 
-LIMIT: Final = ("limb", "finger", "phalanx", "joint", "limit")
-
-COLUMNS: Final = (
+RESULT_COLUMNS: Final = (
     Column("status", "text", "", "of the plan, or error"),
     Column("utilisation", "float", "1", "the largest of any limit"),
     Column("load_factor", "float", "1", "inf where there is no end to it"),
-    *(Column(part, "text", "", f"{part} of the limit that is used most") for part in LIMIT),
+    *(Column(part, "text", "", f"{part} of the limit that is used most") for part in LIMIT_PARTS),
     Column("error", "text", "", "why there is no plan"),
 )
 """Columns after those of what varies."""
@@ -86,7 +80,15 @@ class Row(msgspec.Struct, frozen=True):
     @property
     def state(self) -> State:
         """State as it is drawn; an error where the planner failed, too."""
-        return STATES.get(self.status, "error")
+        match self.status:
+            case "optimal":
+                return "holds"
+            case "overloaded":
+                return "overloaded"
+            case "infeasible":
+                return "infeasible"
+            case _:
+                return "error"
 
     @property
     def answered(self) -> bool:
@@ -115,16 +117,16 @@ class Row(msgspec.Struct, frozen=True):
             word_of(each) if each is None or isinstance(each, bool) else each for each in self.point
         ]
         factor = "inf" if self.load_factor_unbounded else self.load_factor
-        limit = [getattr(self.limiting, part, None) for part in LIMIT]
+        limit = [getattr(self.limiting, part, None) for part in LIMIT_PARTS]
         return [*point, self.status, self.utilisation, factor, *limit, self.complaint]
 
     @classmethod
     def read(cls, design: Design, point: Point, line: bulk.Row) -> Row:
         """Return the row of a point that was written as a line."""
-        names = (column.name for column in COLUMNS)
+        names = (column.name for column in RESULT_COLUMNS)
         known = dict(zip(names, line.values[len(point) :], strict=True))
         factor, unbounded = known["load_factor"], known["load_factor"] == "inf"
-        limit = {part: known[part] for part in LIMIT}
+        limit = {part: known[part] for part in LIMIT_PARTS}
         return cls(
             point,
             known["status"],
@@ -148,7 +150,7 @@ def asking(
     if on is None:
         workers = worth(count, workers)
         on = "here" if workers == 1 else "processes"
-    place = LOCAL if on == "local" else on
+    place = LOCAL_CLUSTER if on == "local" else on
     return partial(evaluate, on=place, workers=workers, robot=robot, form=Format.MSGPACK)
 
 
@@ -173,7 +175,7 @@ def columns_of(design: Design) -> tuple[Column, ...]:
             Column(label, "float" if each.numbers else "text", target.unit or "", each.path)
             for label, each, target in varied
         ),
-        *COLUMNS,
+        *RESULT_COLUMNS,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Self
 
 import numpy as np
 
@@ -15,16 +15,6 @@ __all__ = ["Value", "Variation", "word_of"]
 
 Value = float | bool | str | None
 """Value of a field: a number, a word, or what JSON has besides."""
-
-WORDS: Final[dict[str, Value]] = {"true": True, "false": False, "null": None}
-
-FORM: Final = "must be PATH=LOW:HIGH:COUNT or PATH=VALUE,VALUE,..."
-
-LIKE_A_RANGE: Final = re.compile(r"-?[\d.]+ *(-|–|\.\.|to) *-?[\d.]+")
-"""Two numbers that are parted by something else than colons."""
-
-MOST_VALUES: Final = 10_000
-"""Most values of one range."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +74,10 @@ class Variation:
             raise InvalidInputError(f"must be finite numbers, got {low:g}:{high:g}", field=path)
         if not low < high:
             raise InvalidInputError(f"LOW must be below HIGH, got {low:g}:{high:g}", field=path)
-        if not 2 <= count <= MOST_VALUES:
+        most = 10_000
+        if not 2 <= count <= most:
             raise InvalidInputError(
-                f"COUNT must be from 2 to {MOST_VALUES}, got {count}; one value alone is "
-                f"{path}={low:g}",
+                f"COUNT must be from 2 to {most}, got {count}; one value alone is {path}={low:g}",
                 field=path,
             )
         values = [float(f"{value:.12g}") for value in np.linspace(low, high, count)]
@@ -111,7 +101,7 @@ class Variation:
         """
         path, _, given = (part.strip() for part in text.partition("="))
         if not path or not given:
-            raise InvalidInputError(f"{FORM}, got {text!r}")
+            raise _unreadable(text)
         ends = given.split(":")
         if len(ends) == 1:
             return cls(path, tuple(_value(each.strip(), path) for each in given.split(",")))
@@ -119,16 +109,15 @@ class Variation:
             low, high, *counts = float(ends[0]), float(ends[1]), *map(int, ends[2:])
             (count,) = counts or ([2] if sampled else [])
         except ValueError:
-            raise InvalidInputError(
-                f"{FORM} (with --samples also PATH=LOW:HIGH), got {text!r}", field=path
-            ) from None
+            more = " (with --samples also PATH=LOW:HIGH)"
+            raise _unreadable(text, path, more) from None
         return cls.over(path, low, high, count)
 
 
 def word_of(value: Value) -> str:
     """Return a value as a caller writes it."""
     if value is None or isinstance(value, bool):
-        return next(word for word, meant in WORDS.items() if meant is value)
+        return "null" if value is None else str(value).lower()
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -141,6 +130,13 @@ def _value(text: str, path: str) -> Value:
             return kind(text)
         except ValueError:
             continue
-    if LIKE_A_RANGE.fullmatch(text):
-        raise InvalidInputError(f"{FORM}, got {text!r}", field=path)
-    return WORDS.get(text, text)
+    # two numbers that are parted by something else than colons
+    if re.fullmatch(r"-?[\d.]+ *(-|–|\.\.|to) *-?[\d.]+", text):
+        raise _unreadable(text, path)
+    words: dict[str, Value] = {"true": True, "false": False, "null": None}
+    return words.get(text, text)
+
+
+def _unreadable(text: str, path: str | None = None, more: str = "") -> InvalidInputError:
+    form = f"must be PATH=LOW:HIGH:COUNT or PATH=VALUE,VALUE,...{more}"
+    return InvalidInputError(f"{form}, got {text!r}", field=path)

@@ -1,4 +1,5 @@
 from .body_spaces import print_body_space as print_body_space
+from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus
 from .extras import print_advice as print_advice, words_of as words_of
 from .hands import (
     print_robust as print_robust,
@@ -19,11 +20,6 @@ from .output_lock import write_alone as write_alone
 from .plans import print_plan as print_plan, print_route as print_route
 from .sweeps import print_sweep as print_sweep
 from .terminal import (
-    BAD_INPUT as BAD_INPUT,
-    DONE as DONE,
-    EXIT_STATUS as EXIT_STATUS,
-    FAILED as FAILED,
-    OVERLOADED as OVERLOADED,
     draw_plan as draw_plan,
     filling_folder as filling_folder,
     note as note,

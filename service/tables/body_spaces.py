@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -11,22 +11,18 @@ from rich.text import Text
 from planner import OTHER_COMPONENTS, WRENCH_COMPONENTS
 from service import replies
 from service.replies import BodySpaceReply
-from service.tables.layout import in_colour, name, number, print_rows, print_warnings, text, unit_of
+from service.tables.layout import (
+    Column,
+    in_colour,
+    name,
+    number,
+    print_rows,
+    print_warnings,
+    text,
+    unit_of,
+)
 
 __all__ = ["print_body_space"]
-
-FINEST: Final = 1e-3
-"""Smallest gap that is printed; a smaller one is printed as this [N]."""
-
-LETS_GO: Final = text(
-    "first to let go",
-    "1.limiting",
-    lambda limit: " ".join(
-        part
-        for part in (limit.limb, limit.joint, limit.finger, limit.phalanx, limit.limit)
-        if part is not None
-    ),
-)
 
 
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:
@@ -44,11 +40,21 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     axis = name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}")
     ends = [number(part, f"1.{part}", "z.1f") for part in ("more", "pure", "extent")]
     title = "how far body wrenches that are held go along the axes of B"
-    print_rows(reply.capability.items(), (axis, *ends, LETS_GO), out, title)
+    print_rows(reply.capability.items(), (axis, *ends, _lets_go()), out, title)
     out.print("more: beyond the body wrench asked for, and what lets go there first")
     out.print("pure: with every other component zero; extent: with whatever else; -: none")
     _print_section(reply.section, out)
     _print_accelerations(reply, out)
+
+
+def _lets_go() -> Column:
+    """Return the column of what lets go first."""
+
+    def words(limit: Any) -> str:
+        parts = (limit.limb, limit.joint, limit.finger, limit.phalanx, limit.limit)
+        return " ".join(part for part in parts if part is not None)
+
+    return text("first to let go", "1.limiting", words)
 
 
 def _print_section(section: replies.BodySection, out: Console) -> None:
@@ -66,7 +72,7 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
     )
     over = " (moments over 0.1 m)" if any(axis.startswith("m") for axis in section.axes) else ""
     shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
-    out.print(f"{plane}: {shape}, {ranges}; known to {max(section.gap, FINEST):.2g} N{over}")
+    out.print(f"{plane}: {shape}, {ranges}; known to {max(section.gap, 1e-3):.2g} N{over}")
 
 
 def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
@@ -80,4 +86,4 @@ def _print_accelerations(reply: BodySpaceReply, out: Console) -> None:
         rows.append((f"({where}) m/s²", one))
     largest = number("largest", "1.acceleration", "z.2f")
     title = "largest accelerations of the body from rest, in W"
-    print_rows(rows, (name("along", "0"), largest, LETS_GO), out, title)
+    print_rows(rows, (name("along", "0"), largest, _lets_go()), out, title)

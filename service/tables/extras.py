@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from itertools import islice
 from types import MappingProxyType
-from typing import Final
 
 from rich.console import Console
 
@@ -21,15 +20,6 @@ __all__ = [
     "words_of",
 ]
 
-MOST_DIGITS: Final = 3
-"""Most decimals of a number, however small the spread."""
-
-CORRELATED: Final = 10
-"""Fewest samples for which the largest sensitivity is printed: fewer correlate by chance."""
-
-MOST: Final = 3
-"""Number of changes shown, the best first."""
-
 
 def words_of(advice: Advice, *, holding: bool = False) -> str:
     """Return in words what one change would do; ``holding``: the stance already holds."""
@@ -40,7 +30,8 @@ def words_of(advice: Advice, *, holding: bool = False) -> str:
 def print_advice(reply: PlanReply, out: Console) -> None:
     """Print the advice of a plan, or that none of the changes that were tried would help."""
     holding = reply.status == "optimal"
-    for advice in islice(reply.advice or (), MOST):
+    # the three best changes
+    for advice in islice(reply.advice or (), 3):
         out.print(words_of(advice, holding=holding))
     doubtful = any(each.kind == "unit" for each in reply.findings)
     if reply.advice == [] and "advice" not in reply.unfinished and not doubtful:
@@ -53,8 +44,8 @@ def within(value: float, spread: Quantiles | None) -> str:
     The interval has the first decimal in which its ends differ, the number one more.
     """
     if spread is None:
-        return f"{value:.{MOST_DIGITS}f}"
-    more = min(_digits(spread) + 1, MOST_DIGITS)
+        return f"{value:.3f}"
+    more = min(_digits(spread) + 1, 3)
     return f"{value:.{more}f} ({_interval(spread)})"
 
 
@@ -63,7 +54,8 @@ def spread_sentence(spread: Spread) -> str:
     said = f"holds in {spread.holds} of {spread.draws} draws"
     if spread.cap < 1.0:
         said += f" within a utilisation of {spread.cap:g}"
-    if spread.hangs_on and spread.draws >= CORRELATED:
+    # fewer samples correlate by chance
+    if spread.hangs_on and spread.draws >= 10:
         most = spread.hangs_on[0]
         said += f"; hangs most on {most.quantity} ({100.0 * most.share:.0f} %)"
     if spread.without:
@@ -94,10 +86,10 @@ def _refused(limbs: Mapping[str, int], reasons: Mapping[str, str] = MappingProxy
 
 
 def _digits(spread: Quantiles) -> int:
-    """Return the first decimal in which an interval's ends differ, from 1 to `MOST_DIGITS`."""
+    """Return the first decimal in which an interval's ends differ, from 1 to 3."""
     wide = spread.high - spread.low
-    first = MOST_DIGITS if wide <= 0.0 else math.ceil(-math.log10(wide))
-    return min(max(first, 1), MOST_DIGITS)
+    first = 3 if wide <= 0.0 else math.ceil(-math.log10(wide))
+    return min(max(first, 1), 3)
 
 
 def _interval(spread: Quantiles) -> str:

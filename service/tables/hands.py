@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 from rich.console import Console
 from rich.text import Text
@@ -15,37 +15,10 @@ from hand_models.hand import FINGERS, NAIL
 from hand_models.wrench_spaces import Row
 from planner import Survey
 from service import replies
-from service.replies import AXES
+from service.replies import WRENCH_AXES
 from service.tables.layout import in_order, name, number, print_rows, text, unit_of
 
 __all__ = ["print_failures", "print_robust", "print_survey", "print_wrench_space", "survey_json"]
-
-NEARLY: Final = 0.02
-"""Smallest turn of a joint that is printed for rock a little elsewhere [rad]."""
-
-TENSION_LIMITS: Final = (
-    name("finger"),
-    name("phalanx"),
-    number("f_t(max) N", lambda limit: "none" if limit.tension is None else f"{limit.tension:.1f}"),
-)
-
-CARRIES: Final[Mapping[str, str]] = {
-    "off": "carries nothing",
-    "drags": "drags on the rock",
-    "presses": "presses on the rock",
-    "drags_and_presses": "drags and presses on the rock",
-}
-"""Words for each mode of a palm."""
-
-DRAGGED: Final = "a tile dragged backwards"
-"""Words for an end without a limit: a part that can only push or only pull would have to do the
-other; it is nearly always a tile."""
-
-WHOLE: Final = "finger"
-"""Column for limits of a finger as a whole, not of one of its tiles."""
-
-ORDER: Final = (WHOLE, "base", *PHALANGES, NAIL)
-"""Order of the columns of a finger's parts."""
 
 
 def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
@@ -59,10 +32,16 @@ def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
         _print_floating(reply.wrist.palm or "off", reply.wrist.error, out)
     _print_closing(reply, out)
     for closing in reply.closing:
-        if closing.nearby or closing.nearby_turn > NEARLY:
+        # [rad] for rock a little elsewhere
+        if closing.nearby or closing.nearby_turn > 0.02:
             out.print(_nearby_sentence(closing))
     title = "tendon tension at which the finger's first tile lets go"
-    print_rows(reply.tension_limits, TENSION_LIMITS, out, title)
+    columns = (
+        name("finger"),
+        name("phalanx"),
+        number("f_t(max) N", lambda end: "none" if end.tension is None else f"{end.tension:.1f}"),
+    )
+    print_rows(reply.tension_limits, columns, out, title)
     if reply.capability is None:
         out.print("nothing is left at utilisation 1: closing alone is more than its tiles hold")
         return
@@ -93,8 +72,8 @@ def _print_ends(
 ) -> None:
     """Print the least and the most of each component, from the reach both ways along its axis."""
     heads = [f"{what}{end}" for what in reaches for end in ("least", "most")]
-    rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in AXES]
-    for row, axis in zip(rows, AXES, strict=True):
+    rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in WRENCH_AXES]
+    for row, axis in zip(rows, WRENCH_AXES, strict=True):
         for ways in reaches.values():
             back = ways[f"-{axis}"]
             row += [None if back is None else -back, ways[f"+{axis}"]]
@@ -103,8 +82,14 @@ def _print_ends(
 
 def _print_floating(palm: str, error: float, out: Console) -> None:
     """Print what the wrench space of a floating hand covers, and what it does not."""
+    carries = {
+        "off": "carries nothing",
+        "drags": "drags on the rock",
+        "presses": "presses on the rock",
+        "drags_and_presses": "drags and presses on the rock",
+    }[palm]
     out.print(
-        f"floating wrist: this set is linearised at rest, for a palm that {CARRIES[palm]}. At its "
+        f"floating wrist: this set is linearised at rest, for a palm that {carries}. At its "
         f"farthest wrenches the exact model differs by up to {error:.1f} N (moments over 0.1 m). "
         "--search N finds what the hand really holds, palm and all.",
     )
@@ -122,7 +107,7 @@ def _print_capability(capability: Mapping[str, replies.AxisCapability], out: Con
     out.print("least, most: with whatever else the hand can carry")
     if with_pure:
         out.print("pure: with every other component zero; -: none")
-    ends = [capability[f"{sign}{AXES[0]}"].pure for sign in "+-"]
+    ends = [capability[f"{sign}{WRENCH_AXES[0]}"].pure for sign in "+-"]
     if any(end is None or round(end, 2) < 0.0 for end in ends):
         out.print("zero is not in this set: with nothing on the wrist a limit would be exceeded")
 
@@ -178,7 +163,7 @@ def survey_json(survey: Survey) -> dict[str, Any]:
 
 
 def _names() -> list[str]:
-    return [f"{sign}{axis}" for axis in AXES for sign in "+-"]
+    return [f"{sign}{axis}" for axis in WRENCH_AXES for sign in "+-"]
 
 
 def _limit(row: Row | None) -> dict[str, str | None] | None:
@@ -211,15 +196,19 @@ def _print_survey_ends(survey: Survey, out: Console) -> None:
         out.print("reach -: no way along the axis was found that holds")
     if any(end is not None and end.limiting is None for end in survey.ends):
         out.print(
-            f"limit -: no limit binds there; the way ends at {DRAGGED}, or where the search "
-            "stopped",
+            "limit -: no limit binds there; the way ends at a tile dragged backwards, or where the "
+            "search stopped",
         )
 
 
 def print_failures(limiting: Sequence[Row | None], out: Console) -> None:
     """Print how often each tile of each finger, or another part, lets go first."""
-    counts = Counter((None, DRAGGED) if row is None else _place(row) for row in limiting)
-    parts = [part for part in ORDER if any(finger and what == part for finger, what in counts)]
+    # without a limit, a part that can only push or only pull would have to do the other: nearly
+    # always a tile
+    dragged = (None, "a tile dragged backwards")
+    counts = Counter(dragged if row is None else _place(row) for row in limiting)
+    order = ("finger", "base", *PHALANGES, NAIL)
+    parts = [part for part in order if any(finger and what == part for finger, what in counts)]
     rows = []
     for finger in FINGERS:
         own = [counts[finger, part] for part in parts]
@@ -236,4 +225,5 @@ def _place(row: Row) -> tuple[str | None, str]:
     """Return finger and part of a limit; if it is of no finger, the limit in words."""
     if row.finger is None:
         return None, row.limit.replace("_", " ")
-    return row.finger, row.phalanx or WHOLE
+    # of a finger as a whole, not of one of its tiles
+    return row.finger, row.phalanx or "finger"

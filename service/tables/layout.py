@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,31 +24,16 @@ __all__ = [
     "unit_of",
 ]
 
-COLOURS: Final = {
-    "optimal": "green",
-    "overloaded": "red",
-    "infeasible": "red",
-    "failed": "red",
-}
-"""Colour of a plan's status, if the terminal has colours and ``NO_COLOR`` is not set."""
-
-NARROWEST: Final = 80
-"""Narrowest width of a table [characters]; a narrower terminal wraps its lines."""
-
-LONG: Final = 1e4
-"""Smallest number without decimals; from a tenth of it on, a number has one decimal."""
-
-UNBOUNDED: Final = 1000
-"""Width in which any table fits [characters]."""
-
 
 def console(stderr: bool = False) -> Console:
     """Return the console on standard output, or on standard error."""
     from rich.console import Console
 
     screen = Console(highlight=False, stderr=stderr)
-    if not stderr and screen.width < NARROWEST:
-        screen.width = NARROWEST
+    # a narrower terminal wraps the lines of a table
+    narrowest = 80
+    if not stderr and screen.width < narrowest:
+        screen.width = narrowest
     return screen
 
 
@@ -56,7 +41,9 @@ def in_colour(status: str, word: str | None = None) -> Text:
     """Return a status, or a word in its place, in bold and in its colour."""
     from rich.text import Text
 
-    return Text(word or status, f"bold {COLOURS.get(status, 'default')}")
+    bad = status in {"overloaded", "infeasible", "failed"}
+    colour = "red" if bad else "green" if status == "optimal" else "default"
+    return Text(word or status, f"bold {colour}")
 
 
 def print_warnings(warnings: Iterable[str], out: Console) -> None:
@@ -69,7 +56,8 @@ def print_warnings(warnings: Iterable[str], out: Console) -> None:
 
 def short(value: float, digits: int) -> str:
     """Return a number with at most so many decimals, fewer if it is large."""
-    while digits and abs(value) >= LONG / 10.0**digits:
+    # from 1e4 on, a number has no decimals; from a tenth of it on, it has one
+    while digits and abs(value) >= 1e4 / 10.0**digits:
         digits -= 1
     return f"{value:z.{digits}f}"
 
@@ -182,7 +170,8 @@ def print_rows(
         table.add_row(*shown, style=None if style is None else style(row))
     if title:
         out.print(Text(f"\n{title}", style="bold"))
-    widest = out.measure(table, options=out.options.update(max_width=UNBOUNDED)).maximum
+    # any table fits in 1000 characters
+    widest = out.measure(table, options=out.options.update(max_width=1000)).maximum
     if widest > out.width and not any(column.kind == "text" for column in columns):
         table.padding = (0, padding, 0, 0)
     out.print(table)

@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final
 
 import click
 
@@ -15,12 +14,6 @@ from hand_models.base import InvalidInputError
 from service.tables.terminal import remark, writing
 
 __all__ = ["write_alone"]
-
-HELD: Final = (errno.EACCES, errno.EAGAIN)
-"""Error numbers of the system if another process has the lock."""
-
-NO_LOCKS: Final = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
-"""Error numbers of the system if the file system has no locks."""
 
 
 def write_alone(file: Path, output: Path | None = None) -> None:
@@ -73,9 +66,10 @@ def _locked(path: Path, output: Path) -> int | None:
             fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             os.close(lock)
-            if error.errno in HELD:
+            if error.errno in {errno.EACCES, errno.EAGAIN}:
                 raise _held(path, output) from None
-            if error.errno not in NO_LOCKS:
+            # these say that the file system has no locks
+            if error.errno not in {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}:
                 raise
             remark(f"{path}: the file system has no locks; no other run may write {output} now")
             return None

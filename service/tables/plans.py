@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from rich.console import Console
 from rich.text import Text
@@ -27,50 +27,6 @@ from service.tables.layout import (
 )
 
 __all__ = ["print_plan", "print_route"]
-
-MOST_PRICES: Final = 8
-"""Number of shadow prices shown, the largest first."""
-
-JOINTS_A_LINE: Final = 7
-"""Number of a limb's joint torques in one line of a table."""
-
-HANDS: Final = (
-    name("hand", "limb"),
-    *(
-        number(axis, f"wrench.{i}", partial(short, digits=i // 3))
-        for i, axis in enumerate(replies.AXES)
-    ),
-    number("hand\nutil", "utilisation", partial(short, digits=2)),
-    number("palm\nshear", "palm.force.0", partial(short, digits=0), scale=-1.0),
-    number("palm\npress", "palm.force.2", partial(short, digits=0)),
-)
-TURNS: Final = ("vx", "vy", "vz", "wx", "wy", "wz")
-WRISTS: Final = (
-    name("hand", "limb"),
-    *(number(axis, f"wrist.twist.{i}", "z.2f", scale=1e3) for i, axis in enumerate(TURNS)),
-    text("palm", "wrist.palm", lambda palm: palm.replace("_", " ")),
-)
-FINGERS: Final = (
-    name("hand", "0"),
-    name("finger", "1.name"),
-    number("tension N", "1.tendon_tension", ".1f"),
-    number("current A", "1.motor_current", ".3f"),
-    text("tile", "2.phalanx"),
-    number("util", "2.utilisation", ".2f"),
-)
-PRICES: Final = (
-    name("hand", "limb"),
-    name("finger, joint", lambda price: price.finger or price.joint),
-    name("tile", "phalanx"),
-    name("limit"),
-    number("price", lambda price: f"{price.price:.2g} /{price.unit}"),
-)
-CLEARANCES: Final = (
-    name("", "0"),
-    number("mm", "1.distance", ".0f", scale=1e3),
-    text("between", "1.between.0"),
-    text("and", "1.between.1"),
-)
 
 
 def print_plan(
@@ -118,12 +74,25 @@ def print_plan(
         _print_joints(reply.joint_torque, reply.joint_torque_limit, out)
     for prices, what in ((reply.prices, "utilisation"), (reply.effort_prices, "effort")):
         if prices:
-            title = f"what one unit more of a limit would take off the {what}"
-            if len(prices) > MOST_PRICES:
-                title += f" ({MOST_PRICES} of {len(prices)})"
-            print_rows(prices[:MOST_PRICES], PRICES, out, title)
+            _print_prices(prices, what, out)
     if reply.certificate is not None:
         _print_certificate(reply.certificate, reply.body_wrench, out)
+
+
+def _print_prices(prices: Sequence[planner.Price], what: str, out: Console) -> None:
+    """Print the largest shadow prices."""
+    columns = (
+        name("hand", "limb"),
+        name("finger, joint", lambda price: price.finger or price.joint),
+        name("tile", "phalanx"),
+        name("limit"),
+        number("price", lambda price: f"{price.price:.2g} /{price.unit}"),
+    )
+    title = f"what one unit more of a limit would take off the {what}"
+    most = 8
+    if len(prices) > most:
+        title += f" ({most} of {len(prices)})"
+    print_rows(prices[:most], columns, out, title)
 
 
 def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iterator[str]:
@@ -152,7 +121,7 @@ def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out:
             ("nearest held", *proof.nearest),
             ("missing", *proof.shortfall),
         )
-        columns = in_order([""], replies.AXES, form="z.1f")
+        columns = in_order([""], replies.WRENCH_AXES, form="z.1f")
         print_rows(rows, columns, out, f"body wrenches {where}, in B [N, N·m]")
     if proof.irreducible:
         title = "these leave no balance, each needed for that; others may be in the way, too"
@@ -207,14 +176,38 @@ def _load_factor(reply: replies.PlanReply) -> str:
 
 def _print_hands(hands: Sequence[replies.Hand], out: Console) -> None:
     """Print the load of each hand, the twist of floating wrists, and the tendons of each finger."""
-    print_rows(hands, HANDS, out, "wrench on the rock, in H [N, N·m], and the palm's part")
+    columns = (
+        name("hand", "limb"),
+        *(
+            number(axis, f"wrench.{i}", partial(short, digits=i // 3))
+            for i, axis in enumerate(replies.WRENCH_AXES)
+        ),
+        number("hand\nutil", "utilisation", partial(short, digits=2)),
+        number("palm\nshear", "palm.force.0", partial(short, digits=0), scale=-1.0),
+        number("palm\npress", "palm.force.2", partial(short, digits=0)),
+    )
+    print_rows(hands, columns, out, "wrench on the rock, in H [N, N·m], and the palm's part")
     floating = [hand for hand in hands if hand.wrist.twist is not None]
     if floating:
         title = "where floating wrists go (mm, mrad), and how their palms carry"
-        print_rows(floating, WRISTS, out, title)
+        turns = enumerate(("vx", "vy", "vz", "wx", "wy", "wz"))
+        columns = (
+            name("hand", "limb"),
+            *(number(axis, f"wrist.twist.{i}", "z.2f", scale=1e3) for i, axis in turns),
+            text("palm", "wrist.palm", lambda palm: palm.replace("_", " ")),
+        )
+        print_rows(floating, columns, out, title)
     fingers = [(hand.limb, finger, _worst(finger)) for hand in hands for finger in hand.fingers]
     title = "tendons and their motors, and each finger's most loaded tile"
-    print_rows(fingers, FINGERS, out, title, groups=True)
+    columns = (
+        name("hand", "0"),
+        name("finger", "1.name"),
+        number("tension N", "1.tendon_tension", ".1f"),
+        number("current A", "1.motor_current", ".3f"),
+        text("tile", "2.phalanx"),
+        number("util", "2.utilisation", ".2f"),
+    )
+    print_rows(fingers, columns, out, title, groups=True)
 
 
 def _worst(finger: Any) -> Any:
@@ -231,7 +224,8 @@ def _print_joints(
     The joint with the largest utilisation is marked.
     """
     most = max((len(row) for row in torques.values()), default=0)
-    width = min(most, JOINTS_A_LINE)
+    # so many torques fit in one line
+    width = min(most, 7)
     rows: list[list[str]] = []
     for limb, row in torques.items():
         # a joint without a motor has no torque and a limit of zero
@@ -258,7 +252,13 @@ def _print_clearance(clearance: planner.Clearance, out: Console) -> None:
     pairs = ("link_rock", "link_link", "hand_hand", "hand_body", "body_rock")
     near = {pair.replace("_", " "): getattr(clearance, pair) for pair in pairs}
     title = "least distances; below zero: how deep one is in the other"
-    print_rows([row for row in near.items() if row[1] is not None], CLEARANCES, out, title)
+    columns = (
+        name("", "0"),
+        number("mm", "1.distance", ".0f", scale=1e3),
+        text("between", "1.between.0"),
+        text("and", "1.between.1"),
+    )
+    print_rows([row for row in near.items() if row[1] is not None], columns, out, title)
     for missing in clearance.unchecked:
         out.print(f"not measured: {missing}")
 

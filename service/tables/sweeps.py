@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from rich.console import Console
@@ -13,13 +13,8 @@ from service.tables.layout import in_order, name, number, print_rows, text
 
 __all__ = ["print_sweep"]
 
-T = TypeVar("T")
 
-LINES: Final = 24
-"""Most lines of a table; lines above it are left out evenly."""
-
-LARGEST: Final = 30
-"""Most characters of a path at the head of a column."""
+ItemT = TypeVar("ItemT")
 
 
 def print_sweep(sweep: Sweep, out: Console) -> None:
@@ -71,9 +66,10 @@ def _print_points(sweep: Sweep, x: int, out: Console) -> None:
         number("load factor", _factor),
         text("limited by", _limit),
     )
-    print_rows(_thinned(rows), columns, out, sweep.design.labels[x])
-    if len(rows) > LINES:
-        out.print(f"{LINES} of {len(rows)} points are shown")
+    shown = _thinned(rows)
+    print_rows(shown, columns, out, sweep.design.labels[x])
+    if len(rows) > len(shown):
+        out.print(f"{len(shown)} of {len(rows)} points are shown")
 
 
 def _factor(row: Row) -> str | None:
@@ -131,10 +127,11 @@ def _print_extremes(sweep: Sweep, out: Console) -> None:
 def _head(sweep: Sweep, place: int) -> str:
     """Return a path and its unit; only the end of a long path."""
     label = sweep.design.labels[place]
-    return label if len(label) <= LARGEST else f"…{label[1 - LARGEST :]}"
+    most = 30
+    return label if len(label) <= most else f"…{label[1 - most :]}"
 
 
-def _thinned(items: Sequence[T]) -> list[T]:
-    """Return at most so many items, evenly spaced from the first to the last."""
-    places = np.linspace(0, len(items) - 1, min(len(items), LINES))
+def _thinned(items: Sequence[ItemT]) -> list[ItemT]:
+    """Return 24 items at most, evenly spaced from the first to the last: the lines of a table."""
+    places = np.linspace(0, len(items) - 1, min(len(items), 24))
     return [items[round(i)] for i in places]

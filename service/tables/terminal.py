@@ -6,7 +6,7 @@ import errno
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Protocol
 
 import click
 import msgspec
@@ -15,14 +15,10 @@ import planner
 from hand_models.base import CruxError, InvalidInputError
 from service import answering, replies
 from service.requests import PlanRequest
+from service.tables.command_line import VERBOSITY_KEY, ExitStatus
 from service.tables.layout import console
 
 __all__ = [
-    "BAD_INPUT",
-    "DONE",
-    "EXIT_STATUS",
-    "FAILED",
-    "OVERLOADED",
     "draw_plan",
     "filling_folder",
     "note",
@@ -37,26 +33,11 @@ __all__ = [
     "writing",
 ]
 
-DONE: Final = 0
-FAILED: Final = 1
-BAD_INPUT: Final = 2
-OVERLOADED: Final = 3
-
-EXIT_STATUS: Final = {"optimal": DONE, "overloaded": OVERLOADED, "infeasible": OVERLOADED}
-"""Exit status by a plan's status; any other is `FAILED`."""
-
-NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""Error numbers for which the file's name is not to blame."""
-
-
-VERBOSITY: Final = "crux.verbosity"
-"""Key in the context of a command: 1 for more output, -1 for less."""
-
 
 def verbosity() -> int:
     """Return the verbosity: 1 for more output than by default (0), -1 for less."""
     context = click.get_current_context(silent=True)
-    level: int = 0 if context is None else context.meta.get(VERBOSITY, 0)
+    level: int = 0 if context is None else context.meta.get(VERBOSITY_KEY, 0)
     return level
 
 
@@ -88,7 +69,7 @@ def show(reply: replies.PlanReply | replies.BriefPlanReply, as_json: bool) -> in
         if verbosity() >= 0:
             print_advice(reply, console())
         tell_solver(reply)
-    return EXIT_STATUS.get(reply.status, FAILED)
+    return ExitStatus.of(reply.status)
 
 
 def tell_solver(reply: replies.PlanReply) -> None:
@@ -131,7 +112,8 @@ def filling_folder() -> Iterator[None]:
 def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError:
     """Return the error of a file that cannot be written: bad input, unless the disk is full."""
     message = f"cannot write {path}: {error.strerror or error}"
-    if error.errno in NO_ROOM:
+    # the file's name is not to blame
+    if error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}:
         return CruxError(message)
     return InvalidInputError(message, field=field)
 

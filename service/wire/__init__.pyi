@@ -12,7 +12,6 @@ from .codec import (
 )
 from .errors import (
     REQUEST_KINDS as REQUEST_KINDS,
-    UNREACHABLE as UNREACHABLE,
     BusyError as BusyError,
     LostError as LostError,
     MalformedError as MalformedError,
@@ -22,17 +21,8 @@ from .errors import (
 )
 from .json_schema import schema as schema
 from .keys import (
-    ALIVE as ALIVE,
-    BODY_SPACE as BODY_SPACE,
-    CLIENTS as CLIENTS,
     DEFAULT_ROBOT as DEFAULT_ROBOT,
-    HEALTH as HEALTH,
-    METRICS as METRICS,
-    PLAN as PLAN,
-    ROUTE as ROUTE,
-    SET_POINTS as SET_POINTS,
-    STREAM as STREAM,
-    WRENCH_SPACE as WRENCH_SPACE,
+    ServiceName as ServiceName,
     service_key as service_key,
 )
 from .validation_errors import (

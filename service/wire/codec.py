@@ -32,51 +32,17 @@ __all__ = [
     "most_error_bytes",
 ]
 
-T = TypeVar("T")
+MessageT = TypeVar("MessageT")
 
 LARGEST_REQUEST: Final = 2**26
 """Most bytes of a request; a stance takes a few thousand, a scan of 200,000 triangles about 10⁷."""
 
-LARGEST: Final[dict[type, int]] = {SetPointsRequest: 2**12, StreamRequest: 2**24}
-"""Most bytes of requests without rock, and of streams, which are kept: sixteen of them have to fit
-into one process."""
-
-ADVICE: Final[dict[type, str]] = {
-    SetPointsRequest: "ask for one body wrench at a time, with a shorter id",
-}
-"""Advice on smaller requests; by default, to send less rock."""
-
-LESS_ROCK: Final = (
-    "let hands share a scan under stance.rocks, cut it to what is near them, or make its triangles "
-    "larger (crux rock --spacing)"
-)
-
 LARGEST_ERROR: Final = 4096
 """Most bytes of an error reply."""
 
-PARTS: Final = {"id": 1540, "field": 600, "message": 1600}
-"""Most encoded bytes of its texts; every ``id`` that a request may have fits."""
 
-BARE: Final = 200
-"""Most bytes of an error reply without these texts."""
-
-ALIASES: Final = {
-    "": "application/json",
-    "zenoh/bytes": "application/json",
-    "text/json": "application/json",
-}
-
-
-LATER: Final = {"confidence": "leave it out: tile limits are nominal"}
+LATER_FIELDS: Final = {"confidence": "leave it out: tile limits are nominal"}
 """Fields of later versions, with the advice for a request that has them."""
-
-LATER_VALUES: Final = {
-    ("objective", "max_reliability"): f"valid are {' and '.join(get_args(Objective))}",
-}
-"""Values of fields of later versions, with the advice for a request that has them."""
-
-BULK: Final = ("vertices", "faces")
-"""Long lists of numbers of a mesh, which its model checks as arrays."""
 
 
 class Format(Enum):
@@ -97,8 +63,10 @@ class Format(Enum):
             If the encoding is of neither format.
         """
         plain = encoding.partition(";")[0].strip().lower()
+        if plain in {"", "zenoh/bytes", "text/json"}:
+            return cls.JSON
         try:
-            return cls(ALIASES.get(plain, plain))
+            return cls(plain)
         except ValueError:
             raise MalformedError(
                 f"unknown encoding {plain[:80]!r}; valid: {', '.join(f.value for f in cls)}"
@@ -119,7 +87,7 @@ class Format(Enum):
             return msgspec.json.encode(message)
         return msgspec.msgpack.encode(message)
 
-    def decode(self, payload: bytes, kind: type[T]) -> T:
+    def decode(self, payload: bytes, kind: type[MessageT]) -> MessageT:
         """Return bytes as a message.
 
         Raises
@@ -173,7 +141,7 @@ class Answer(NamedTuple):
     cost: float = 0.0
 
 
-def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) -> T:
+def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.JSON) -> MessageT:
     """Return bytes as a request that has passed every check which needs no model.
 
     Raises
@@ -195,11 +163,12 @@ def decode_request(payload: bytes, kind: type[T], form: Format = Format.JSON) ->
             partial(_plain, payload, form),
             lambda part: form.decode(form.encode(part), kind),
         )
-        for (name, value), advice in LATER_VALUES.items():
-            if field == name and f"value '{value}'" in str(error):
-                raise UnsupportedError(
-                    f"{value} is not supported in this version; {advice}", field=field
-                ) from None
+        if field == "objective" and "value 'max_reliability'" in str(error):
+            raise UnsupportedError(
+                "max_reliability is not supported in this version; valid are "
+                f"{' and '.join(get_args(Objective))}",
+                field=field,
+            ) from None
         raise InvalidInputError(message, field=field) from None
     try:
         if form is Format.JSON:
@@ -228,9 +197,12 @@ def _check(value: object, path: str = "") -> None:
     elif isinstance(value, msgspec.Struct):
         for name in value.__struct_fields__:
             part, field = getattr(value, name), f"{path}.{name}" if path else name
-            if name in LATER and part is not None:
-                raise UnsupportedError(f"not supported in this version; {LATER[name]}", field=field)
-            if name not in BULK:
+            if name in LATER_FIELDS and part is not None:
+                raise UnsupportedError(
+                    f"not supported in this version; {LATER_FIELDS[name]}", field=field
+                )
+            # a mesh's model checks its long lists of numbers as arrays
+            if name not in {"vertices", "faces"}:
                 _check(part, field)
     elif isinstance(value, Mapping):
         for name, part in value.items():
@@ -242,7 +214,13 @@ def _check(value: object, path: str = "") -> None:
 
 def most_bytes(kind: type) -> int:
     """Return the most bytes of a request of a kind; a larger one is not decoded."""
-    return LARGEST.get(kind, LARGEST_REQUEST)
+    if kind is SetPointsRequest:
+        # it has no rock
+        return 2**12
+    if kind is StreamRequest:
+        # streams are kept: sixteen of them have to fit into one process
+        return 2**24
+    return LARGEST_REQUEST
 
 
 def check_size(size: int, kind: type) -> None:
@@ -255,10 +233,13 @@ def check_size(size: int, kind: type) -> None:
     """
     most = most_bytes(kind)
     if size > most:
-        raise LimitError(
-            f"{size} bytes; a {kind.__name__} may have {most} at most: "
-            f"{ADVICE.get(kind, LESS_ROCK)}"
+        advice = (
+            "ask for one body wrench at a time, with a shorter id"
+            if kind is SetPointsRequest
+            else "let hands share a scan under stance.rocks, cut it to what is near them, or make "
+            "its triangles larger (crux rock --spacing)"
         )
+        raise LimitError(f"{size} bytes; a {kind.__name__} may have {most} at most: {advice}")
 
 
 def _plain(payload: bytes, form: Format) -> Any:
@@ -293,7 +274,7 @@ def most_error_bytes(payload: bytes, form: Format, kind: type | None = None) -> 
     return LARGEST_ERROR if most is None else min(most, LARGEST_ERROR)
 
 
-def _part(payload: bytes, form: Format, kind: type | None, part: type[T]) -> T | None:
+def _part(payload: bytes, form: Format, kind: type | None, part: type[MessageT]) -> MessageT | None:
     if len(payload) > (LARGEST_REQUEST if kind is None else most_bytes(kind)):
         return None
     try:
@@ -326,11 +307,14 @@ def encode_error(
         Bytes that it may take, at least `service.requests.LEAST_REPLY_BYTES`.
     """
     status = error.kind if kind is None else kind
-    reply = _error_reply(error, form, name, status, PARTS)
+    # most encoded bytes of each text; every id that a request may have fits
+    parts = {"id": 1540, "field": 600, "message": 1600}
+    reply = _error_reply(error, form, name, status, parts)
     payload = form.encode(reply)
     if len(payload) > most:
-        share = (most - BARE) / sum(PARTS.values())
-        parts = {part: int(share * size) for part, size in PARTS.items()}
+        # without these texts, it has 200 bytes at most
+        share = (most - 200) / sum(parts.values())
+        parts = {part: int(share * size) for part, size in parts.items()}
         reply = _error_reply(error, form, name, status, parts)
         payload = form.encode(reply)
     return Answer(payload, form.label(reply), False, status)

@@ -14,16 +14,8 @@ from service.wire.errors import MalformedError
 
 __all__ = ["refuse_in_json", "refuse_in_msgpack"]
 
-LONG: Final = 2**16
-"""Size of a payload above which its long lists of numbers are skipped [bytes]."""
-
-BULK: Final = re.compile(rb":[ \t\n\r]*\[[-+0-9.eE,\[\] \t\n\r]{1000,}\](?=[ \t\n\r]*[,}])")
+LONG_LIST: Final = re.compile(rb":[ \t\n\r]*\[[-+0-9.eE,\[\] \t\n\r]{1000,}\](?=[ \t\n\r]*[,}])")
 """Pattern of a long list of numbers, or of lists of them, as an object's value."""
-
-MAPS: Final = frozenset({*range(0x80, 0x90), 0xDE, 0xDF})
-LISTS: Final = frozenset({*range(0x90, 0xA0), 0xDC, 0xDD})
-LENGTHS: Final = {0xDC: 2, 0xDD: 4, 0xDE: 2, 0xDF: 4}
-"""First bytes of MessagePack's maps and lists; for long ones, the bytes of their length."""
 
 
 def refuse_in_json(payload: bytes) -> None:
@@ -34,7 +26,7 @@ def refuse_in_json(payload: bytes) -> None:
     MalformedError
         With the key's path.
     """
-    short = BULK.sub(b":[]", payload) if len(payload) > LONG else payload
+    short = LONG_LIST.sub(b":[]", payload) if _is_long(payload) else payload
     found: list[_Repeated] = []
     # numbers stay text, also those of thousands of digits
     read = json.JSONDecoder(
@@ -56,7 +48,7 @@ def refuse_in_msgpack(payload: bytes) -> None:
     MalformedError
         With the key's path.
     """
-    if len(payload) <= LONG:
+    if not _is_long(payload):
         again = msgspec.msgpack.encode(msgspec.msgpack.decode(payload))
         if again == payload:
             return
@@ -101,17 +93,28 @@ def _refuse(document: Any, path: str) -> None:
             _refuse(part, f"{path}[{i}]")
 
 
+def _is_long(payload: bytes) -> bool:
+    """Return whether a payload is so large that its long lists of numbers are skipped."""
+    return len(payload) > 2**16
+
+
+def _is_map(first: int) -> bool:
+    """Return whether a map of MessagePack begins with this byte."""
+    return first >> 4 == 0x8 or first in {0xDE, 0xDF}
+
+
 def _maps(value: bytes, found: list[_Repeated]) -> Any:
     """Return a map, or a list whose first item is a map, with the maps in it; None otherwise."""
-    if value[0] in MAPS:
+    if _is_map(value[0]):
         parts = _parts(value, 2)
         pairs = zip(parts, parts, strict=True)
         return _object(
             found, [(str(msgspec.msgpack.decode(key)), _maps(part, found)) for key, part in pairs]
         )
-    if value[0] in LISTS:
+    # the first bytes of lists
+    if value[0] >> 4 == 0x9 or value[0] in {0xDC, 0xDD}:
         head, count = _header(value)
-        if count and value[head] in MAPS:
+        if count and _is_map(value[head]):
             return [_maps(part, found) for part in _parts(value, 1)]
     return None
 
@@ -125,7 +128,11 @@ def _parts(value: bytes, each: int) -> Iterator[bytes]:
 
 def _header(value: bytes) -> tuple[int, int]:
     """Return the bytes before the items of a map or a list, and the number of items."""
-    size = LENGTHS.get(value[0])
-    if size is None:
-        return 1, value[0] & 0x0F
+    match value[0]:
+        case 0xDC | 0xDE:
+            size = 2
+        case 0xDD | 0xDF:
+            size = 4
+        case short:
+            return 1, short & 0x0F
     return 1 + size, int.from_bytes(value[1 : 1 + size], "big")

@@ -8,7 +8,6 @@ from hand_models.base import CruxError, InvalidInputError
 
 __all__ = [
     "REQUEST_KINDS",
-    "UNREACHABLE",
     "BusyError",
     "LostError",
     "MalformedError",
@@ -17,10 +16,7 @@ __all__ = [
     "ServiceTimeout",
 ]
 
-UNREACHABLE: Final = "unreachable"
-"""Kind of error for limbs that do not reach their holds."""
-
-REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", "limit", UNREACHABLE})
+REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", "limit", "unreachable"})
 """Kinds of error in the request; the same request would fail again."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 import msgspec
@@ -27,20 +27,12 @@ from service.requests import (
     StreamRequest,
     WrenchSpaceRequest,
 )
-from service.wire.codec import LATER
-from service.wire.keys import (
-    BODY_SPACE,
-    HEALTH,
-    PLAN,
-    SET_POINTS,
-    STREAM,
-    WRENCH_SPACE,
-    service_key,
-)
+from service.wire.codec import LATER_FIELDS
+from service.wire.keys import ServiceName, service_key
 
-__all__ = ["KEYS", "MESSAGES", "schema"]
+__all__ = ["MESSAGE_KINDS", "schema"]
 
-MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
+MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
     PlanRequest,
     PlanReply,
     BriefPlanReply,
@@ -59,49 +51,45 @@ MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
 )
 
 
-KEYS: Final[dict[str, tuple[type[msgspec.Struct] | None, tuple[type[msgspec.Struct], ...]]]] = {
-    PLAN: (PlanRequest, (PlanReply, BriefPlanReply)),
-    WRENCH_SPACE: (WrenchSpaceRequest, (WrenchSpaceReply,)),
-    BODY_SPACE: (BodySpaceRequest, (BodySpaceReply,)),
-    STREAM: (StreamRequest, (StreamReply,)),
-    SET_POINTS: (SetPointsRequest, (SetPointsReply,)),
-    HEALTH: (None, (HealthReply,)),
-}
-"""Request of each key, if it takes one, and the possible replies."""
-
-REPLIES: Final = "service.replies."
-"""Module prefix of parts of replies; a part of a request may have the same name."""
-
-
 def schema() -> dict[str, Any]:
     """Return one schema whose ``$defs`` hold every message; a valid document is one of them.
 
     ``keys`` has for each key the request, null if it takes none, and the reply.
     """
     wholes, parts = msgspec.json.schema_components(
-        (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
+        (*MESSAGE_KINDS, Quantity), ref_template="#/$defs/{name}"
     )
     names = {name: _plain_name(name, part["title"]) for name, part in parts.items()}
     assert len({*names.values()}) == len(parts)
     for part in parts.values():
         # fields of later versions are left out
-        for name in LATER.keys() & part.get("properties", {}).keys():
+        for name in LATER_FIELDS.keys() & part.get("properties", {}).keys():
             del part["properties"][name]
         # keep the first sentence of a docstring
         if "description" in part:
             part["description"] = part["description"].partition("\n\n")[0]
+    # request of each key, if it takes one, and the possible replies
+    keys: dict[str, tuple[type[msgspec.Struct] | None, *tuple[type[msgspec.Struct], ...]]] = {
+        ServiceName.PLAN: (PlanRequest, PlanReply, BriefPlanReply),
+        ServiceName.WRENCH_SPACE: (WrenchSpaceRequest, WrenchSpaceReply),
+        ServiceName.BODY_SPACE: (BodySpaceRequest, BodySpaceReply),
+        ServiceName.STREAM: (StreamRequest, StreamReply),
+        ServiceName.SET_POINTS: (SetPointsRequest, SetPointsReply),
+        ServiceName.HEALTH: (None, HealthReply),
+    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Messages of crux, version 1",
-        "anyOf": list(wholes[: len(MESSAGES)]),
-        "keys": {service_key("<robot>", name): _exchange(*each) for name, each in KEYS.items()},
+        "anyOf": list(wholes[: len(MESSAGE_KINDS)]),
+        "keys": {service_key("<robot>", name): _exchange(*each) for name, each in keys.items()},
         "$defs": {names[name]: _renamed(part, names) for name, part in parts.items()},
     }
 
 
 def _plain_name(name: str, title: str) -> str:
     """Return a part's name without module and parameters; a reply's part gets the suffix Reply."""
-    return title.partition("[")[0] + ("Reply" if name.startswith(REPLIES) else "")
+    # a part of a request may have the same name
+    return title.partition("[")[0] + ("Reply" if name.startswith("service.replies.") else "")
 
 
 def _renamed(part: Any, names: Mapping[str, str]) -> Any:
@@ -117,7 +105,7 @@ def _renamed(part: Any, names: Mapping[str, str]) -> Any:
 
 
 def _exchange(
-    request: type[msgspec.Struct] | None, replies: Sequence[type[msgspec.Struct]]
+    request: type[msgspec.Struct] | None, *replies: type[msgspec.Struct]
 ) -> dict[str, Any]:
     references = [{"$ref": f"#/$defs/{reply.__name__}"} for reply in replies]
     return {

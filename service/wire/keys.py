@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Final
 
-__all__ = [
-    "ALIVE",
-    "BODY_SPACE",
-    "CLIENTS",
-    "DEFAULT_ROBOT",
-    "HEALTH",
-    "METRICS",
-    "PLAN",
-    "ROUTE",
-    "SET_POINTS",
-    "STREAM",
-    "WRENCH_SPACE",
-    "service_key",
-]
+__all__ = ["DEFAULT_ROBOT", "ServiceName", "service_key"]
 
-PLAN: Final = "plan"
-WRENCH_SPACE: Final = "wrench_space"
-BODY_SPACE: Final = "body_space"
-STREAM: Final = "stream"
-SET_POINTS: Final = "set_points"
-ALIVE: Final = "alive"
-"""Liveliness token, present while the service runs."""
-HEALTH: Final = "health"
-METRICS: Final = "metrics"
-CLIENTS: Final = "clients"
-"""Prefix of session identifiers in the liveliness tokens of clients."""
 
-ROUTE: Final = "route"
-"""Question of bulk work alone: it takes too long to be asked over zenoh."""
+class ServiceName(StrEnum):
+    """Last part of a key."""
+
+    PLAN = "plan"
+    WRENCH_SPACE = "wrench_space"
+    BODY_SPACE = "body_space"
+    STREAM = "stream"
+    SET_POINTS = "set_points"
+    HEALTH = "health"
+    METRICS = "metrics"
+    ROUTE = "route"
+    """Question of bulk work alone: it takes too long to be asked over zenoh."""
+    ALIVE = "alive"
+    """Liveliness token, present while the service runs."""
+    CLIENTS = "clients"
+    """Prefix of session identifiers in the liveliness tokens of clients."""
+
 
 DEFAULT_ROBOT: Final = "robosimian"
 """Robot of a stance that names none."""

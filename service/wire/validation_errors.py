@@ -9,7 +9,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from itertools import islice
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 from msgspec import inspect
@@ -19,46 +19,10 @@ from service.requests import Later
 
 __all__ = ["Place", "Step", "entered", "field_names", "places_at", "validation_error"]
 
-SYMBOL: Final = r"(?:kg|rad|[Nms·/²])+"
-UNITS: Final = re.compile(rf"\[({SYMBOL}(?:, {SYMBOL})*)\]")
-"""Pattern of the units in a description: one, or two of a wrench, forces first."""
-
 Step = str | int | None
 """Step of a path; None for a key that the caller chose."""
 
-WHERE: Final = re.compile(r" - at (?:`key` in )?`\$([^`]*)`$")
-STEP: Final = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[\.\.\.\]")
-"""Pattern of a step: a field, an index, or msgspec's mark for a key that the caller chose."""
-
-OF_FIELD: Final = re.compile(
-    r"Object (?:missing required|contains (unknown)) field `(.*)`", re.DOTALL
-)
-WORDS: Final = {
-    "float": "a number",
-    "int": "a whole number",
-    "str": "a string",
-    "bool": "true or false",
-    "array": "a list",
-    "object": "an object",
-    "null": "null",
-    "None": "null",
-}
-OUT_OF_RANGE: Final = re.compile(r"^Expected `(?:float|int)[^`]*` [<>]")
-OF_LENGTH: Final = re.compile(r"Expected `(?:array|str|object)` of length [<>= ]*\d+")
-LONG: Final = re.compile(r"\d+\.\d{6,}")
 Decoder = Callable[[Any], object]
-
-CIRCLE: Final = 360.0
-"""Largest size of an angle out of range that may be in degrees."""
-
-MANY: Final = 10.0
-"""Smallest size of a length out of range that may be in mm."""
-
-FARTHEST: Final = 1e4
-"""Largest distance of a position from its frame's origin; beyond it are map coordinates [m]."""
-
-LONGEST: Final = 400
-"""Most characters of a message, which may quote the request."""
 
 
 def validation_error(
@@ -88,7 +52,9 @@ def validation_error(
     if isinstance(cause, InvalidInputError):
         cause = cause.within(field.removeprefix("."))
         return cause.field, cause.message
-    if of_field := OF_FIELD.fullmatch(complaint):
+    if of_field := re.fullmatch(
+        r"Object (?:missing required|contains (unknown)) field `(.*)`", complaint, re.DOTALL
+    ):
         unknown, name = of_field.groups()
         field = f"{field}.{name}"
         only = _values(place.kind for place in entered(places, name))
@@ -102,13 +68,15 @@ def validation_error(
     else:
         message = re.sub(r"`([^`]*)`", _plain, complaint)
         message = message[:1].lower() + message[1:]
-        if OUT_OF_RANGE.search(complaint):
+        if re.search(r"^Expected `(?:float|int)[^`]*` [<>]", complaint):
             # print a bound such as π with 6 digits, not with all digits of a double
-            message = LONG.sub(lambda number: f"{float(number[0]):.6g}", message)
+            message = re.sub(r"\d+\.\d{6,}", lambda number: f"{float(number[0]):.6g}", message)
             unit = _unit_of(places)
             message += f", in {unit}" if unit else ""
             message += _got(document, where, unit)
-        elif OF_LENGTH.fullmatch(complaint) and where is not None:
+        elif where is not None and re.fullmatch(
+            r"Expected `(?:array|str|object)` of length [<>= ]*\d+", complaint
+        ):
             given = _given(document, where)
             if isinstance(given, list | str | dict):
                 message += f", got {len(given)}"
@@ -118,16 +86,20 @@ def validation_error(
 def _parts(error: msgspec.ValidationError) -> tuple[str, str]:
     """Return msgspec's error message, and the path of the error."""
     text = str(error)
-    found = WHERE.search(text)
+    found = re.search(r" - at (?:`key` in )?`\$([^`]*)`$", text)
     return (text, "") if found is None else (text[: found.start()], found[1])
 
 
 def _steps(path: str) -> list[Step]:
-    return [name or (int(index) if index else None) for name, index in STEP.findall(path)]
+    # a field, an index, or msgspec's mark for a key that the caller chose
+    found = re.findall(r"\.([^.\[\]]+)|\[(\d+)\]|\[\.\.\.\]", path)
+    return [name or (int(index) if index else None) for name, index in found]
 
 
 def _clip(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+    # a message may quote the request
+    longest = 400
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
 def _with_keys(
@@ -202,7 +174,16 @@ def _beginning(document: Any, steps: Sequence[str | int], count: int) -> Any:
 
 
 def _plain(match: re.Match[str]) -> str:
-    return " or ".join(WORDS.get(word, word) for word in match[1].split(" | "))
+    words = {
+        "float": "a number",
+        "int": "a whole number",
+        "str": "a string",
+        "bool": "true or false",
+        "array": "a list",
+        "object": "an object",
+        "None": "null",
+    }
+    return " or ".join(words.get(word, word) for word in match[1].split(" | "))
 
 
 def _unit_of(places: Iterable[Place]) -> str | None:
@@ -228,15 +209,17 @@ def _got(document: Callable[[], Any], where: Iterable[str | int] | None, unit: s
         return ""
     if isinstance(value, int) and value.bit_length() > sys.float_info.max_exp:
         return ", got an integer beyond all floats"
+    # sizes from which a number is likely to be in degrees, in mm, or in map coordinates
+    circle, many, farthest = 360.0, 10.0, 1e4
     asked = ""
-    if unit == "rad" and abs(value) <= CIRCLE:
+    if unit == "rad" and abs(value) <= circle:
         asked = f"; in degrees? {value:g}° are {math.radians(value):.4g} rad"
-    elif unit == "m" and abs(value) > FARTHEST:
+    elif unit == "m" and abs(value) > farthest:
         asked = (
             "; in map coordinates or mm? The stance's world may begin anywhere: subtract one "
             "offset from all its positions"
         )
-    elif unit == "m" and abs(value) >= MANY:
+    elif unit == "m" and abs(value) >= many:
         asked = "; in mm?"
     return f", got {value:.10g}{asked}"
 
@@ -312,7 +295,10 @@ def _known(kind: Any) -> inspect.Type:
 def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[Place]:
     """Yield a type without its metadata, and each member of a union."""
     if isinstance(kind, inspect.Metadata):
-        found = UNITS.findall((kind.extra_json_schema or {}).get("description", ""))
+        # one unit, or two of a wrench, forces first
+        symbol = r"(?:kg|rad|[Nms·/²])+"
+        described = (kind.extra_json_schema or {}).get("description", "")
+        found = re.findall(rf"\[({symbol}(?:, {symbol})*)\]", described)
         yield from _bare(kind.type, tuple(found[-1].split(", ")) if found else units)
     elif isinstance(kind, inspect.UnionType):
         for member in kind.types:

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 from hand_models import Cylinder, Ellipsoid, Grasp, InvalidInputError, Sphere
 from service.answering import dispatch
-from service.wire import PLAN
+from service.wire import ServiceName
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.requests import wall_request
 
@@ -126,9 +126,11 @@ def test_a_request_may_have_one():
     request = wall_request()
     for hand in request["stance"]["hands"]:
         hand["hold"] = {"shape": "ellipsoid", "semi_axes": [0.2, 0.3, 0.12]}
-    reply = json.loads(dispatch.handle(PLAN, json.dumps(request).encode()).payload)
+    reply = json.loads(dispatch.handle(ServiceName.PLAN, json.dumps(request).encode()).payload)
     assert reply["verified"] is True
     assert all(hand["seating"]["rule"] == "pinch" for hand in reply["hands"])
     request["stance"]["hands"][1]["hold"]["semi_axes"] = [0.2, 0.3]
-    error = json.loads(dispatch.handle(PLAN, json.dumps(request).encode()).payload)["error"]
+    error = json.loads(dispatch.handle(ServiceName.PLAN, json.dumps(request).encode()).payload)[
+        "error"
+    ]
     assert error["field"] == "stance.hands[1].hold.semi_axes"

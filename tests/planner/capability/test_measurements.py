@@ -12,7 +12,7 @@ from hand_models.parameters import bundled_draws, experiment_table, hand_table, 
 from hand_models.studies import run_study
 from planner.capability import MeasurementStudy, measured, measurements, widths
 from service.commands.cli import run
-from service.commands.studies import NAMES
+from service.commands.studies import STUDY_NAMES
 from tests.suite.helpers.commands import BAD_INPUT, complaint, result
 from tests.suite.helpers.stances import ask, on_wall
 
@@ -130,9 +130,9 @@ def test_the_command_finds_it_beside_the_studies_of_one_hand(tmp_path, capfd):
 
 
 def test_the_command_names_it_among_the_studies(tmp_path, capfd):
-    assert "measure" in NAMES
+    assert "measure" in STUDY_NAMES
     assert run(["study", "measures", "-o", str(tmp_path)]) == BAD_INPUT
     told = complaint(capfd)
-    assert all(name in told for name in NAMES)
+    assert all(name in told for name in STUDY_NAMES)
     assert run(["study", "measure", "-o", str(tmp_path), "--tension", "40"]) == BAD_INPUT
     assert "only the study sweep takes it, not measure" in complaint(capfd)

@@ -92,7 +92,9 @@ def raising(half_planes: int, lateral: bool, diameter: float) -> object:
     from service.wire import decode_request
 
     asked = decode_request(space_request(half_planes, lateral, diameter), WrenchSpaceRequest)
-    return dispatch.SERVICES["wrench_space"].answer(asked, dispatch.ROBOTS, dispatch.STREAMS)
+    return dispatch.SERVICES_BY_NAME["wrench_space"].answer(
+        asked, dispatch.BUNDLED_ROBOTS, dispatch.LOCAL_STREAMS
+    )
 
 
 def test_a_mesh_is_broken_off_at_each_step_of_its_welding() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hand_models.base import CruxError
-from planner.processes.stations import THREADS
+from planner.processes.worker_handles import THREADS
 from planner.processes.workers import NO_GUARD, Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE
@@ -43,7 +43,7 @@ def not_started(workers: Workers) -> str:
 
 
 def processes(workers: Workers) -> list:
-    return [lane.station.process for lane in workers.hands]
+    return [lane.handle.process for lane in workers.hands]
 
 
 def kill(workers: Workers, pid: int) -> None:
@@ -120,7 +120,7 @@ def test_the_guard_of_a_program_is_named_only_where_that_may_be_it(monkeypatch, 
     assert reason == "processes do not start: a worker ended with status 70"
     assert caplog.messages == [reason]
     caplog.clear()
-    monkeypatch.setattr("planner.processes.stations._answer_each", workshop.exits)
+    monkeypatch.setattr("planner.processes.worker_handles._answer_each", workshop.exits)
     with Workers(workshop.naps, 2) as workers:
         reason = not_started(workers)
     assert reason == f"processes do not start: a worker ended with status 1{NO_GUARD}"
@@ -131,7 +131,7 @@ def test_what_the_system_does_not_start_is_told_in_a_line(monkeypatch, caplog):
     def refused(*_, **__):
         raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
 
-    monkeypatch.setattr("planner.processes.workers.Station", refused)
+    monkeypatch.setattr("planner.processes.workers.WorkerHandle", refused)
     reason = "processes do not start: Resource temporarily unavailable"
     with Workers(workshop.naps, 2) as workers:
         assert not_started(workers) == reason

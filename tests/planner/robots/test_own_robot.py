@@ -354,7 +354,9 @@ def test_serve_and_query_a_robot_and_a_hand(
 ) -> None:
     hand = tmp_path / "hand.toml"
     hand.write_text(entry_toml("structure", "held_mass", 20.0))
-    assert set(served.ready["keys"]) == {service_key("arms", name) for name in dispatch.SERVICES}
+    assert set(served.ready["keys"]) == {
+        service_key("arms", name) for name in dispatch.SERVICES_BY_NAME
+    }
     flags = [*flags_to(served), "--robot", str(file), "--hand", str(hand)]
     assert run(["query", written(hanging(file)), *flags]) == 0
     request = with_hand(plan_request(hanging(file)), read_hand(hand))

@@ -19,8 +19,9 @@ import pytest
 from hand_models.base import CruxError
 from service import sweep
 from service.bulk import evaluate
+from service.bulk.chunks import BulkSettings
 from service.commands.stances import read_request, read_route
-from service.wire import ROUTE
+from service.wire import ServiceName
 from tests.service.bulk.test_evaluation import CASES, encoded, timeless
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import FAILED
@@ -56,7 +57,7 @@ def test_a_cluster_answers_to_the_last_digit_as_this_process_does(client):
 def test_routes_and_sweeps_come_to_the_same_on_a_cluster(client):
     route = read_route("six-moves")
     asked = [msgspec.structs.replace(route, id=str(i)) for i in range(3)]
-    here, there = (list(evaluate(asked, on, kind=ROUTE)) for on in ("here", client))
+    here, there = (list(evaluate(asked, on, kind=ServiceName.ROUTE)) for on in ("here", client))
     assert [answer.payload for answer in there] == [answer.payload for answer in here]
     wall, varied = read_request("wall-300"), ["load.mass=60:120:7"]
     alone, spread = (sweep(wall, varied, on=on) for on in ("here", client))
@@ -93,7 +94,8 @@ def test_a_worker_that_is_killed_is_replaced(client):
 
 
 def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
-    monkeypatch.setattr("service.bulk.pools.LOOK", 0.05)
+    settings = BulkSettings(check_interval=0.05)
+    monkeypatch.setattr("service.bulk.pools.BULK_SETTINGS", settings)
     asked = encoded([wall_request(HEAVY + i / 100) | {"id": str(i)} for i in range(60)])
     told = []
     cluster = distributed.LocalCluster(
@@ -124,7 +126,8 @@ def test_a_cluster_without_workers_is_told_and_waited_for(monkeypatch):
 
 
 def test_no_scheduler_is_told(monkeypatch):
-    monkeypatch.setattr("service.bulk.pools.PATIENCE", 0.5)
+    settings = BulkSettings(scheduler_timeout=0.5)
+    monkeypatch.setattr("service.bulk.pools.BULK_SETTINGS", settings)
     with pytest.raises(CruxError, match=r"no Dask scheduler with a worker answers at tcp://"):
         list(evaluate([b"{}"], "tcp://127.0.0.1:9"))
 

@@ -17,9 +17,8 @@ from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
-from service.bulk.chunks import About, Setting, about, grouped, own_versions
-from service.bulk.evaluation import AHEAD, WINDOW
-from service.bulk.pools import LARGEST, Here
+from service.bulk.chunks import BULK_SETTINGS, About, Setting, about, grouped, own_versions
+from service.bulk.pools import Here
 from service.requests import PlanRequest
 from service.wire import Format
 from tests.suite.helpers import workshop
@@ -115,8 +114,9 @@ def test_questions_without_end_are_taken_as_answers_are(tmp_path):
     with letters(tmp_path / "log", 2) as pool:
         found = [answer.payload for answer in itertools.islice(answered(endless(), pool), 3000)]
     assert found == [b"%d" % i for i in range(1, 3001)]
+    in_window = BULK_SETTINGS.window * BULK_SETTINGS.most_questions
     # those that are out, those that are made at once, and those that wait for one before them
-    assert taken - 3000 <= (AHEAD + 1) * LARGEST * 2 * WINDOW
+    assert taken - 3000 <= (BULK_SETTINGS.windows_ahead + 1) * 2 * in_window
 
 
 def test_a_process_that_is_killed_costs_nothing(tmp_path):
@@ -172,7 +172,8 @@ def test_answers_are_in_order_however_chunks_come_back(picks, width):
     pool = Shuffled(width, itertools.cycle(picks or [0]))
     found = list(answered(asked, pool))
     assert [json.loads(answer.payload)["id"] for answer in found] == [str(i) for i in range(40)]
-    assert pool.most <= AHEAD * width * WINDOW * LARGEST
+    in_window = BULK_SETTINGS.window * BULK_SETTINGS.most_questions
+    assert pool.most <= BULK_SETTINGS.windows_ahead * width * in_window
 
 
 # Groups -------------------------------------------------------------------------------------------
@@ -236,4 +237,4 @@ def test_here_one_question_is_answered_at_a_time():
     with pool:
         answers = answered(asked(), pool)
         next(answers)
-    assert len(taken) <= AHEAD * WINDOW
+    assert len(taken) <= BULK_SETTINGS.windows_ahead * BULK_SETTINGS.window

@@ -15,6 +15,7 @@ import pytest
 from hand_models.base import InvalidInputError
 from service.answering import dispatch
 from service.bulk import chosen_columns, columns_of, row_of
+from service.bulk.chunks import BulkSettings
 from service.commands.cli import run
 from tests.service.commands.test_interruption import limited
 from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint
@@ -295,7 +296,8 @@ def test_answers_stay_where_no_others_take_their_place(
     name, address, status, told, lines, tmp_path, capfd, monkeypatch
 ):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("service.bulk.pools.PATIENCE", 0.5)
+    settings = BulkSettings(scheduler_timeout=0.5)
+    monkeypatch.setattr("service.bulk.pools.BULK_SETTINGS", settings)
     path = tmp_path / name
     path.write_text("answers\n")
     assert run(["batch", str(lines), "-o", str(path), "--dask", address]) == status

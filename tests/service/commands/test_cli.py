@@ -16,7 +16,7 @@ from rich.console import Console
 
 from service import answering
 from service.answering import dispatch
-from service.commands.cli import COMMANDS, run
+from service.commands.cli import COMMANDS_BY_NAME, run
 from service.commands.stances import bundled
 from service.requests import PlanRequest
 from service.tables import print_plan
@@ -480,6 +480,6 @@ def test_wrong_usage_leads_to_the_commands_own_help(arguments, told, asked, capf
 def test_help_lists_the_commands_and_bundled_stances(capfd):
     assert run(["--help"]) == DONE
     out = capfd.readouterr().out
-    for name in COMMANDS:
+    for name in COMMANDS_BY_NAME:
         assert f"  {name} " in out
     assert all(name in out for name in bundled())

@@ -14,7 +14,7 @@ from service.bulk import evaluate
 from service.commands.cli import run
 from service.commands.stances import read_route
 from service.replies import RouteReply
-from service.wire import ROUTE
+from service.wire import ServiceName
 from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
 
@@ -152,7 +152,9 @@ def test_processes_are_ended_and_what_is_whole_is_kept(climbs, tmp_path):
 
 def test_routes_are_questions_of_bulk_work_in_processes_too(climbs):
     asked = [read_route(str(climbs / name)) for name in ("a.json", "c.json")]
-    here, there = (list(evaluate(asked, on, kind=ROUTE)) for on in ("here", "processes"))
+    here, there = (
+        list(evaluate(asked, on, kind=ServiceName.ROUTE)) for on in ("here", "processes")
+    )
     assert [each.payload for each in here] == [each.payload for each in there]
     first, second = (msgspec.json.decode(each.payload, type=RouteReply) for each in here)
     assert first.load_factor > 1.0 > second.load_factor

@@ -22,7 +22,6 @@ from planner.processes import cores
 from service.answering import dispatch, mesh_files
 from service.commands.cli import run
 from service.processes import Planners, plan_many, worth
-from service.processes.many import WORTH_A_PROCESS
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest
 from service.wire import decode_request, schema
@@ -142,8 +141,8 @@ def test_what_is_broken_off_is_no_answer_to_what_is_asked_next():
 
 
 def test_few_requests_are_not_worth_processes():
-    assert worth(WORTH_A_PROCESS - 1) == 1
-    assert worth(WORTH_A_PROCESS) == cores() >= 1
+    assert worth(499) == 1
+    assert worth(500) == cores() >= 1
     assert [worth(count, 3) for count in (0, 1, 2, 4)] == [1, 1, 2, 3]
 
 

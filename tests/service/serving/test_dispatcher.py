@@ -23,10 +23,10 @@ import zenoh
 
 from hand_models.base import InvalidInputError
 from service.serving import PlanService, dispatcher, open_session, zenoh_config
-from service.serving.waiting import EACH
+from service.serving.settings import SERVING_SETTINGS
 from service.wire import LostError, service_key
 from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.odd_answers import obedient, stillborn
+from tests.suite.helpers.odd_answers import never_ready, obedient
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.served import client_config, free_endpoint
 
@@ -280,7 +280,7 @@ def test_a_service_whose_processes_do_not_start_says_so() -> None:
     with (
         open_session(config) as session,
         pytest.raises(LostError, match="do not live to be ready"),
-        PlanService(session, make=stillborn),
+        PlanService(session, make=never_ready),
     ):
         pass
 
@@ -337,8 +337,8 @@ def test_a_stream_is_rehearsed_where_it_can_do_no_harm(site: Site, client: Clien
 def test_who_asks_too_much_is_told_to_come_again_and_others_have_their_turn(
     site: Site, client: Client
 ) -> None:
-    flood = site.client(named=False)
-    asked = [flood.send({"sleep": 0.05, "id": "flood"}) for _ in range(3 * EACH)]
+    flood, most = site.client(named=False), SERVING_SETTINGS.waiting_of_client
+    asked = [flood.send({"sleep": 0.05, "id": "flood"}) for _ in range(3 * most)]
     named = [client.ask({"echo": i}) for i in range(5)]
     assert all(answer.get("echo") == i for i, answer in enumerate(named))
     answers = [result(each) for each in asked]
@@ -347,7 +347,7 @@ def test_who_asks_too_much_is_told_to_come_again_and_others_have_their_turn(
     assert all(answer["error"]["retry_after"] > 0.0 for answer in busy)
     assert {answer["id"] for answer in busy} == {"flood"}
     # what was let in has been worked on
-    assert len(answers) - len(busy) >= EACH
+    assert len(answers) - len(busy) >= most
 
 
 def test_what_a_client_asked_that_has_gone_is_not_worked_on(site: Site, client: Client) -> None:

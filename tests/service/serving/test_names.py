@@ -10,8 +10,8 @@ import pytest
 import zenoh
 
 from service.serving import CruxClient, open_session, zenoh_config
-from service.serving.waiting import EACH
-from service.wire import CLIENTS, service_key
+from service.serving.settings import SERVING_SETTINGS
+from service.wire import ServiceName, service_key
 from tests.service.serving.test_dispatcher import LONG, PLAN, Site, all_up, kind, result, until
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.served import client_config
@@ -79,7 +79,7 @@ def other(site: Site) -> Iterator[Asker]:
 
 
 def test_a_token_of_another_ends_no_question(site: Site, victim: Asker, other: Asker) -> None:
-    key = service_key("robosimian", f"{CLIENTS}/{victim.name}")
+    key = service_key("robosimian", f"{ServiceName.CLIENTS}/{victim.name}")
     operator = site.client()
     with until(site) as go_on:
         held = [victim.send(go_on) for _ in range(2)]
@@ -107,11 +107,12 @@ def test_a_name_that_is_another_s_takes_no_room_from_him(
     victim: Asker, other: Asker, secret: bytes | None
 ) -> None:
     source = zenoh.SourceInfo(victim.client._source.id, 7)
+    most = SERVING_SETTINGS.waiting_of_client
     forged = [
-        other.send({"sleep": 0.02}, source_info=source, attachment=secret) for _ in range(3 * EACH)
+        other.send({"sleep": 0.02}, source_info=source, attachment=secret) for _ in range(3 * most)
     ]
-    own = [victim.send({"echo": i}) for i in range(EACH // 2)]
-    assert [result(each).get("echo") for each in own] == list(range(EACH // 2))
+    own = [victim.send({"echo": i}) for i in range(most // 2)]
+    assert [result(each).get("echo") for each in own] == list(range(most // 2))
     answers = [result(each) for each in forged]
     assert {kind(each) for each in answers if "error" in each} == {"busy"}
 
@@ -121,7 +122,7 @@ def test_nine_names_are_one_place(victim: Asker, other: Asker) -> None:
     ids = [querier_of(name) for name in "123456789"]
     crowd = [
         other.send({"sleep": 0.01}, source_info=zenoh.SourceInfo(each, i), attachment=None)
-        for i in range(2 * EACH)
+        for i in range(2 * SERVING_SETTINGS.waiting_of_client)
         for each in ids
     ]
     own = [victim.ask({"echo": i}).get("echo") for i in range(27)]

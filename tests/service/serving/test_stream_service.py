@@ -16,11 +16,10 @@ from planner.result import SetPoints
 from planner.streaming import WrenchStream
 from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
 from service.answering import Streams, dispatch, streams
-from service.answering.streams import KEPT
 from service.commands.cli import run
 from service.replies import SetPointsReply, StreamReply
 from service.serving import PlanService, open_session, zenoh_config
-from service.wire import SET_POINTS, STREAM, Format, ServiceError, decode_request, service_key
+from service.wire import Format, ServiceError, ServiceName, decode_request, service_key
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, process
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.replies import departures
@@ -108,11 +107,11 @@ def test_messages_come_in_the_encoding_of_the_request(serving, form: Format) -> 
             (reply,) = session.get(key, payload=payload, encoding=form.value, timeout=PATIENCE)
             return reply.ok
 
-        declared = ask(STREAM, declaration())
+        declared = ask(ServiceName.STREAM, declaration())
         assert str(declared.encoding) == f"{form.value};crux.StreamReply@1"
         identifier = form.decode(declared.payload.to_bytes(), StreamReply).stream
         request = {"v": 1, "stream": identifier, "body_wrench": WRENCH}
-        told = ask(SET_POINTS, request)
+        told = ask(ServiceName.SET_POINTS, request)
         assert str(told.encoding) == f"{form.value};crux.SetPointsReply@1"
         assert form.decode(told.payload.to_bytes(), SetPointsReply).verified
 
@@ -136,17 +135,17 @@ def test_only_so_many_streams_are_kept(known: Streams, monkeypatch) -> None:
         return stand_in(lambda: closed.append(number))
 
     monkeypatch.setattr(streams, "opened", opened)
-    names = [known.declare(declaration()).stream for _ in range(KEPT)]
-    assert len(set(names)) == KEPT
+    names = [known.declare(declaration()).stream for _ in range(known.most)]
+    assert len(set(names)) == known.most
     known.set_points(SetPointsRequest(v=1, stream=names[0], body_wrench=tuple(WRENCH)))
     names += [known.declare(declaration()).stream for _ in range(2)]
     # the first was asked for since
     assert closed == [1, 2]
     request = {"v": 1, "stream": names[1], "body_wrench": WRENCH}
-    assert answered(SET_POINTS, request, known)["error"]["field"] == "stream"
-    assert answered(SET_POINTS, request | {"stream": names[0]}, known)["good"]
+    assert answered(ServiceName.SET_POINTS, request, known)["error"]["field"] == "stream"
+    assert answered(ServiceName.SET_POINTS, request | {"stream": names[0]}, known)["good"]
     known.close()
-    assert sorted(closed) == list(range(KEPT + 2))
+    assert sorted(closed) == list(range(known.most + 2))
 
 
 @pytest.mark.parametrize("counts", [(1, 40), (2, 40), (8, 40), (1, 1, 40), (3, 4, 4, 40)])
@@ -159,12 +158,12 @@ def test_who_declares_many_streams_puts_out_his_own(
         [owner.declare(declaration()).stream for _ in range(count)]
         for owner, count in zip(owners, counts, strict=True)
     ]
-    assert len(known) == KEPT
+    assert len(known) == known.most
     *few, many = names
     for mine in few:
         # whoever asks
         assert all(kept(known, name) for name in mine)
-    left = KEPT - sum(counts[:-1])
+    left = known.most - sum(counts[:-1])
     assert [kept(known, name) for name in many] == [False] * (counts[-1] - left) + [True] * left
     known.close()
     assert len(known) == 0
@@ -175,10 +174,10 @@ def test_a_client_with_more_than_its_share_gives_room_to_others(
 ) -> None:
     monkeypatch.setattr(streams, "opened", lambda *_: stand_in())
     first, second = known.of("first"), known.of("second")
-    names = [first.declare(declaration()).stream for _ in range(KEPT)]
-    for _ in range(KEPT):
+    names = [first.declare(declaration()).stream for _ in range(known.most)]
+    for _ in range(known.most):
         second.declare(declaration())
-    half = KEPT // 2
+    half = known.most // 2
     assert [kept(known, name) for name in names] == [False] * half + [True] * half
 
 
@@ -199,18 +198,18 @@ def stand_in(close: Callable[[], None] = lambda: None) -> SimpleNamespace:
 def kept(known: Streams, name: str) -> bool:
     """Whether a stream is still there."""
     request = {"v": 1, "stream": name, "body_wrench": WRENCH}
-    return bool(answered(SET_POINTS, request, known)["good"])
+    return bool(answered(ServiceName.SET_POINTS, request, known)["good"])
 
 
 def test_messages_are_of_the_schema(known: Streams) -> None:
     request = stream_request(radius=10.0)
     assert departures("StreamRequest", request) == []
-    declared = answered(STREAM, request, known)
+    declared = answered(ServiceName.STREAM, request, known)
     assert declared.pop("good")
     assert departures("StreamReply", declared) == []
     asked = {"v": 1, "stream": declared["stream"], "body_wrench": WRENCH}
     assert departures("SetPointsRequest", asked) == []
-    told = answered(SET_POINTS, asked, known)
+    told = answered(ServiceName.SET_POINTS, asked, known)
     assert told.pop("good")
     assert departures("SetPointsReply", told) == []
     assert len(json.dumps(told)) < 3000
@@ -222,11 +221,11 @@ def test_numbers_that_are_not_there_are_null(known: Streams) -> None:
         hand["grasp"] = hand.get("grasp", {}) | {"palm": False}
     request.pop("load", None)
     request["body_wrench"] = [0.0, 0.0, 2000.0, 0.0, 0.0, 0.0]
-    declared = answered(STREAM, request, known)
+    declared = answered(ServiceName.STREAM, request, known)
     assert (declared["status"], declared["radius"]) == ("infeasible", None)
     assert declared["reason"]
     asked = {"v": 1, "stream": declared["stream"], "body_wrench": [0.0, 0.0, 2500.0, 0.0, 0.0, 0.0]}
-    told = answered(SET_POINTS, asked, known)
+    told = answered(ServiceName.SET_POINTS, asked, known)
     assert (told["status"], told["verified"]) == ("infeasible", True)
     assert told["utilisation"] is told["gap"] is told["hands"] is None
 
@@ -246,7 +245,7 @@ WRONG = [
 @pytest.mark.parametrize(("path", "value", "kind", "field"), WRONG)
 def test_a_declaration_that_is_wrong_is_told_the_field(path, value, kind, field, known) -> None:
     request = put(stream_request(), path, value)
-    told = answered(STREAM, request, known)
+    told = answered(ServiceName.STREAM, request, known)
     assert not told["good"]
     assert (told["error"]["kind"], told["error"]["field"]) == (kind, field)
 
@@ -263,14 +262,16 @@ def test_a_declaration_that_is_wrong_is_told_the_field(path, value, kind, field,
     ],
 )
 def test_a_question_that_is_wrong_is_told_the_field(request_, field, known) -> None:
-    told = answered(SET_POINTS, request_, known)
+    told = answered(ServiceName.SET_POINTS, request_, known)
     assert not told["good"]
     assert told["error"]["field"] == field
 
 
 def test_what_is_not_a_number_is_told_as_such(known) -> None:
     request = {"v": 1, "stream": "x", "body_wrench": [*WRENCH[:5], float("nan")]}
-    answer = dispatch.handle(SET_POINTS, msgspec.msgpack.encode(request), MSGPACK, streams=known)
+    answer = dispatch.handle(
+        ServiceName.SET_POINTS, msgspec.msgpack.encode(request), MSGPACK, streams=known
+    )
     error = msgspec.msgpack.decode(answer.payload)["error"]
     assert (error["field"], error["message"]) == (
         "body_wrench[5]",
@@ -288,7 +289,7 @@ def test_the_hand_of_the_service_is_that_of_its_streams(form, known, tmp_path) -
     used = []
     for hand in (None, weak):
         payload = Format.named(form).encode(stream_request())
-        answer = dispatch.handle(STREAM, payload, form, hand, streams=known)
+        answer = dispatch.handle(ServiceName.STREAM, payload, form, hand, streams=known)
         declared = Format.named(form).decode(answer.payload, StreamReply)
         used.append(declared.utilisation)
     assert used[1] > used[0]

@@ -11,15 +11,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from planner.processes import Lane, Station
-from planner.processes.stations import PART, _send_parts
+from planner.processes import PriorityLane, WorkerHandle
+from planner.processes.worker_handles import PART, _send_parts
 from service.processes import Job
-from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.serving.names import SHARED, Names, digest
-from service.serving.question import ATTACHED, LARGE, Question, take
-from service.serving.shares import ACTIVE, LAST, PAYS, Shares
-from service.serving.waiting import ALL, EACH, HELD, SHARE, Costs, Kind, Waiting
+from service.serving.names import Names, digest
+from service.serving.question import Question, take
+from service.serving.settings import SERVING_SETTINGS as SETTINGS
+from service.serving.shares import Shares
+from service.serving.waiting import Costs, Kind, Waiting
+from service.serving.worker_pool import WorkerPool
 from service.wire import Answer
 from tests.suite.helpers.checkout import ROOT
 
@@ -41,44 +42,48 @@ def test_large_questions_of_one_client_leave_room_for_all_others():
     def has_room(asked: Question, kind: Kind = Kind.OTHER) -> bool:
         return waiting.put(kind, asked) is None
 
-    assert has_room(question("greedy", SHARE))
+    assert has_room(question("greedy", SETTINGS.waiting_bytes_of_place))
     # by place, whatever the names
-    assert not has_room(question("greedy", LARGE + 1, client="other name"))
-    assert all(has_room(question(client, SHARE)) for client in "bcd")
-    assert HELD == 4 * SHARE
-    assert not has_room(question("e", LARGE + 1))
+    assert not has_room(question("greedy", SETTINGS.large_payload + 1, client="other name"))
+    assert all(has_room(question(client, SETTINGS.waiting_bytes_of_place)) for client in "bcd")
+    assert SETTINGS.waiting_bytes == 4 * SETTINGS.waiting_bytes_of_place
+    assert not has_room(question("e", SETTINGS.large_payload + 1))
     assert has_room(question("e"), Kind.SET_POINTS)
     gone = waiting.take(Kind.OTHER)
     assert gone is not None
     assert gone.client == "greedy"
-    assert has_room(question("greedy", SHARE))
-    assert has_room(question("greedy", LARGE))
+    assert has_room(question("greedy", SETTINGS.waiting_bytes_of_place))
+    assert has_room(question("greedy", SETTINGS.large_payload))
 
 
 def test_one_question_fits_however_large_it_is():
-    assert Waiting(Shares()).put(Kind.OTHER, question("a", HELD + 1)) is None
+    assert Waiting(Shares()).put(Kind.OTHER, question("a", SETTINGS.waiting_bytes + 1)) is None
 
 
 @pytest.mark.parametrize("names", [9, 20, 100])
 def test_however_many_names_one_place_takes_it_leaves_room_to_others(names: int):
     waiting = Waiting(Shares())
     for i in range(names):
-        for _ in range(EACH):
+        for _ in range(SETTINGS.waiting_of_client):
             waiting.put(Kind.OTHER, question("crowd", client=str(i)))
-    assert len(waiting) == ALL
+    assert len(waiting) == SETTINGS.waiting_in_queue
     # each has room, and the newest of those who have most go
     for client in "abcdefgh":
-        gone = [waiting.put(Kind.OTHER, question(client)) for _ in range(EACH)]
+        gone = [
+            waiting.put(Kind.OTHER, question(client)) for _ in range(SETTINGS.waiting_of_client)
+        ]
         most = [each for each in gone if each is not None and each.place == client]
-        assert len(waiting) == ALL
-        assert len(gone) - len(most) >= ALL // 9 - 1
+        assert len(waiting) == SETTINGS.waiting_in_queue
+        assert len(gone) - len(most) >= SETTINGS.waiting_in_queue // 9 - 1
     places = [each.place for each in waiting]
-    assert min(places.count(place) for place in set(places)) >= ALL // 9 - 1
+    assert min(places.count(place) for place in set(places)) >= SETTINGS.waiting_in_queue // 9 - 1
 
 
 def test_a_client_has_so_many_questions_and_no_more():
     waiting = Waiting(Shares())
-    assert all(waiting.put(Kind.OTHER, question("a")) is None for _ in range(EACH))
+    assert all(
+        waiting.put(Kind.OTHER, question("a")) is None for _ in range(SETTINGS.waiting_of_client)
+    )
     last = question("a")
     assert waiting.put(Kind.OTHER, last) is last
     assert waiting.put(Kind.OTHER, question("b")) is None
@@ -160,12 +165,12 @@ def test_who_ends_a_process_pays_for_the_next_one(monkeypatch: pytest.MonkeyPatc
     waiting.put(Kind.OTHER, question("killer"))
     waiting.put(Kind.SET_POINTS, question("killer"))
     assert waiting.take(Kind.OTHER) is None
-    assert waiting.held() == PAYS * 2.0
+    assert waiting.held() == SETTINGS.starts_waited * 2.0
     # what ends no process is not held up by one that has ended
     assert waiting.take(Kind.SET_POINTS) is not None
     waiting.put(Kind.OTHER, question("polite"))
     assert waiting.take(Kind.OTHER).place == "polite"  # type: ignore[union-attr]
-    clock.now += PAYS * 2.0
+    clock.now += SETTINGS.starts_waited * 2.0
     waiting.put(Kind.OTHER, question("polite"))
     # and has less time for what it has cost
     assert waiting.take(Kind.OTHER).place == "polite"  # type: ignore[union-attr]
@@ -180,12 +185,12 @@ def test_who_ends_processes_does_not_wait_for_who_asks_no_more(monkeypatch: pyte
     shares.asks("killer")
     shares.asks("polite")
     shares.ended_process("killer", 0.5)
-    assert shares.waits("killer") == ACTIVE
-    clock.now += ACTIVE
+    assert shares.waits("killer") == SETTINGS.active_time
+    clock.now += SETTINGS.active_time
     assert shares.waits("killer") == 0.0
     shares.ended_process("killer", 0.5)
     shares.asks("polite")
-    assert shares.waits("killer") == ACTIVE
+    assert shares.waits("killer") == SETTINGS.active_time
     shares.gone("polite")
     assert shares.waits("killer") == 0.0
 
@@ -202,8 +207,8 @@ def test_one_costly_question_changes_no_lane_and_cheap_ones_win_it_back():
     for _ in range(30):
         shares.charge("a", 1.0)
     assert shares.is_dear("a")
-    for i in range(LAST):
-        assert shares.is_dear("a") == (i <= LAST // 2)
+    for i in range(SETTINGS.remembered_costs):
+        assert shares.is_dear("a") == (i <= SETTINGS.remembered_costs // 2)
         shares.charge("a", 0.01)
 
 
@@ -227,7 +232,7 @@ def test_a_known_stance_has_its_lane_back():
         assert costs.is_short(1)
     took(10, 2.0)
     assert not costs.is_short(1)
-    took(LAST // 2 + 1, 0.01)
+    took(SETTINGS.remembered_costs // 2 + 1, 0.01)
     assert costs.is_short(1)
 
 
@@ -250,7 +255,7 @@ def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
     names.linked.add("victim")
     assert names.place("victim", b"") == "victim"
     for made_up in ("x", "y", "", "victim "):
-        assert names.place(made_up, b"") == SHARED
+        assert names.place(made_up, b"") == ""
     assert names.is_to_prove("victim", b"secret")
     # not again at once
     assert not names.is_to_prove("victim", b"secret")
@@ -258,7 +263,7 @@ def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
     names.proven("victim", digest(b"secret"))
     assert names.place("victim", b"secret") == "victim"
     for forged in (b"", b"secre", b"secret ", digest(b"secret")):
-        assert names.place("victim", forged) == SHARED
+        assert names.place("victim", forged) == ""
     # a second client of that session
     names.proven("victim", digest(b"mine"))
     assert names.place("victim", b"mine") == "victim"
@@ -267,7 +272,7 @@ def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
     assert names.has_proof("far")
     assert names.place("far", b"far") == "far"
     names.gone("victim")
-    assert names.place("victim", b"secret") == SHARED
+    assert names.place("victim", b"secret") == ""
 
 
 def test_nothing_grows_with_names_that_are_made_up():
@@ -289,7 +294,7 @@ def test_an_answer_comes_in_parts_and_whole():
     # around where the last part is cut to the byte, too: it is shorter than others, be it empty
     for size in (0, 10, *range(PART - 60, PART), 5 * PART, 1_000_000):
         here, there = Pipe()
-        lane: Lane[object, object] = Lane(SimpleNamespace(), 0, here)  # type: ignore[arg-type]
+        lane: PriorityLane[object, object] = PriorityLane(SimpleNamespace(), 0, here)  # type: ignore[arg-type]
         parts: list[bytes] = []
         _send_parts(SimpleNamespace(send_bytes=parts.append), b"x" * size)  # type: ignore[arg-type]
         assert all(len(part) == PART for part in parts[:-1])
@@ -308,22 +313,22 @@ def test_an_answer_comes_in_parts_and_whole():
 
 
 def test_a_deadline_that_is_over_already_is_not_slept_through():
-    crew = Crew(lambda: lambda job: job, 1, 2**30)
-    dispatcher = Dispatcher(crew, 10.0, "robot")
+    pool = WorkerPool(lambda: lambda job: job, 1, 2**30)
+    dispatcher = Dispatcher(pool, 10.0, "robot")
     assert dispatcher._pause() is None
     late = question(seconds=-1.0)
     dispatcher._waiting.put(Kind.OTHER, late)
     assert dispatcher._pause() == 0.0
     assert dispatcher._waiting.first_deadline() == late.deadline
     dispatcher._waiting.remove(lambda each: each is late)
-    station: Station[Job, Answer] = Station.__new__(Station)
-    lane: Lane[Job, Answer] = Lane(station, 0, Pipe()[0])
-    station.lanes, asked = (lane,), question(seconds=-1.0)
-    crew.put(station, "questions")
-    crew.work[lane] = asked
+    handle: WorkerHandle[Job, Answer] = WorkerHandle.__new__(WorkerHandle)
+    lane: PriorityLane[Job, Answer] = PriorityLane(handle, 0, Pipe()[0])
+    handle.lanes, asked = (lane,), question(seconds=-1.0)
+    pool.put(handle, "questions")
+    pool.work[lane] = asked
     assert dispatcher._pause() == 0.0
-    crew.put(station, "streams")
-    crew.work[lane], asked.replied = asked, True
+    pool.put(handle, "streams")
+    pool.work[lane], asked.replied = asked, True
     # it was told, and its process has a while to come back
     pause = dispatcher._pause()
     assert pause is not None
@@ -373,12 +378,19 @@ def test_a_head_with_what_is_no_number_is_left_to_a_process(payload: bytes, enco
 
 
 def test_an_attachment_counts_too():
-    taken = taken_of(b"{}", "application/json", b"x" * ATTACHED)
-    assert (taken.fault, len(taken.secret), taken.payload) == (None, ATTACHED, b"{}")
-    refused = taken_of(b"{}", "application/json", b"x" * (ATTACHED + 1))
+    taken = taken_of(b"{}", "application/json", b"x" * SETTINGS.most_attached)
+    assert (taken.fault, len(taken.secret), taken.payload) == (
+        None,
+        SETTINGS.most_attached,
+        b"{}",
+    )
+    refused = taken_of(b"{}", "application/json", b"x" * (SETTINGS.most_attached + 1))
     assert refused.fault is not None
     assert refused.fault.field == "attachment"
-    assert f"{ATTACHED + 1} bytes; {ATTACHED} at most" in refused.fault.message
+    assert (
+        f"{SETTINGS.most_attached + 1} bytes; {SETTINGS.most_attached} at most"
+        in refused.fault.message
+    )
     assert (refused.secret, refused.payload) == (b"", b"")
 
 

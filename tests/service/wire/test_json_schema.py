@@ -9,7 +9,7 @@ from jsonschema import Draft202012Validator
 
 from service.answering import dispatch
 from service.wire import schema
-from service.wire.json_schema import MESSAGES
+from service.wire.json_schema import MESSAGE_KINDS
 from tests.suite.helpers.replies import PLAN, departures, refusal
 from tests.suite.helpers.requests import (
     dotted,
@@ -25,7 +25,7 @@ def test_the_schema_names_every_message_and_every_part_of_it() -> None:
     whole = schema()
     text = json.dumps(whole)
     defined = set(whole["$defs"])
-    assert {message.__name__ for message in MESSAGES} <= defined
+    assert {message.__name__ for message in MESSAGE_KINDS} <= defined
     wanted = {ref.split('"')[0] for ref in text.split("#/$defs/")[1:]}
     assert wanted <= defined
     request = whole["$defs"]["PlanRequest"]
@@ -49,7 +49,7 @@ def test_names_are_of_messages_and_not_of_modules() -> None:
 def test_every_key_has_its_request_and_reply() -> None:
     whole = schema()
     told = whole["keys"]
-    for name, service in dispatch.SERVICES.items():
+    for name, service in dispatch.SERVICES_BY_NAME.items():
         assert told[f"crux/<robot>/{name}"]["request"] == {
             "$ref": f"#/$defs/{service.request.__name__}"
         }

@@ -19,9 +19,9 @@ from service.requests import (
 )
 from service.wire import (
     LARGEST_ERROR,
-    SET_POINTS,
     BusyError,
     Format,
+    ServiceName,
     decode_request,
     encode_error,
     identifier,
@@ -104,7 +104,7 @@ def test_of_what_is_too_large_nothing_is_decoded(
 ) -> None:
     payload = form.encode({"v": 1, "id": "mine", "stream": "x" * 4096, "body_wrench": [0.0] * 6})
     monkeypatch.setattr(Format, "decode", None)
-    answer = dispatch.handle(f"crux/robosimian/{SET_POINTS}", payload, form.value)
+    answer = dispatch.handle(f"crux/robosimian/{ServiceName.SET_POINTS}", payload, form.value)
     monkeypatch.undo()
     reply = form.decode(answer.payload, ErrorReply)
     assert (reply.id, reply.error.kind, reply.error.field) == (None, "limit", None)

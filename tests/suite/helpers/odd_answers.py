@@ -36,7 +36,7 @@ def obedient() -> Callable[[Job], Answer]:
     return answer
 
 
-def stillborn() -> Callable[[Job], Answer]:
+def never_ready() -> Callable[[Job], Answer]:
     """Called in each process, which does not live to be ready."""
     os.kill(os.getpid(), signal.SIGKILL)
     raise AssertionError

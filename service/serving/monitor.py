@@ -6,7 +6,7 @@ import logging
 import time
 from collections import Counter as Counts
 from collections.abc import Callable, Iterator
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from prometheus_client import (
     CONTENT_TYPE_LATEST,
@@ -24,17 +24,9 @@ from service.replies import HealthReply, LastFailure, ProcessHealth
 from service.serving.question import Question
 from service.wire import Answer, Format
 
-__all__ = ["State", "Watch"]
+__all__ = ["ServiceMonitor", "State"]
 
 log = logging.getLogger(__name__)
-
-BUCKETS: Final = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""Upper ends of the buckets in which times are counted [s]."""
-
-LOOPBACK: Final = "127.0.0.1"
-
-FAILURES: Final = frozenset({"failed", "internal", "lost", "deadline"})
-"""Statuses and kinds of error that are the service's, and not the question's."""
 
 
 class State(NamedTuple):
@@ -51,7 +43,7 @@ class State(NamedTuple):
     waiting: dict[str, int]
 
 
-class Watch:
+class ServiceMonitor:
     """Count and log what happens in a service; for its dispatcher's thread.
 
     Parameters
@@ -67,6 +59,8 @@ class Watch:
         self._failure: LastFailure | None = None
         self._replied = 0
         self.registry = kept = CollectorRegistry()
+        # upper ends of the buckets in which times are counted [s]
+        buckets = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
         self._questions = Counter(
             "crux_questions",
             "Questions that have been replied to.",
@@ -77,11 +71,11 @@ class Watch:
             "crux_waiting_seconds",
             "From arrival to work.",
             ["key"],
-            buckets=BUCKETS,
+            buckets=buckets,
             registry=kept,
         )
         self._worked = Histogram(
-            "crux_work_seconds", "Of a process.", ["key"], buckets=BUCKETS, registry=kept
+            "crux_work_seconds", "Of a process.", ["key"], buckets=buckets, registry=kept
         )
         self._ended = Counter(
             "crux_processes_ended", "Processes that were replaced.", registry=kept
@@ -96,7 +90,7 @@ class Watch:
         OSError
             If the port is taken.
         """
-        start_http_server(port, addr=LOOPBACK, registry=self.registry)
+        start_http_server(port, addr="127.0.0.1", registry=self.registry)
 
     def count(self, question: Question, status: str, worked: float) -> None:
         """Count a reply.
@@ -116,7 +110,8 @@ class Watch:
         self._waited.labels(question.name).observe(waited)
         if worked > 0.0:
             self._worked.labels(question.name).observe(worked)
-        if status in FAILURES:
+        # these are the service's, and not the question's
+        if status in {"failed", "internal", "lost", "deadline"}:
             self._failure = LastFailure(
                 kind=status, about=question.name, id=question.id, at=time.time()
             )

@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection, wait
 from types import FrameType
 from typing import Any, Final, Generic, TypeVar
 
-__all__ = ["Lane", "Make", "Station", "resident", "starting_children"]
+__all__ = ["Make", "PriorityLane", "WorkerHandle", "resident", "starting_children"]
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -57,12 +57,12 @@ Make = Callable[[], Callable[[T], R]]
 """Called once in a process: returns what answers there."""
 
 
-class Lane(Generic[T, R]):
+class PriorityLane(Generic[T, R]):
     """One of a process's lanes, which answers one question after another.
 
     Attributes
     ----------
-    station : Station
+    handle : WorkerHandle
     number : int
         Among its process's lanes.
     pipe : Connection
@@ -71,8 +71,8 @@ class Lane(Generic[T, R]):
         Whether it has said that it can work.
     """
 
-    def __init__(self, station: Station[T, R], number: int, pipe: Connection) -> None:
-        self.station = station
+    def __init__(self, handle: WorkerHandle[T, R], number: int, pipe: Connection) -> None:
+        self.handle = handle
         self.number = number
         self.pipe = pipe
         self.ready = False
@@ -130,7 +130,7 @@ class Lane(Generic[T, R]):
         return found
 
 
-class Station(Generic[T, R]):
+class WorkerHandle(Generic[T, R]):
     """A process that answers.
 
     Parameters
@@ -148,7 +148,7 @@ class Station(Generic[T, R]):
     Attributes
     ----------
     process : Process
-    lanes : tuple of Lane
+    lanes : tuple of PriorityLane
     """
 
     def __init__(
@@ -170,7 +170,7 @@ class Station(Generic[T, R]):
         for other in others:
             # the process has the other ends alone, so that its death ends the pipes
             other.close()
-        self.lanes = tuple(Lane(self, i, pipe) for i, (pipe, _) in enumerate(ends))
+        self.lanes = tuple(PriorityLane(self, i, pipe) for i, (pipe, _) in enumerate(ends))
         # by a pipe, which reports a death: it may be large
         with suppress(OSError):
             ends[0][0].send(make)

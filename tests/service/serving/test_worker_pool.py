@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from service.serving import PlanService, crew, open_session, zenoh_config
-from service.serving.crew import LONGEST_REST, RESTING, Crew
-from service.serving.dispatcher import FAILED_STARTS
+from service.serving import PlanService, open_session, worker_pool, zenoh_config
+from service.serving.settings import SERVING_SETTINGS, ServingSettings
+from service.serving.worker_pool import WorkerPool
 from service.wire import LostError
 from tests.suite.helpers.odd_answers import obedient
 
@@ -46,8 +46,8 @@ def test_the_rest_grows_while_no_process_can_be_started(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     clock = Clock()
-    monkeypatch.setattr(crew, "time", clock)
-    found = Crew(obedient, 1, MEMORY)
+    monkeypatch.setattr(worker_pool, "time", clock)
+    found = WorkerPool(obedient, 1, MEMORY)
     rests = []
     with no_file_more():
         for _ in range(8):
@@ -57,8 +57,9 @@ def test_the_rest_grows_while_no_process_can_be_started(
             # nothing is tried before that is over
             found.start_worker()
             assert found.failed_starts == len(rests)
-    assert rests == [min(RESTING * 2.0**i, LONGEST_REST) for i in range(8)]
-    assert rests[0] < rests[-1] == LONGEST_REST
+    first, longest = SERVING_SETTINGS.first_rest, SERVING_SETTINGS.longest_rest
+    assert rests == [min(first * 2.0**i, longest) for i in range(8)]
+    assert rests[0] < rests[-1] == longest
     assert len(caplog.messages) == 8
     assert caplog.messages[1] == (
         "no process can be started, again in 2 s: [Errno 24] Too many open files"
@@ -68,7 +69,7 @@ def test_the_rest_grows_while_no_process_can_be_started(
     clock.now = found.rests_until
     found.start_worker()
     try:
-        assert len(found.stations) == 2
+        assert len(found.handles) == 2
     finally:
         found.end()
 
@@ -79,19 +80,19 @@ class Part(SimpleNamespace):
     __eq__, __hash__ = object.__eq__, object.__hash__
 
 
-def station(*, ready: bool) -> Any:
+def handle(*, ready: bool) -> Any:
     made = Part(ready=ready)
-    made.lanes = tuple(Part(station=made, number=i) for i in range(2))
+    made.lanes = tuple(Part(handle=made, number=i) for i in range(2))
     made.process = SimpleNamespace(is_alive=lambda: True)
     return made
 
 
-def crew_of(workers: int, ready: int, dear: int) -> Crew:
-    """A crew in which some processes are ready, and some of these have what may take long."""
-    found = Crew(obedient, workers, MEMORY)
-    found.put(station(ready=True), "streams")
+def pool_of(workers: int, ready: int, dear: int) -> WorkerPool:
+    """A pool in which some processes are ready, and some of these have what may take long."""
+    found = WorkerPool(obedient, workers, MEMORY)
+    found.put(handle(ready=True), "streams")
     for i in range(workers):
-        process = station(ready=i < ready)
+        process = handle(ready=i < ready)
         found.put(process, "questions")
         if i < dear:
             found.work[process.lanes[0]] = SimpleNamespace(dear=True)  # type: ignore[assignment]
@@ -118,7 +119,7 @@ def crew_of(workers: int, ready: int, dear: int) -> Crew:
 def test_only_processes_that_are_ready_count(
     workers: int, ready: int, dear: int, takes: bool
 ) -> None:
-    assert crew_of(workers, ready, dear).takes_dear() == takes
+    assert pool_of(workers, ready, dear).takes_dear() == takes
 
 
 def test_a_service_for_which_no_process_can_be_started_says_so(
@@ -130,8 +131,8 @@ def test_a_service_for_which_no_process_can_be_started_says_so(
         tried.append(1)
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
-    monkeypatch.setattr(crew, "Station", refused)
-    monkeypatch.setattr(crew, "RESTING", 0.05)
+    monkeypatch.setattr(worker_pool, "WorkerHandle", refused)
+    monkeypatch.setattr(worker_pool, "SERVING_SETTINGS", ServingSettings(first_rest=0.05))
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with (
         open_session(config) as session,
@@ -140,4 +141,5 @@ def test_a_service_for_which_no_process_can_be_started_says_so(
     ):
         pass
     # each after a rest, the last perhaps while the start is given up; not at each of its turns
-    assert FAILED_STARTS <= len(tried) < 2 * FAILED_STARTS
+    failed = SERVING_SETTINGS.failed_starts
+    assert failed <= len(tried) < 2 * failed

@@ -13,40 +13,20 @@ from collections.abc import Callable
 from enum import StrEnum
 from functools import partial
 from queue import SimpleQueue
-from typing import Final
 
 import zenoh
 
 from hand_models.base import CruxError
+from service.serving.monitor import ServiceMonitor
 from service.serving.question import Question
-from service.serving.watch import Watch
 from service.wire import Answer, BusyError
 
-__all__ = ["Mail", "Replies", "Sender", "reply_to"]
+__all__ = ["Replies", "ReplySender", "SharedQueue", "reply_to"]
 
 log = logging.getLogger(__name__)
 
-SENDERS: Final = 32
-"""Clients that can be waited for at a time."""
 
-UNNAMED: Final = 8
-"""Reply queues that clients without a known name share."""
-
-FIRST_GUESS: Final = 0.05
-"""How long questions take, before any has been answered [s]."""
-
-AVERAGED: Final = 20
-"""About how many questions the mean time is averaged over."""
-
-COME_AGAIN: Final = (0.05, 10.0)
-"""Least and longest time after which a refused client is asked to come again [s]."""
-
-MAILS: Final = 1.0
-"""How long the end waits for replies that are on their way [s]; clients that do not read keep some
-from leaving."""
-
-
-class Sender(StrEnum):
+class SharedQueue(StrEnum):
     """Queues of what is sent to no known client."""
 
     OPERATORS = "operators"
@@ -57,15 +37,22 @@ class Sender(StrEnum):
     """Sessions that are asked to prove their names."""
 
 
-class Mail:
-    """Sends replies in the background. Safe to use from several threads."""
+class ReplySender:
+    """Sends replies in the background. Safe to use from several threads.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    threads : int, optional
+        Clients that can be waited for at a time.
+    """
+
+    def __init__(self, threads: int = 32) -> None:
+        self._threads = threads
         self._sent = threading.Condition()
         self._to: dict[str, deque[Callable[[], None]]] = {}
         self._clients: SimpleQueue[str | None] = SimpleQueue()
-        for _ in range(SENDERS):
-            threading.Thread(target=self._run, name="crux-mail", daemon=True).start()
+        for _ in range(self._threads):
+            threading.Thread(target=self._run, name="crux-replies", daemon=True).start()
 
     def send(self, client: str, reply: Callable[[], None]) -> None:
         """Let a reply be sent after those to the same client that have been handed in before."""
@@ -81,7 +68,7 @@ class Mail:
         """Wait until all that was handed in has been sent, but no longer than some seconds."""
         with self._sent:
             self._sent.wait_for(lambda: not self._to, seconds)
-        for _ in range(SENDERS):
+        for _ in range(self._threads):
             self._clients.put(None)
 
     def _run(self) -> None:
@@ -112,22 +99,25 @@ def reply_to(query: zenoh.Query, key: str, make_answer: Callable[[], Answer]) ->
 
 
 class Replies:
-    """Reply to each question once, and report every reply to a watch.
+    """Reply to each question once, and report every reply to a monitor.
 
     Parameters
     ----------
-    watch : Watch
+    monitor : ServiceMonitor
     """
 
-    def __init__(self, watch: Watch) -> None:
-        self._watch = watch
-        self._mail = Mail()
+    def __init__(self, monitor: ServiceMonitor) -> None:
+        self._monitor = monitor
+        self._sender = ReplySender()
         self._unnamed = 0
-        self._mean = FIRST_GUESS
+        # [s] how long questions take, before any has been answered
+        self._mean = 0.05
+        # [s] the longest time after which a refused client is asked to come again
+        self._longest_retry = 10.0
 
     def later(self, client: str, work: Callable[[], None]) -> None:
         """Let work that may wait for a client be done, after what was handed in for it before."""
-        self._mail.send(client, work)
+        self._sender.send(client, work)
 
     def refuse(self, question: Question, error: CruxError, status: str | None = None) -> None:
         """Reply with an error; the status is its kind, unless another is given."""
@@ -136,25 +126,27 @@ class Replies:
 
     def busy(self, question: Question, ahead: float) -> None:
         """Refuse a question that has no room, for now; ``ahead``: questions for each process."""
-        low, high = COME_AGAIN
-        again = round(min(max(self._mean * ahead, low), high), 3)
+        again = round(min(max(self._mean * ahead, 0.05), self._longest_retry), 3)
         busy = f"the service has too many questions; ask again in {again:g} s"
         self.refuse(question, BusyError(busy, again))
 
     def ending(self, question: Question) -> None:
         """Refuse a question because the service is ending."""
-        self.refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
+        self.refuse(question, BusyError("the service is ending", self._longest_retry))
 
     def reply(self, question: Question, answer: Answer) -> None:
         """Reply with an answer."""
         if answer.seconds > 0.0:
-            self._mean += (answer.seconds - self._mean) / AVERAGED
+            # a mean over about 20 questions
+            self._mean += (answer.seconds - self._mean) / 20
         question.replied, question.payload = True, b""
-        self._watch.count(question, answer.status, answer.seconds)
-        self._unnamed = (self._unnamed + 1) % UNNAMED
+        self._monitor.count(question, answer.status, answer.seconds)
+        # clients without a known name share 8 queues
+        self._unnamed = (self._unnamed + 1) % 8
         send = partial(reply_to, question.query, question.key, lambda: answer)
-        self._mail.send(question.place or str(self._unnamed), send)
+        self._sender.send(question.place or str(self._unnamed), send)
 
     def close(self) -> None:
         """Wait a little for replies that are on their way."""
-        self._mail.close(MAILS)
+        # clients that do not read keep some from leaving
+        self._sender.close(seconds=1.0)
