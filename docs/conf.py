@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from docutils.nodes import SkipNode
+from docutils.nodes import SkipNode, document, image
 from latex2mathml.converter import convert as latex_to_mathml
 
 HERE = Path(__file__).parent
@@ -17,6 +17,7 @@ from generation import write_all  # noqa: E402 - found by the line above
 
 project = "crux"
 author = "The crux authors"
+copyright = f"2026 {author}"  # as in LICENSE
 release = version = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"][
     "version"
 ]
@@ -32,6 +33,8 @@ html_math_renderer = "mathml"
 smartquotes = False  # which would make a dash of --hand
 html_theme = "furo"
 html_title = f"crux {release}"
+html_static_path = ["style"]
+html_css_files = ["crux.css"]
 exclude_patterns = ["reference/generated/bytes"]
 
 myst_heading_anchors = 3
@@ -60,9 +63,16 @@ def display_formula(translator: Any, node: Any) -> None:
     raise SkipNode
 
 
+def link_pictures(app: Any, page: document) -> None:
+    """Give every picture the page's width, so that Sphinx links it to its full size."""
+    for picture in page.findall(image):
+        picture["width"] = "100%"
+
+
 def setup(app: Any) -> None:
-    """Take part in what autodoc does, and write formulas."""
+    """Take part in what autodoc does, link pictures and write formulas."""
     app.connect("autodoc-skip-member", skip_alias)
+    app.connect("doctree-read", link_pictures)
     app.add_html_math_renderer("mathml", (inline_formula, None), (display_formula, None))
 
 

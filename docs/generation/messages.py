@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -28,10 +29,13 @@ BOUNDS = {
     "maxProperties": "entries ≤",
 }
 
+FIELD = re.compile(r"(?:\A|(?<=[.;])\s)(?=`[a-z_]+`(?:(?:,| and)\s`[a-z_]+`)*: )")
+"""Where the words about a field begin, which get a line of their own."""
+
 BEGINNING = """# Messages
 
 Every message of the service, from the JSON Schema that `crux schema` prints. Requests are strict:
-an unknown or missing field is an error. Replies may gain fields; ignore those that you do not know.
+an unknown or missing field is an error. Replies may gain fields; ignore unknown ones.
 MessagePack has the same structure: an object is a map with the field names as keys.
 
 Frames: W world, B body, H hand, see [frames, signs and units](../frames.md).
@@ -92,8 +96,10 @@ def _section(name: str, part: Schema, words: str) -> str:
         (f"`{field}`", _type(entry), _need(field, entry, required), _meaning(entry))
         for field, entry in part.get("properties", {}).items()
     ]
-    text = [f"({anchor(name)})=\n### {name}\n", part.get("description", ""), "", words, ""]
-    return "\n".join([*text, table(("field", "type", "needed", "meaning"), rows)])
+    shown = 4 if any(meaning for *_, meaning in rows) else 3
+    fields = table(("field", "type", "needed", "meaning")[:shown], [row[:shown] for row in rows])
+    title, about = f"({anchor(name)})=\n### {name}\n", part.get("description", "")
+    return "\n".join([title, about, "", FIELD.sub("\n- ", words), "", fields])
 
 
 def _need(field: str, entry: Schema, required: list[str]) -> str:

@@ -116,6 +116,7 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
         if not told.good:
             raise RuntimeError(f"{key.name}: {told.payload.decode()}")
         text.append(f"## {'JSON' if form == 'json' else 'MessagePack'}\n")
+        kept = "" if form == "json" else ":class: bytes\n"  # a style that does not wrap lines
         for part, payload, coded in (
             ("request", asked, encoding),
             ("reply", told.payload, told.encoding),
@@ -125,7 +126,7 @@ def _add_page(session: zenoh.Session, key: _Key, pages: dict[str, bytes]) -> Non
             text += [
                 f"The {part}, {len(payload):,} bytes, encoding `{coded}`"
                 f" ({{download}}`download <../{name}>`):\n",
-                f"```{{code-block}} text\n{_shown(payload, form)}\n```\n",
+                f"```{{code-block}} text\n{kept}{_shown(payload, form)}\n```\n",
             ]
     pages[f"keys/{key.name}.md"] = "\n".join(text).encode()
 
@@ -192,16 +193,18 @@ encoding. The reply is one sample on that key.
 | none, `zenoh/bytes`, `text/json`, `application/json` | JSON |
 | `application/msgpack` | MessagePack, field names as keys |
 
-A `;schema` after it is not looked at. The reply has the format of the request; its encoding tells
-the message too, such as `application/msgpack;crux.PlanReply@1`. An error comes as zenoh's error
-reply (`reply_err`), in the same format: see [errors](errors.md).
+A `;schema` after it is ignored. The reply has the format of the request. Its encoding also names
+the message, such as `application/msgpack;crux.PlanReply@1`. An error comes as zenoh's error reply
+(`reply_err`), in the same format: see [errors](errors.md).
 
-Send `source_info` (the identifier of a querier or publisher of yours, and a number that counts your
-questions): by it the service gives each client its turn where it is linked to the service. Behind a
-router, or so that nobody else can ask in your name, send a secret of 16 random bytes as attachment,
-too, and declare a queryable at `crux/<robot>/clients/<zid>`, with your session's zenoh identifier,
-that replies with the secret's SHA-256. With a liveliness token of the same key, what you asked is
-dropped when you go. All may be left out.
+Three things are optional:
+
+- `source_info`: the identifier of a querier or publisher of yours, and a number that counts your
+  questions. With it, a client that is linked to the service has a turn of its own.
+- A secret of 16 random bytes as attachment, and a queryable at `crux/<robot>/clients/<zid>` (with
+  your session's zenoh identifier) that replies with the secret's SHA-256. With it, a client behind
+  a router has a turn of its own, and nobody else can ask in its name.
+- A liveliness token of the same key. With it, your questions are dropped when you go.
 
 The service itself holds the liveliness token `crux/<robot>/alive`.
 
@@ -214,23 +217,24 @@ Below, `id` is `"a"`, and line breaks within JSON are those of this page.
 ```
 """
 
-PLAN = """Who carries what in a stance. The example asks for `"detail": "set_points"`, which a
-controller reads; the reply is then a [BriefPlanReply](#message-briefplanreply)."""
+PLAN = """Plans the loads of a stance. The example asks for `"detail": "set_points"`, which is for
+controllers. The reply is then a [BriefPlanReply](#message-briefplanreply)."""
 
-WRENCH_SPACE = """What one hand of a stance can carry. The example leaves out vertices and
-half-spaces (`"want": []`)."""
+WRENCH_SPACE = """Lists which wrenches one hand of a stance can exert. The example leaves out
+vertices and half-spaces (`"want": []`)."""
 
-BODY_SPACE = """Which body wrenches a stance holds."""
+BODY_SPACE = """Lists which body wrenches a stance holds."""
 
 STREAM = """Declares a stance for set-points of many body wrenches. The reply names the `stream`;
 the 16 streams that were used last are kept."""
 
-SET_POINTS = """Set-points of a stream that was declared with [stream](stream.md), for one body
-wrench."""
+SET_POINTS = """Gives the set-points of a stream for one body wrench. The stream was declared with
+[stream](stream.md)."""
 
-HEALTH = """What an operator asks for: version, uptime, processes, what waits, the last failure."""
+HEALTH = """Reports the state for an operator: version, uptime, workers, the queue, the last
+failure."""
 
-METRICS = """Counts and times, as Prometheus reads them."""
+METRICS = """Reports counts and times in the format of Prometheus."""
 
 PLAIN = """# {}
 
@@ -248,9 +252,9 @@ The reply, encoding `{}`:
 
 ERRORS = """# Errors
 
-An error is zenoh's error reply, of 4,096 bytes at most; long texts end in `…`. The message is an
-[ErrorReply](#message-errorreply). `field` is the path in the request that is wrong, or null. What
-each `kind` means: [the service](../../../how-to/service.md#errors).
+An error is zenoh's error reply, of 4,096 bytes at most. Long texts end in `…`. The message is an
+[ErrorReply](#message-errorreply). `field` is the path of the fault in the request, or null.
+[Run the service](../../../how-to/service.md#errors) explains each `kind`.
 
 A request whose stance has no hands, `{{"v": 1, "id": "a", "stance": {{}}}}`, is answered with an
 error reply, encoding `{}`:
