@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, Progress
 from hand_models.compliance.grasp import CompliantGrasp
 from hand_models.compliance.pose_box import SearchBox, search_box
-from hand_models.wrench_spaces import SCALE, Row
+from hand_models.wrench_spaces import WRENCH_SCALE, Row
 
 __all__ = ["PLANAR", "WristSearch", "boundary", "search"]
 
@@ -74,7 +74,7 @@ class WristSearch:
 
     @property
     def hull(self) -> scipy.spatial.ConvexHull:
-        """The hull of the wrenches, in newtons (moments over a length, `SCALE`).
+        """The hull of the wrenches, in newtons (moments over a length, `WRENCH_SCALE`).
 
         Raises
         ------
@@ -83,7 +83,7 @@ class WristSearch:
         """
         components = _components(self.poses.shape[1])
         try:
-            return scipy.spatial.ConvexHull(self.wrenches[:, components] * SCALE[components])
+            return scipy.spatial.ConvexHull(self.wrenches[:, components] * WRENCH_SCALE[components])
         except scipy.spatial.QhullError:
             raise EmptySetError(
                 f"the {len(self.wrenches)} wrenches found span no volume: try more poses per axis"
@@ -129,7 +129,7 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
         held += int(found.holds.sum())
         outermost = np.vstack([outermost, t[found.holds]])
         wrenches = np.vstack([wrenches, found.wrenches[found.holds]])
-        some = _extremes((wrenches * SCALE)[:, components], directions)
+        some = _extremes((wrenches * WRENCH_SCALE)[:, components], directions)
         outermost, wrenches = outermost[some], wrenches[some]
     if progress is not None:
         progress(total, total)

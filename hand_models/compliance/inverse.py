@@ -25,7 +25,7 @@ from hand_models.compliance.directional_limit import pose_units
 from hand_models.compliance.floating_wrist import WRIST
 from hand_models.compliance.grasp import complex_steps, slopes
 from hand_models.compliance.rolling import Numbers
-from hand_models.wrench_spaces import SCALE
+from hand_models.wrench_spaces import WRENCH_SCALE
 
 __all__ = ["WristPose", "wrist_pose"]
 
@@ -91,7 +91,7 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
             found.append(_nearest(hand, wanted, start, carries))
             if found[-1].converged:
                 return found[-1]
-    return min(found, key=lambda pose: float(np.abs(pose.residual * SCALE).max()))
+    return min(found, key=lambda pose: float(np.abs(pose.residual * WRENCH_SCALE).max()))
 
 
 def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | None) -> WristPose:
@@ -106,10 +106,10 @@ def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | 
         loads = hand.loads(twists)
         if carries is not None:
             loads = loads._replace(palm=hand.palm_loads(twists) * carries)
-        return np.asarray(hand.wrenches(loads) * SCALE)
+        return np.asarray(hand.wrenches(loads) * WRENCH_SCALE)
 
     def residual(x: Array) -> Array:
-        left = wrenches((x * units)[None])[0] - wanted * SCALE
+        left = wrenches((x * units)[None])[0] - wanted * WRENCH_SCALE
         return np.asarray(np.where(np.isfinite(left), left, LOST))
 
     def jacobian(x: Array) -> Array:
@@ -129,4 +129,4 @@ def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | 
         )
         at = found.x * units
     left = wanted - hand.wrenches(hand.loads(at[None]))[0]
-    return WristPose(at, left, float(np.abs(left * SCALE).max()) <= TOLERANCE)
+    return WristPose(at, left, float(np.abs(left * WRENCH_SCALE).max()) <= TOLERANCE)

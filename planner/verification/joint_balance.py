@@ -23,7 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import SKEW, Array
+from hand_models.base import SKEW_MATRICES, Array
 from hand_models.finger import PHALANGES, STOPS
 from hand_models.hand import HandModel
 from planner.prepare import NONE, NOTHING, TileIndex
@@ -45,7 +45,7 @@ BEFORE: Final = np.tri(JOINTS, k=-1)
 OUTWARD: Final = np.tri(JOINTS).T
 """Ones where a joint (row) turns a phalanx (column)."""
 
-CROSS: Final = SKEW.transpose(0, 2, 1).reshape(9, 3)
+CROSS: Final = SKEW_MATRICES.transpose(0, 2, 1).reshape(9, 3)
 """The map of p ⊗ F to the moment p × F."""
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import msgspec
 
-from hand_models.base import DISTRIBUTION, BoundedStore, CruxError, installed_version
+from hand_models.base import DISTRIBUTION_NAME, BoundedStore, CruxError, installed_version
 from hand_models.parameters import ParameterTable
 from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format, MalformedError
@@ -29,7 +29,7 @@ __all__ = ["About", "Setting", "about", "answer_chunk", "grouped", "own_versions
 SETTINGS: Final = 4
 """Settings whose models and files a process keeps."""
 
-PACKAGES: Final = (DISTRIBUTION, "numpy", "scipy", "clarabel")
+PACKAGES: Final = (DISTRIBUTION_NAME, "numpy", "scipy", "clarabel")
 """Packages on whose versions the last digits of answers depend."""
 
 NOTHING: Final = msgspec.Raw(b"null")
