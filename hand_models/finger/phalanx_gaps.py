@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.sections import BLOCK, Complexes, Outlines, stretch_minima
+from hand_models.sections import SECTION_SETTINGS, Complexes, Outlines, stretch_minima
 
 __all__ = [
     "Beside",
@@ -330,10 +330,11 @@ def nearest_points(
     blocks_each = rock.centres.shape[-1]
     phalanx, block = np.divmod(np.flatnonzero(chosen), blocks_each)
     block += phalanx // q.shape[-1] * blocks_each
-    points = rock.points.reshape(-1, BLOCK)[block].ravel()
-    lengths = rock.lengths.reshape(-1, BLOCK)[block].ravel()
-    count = BLOCK * np.bincount(phalanx, minlength=q.size)
-    phalanx = np.repeat(phalanx, BLOCK)
+    each = SECTION_SETTINGS.points_per_circle
+    points = rock.points.reshape(-1, each)[block].ravel()
+    lengths = rock.lengths.reshape(-1, each)[block].ravel()
+    count = each * np.bincount(phalanx, minlength=q.size)
+    phalanx = np.repeat(phalanx, each)
     near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count)
     seen = (points - joints.ravel()[phalanx]) * u.ravel().conj()[phalanx]
     return shape.may_press(seen, near, within.ravel())
