@@ -17,7 +17,7 @@ from hand_models.base import (
     Progress,
     check_positive,
 )
-from hand_models.finger import NONE
+from hand_models.finger import CONTACT_KINDS
 from hand_models.fixed_wrist.placing import UP, approach_frame
 from hand_models.fixed_wrist.seat_scatter import robustness
 from hand_models.fixed_wrist.seat_search import BEST, best_seats
@@ -179,7 +179,7 @@ def _at_border(hand: SpinyHand, settled: SettledHand) -> bool:
     """Return True if a scan ends within a finger's reach, or has no rock at all for one."""
     if min(settled.rock_ends) < hand.finger.reach:
         return True
-    off = (settled.postures.kinds == NONE).all(axis=1)
+    off = (settled.postures.kinds == CONTACT_KINDS.index("none")).all(axis=1)
     at = settled.hold, settled.grasp, settled.seating.pose
     return bool(len(settled.hold.border)) and any(
         hand.section(name, *at) is None for name in np.array(FINGERS)[off].tolist()

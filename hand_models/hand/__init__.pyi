@@ -2,7 +2,6 @@ from .finger_frames import FingerFrame as FingerFrame
 from .grasp import Grasp as Grasp
 from .model import HandModel as HandModel
 from .names import (
-    CLOSURES as CLOSURES,
     FINGERS as FINGERS,
     FINGERTIP_FORCE as FINGERTIP_FORCE,
     NAIL as NAIL,

@@ -16,11 +16,9 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.finger import (
-    FACE,
-    FREE,
-    KINDS,
+    CONTACT_KINDS,
+    JOINT_STOPS,
     PHALANGES,
-    STOPS,
     ClosedFinger,
     ClosedPhalanx,
     OpenFinger,
@@ -246,11 +244,12 @@ def _row(
 ) -> FingerNumbers:
     """Return the numbers of a finger that is laid; ``height`` of its tiles [m]."""
     row: FingerNumbers = []
+    laid = CONTACT_KINDS.index("face"), JOINT_STOPS.index(None)
     for (angle, u, joint, along, _), t, n in zip(phalanges, shears, normals, strict=True):
         place = joint + complex(along, height) * u
         # the tile of a phalanx that is laid is on the rock with all its spines
         row += (angle, along, 0.0, 0.0, joint.real, joint.imag)
-        row += (t.real, t.imag, n.real, n.imag, 1.0, FACE, FREE)
+        row += (t.real, t.imag, n.real, n.imag, 1.0, *laid)
         row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
     return row
 
@@ -269,6 +268,7 @@ def _row_alone(closed: ClosedFinger) -> FingerNumbers:
         strict=True,
     ):
         row += (contact.angle, contact.along, contact.rise, contact.tilt, *contact.joint)
-        row += (*shear, *normal, share, KINDS.index(contact.kind), STOPS.index(contact.stop))
+        kind, stop = CONTACT_KINDS.index(contact.kind), JOINT_STOPS.index(contact.stop)
+        row += (*shear, *normal, share, kind, stop)
         row += (*place, 1.0, -x, -z, 0.0, -z, x, 0.0)
     return row

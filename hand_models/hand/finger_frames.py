@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, Pose
-from hand_models.finger import NONE, PHALANGES
+from hand_models.finger import CONTACT_KINDS, PHALANGES
 from hand_models.hand.names import FINGERS
 from hand_models.rock import Hold
 from hand_models.sections import Section
@@ -128,7 +128,7 @@ class FrameStack:
         places = np.insert(np.concatenate([bases, palms, joints], axis=1), 3, 1.0, axis=2)
         directions = np.insert(np.concatenate([alongs, into[:, :1]], axis=1), 3, 0.0, axis=2)
         tiles = np.zeros((count, BASES, COLUMNS))
-        tiles[..., POSITION], tiles[..., KIND] = bases, NONE
+        tiles[..., POSITION], tiles[..., KIND] = bases, CONTACT_KINDS.index("none")
         tiles[..., AXES] = np.concatenate([-alongs, into, acrosses], axis=2)[:, OUTER]
         stacks = (
             np.concatenate([places, directions], axis=1),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.finger import NONE
+from hand_models.finger import CONTACT_KINDS
 from hand_models.hand.closed_fingers import ClosedFingers
 from hand_models.hand.finger_frames import AXES, COLUMNS, KIND, NORMAL, POSITION, UP
 from hand_models.hand.names import CONTACTS, FINGERS, NAIL
@@ -56,7 +56,7 @@ def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: 
     angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
     clinging = len(FINGERS) if placed.placements[index].grasp.fingernail else 0
     rows, tiles = [], np.zeros((clinging, COLUMNS))
-    tiles[:, KIND] = NONE
+    tiles[:, KIND] = CONTACT_KINDS.index("none")
     frames = placed.frames.hands[index]
     for i, (name, frame, tip) in enumerate(zip(FINGERS, frames, tiles, strict=False)):
         section = placed.section(index, i)

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array, BoundedStore, Indices
-from hand_models.finger import BALANCE, NONE, STOPS, Contact, FingerModel, SettledFinger
+from hand_models.finger import CONTACT_KINDS, JOINT_STOPS, Contact, FingerModel, SettledFinger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
-from hand_models.hand.names import CLOSURES, CONTACTS, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
+from hand_models.hand.names import CONTACTS, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
@@ -40,7 +40,7 @@ class HandPostures(NamedTuple):
         Of each contact: along its phalanx from the joint, above the tile's face [m], from the
         phalanx's normal [rad], and the share of the tile's spines on the rock.
     kinds, stops : ndarray of int8
-        Codes of `CONTACTS` and `hand_models.finger.STOPS`.
+        Codes of `CONTACTS` and `hand_models.finger.JOINT_STOPS`.
     """
 
     angles: Array
@@ -63,7 +63,7 @@ class HandPostures(NamedTuple):
                         (joint.real, joint.imag),
                         along,
                         CONTACTS[kind],
-                        STOPS[stop],
+                        JOINT_STOPS[stop],
                         rise,
                         tilt,
                         share,
@@ -212,10 +212,15 @@ class SettledHand:
 
     @cached_property
     def closures(self) -> tuple[str, ...]:
-        """Closure of each finger, one of `CLOSURES`."""
-        laid, hooked, wedged, curled, stopped, straight = CLOSURES
+        """How each finger has ended.
+
+        Laid with all of its tiles on the rock; hooked with some of them; wedged with bare phalanges
+        or its tip only; curled in the air between its springs and its tendon; stopped there with
+        all joints at limits; or held straight to cling with its nail.
+        """
         if self.grasp.fingernail:
-            return (straight,) * len(FINGERS)
+            return ("straight",) * len(FINGERS)
+        none, balance = CONTACT_KINDS.index("none"), JOINT_STOPS.index("balance")
         postures = self.postures
         words = []
         for shares, kinds, stops in zip(
@@ -225,11 +230,11 @@ class SettledHand:
             strict=True,
         ):
             if any(shares):
-                words.append(laid if all(shares) else hooked)
-            elif any(kind != NONE for kind in kinds):
-                words.append(wedged)
+                words.append("laid" if all(shares) else "hooked")
+            elif any(kind != none for kind in kinds):
+                words.append("wedged")
             else:
-                words.append(curled if BALANCE in stops else stopped)
+                words.append("curled" if balance in stops else "stopped")
         return tuple(words)
 
     @cached_property

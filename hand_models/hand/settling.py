@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError, go_on
-from hand_models.finger import BALANCE, NONE, PHALANGES, ClosedPhalanx
+from hand_models.finger import CONTACT_KINDS, JOINT_STOPS, PHALANGES, ClosedPhalanx
 from hand_models.hand.closed_fingers import ClosedFingers, close_fingers
 from hand_models.hand.finger_frames import BASES
 from hand_models.hand.hooked_nails import Nails, hook_nails
@@ -157,7 +157,8 @@ def _too_slack(
     hand, placements = placed.hand, placed.placements
     stops, kinds = closed.postures.stops, closed.postures.kinds
     # fingers that are laid on the rock, or would be, without asking for the path to it
-    angles, closes = closed.postures.angles.copy(), (kinds != NONE).all(axis=2)
+    none = CONTACT_KINDS.index("none")
+    angles, closes = closed.postures.angles.copy(), (kinds != none).all(axis=2)
     for k in closed.alone:
         i, finger = divmod(k, len(FINGERS))
         phalanges = laid[i][finger]
@@ -180,7 +181,8 @@ def _too_slack(
                 field="grasp.closing_tension",
             ),
         )
-    idle = (kinds == NONE).all(axis=(1, 2)) & (stops == BALANCE).any(axis=(1, 2))
+    balance = JOINT_STOPS.index("balance")
+    idle = (kinds == none).all(axis=(1, 2)) & (stops == balance).any(axis=(1, 2))
     slack = [
         i
         for i in idle.nonzero()[0].tolist()
@@ -217,7 +219,7 @@ def _closed_by_more(
     again = PlacedHands(hand, which, [placed.seatings[i] for i in slack])
     refused: dict[int, InvalidInputError] = {}
     closed = close_fingers(again, [laid[i] for i in slack], [most] * len(slack), refused)
-    near = (closed.postures.kinds != NONE).any(axis=(1, 2))
+    near = (closed.postures.kinds != CONTACT_KINDS.index("none")).any(axis=(1, 2))
     near[[*refused]] = True
     for finger, each in closed.alone.items():
         k = finger // len(FINGERS)

@@ -39,7 +39,7 @@ class NearbyClosure(NamedTuple):
     Attributes
     ----------
     closures : tuple of str
-        Ends other than where it is, of `hand_models.hand.CLOSURES`, and ``refused`` where the hand
+        Ends other than where it is, as of `SettledHand.closures`, and ``refused`` where the hand
         cannot be there.
     turn : float
         Largest change of the angle at which any of its joints ends [rad].

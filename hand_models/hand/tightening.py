@@ -57,7 +57,7 @@ class ClosingSequence(NamedTuple):
         Whether nail and joints move one after the other, as Section 3.2 wants it: each starts no
         sooner than the one before it ends.
     closure : str
-        How it has ended, one of `hand_models.hand.CLOSURES`.
+        How it has ended, as of `SettledHand.closures`.
     """
 
     finger: str

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.finger import FACE, PHALANGES
+from hand_models.finger import CONTACT_KINDS, PHALANGES
 from hand_models.hand.closed_fingers import ClosedFingers
 from hand_models.hand.finger_frames import (
     AXES,
@@ -111,7 +111,7 @@ def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
     own[:, SHEAR.start] = (model.base_engagement - gain) * np.array(tensions)[engaged[0]]
     own[:, SHEAR.stop - 1] = gain
     own[:, SHEAR] *= shares[engaged][:, None]
-    own[:, ENGAGEMENT], own[:, KIND] = shares[engaged], FACE
+    own[:, ENGAGEMENT], own[:, KIND] = shares[engaged], CONTACT_KINDS.index("face")
     tiles = tiles.copy()
     tiles[engaged] = own
     return tiles
