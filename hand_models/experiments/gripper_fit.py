@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, CruxError, SolverError
-from hand_models.compliance import PLANAR, Gripper, boundary, gripper_table, linear_box
+from hand_models.compliance import PLANAR_COMPONENTS, Gripper, boundary, gripper_table, linear_box
 from hand_models.experiments.pulling import held_wrenches, pulled_off_poses
 from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import edge, extents, in_paper_signs, with_mirrored
@@ -189,7 +189,7 @@ class GripperFit:
             return held_wrenches(gripper)
         toward = np.zeros((len(TOWARD), 6))
         size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
-        toward[:, PLANAR] = TOWARD / np.abs(size) * (1.0, 1.0, -1.0)
+        toward[:, PLANAR_COMPONENTS] = TOWARD / np.abs(size) * (1.0, 1.0, -1.0)
         found = boundary(gripper, linear_box(gripper), RAYS, toward)
         return with_mirrored(in_paper_signs(found.wrenches) * SHORT)
 

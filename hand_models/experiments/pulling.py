@@ -14,7 +14,14 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, EmptySetError, Progress
-from hand_models.compliance import SIDES, STEP, Gripper, Numbers, WristSearch, search
+from hand_models.compliance import (
+    COMPLEX_STEP,
+    GRIPPER_SIDES,
+    Gripper,
+    Numbers,
+    WristSearch,
+    search,
+)
 from hand_models.experiments.study_result import part
 from hand_models.experiments.wrench_hull import (
     UNITS,
@@ -129,7 +136,7 @@ def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array,
         [N].
     """
     poses, m = start.copy(), len(start)
-    steps = 1j * STEP * np.eye(3)
+    steps = 1j * COMPLEX_STEP * np.eye(3)
     with np.errstate(invalid="ignore"):
         for _ in range(NEWTON_STEPS):
             moved = (poses[:, None, :] + steps).reshape(-1, 3)
@@ -137,7 +144,7 @@ def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array,
             left = found[:, 0].real - wrenches
             residual = np.abs(left * UNITS).max(axis=1)
             # tiny steps move no real part: all three rows have the wrench itself
-            stiffness = found.imag.swapaxes(1, 2) / STEP
+            stiffness = found.imag.swapaxes(1, 2) / COMPLEX_STEP
             going = (residual > BALANCED) & (np.abs(np.linalg.det(stiffness)) > 0.0)
             if not going.any():
                 break
@@ -194,7 +201,7 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     unit = directions / np.linalg.norm(directions * UNITS, axis=1)[:, None]
     poses = np.repeat(unloaded(gripper)[None], m, axis=0)
     loads, increments = np.zeros(m), np.full(m, INCREMENT)
-    tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
+    tiles = [(side, phalanx) for side in GRIPPER_SIDES for phalanx in PHALANGES]
     limits = gripper.limits
     fails: list[tuple[str | None, str | None, str]] = [(None, None, UNBALANCED)] * m
     going = np.ones(m, dtype=bool)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices
-from hand_models.compliance import PLANAR
+from hand_models.compliance import PLANAR_COMPONENTS
 from hand_models.wrench_spaces import WRENCH_SCALE, hull, hull_facets
 
 __all__ = [
@@ -34,7 +34,7 @@ __all__ = [
     "with_mirrored",
 ]
 
-UNITS: Final = WRENCH_SCALE[list(PLANAR)]
+UNITS: Final = WRENCH_SCALE[list(PLANAR_COMPONENTS)]
 """Per newton, newton and newton metre: what makes wrenches commensurate."""
 
 
@@ -52,7 +52,7 @@ class Extents(NamedTuple):
 
 def in_paper_signs(wrenches: Array) -> Array:
     """Return (F_x, F_z, M_y) in the paper's signs of wrenches (n, 6) in the contract's."""
-    return wrenches[:, PLANAR] * (1.0, 1.0, -1.0)
+    return wrenches[:, PLANAR_COMPONENTS] * (1.0, 1.0, -1.0)
 
 
 def extents(points: Array) -> Extents:

@@ -17,5 +17,5 @@ from .spinyhand import (
     nearby_closures as nearby_closures,
     spiny_hand as spiny_hand,
 )
-from .structure import HELD as HELD
+from .structure import HELD_DIRECTIONS as HELD_DIRECTIONS
 from .tightening import closing_sequence as closing_sequence

@@ -6,7 +6,7 @@ from typing import Final
 
 from hand_models.finger import CONTACT_KINDS
 
-__all__ = ["CONTACTS", "FINGERS", "FINGERTIP_FORCE", "NAIL", "NAIL_SHEAR"]
+__all__ = ["CONTACT_NAMES", "FINGERS", "FINGERTIP_FORCE", "NAIL", "NAIL_SHEAR"]
 
 FINGERS: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
 """Order of every list of four tensions; left is +y of H."""
@@ -20,5 +20,5 @@ NAIL_SHEAR: Final = "nail_shear"
 FINGERTIP_FORCE: Final = "fingertip_force"
 """Name of the limit of a distal phalanx, or a nail, that presses into the rock."""
 
-CONTACTS: Final = (*CONTACT_KINDS, NAIL)
+CONTACT_NAMES: Final = (*CONTACT_KINDS, NAIL)
 """Part of a tile that touches the rock, by code."""

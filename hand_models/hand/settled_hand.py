@@ -6,7 +6,7 @@ import itertools
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,13 @@ from hand_models.base import Array, BoundedStore, Indices
 from hand_models.finger import CONTACT_KINDS, JOINT_STOPS, Contact, FingerModel, SettledFinger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
-from hand_models.hand.names import CONTACTS, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
+from hand_models.hand.names import CONTACT_NAMES, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["HandPostures", "Palm", "SettledHand", "Tile"]
-
-KEPT: Final = 4
-"""Sets that are kept of one settled hand, for different tension limits."""
 
 
 class HandPostures(NamedTuple):
@@ -40,7 +37,7 @@ class HandPostures(NamedTuple):
         Of each contact: along its phalanx from the joint, above the tile's face [m], from the
         phalanx's normal [rad], and the share of the tile's spines on the rock.
     kinds, stops : ndarray of int8
-        Codes of `CONTACTS` and `hand_models.finger.JOINT_STOPS`.
+        Codes of `CONTACT_NAMES` and `hand_models.finger.JOINT_STOPS`.
     """
 
     angles: Array
@@ -62,7 +59,7 @@ class HandPostures(NamedTuple):
                         angle,
                         (joint.real, joint.imag),
                         along,
-                        CONTACTS[kind],
+                        CONTACT_NAMES[kind],
                         JOINT_STOPS[stop],
                         rise,
                         tilt,
@@ -202,7 +199,7 @@ class SettledHand:
     stops: tuple[tuple[int, int, Array], ...]
     palm: Palm
     sets: BoundedStore[float, WrenchSpace] = field(
-        default_factory=lambda: BoundedStore("sets of hands", KEPT), init=False, repr=False
+        default_factory=lambda: BoundedStore("sets of hands", 4), init=False, repr=False
     )
 
     @cached_property

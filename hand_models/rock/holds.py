@@ -23,9 +23,6 @@ __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"
 
 Angle = TypeVar("Angle", float, Array)
 
-LARGEST_HOLD: Final = 1e6
-"""Size of a hold above which its curve is lost in rounding [m]."""
-
 CURVE_PIECES: Final = 28
 """Pieces of a curve in a hold's surface."""
 
@@ -239,7 +236,7 @@ class Cylinder(SweptHold):
     shape = "cylinder"
 
     def __post_init__(self) -> None:
-        check_positive(self.diameter, "m", "diameter", LARGEST_HOLD)
+        _check_size(self.diameter, "diameter")
 
     @property
     def swept(self) -> Swept:
@@ -267,7 +264,7 @@ class Edge(SweptHold):
     shape = "edge"
 
     def __post_init__(self) -> None:
-        check_positive(self.fillet_radius, "m", "fillet_radius", LARGEST_HOLD)
+        _check_size(self.fillet_radius, "fillet_radius")
         if not 0.0 < self.angle < math.pi:
             raise InvalidInputError(f"must be in (0, pi) rad, got {self.angle:g}", field="angle")
 
@@ -294,7 +291,7 @@ class Sphere(SweptHold):
     shape = "sphere"
 
     def __post_init__(self) -> None:
-        check_positive(self.diameter, "m", "diameter", LARGEST_HOLD)
+        _check_size(self.diameter, "diameter")
 
     @property
     def swept(self) -> Swept:
@@ -325,7 +322,7 @@ class Ellipsoid(SweptHold):
                 f"three numbers are needed, got {len(self.semi_axes)}", field="semi_axes"
             )
         for i, value in enumerate(self.semi_axes):
-            check_positive(value, "m", f"semi_axes[{i}]", LARGEST_HOLD)
+            _check_size(value, f"semi_axes[{i}]")
 
     @property
     def swept(self) -> Swept:
@@ -340,3 +337,8 @@ class Ellipsoid(SweptHold):
         x, z = a * shrink * np.sin(angle), -c * shrink * np.cos(angle)
         length = np.hypot(x, z)
         return a * shrink * x / length, c + c * shrink * z / length
+
+
+def _check_size(value: float, field: str) -> None:
+    """Refuse a size [m] that is not positive, or above which a hold's curve is lost in rounding."""
+    check_positive(value, "m", field, 1e6)
