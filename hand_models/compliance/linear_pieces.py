@@ -93,7 +93,9 @@ def pieces(
     box = search_box(grasp)
     at = np.zeros(len(box.centre))
     half = np.abs(box.axes) @ box.range
-    limits = _Limits(grasp, np.asarray(directions, dtype=float), boundary(grasp, box, 1024))
+    # rays of a search from whose ends limiting poses are sought
+    rays = boundary(grasp, box, rays=1024)
+    limits = _Limits(grasp, np.asarray(directions, dtype=float), rays)
     for i, pose in enumerate(limits.poses):
         if progress is not None:
             progress(i, len(limits.poses))

@@ -75,7 +75,7 @@ def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused
     if section is not None:
         tile = Face(*model.tile_range, model.tile_height)
         depth = max(-section.face_clearance(joint, 1.0, tile) for joint in joints.tolist())
-        # about as deep as a gap of zero may be
+        # a little, in parts of a gap's fineness, may be in a finger that clings
         if depth > 4.0 * PhalanxShape.of(model).fine:
             return Refused(depth, np.nan)
     contacts = (Contact(0.0, place, model.tile_centre, "none", "balance") for place in places)
@@ -164,7 +164,7 @@ def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
     now, low, high = max(depth(0.0, how_far=True), shape.closes), 0.0, most
     if depth(high) > 0.0:
         return Refused(now, np.inf)
-    for _ in range(24):  # halvings
+    for _ in range(24):  # halvings of the lift
         middle = 0.5 * (low + high)
         low, high = (middle, high) if depth(middle) > 0.0 else (low, middle)
     return Refused(now, high)

@@ -13,10 +13,10 @@ __all__ = ["CONTACT_CODES", "SETTINGS"]
 class ContactCodes:
     """Codes of a contact state: of the place of a phalanx, and of its tile's spines."""
 
-    off: int = 0  # the rock
-    on: int = 1
-    held: int = 2  # by its spines, at the least gap
-    caught: int = 0  # all spines that reach the rock
+    off: int = 0  # the phalanx is off the rock
+    on: int = 1  # it touches the rock
+    held: int = 2  # its spines hold it at the least gap
+    caught: int = 0  # all spines that reach the rock hold
     pulled: int = 1  # some were pulled off
     lost: int = 2  # some were, and the tile has left the place since
 

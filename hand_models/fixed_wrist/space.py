@@ -40,6 +40,8 @@ __all__ = [
 
 TENDON_COUNT: Final = len(FINGERS)
 
+EACH_TENDON: Final = np.eye(TENDON_COUNT)
+
 HELD_ROWS: Final = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
 """D of every hand: the rows of `HELD_DIRECTIONS` of a wrench."""
 
@@ -127,7 +129,7 @@ def limit_rows(
         *model.drive.limits,
     ):
         own = slice(k, k + TENDON_COUNT)
-        L[:, own, :TENDON_COUNT], l0[:, own], s[:, own] = slope * np.eye(TENDON_COUNT), start, end
+        L[:, own, :TENDON_COUNT], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end
         k += TENDON_COUNT
     engaged, tips = np.array(layout.engaged, dtype=np.intp), layout.tips
     signs = (1.0, -1.0)  # of a lateral reaction
@@ -169,7 +171,7 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     drags = loads[:, :, 0] + friction * pressed
     drags[:, :, 0] += _of_tiles(hands, "drag_allowances")
     H, h = np.zeros((*shape, len(layout.columns))), np.zeros(shape)
-    H[:, :TENDON_COUNT, :TENDON_COUNT] = -np.eye(TENDON_COUNT)
+    H[:, :TENDON_COUNT, :TENDON_COUNT] = -EACH_TENDON
     k = TENDON_COUNT
     for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
         row, along = k + np.arange(len(tiles)), kept[:, tiles]

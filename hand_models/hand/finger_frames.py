@@ -26,7 +26,7 @@ HAND_Z.setflags(write=False)
 
 
 class StackRows(NamedTuple):
-    """Which rows of `FrameStack.rows` are what.
+    """Rows of `FrameStack.rows`, by what they are.
 
     Attributes
     ----------

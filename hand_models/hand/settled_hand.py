@@ -199,7 +199,7 @@ class SettledHand:
     stops: tuple[tuple[int, int, Array], ...]
     palm: Palm
     sets: BoundedStore[float, WrenchSpace] = field(
-        default_factory=lambda: BoundedStore("sets of hands", 4), init=False, repr=False
+        default_factory=lambda: BoundedStore("sets of hands", most=4), init=False, repr=False
     )
 
     @cached_property
@@ -209,7 +209,7 @@ class SettledHand:
 
     @cached_property
     def closures(self) -> tuple[str, ...]:
-        """How each finger has ended.
+        """Closure of each finger.
 
         Laid with all of its tiles on the rock; hooked with some of them; wedged with bare phalanges
         or its tip only; curled in the air between its springs and its tendon; stopped there with
