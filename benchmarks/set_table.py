@@ -14,7 +14,7 @@ from benchmarks.race import race
 from benchmarks.results import Table, lines
 from hand_models.fixed_wrist import wrench_space
 from hand_models.fixed_wrist.tension_box import parallelepiped
-from hand_models.wrench_spaces import SCALE
+from hand_models.wrench_spaces import WRENCH_SCALE
 from tests.suite.helpers.hands import pinch
 from tests.suite.helpers.zonotopes import half_spaces
 
@@ -84,7 +84,7 @@ def _hand(rounds: int, step: float, tick: Callable[[], object]) -> Table:
     cloud, hull = searched(settled, step)
     space = parallelepiped(settled)
     missed = 0.0
-    for direction in np.random.default_rng(0).normal(size=(200, 6)) * SCALE:
+    for direction in np.random.default_rng(0).normal(size=(200, 6)) * WRENCH_SCALE:
         reach = space.support(direction)
         width = reach + space.support(-direction)
         short = (reach - float((cloud @ direction).max())) / width

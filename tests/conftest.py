@@ -35,12 +35,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture
 def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """Close hands at 8 places about their own instead of 128 where "robust" is asked for."""
-    from hand_models.fixed_wrist import robustness
+    from hand_models.fixed_wrist import ScatterSettings, robustness
 
     few = functools.partial(robustness, draws=8)
     for module in ("hand_models.fixed_wrist.hold_trials", "service.answering.hand_spaces"):
         monkeypatch.setattr(f"{module}.robustness", few)
-    monkeypatch.setattr("planner.solving.robust.PLACES", 8)
+    monkeypatch.setattr("planner.solving.robust.SCATTER_SETTINGS", ScatterSettings(places=8))
 
 
 @pytest.fixture

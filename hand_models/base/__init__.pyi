@@ -6,7 +6,7 @@ from .bounded_store import (
     stores as stores,
 )
 from .distribution import (
-    DISTRIBUTION as DISTRIBUTION,
+    DISTRIBUTION_NAME as DISTRIBUTION_NAME,
     installed_version as installed_version,
     to_install as to_install,
 )
@@ -24,7 +24,7 @@ from .errors import (
 )
 from .files import reading_file as reading_file, whole_file as whole_file
 from .frames import (
-    SKEW as SKEW,
+    SKEW_MATRICES as SKEW_MATRICES,
     Array as Array,
     Indices as Indices,
     Pose as Pose,
@@ -46,3 +46,4 @@ from .message_fields import (
     Strict as Strict,
     Tension as Tension,
 )
+from .tolerances import BASE_TOLERANCES as BASE_TOLERANCES, BaseTolerances as BaseTolerances

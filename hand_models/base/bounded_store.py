@@ -12,9 +12,9 @@ from weakref import WeakSet
 
 __all__ = ["BoundedStore", "StoreInfo", "enlist", "stored", "stores"]
 
-K = TypeVar("K", bound=Hashable)
-V = TypeVar("V")
-P = ParamSpec("P")
+Question = TypeVar("Question", bound=Hashable)
+Answer = TypeVar("Answer")
+Args = ParamSpec("Args")
 
 
 class StoreInfo(NamedTuple):
@@ -69,7 +69,7 @@ def stores() -> dict[str, StoreInfo]:
     return found
 
 
-class BoundedStore(Generic[K, V]):
+class BoundedStore(Generic[Question, Answer]):
     """The answers to the questions that were asked last.
 
     Its answers are not part of what it is: a copy, and what another process gets, begins empty.
@@ -90,7 +90,7 @@ class BoundedStore(Generic[K, V]):
         self,
         name: str,
         most: int,
-        size: Callable[[Iterable[V]], float] | None = None,
+        size: Callable[[Iterable[Answer]], float] | None = None,
         largest: float = math.inf,
     ) -> None:
         self.name, self.most = name, most
@@ -99,13 +99,13 @@ class BoundedStore(Generic[K, V]):
         self.clear()
         enlist(self)
 
-    def __reduce__(self) -> tuple[type[BoundedStore[K, V]], tuple[object, ...]]:
+    def __reduce__(self) -> tuple[type[BoundedStore[Question, Answer]], tuple[object, ...]]:
         return type(self), (self.name, self.most, self._size, self._largest)
 
     def clear(self) -> None:
         """Forget all."""
         with self._lock:
-            self._answers: OrderedDict[K, V] = OrderedDict()
+            self._answers: OrderedDict[Question, Answer] = OrderedDict()
             self._hits = self._misses = 0
 
     def info(self) -> StoreInfo:
@@ -113,11 +113,11 @@ class BoundedStore(Generic[K, V]):
         with self._lock:
             return StoreInfo(self._hits, self._misses, len(self._answers), self.most)
 
-    def find(self, questions: Sequence[K]) -> list[V | None]:
+    def find(self, questions: Sequence[Question]) -> list[Answer | None]:
         """Return the answer to each question, None where it is not known."""
         with self._lock:
             answers = self._answers
-            found: list[V | None] = []
+            found: list[Answer | None] = []
             for question in questions:
                 answer = answers.get(question)
                 if answer is None:
@@ -128,7 +128,7 @@ class BoundedStore(Generic[K, V]):
                 found.append(answer)
             return found
 
-    def get(self, question: K, make: Callable[[], V]) -> V:
+    def get(self, question: Question, make: Callable[[], Answer]) -> Answer:
         """Return the answer to a question, made and kept where it is not known."""
         (answer,) = self.find([question])
         if answer is None:
@@ -136,7 +136,7 @@ class BoundedStore(Generic[K, V]):
             self.keep([(question, answer)])
         return answer
 
-    def keep(self, answers: Iterable[tuple[K, V]]) -> None:
+    def keep(self, answers: Iterable[tuple[Question, Answer]]) -> None:
         """Add answers, and let those go that were not asked for longest."""
         with self._lock:
             for question, answer in answers:
@@ -148,14 +148,14 @@ class BoundedStore(Generic[K, V]):
         return self._size is not None and self._size(self._answers.values()) > self._largest
 
 
-def stored(name: str, most: int) -> Callable[[Callable[P, V]], Callable[P, V]]:
+def stored(name: str, most: int) -> Callable[[Callable[Args, Answer]], Callable[Args, Answer]]:
     """Keep a function's last answers, by its arguments, in a store of this name that it owns."""
 
-    def owning(function: Callable[P, V]) -> Callable[P, V]:
-        answers: BoundedStore[Hashable, V] = BoundedStore(name, most)
+    def owning(function: Callable[Args, Answer]) -> Callable[Args, Answer]:
+        answers: BoundedStore[Hashable, Answer] = BoundedStore(name, most)
 
         @wraps(function)
-        def asked(*args: P.args, **kwargs: P.kwargs) -> V:
+        def asked(*args: Args.args, **kwargs: Args.kwargs) -> Answer:
             question = args, frozenset(kwargs.items())
             return answers.get(question, partial(function, *args, **kwargs))
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base.errors import InvalidInputError
+from hand_models.base.tolerances import BASE_TOLERANCES
 
 __all__ = [
-    "QUATERNION_NORM_TOLERANCE",
     "Array",
     "Indices",
     "Pose",
@@ -29,9 +29,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-
-QUATERNION_NORM_TOLERANCE: Final = 1e-3
-"""How far a quaternion's norm may be from one before it is refused (the contract's figure)."""
 
 
 def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
@@ -105,13 +102,14 @@ class Pose:
         ------
         InvalidInputError
             If a number is not finite or the norm is off by more than
-            `QUATERNION_NORM_TOLERANCE`.
+            `BaseTolerances.unit_norm`.
         """
         q = finite_vector(orientation, 4, "orientation").tolist()
         norm = math.hypot(*q)
-        if not abs(norm - 1.0) <= QUATERNION_NORM_TOLERANCE:
+        tolerance = BASE_TOLERANCES.unit_norm
+        if not abs(norm - 1.0) <= tolerance:
             raise InvalidInputError(
-                f"a quaternion [x, y, z, w] of norm 1 ± {QUATERNION_NORM_TOLERANCE:g} is needed, "
+                f"a quaternion [x, y, z, w] of norm 1 ± {tolerance:g} is needed, "
                 f"the norm is {norm:.6g}",
                 field="orientation",
             )
@@ -197,8 +195,8 @@ def wrench_transport(pose: Pose) -> Array:
     return transport
 
 
-SKEW: Final = np.stack([skew(axis) for axis in np.eye(3)])
-"""``SKEW[i]`` is `skew` of the unit vector along axis i."""
+SKEW_MATRICES: Final = np.stack([skew(axis) for axis in np.eye(3)])
+"""``SKEW_MATRICES[i]`` is `skew` of the unit vector along axis i."""
 
 
 def wrench_transports(body: Pose, poses: Sequence[Pose]) -> Array:
@@ -217,6 +215,6 @@ def wrench_transports(body: Pose, poses: Sequence[Pose]) -> Array:
     places = (places - body.position) @ body.rotation
     transports = np.zeros((len(poses), 6, 6))
     transports[:, :3, :3] = transports[:, 3:, 3:] = rotations
-    crosses = (places @ SKEW.reshape(3, 9)).reshape(-1, 3, 3)
+    crosses = (places @ SKEW_MATRICES.reshape(3, 9)).reshape(-1, 3, 3)
     np.matmul(crosses, rotations, out=transports[:, 3:, :3])
     return transports

@@ -1,4 +1,4 @@
-from .compliant_finger import STEP as STEP, FingerLoads as FingerLoads
+from .compliant_finger import COMPLEX_STEP as COMPLEX_STEP, FingerLoads as FingerLoads
 from .compliant_hand import CompliantHand as CompliantHand
 from .directional_limit import (
     Farthest as Farthest,
@@ -8,18 +8,18 @@ from .directional_limit import (
 )
 from .floating_wrist import (
     PALM_MODES as PALM_MODES,
-    WRIST as WRIST,
+    WRIST_COLUMNS as WRIST_COLUMNS,
     FloatingWrist as FloatingWrist,
     PalmMode as PalmMode,
 )
 from .grid_search import (
-    PLANAR as PLANAR,
+    PLANAR_COMPONENTS as PLANAR_COMPONENTS,
     WristSearch as WristSearch,
     boundary as boundary,
     search as search,
 )
 from .gripper import (
-    SIDES as SIDES,
+    GRIPPER_SIDES as GRIPPER_SIDES,
     Gripper as Gripper,
     gripper_table as gripper_table,
     pulled_off as pulled_off,

@@ -25,7 +25,7 @@ from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, TendonS
 
 __all__ = ["CompliantFinger", "FingerLoads"]
 
-STEP = 1e-30
+COMPLEX_STEP = 1e-30
 """Size of complex steps, whose error is its square."""
 
 

@@ -20,24 +20,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError, skew
-from hand_models.compliance.compliant_finger import STEP, CompliantFinger, FingerLoads
+from hand_models.compliance.compliant_finger import COMPLEX_STEP, CompliantFinger, FingerLoads
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.tendon import FingerTendon, share_load
 
 __all__ = ["CompliantHand", "HandLoads"]
-
-NOTHING: Final = 1e-20
-"""Load of the palm that is none: the square of a complex step leaves as much [N]."""
-
-UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 class HandLoads(NamedTuple):
@@ -165,7 +160,7 @@ class CompliantHand:
         positions = np.broadcast_to(settled.positions, (m, n, 3)).astype(kind)
         axes = np.broadcast_to(settled.axes, (m, n, 3, 3)).astype(kind)
         reached = np.ones(m, dtype=bool)
-        torques = []
+        torques, up = [], np.array([0.0, 0.0, 1.0])
         for i, (frame, own) in enumerate(zip(self.frames, self._own, strict=True)):
             found = self.finger_loads(i, twists)
             reached &= found.reached
@@ -175,11 +170,11 @@ class CompliantHand:
             phalanges = own[-len(PHALANGES) :]
             normals[:, phalanges] = found.normals
             positions[:, phalanges] = (
-                frame.joint + found.points[..., :1] * frame.along + found.points[..., 1:] * UP
+                frame.joint + found.points[..., :1] * frame.along + found.points[..., 1:] * up
             )
             u = found.directions
-            axes[:, phalanges, 0] = -(u[..., :1] * frame.along + u[..., 1:] * UP)
-            axes[:, phalanges, 1] = u[..., :1] * UP - u[..., 1:] * frame.along
+            axes[:, phalanges, 0] = -(u[..., :1] * frame.along + u[..., 1:] * up)
+            axes[:, phalanges, 1] = u[..., :1] * up - u[..., 1:] * frame.along
             torques.append(found.stop_torques)
         palm = self.palm_loads(twists)
         return HandLoads(
@@ -188,7 +183,8 @@ class CompliantHand:
             laterals=laterals,
             tensions=tensions,
             stop_torques=self._pushing(torques, m),
-            palm=np.where(palm.real > NOTHING, palm, 0.0 * palm),
+            # [N] the square of a complex step leaves as much of a palm that has no load
+            palm=np.where(palm.real > 1e-20, palm, 0.0 * palm),
             positions=positions,
             axes=axes,
             reached=reached,
@@ -255,8 +251,8 @@ class CompliantHand:
         By complex steps: exact but for rounding. At a kink, of one of its sides.
         """
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
-        loads = self.loads(at + 1j * STEP * np.eye(6))
-        return np.asarray(self.wrenches(loads).imag.T / STEP)
+        loads = self.loads(at + 1j * COMPLEX_STEP * np.eye(6))
+        return np.asarray(self.wrenches(loads).imag.T / COMPLEX_STEP)
 
 
 def _moved(place: Array, v: Numbers, turn: Numbers) -> Numbers:

@@ -10,7 +10,6 @@ poses converge quadratically. The set is not convex: the maximum is a local one.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,25 +19,6 @@ from hand_models.compliance.grasp import CompliantGrasp, Evaluation
 from hand_models.wrench_spaces import Row, WrenchSpace, linear_program
 
 __all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
-
-UNITS: Final = {"v": 1e-3, "w": 1e-2}
-"""Units of displacements and turns of a wrist [m, rad]."""
-
-FIRST_BOX: Final = 1.0
-LARGEST_BOX: Final = 4.0
-SMALLEST_BOX: Final = 1e-9
-"""Half width of the box about a pose, in `UNITS`: at first, at most, and when to end."""
-
-ROUNDS: Final = 50
-WEIGHTS: Final = (1e3, 1e4, 1e5)
-"""Penalties of a limit exceeded by the whole of its capacity, in units of d · w: the next if the
-last left one exceeded."""
-
-CLOSE: Final = 1e-6
-"""Promise of a linear program at which the poses have converged, relative to the objective."""
-
-KEPT: Final = 1e-5
-"""Share of its capacity by which a limit may be exceeded at the pose found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +45,8 @@ class Farthest:
 
 def pose_units(columns: tuple[str, ...]) -> Array:
     """Return the unit of each component of a pose, from its name [m, rad]."""
-    return np.array([UNITS[name.split("/")[1][0]] for name in columns])
+    units = {"v": 1e-3, "w": 1e-2}  # of displacements and turns of a wrist
+    return np.array([units[name.split("/")[1][0]] for name in columns])
 
 
 def farthest(
@@ -91,18 +72,20 @@ def farthest(
     d = np.asarray(direction, dtype=float)
     at = np.zeros(len(grasp.columns)) if start is None else np.asarray(start, dtype=float)
     found, excess = grasp.evaluate(at[None]), np.inf
-    # at last the nearest that holds
-    for goal, weight in (*((d, weight) for weight in WEIGHTS), (0.0 * d, WEIGHTS[-1])):
+    kept = 1e-5  # share of its capacity by which a limit may be exceeded at the pose found
+    # penalties of a limit exceeded by the whole of its capacity, in units of d · w: the next if the
+    # last left one exceeded; at last the nearest that holds
+    for goal, weight in ((d, 1e3), (d, 1e4), (d, 1e5), (0.0 * d, 1e5)):
         at, found = _climb(grasp, goal, at, weight)
         excess = _excess(found)
-        if excess <= KEPT:
+        if excess <= kept:
             break
     else:
         raise EmptySetError(
             "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
             f"{100.0 * excess:.2g} %"
         )
-    binding = float(found.utilisation[0]) >= 1.0 - KEPT
+    binding = float(found.utilisation[0]) >= 1.0 - kept
     return Farthest(
         twist=at,
         wrench=found.wrenches[0],
@@ -134,12 +117,13 @@ def _climb(grasp: CompliantGrasp, d: Array, at: Array, weight: float) -> tuple[A
     space = grasp.linearised(at)
     found = grasp.evaluate(at[None])
     merit = _merit(found, d, weight)
-    box, rounds = FIRST_BOX, 0
-    while rounds < ROUNDS and box > SMALLEST_BOX:
+    box, rounds = 1.0, 0  # half width of the box about a pose, in `pose_units`
+    while rounds < 50 and box > 1e-9:
         rounds += 1
         step, foretold = _step(space, d, at, box, weight)
         promised = foretold - merit
-        if promised <= CLOSE * max(1.0, abs(merit)):
+        # poses have converged that promise no more, relative to the objective
+        if promised <= 1e-6 * max(1.0, abs(merit)):
             break
         there = grasp.evaluate((at + step)[None])
         gained = _merit(there, d, weight) - merit
@@ -148,7 +132,7 @@ def _climb(grasp: CompliantGrasp, d: Array, at: Array, weight: float) -> tuple[A
             box = 0.25 * min(box, size)
             continue
         if gained > 0.75 * promised:
-            box = min(2.0 * max(box, size), LARGEST_BOX)
+            box = min(2.0 * max(box, size), 4.0)
         at, found, merit = at + step, there, merit + gained
         space = grasp.linearised(at)
     return at, found

@@ -31,19 +31,13 @@ from hand_models.compliance.grasp import (
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import layout_of
-from hand_models.hand import FINGERS, HELD
+from hand_models.hand import FINGERS, HELD_DIRECTIONS
 from hand_models.wrench_spaces import WrenchSpace
 
-__all__ = ["PALM_MODES", "WRIST", "FloatingWrist", "PalmMode"]
+__all__ = ["PALM_MODES", "WRIST_COLUMNS", "FloatingWrist", "PalmMode"]
 
-WRIST: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
+WRIST_COLUMNS: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
 """Columns of a floating hand's set: the twist of the wrist about H at rest [m, rad]."""
-
-PALM_ROWS: Final = 1e5
-"""Newtons per metre by which rows of the palm's travel are made commensurate."""
-
-KEPT: Final = 16
-"""Poses whose loads are kept: some more than a search comes back to."""
 
 PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
 """Ways in which a palm carries: not at all, by moving toward −x, into the rock, or both."""
@@ -76,13 +70,16 @@ class FloatingWrist(CompliantGrasp):
     tension_limit: float | None = None
     palm: PalmMode = "off"
 
-    columns, range_rows = WRIST, rows_of_range(WRIST)
+    columns, range_rows = WRIST_COLUMNS, rows_of_range(WRIST_COLUMNS)
 
     def __post_init__(self) -> None:
         self.layout = layout_of(self.hand.settled, sticking=False)
         self.load_rows = self._load_rows()
         # loads at the complex steps from poses, by the poses
-        self._kept: BoundedStore[bytes, HandLoads] = BoundedStore("linearised wrists", KEPT)
+        self._kept: BoundedStore[bytes, HandLoads] = BoundedStore(
+            "linearised wrists",
+            most=16,  # some more than a search comes back to
+        )
 
     def _load_rows(self) -> LoadRows:
         """Return what loads and wrenches must keep to, but for the way of the palm."""
@@ -90,7 +87,7 @@ class FloatingWrist(CompliantGrasp):
         n, structure = len(settled.tiles), settled.hand.structure
         tension, palm = 3 * n, 3 * n + len(FINGERS)
         stop = palm + 2
-        size, nl = stop + len(settled.stops), len(layout.limits) - len(HELD)
+        size, nl = stop + len(settled.stops), len(layout.limits) - len(HELD_DIRECTIONS)
         P, p, s = np.zeros((nl, size)), np.zeros(nl), np.full(len(layout.limits), np.nan)
         tile, (planes,) = layout.plane_tiles, layout.planes([settled.surface])
         *slopes, capacity = planes.T
@@ -135,7 +132,8 @@ class FloatingWrist(CompliantGrasp):
         Q[len(those) :, stop:] = -np.diag(pushed)
         q = np.zeros(len(Q))
         q[row] = settled.drag_allowances[touching]
-        return LoadRows(layout.rows, P, p, np.hstack([HELD, np.zeros_like(HELD)]), s, Q, q)
+        held = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
+        return LoadRows(layout.rows, P, p, held, s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
         """Return loads and wrenches at some twists of the wrist, shape (m, 6)."""
@@ -197,8 +195,8 @@ class FloatingWrist(CompliantGrasp):
         Returns
         -------
         WrenchSpace
-            Columns `WRIST`; rows as of a fixed wrist, with hard rows that keep the palm's way of
-            carrying, and the wrist within its range.
+            Columns `WRIST_COLUMNS`; rows as of a fixed wrist, with hard rows that keep the palm's
+            way of carrying, and the wrist within its range.
         """
         return self.linearised_each(self._pose(twist)[None], palm, within)[0]
 
@@ -219,7 +217,8 @@ class FloatingWrist(CompliantGrasp):
             H, h = np.zeros((0, 6)), np.zeros(0)
             if self.hand.settled.palm.engaged:
                 # a palm that carries moves against the rock; one that does not, away from it
-                signs = np.where(carries, -PALM_ROWS, PALM_ROWS)
+                commensurate = 1e5  # [N/m] with other rows
+                signs = np.where(carries, -commensurate, commensurate)
                 slope = slopes(free) / stiffness[:, None]
                 H, h = signs[:, None] * slope, signs * (slope @ at - free[0].real / stiffness)
             carried = self._grasp_loads(loads._replace(palm=free * carries))

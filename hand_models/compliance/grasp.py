@@ -11,13 +11,13 @@ so that with e and w linearised about a pose they are a `WrenchSpace`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, Indices
-from hand_models.compliance.compliant_finger import STEP
+from hand_models.base import BASE_TOLERANCES, Array, Indices
+from hand_models.compliance.compliant_finger import COMPLEX_STEP
 from hand_models.compliance.rolling import Numbers
 from hand_models.wrench_spaces import Row, WrenchSpace
 
@@ -30,9 +30,6 @@ __all__ = [
     "rows_of_range",
     "slopes",
 ]
-
-ROUNDING: Final = 1e-9
-"""Slope of a load that is none [N/m, N/rad]."""
 
 
 class GraspLoads(NamedTuple):
@@ -200,18 +197,18 @@ class CompliantGrasp(ABC):
 
 def complex_steps(at: Array) -> Numbers:
     """Return a pose d times, each with one component a complex step aside, shape (d, d)."""
-    return np.asarray(at + 1j * STEP * np.eye(len(at)))
+    return np.asarray(at + 1j * COMPLEX_STEP * np.eye(len(at)))
 
 
 def slopes(values: Numbers) -> Array:
     """Return the derivatives that complex steps have found, a column for each."""
-    return np.asarray(values.imag.T / STEP)
+    return np.asarray(values.imag.T / COMPLEX_STEP)
 
 
 def _affine(values: Numbers, at: Array) -> tuple[Array, Array]:
     """Return values at zero, and their slopes, of complex steps; without what is rounding alone."""
     slope = slopes(values)
-    slope = np.where(np.abs(slope) > ROUNDING, slope, 0.0)
+    slope = np.where(np.abs(slope) > BASE_TOLERANCES.force, slope, 0.0)  # [N/m, N/rad]
     return values[0].real - slope @ at, slope
 
 

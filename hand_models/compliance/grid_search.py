@@ -19,35 +19,12 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, EmptySetError, Indices, InvalidInputError, Progress
 from hand_models.compliance.grasp import CompliantGrasp
 from hand_models.compliance.pose_box import SearchBox, search_box
-from hand_models.wrench_spaces import SCALE, Row
+from hand_models.wrench_spaces import WRENCH_SCALE, Row
 
-__all__ = ["PLANAR", "WristSearch", "boundary", "search"]
+__all__ = ["PLANAR_COMPONENTS", "WristSearch", "boundary", "search"]
 
-PLANAR: Final = (0, 2, 4)
+PLANAR_COMPONENTS: Final = (0, 2, 4)
 """Components F_x, F_z, M_y of a wrench, of a grasp that moves in a plane."""
-
-CHUNK: Final = 50_000
-"""Poses that are evaluated at once."""
-
-GROWTHS: Final = 6
-"""Largest number of times that a ray is lengthened until something lets go."""
-
-HALVINGS: Final = 30
-"""Number of halvings of the rays' lengths."""
-
-EXTREMES: Final = 1024
-"""Directions in which extreme wrenches are kept where a full hull would be too large."""
-
-CLOSER: Final = 9
-CLOSEST: Final = 2
-"""Rays sent about each of so many rays that reach farthest in a direction looked at closely."""
-
-CLOSER_ROUNDS: Final = 3
-NEARER: Final = 0.4
-"""Number of rounds of such rays, and the factor by which each round is sent from nearer."""
-
-FEWEST: Final = 2
-"""Poses per axis of a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +51,7 @@ class WristSearch:
 
     @property
     def hull(self) -> scipy.spatial.ConvexHull:
-        """The hull of the wrenches, in newtons (moments over a length, `SCALE`).
+        """The hull of the wrenches, in newtons (moments over a length, `WRENCH_SCALE`).
 
         Raises
         ------
@@ -83,7 +60,7 @@ class WristSearch:
         """
         components = _components(self.poses.shape[1])
         try:
-            return scipy.spatial.ConvexHull(self.wrenches[:, components] * SCALE[components])
+            return scipy.spatial.ConvexHull(self.wrenches[:, components] * WRENCH_SCALE[components])
         except scipy.spatial.QhullError:
             raise EmptySetError(
                 f"the {len(self.wrenches)} wrenches found span no volume: try more poses per axis"
@@ -112,24 +89,27 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     InvalidInputError
         If there are fewer than two poses along an axis.
     """
-    if per_axis < FEWEST:
-        raise InvalidInputError(f"must be at least {FEWEST}, got {per_axis}", field="per_axis")
+    if per_axis < 2:
+        raise InvalidInputError(f"must be at least 2, got {per_axis}", field="per_axis")
     box = search_box(grasp)
     total = per_axis ** len(box.centre)
     components = _components(len(box.centre))
-    directions = _sphere(EXTREMES, len(components)) if len(components) > len(PLANAR) else None
+    # of those extreme wrenches are kept where a full hull would be too large
+    many = len(components) > len(PLANAR_COMPONENTS)
+    directions = _sphere(1024, len(components)) if many else None
     outermost, wrenches = np.zeros((0, len(box.centre))), np.zeros((0, 6))
     held = 0
-    for start in range(0, total, CHUNK):
+    at_once = 50_000  # poses that are evaluated together
+    for start in range(0, total, at_once):
         if progress is not None:
             progress(start, total)
-        t = box.grid(per_axis, start, min(start + CHUNK, total))
+        t = box.grid(per_axis, start, min(start + at_once, total))
         t = t[grasp.sieve(box.poses(t))]
         found = grasp.evaluate(box.poses(t))
         held += int(found.holds.sum())
         outermost = np.vstack([outermost, t[found.holds]])
         wrenches = np.vstack([wrenches, found.wrenches[found.holds]])
-        some = _extremes((wrenches * SCALE)[:, components], directions)
+        some = _extremes((wrenches * WRENCH_SCALE)[:, components], directions)
         outermost, wrenches = outermost[some], wrenches[some]
     if progress is not None:
         progress(total, total)
@@ -140,7 +120,7 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
 
 def _components(d: int) -> list[int]:
     """Return the components of a wrench that poses of so many components span."""
-    return list(PLANAR) if d == len(PLANAR) else list(range(6))
+    return list(PLANAR_COMPONENTS) if d == len(PLANAR_COMPONENTS) else list(range(6))
 
 
 def _extremes(points: Array, directions: Array | None) -> Indices:
@@ -177,11 +157,12 @@ def boundary(
     found = _pushed(grasp, box, ways * box.range, 0, 0)
     if toward is None:
         return found
-    about = _sphere(CLOSER, d)
-    for round_ in range(CLOSER_ROUNDS):
+    # nine rays about each of the two that reach farthest, each round from nearer
+    closest, nearer, about = 2, 0.4, _sphere(9, d)
+    for round_ in range(3):
         reaches = found.wrenches @ toward.T
-        best = np.unique(np.argpartition(-reaches, CLOSEST, axis=0)[:CLOSEST])
-        more = (ways[best][:, None, :] + NEARER ** (round_ + 1) * about).reshape(-1, d)
+        best = np.unique(np.argpartition(-reaches, closest, axis=0)[:closest])
+        more = (ways[best][:, None, :] + nearer ** (round_ + 1) * about).reshape(-1, d)
         more /= np.linalg.norm(more, axis=1, keepdims=True)
         near = _pushed(grasp, box, more * box.range, 0, 0)
         ways = np.vstack([ways, more])
@@ -201,13 +182,13 @@ def _pushed(grasp: CompliantGrasp, box: SearchBox, t: Array, tried: int, held: i
     """
     low = np.zeros(len(t))
     high = np.ones(len(t))
-    for _ in range(GROWTHS):
+    for _ in range(6):  # until something lets go
         holds = grasp.evaluate(box.poses(t * high[:, None])).holds
         if not holds.any():
             break
         low = np.where(holds, high, low)
         high = np.where(holds, 1.5 * high, high)
-    for _ in range(HALVINGS):
+    for _ in range(30):  # halvings
         middle = 0.5 * (low + high)
         holds = grasp.evaluate(box.poses(t * middle[:, None])).holds
         low, high = np.where(holds, middle, low), np.where(holds, high, middle)

@@ -24,22 +24,10 @@ from hand_models.sections import Disc
 from hand_models.tendon import FingerTendon
 from hand_models.tile import Surface, inner_half_planes
 
-__all__ = ["PLANE", "SIDES", "Gripper", "gripper_table"]
+__all__ = ["GRIPPER_SIDES", "Gripper", "gripper_table"]
 
-SIDES: Final = ("right", "left")
+GRIPPER_SIDES: Final = ("right", "left")
 """Fingers: the one along +x of G, and the one along −x."""
-
-PLANE: Final = ("wrist/vx", "wrist/vz", "wrist/wy")
-"""Columns of its wrench space [m, rad]."""
-
-OWN: Final = {
-    "tile_height": "finger",
-    "pulley_radii": "finger",
-    "seated_contact": "finger",
-    "engagement": "tile",
-    "contact_stiffness": "tile",
-}
-"""Entries of ``[gripper]`` that stand for the hand's own, and their section there."""
 
 
 def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
@@ -53,7 +41,15 @@ def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
     bundled, gripper = hand_table(), experiment_table().sections["gripper"]
     table = ParameterTable({**bundled.sections, "gripper": gripper})
     own: dict[str, dict[str, Quantity]] = {}
-    for name, section in OWN.items():
+    # entries of ``[gripper]`` that stand for the hand's own, and their section there
+    sections = {
+        "tile_height": "finger",
+        "pulley_radii": "finger",
+        "seated_contact": "finger",
+        "engagement": "tile",
+        "contact_stiffness": "tile",
+    }
+    for name, section in sections.items():
         own.setdefault(section, {})[name] = gripper[name]
     table = table.replaced(ParameterTable(own))
     if hand is None:
@@ -86,7 +82,8 @@ class Gripper(CompliantGrasp):
         If a number is out of range, or the fingers do not all lie on the surface.
     """
 
-    columns, range_rows = PLANE, rows_of_range(PLANE)
+    columns = ("wrist/vx", "wrist/vz", "wrist/wy")
+    range_rows = rows_of_range(columns)
 
     def __init__(
         self,
@@ -136,7 +133,7 @@ class Gripper(CompliantGrasp):
 
     def _load_rows(self) -> LoadRows:
         """Return the rows of each side's tiles, proximal first, and their half-planes."""
-        tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
+        tiles = [(side, phalanx) for side in GRIPPER_SIDES for phalanx in PHALANGES]
         each, pieces = np.eye(len(tiles)), inner_half_planes(self.surface)
         limits = [named_row(*tile, piece.limit, "limit") for tile in tiles for piece in pieces]
         capped = math.isfinite(self.most_pressing)

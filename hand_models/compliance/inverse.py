@@ -13,38 +13,20 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, finite_vector
+from hand_models.base import BASE_TOLERANCES, Array, finite_vector
 from hand_models.compliance.compliant_hand import CompliantHand
 from hand_models.compliance.directional_limit import pose_units
-from hand_models.compliance.floating_wrist import WRIST
+from hand_models.compliance.floating_wrist import WRIST_COLUMNS
 from hand_models.compliance.grasp import complex_steps, slopes
 from hand_models.compliance.rolling import Numbers
-from hand_models.wrench_spaces import SCALE
+from hand_models.wrench_spaces import WRENCH_SCALE
 
 __all__ = ["WristPose", "wrist_pose"]
-
-TOLERANCE: Final = 1e-9
-"""Largest residual of a converged pose, in newtons (moments over a length), over 1 N."""
-
-STEPS: Final = 40
-"""Most steps with one way of taking the palm."""
-
-FINEST: Final = 1e-14
-"""Relative change of pose or residual at which steps end."""
-
-LOST: Final = 1e6
-"""Residual where a phalanx finds no rock [N]."""
-
-OTHER_STARTS: Final = 8
-"""Poses that steps begin anew at, up to `FARTHEST_START` from the first in `pose_units`."""
-
-FARTHEST_START: Final = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +62,10 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
         The nearest that was found from rest on, if none is exact; limits are not looked at.
     """
     wanted = finite_vector(wrench, 6, "wrench")
-    directions = np.random.default_rng(0).normal(size=(OTHER_STARTS, 6)) * pose_units(WRIST)
-    shares = np.linspace(0.0, FARTHEST_START, OTHER_STARTS + 1)[1:]
+    # poses that steps begin anew at, up to so far from the first in `pose_units`
+    other_starts, farthest_start = 8, 2.0
+    directions = np.random.default_rng(0).normal(size=(other_starts, 6)) * pose_units(WRIST_COLUMNS)
+    shares = np.linspace(0.0, farthest_start, other_starts + 1)[1:]
     ways: list[Array | None] = [None]
     if hand.settled.palm.engaged:
         ways += [np.array(way) for way in itertools.product((False, True), repeat=2)]
@@ -91,7 +75,7 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
             found.append(_nearest(hand, wanted, start, carries))
             if found[-1].converged:
                 return found[-1]
-    return min(found, key=lambda pose: float(np.abs(pose.residual * SCALE).max()))
+    return min(found, key=lambda pose: float(np.abs(pose.residual * WRENCH_SCALE).max()))
 
 
 def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | None) -> WristPose:
@@ -100,33 +84,34 @@ def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | 
     Of a hand whose palm's shear and pressing carry both ways, or not at all, each as ``carries``
     says; with None as they are, only against the rock.
     """
-    units = pose_units(WRIST)
+    units = pose_units(WRIST_COLUMNS)
 
     def wrenches(twists: Numbers) -> Numbers:
         loads = hand.loads(twists)
         if carries is not None:
             loads = loads._replace(palm=hand.palm_loads(twists) * carries)
-        return np.asarray(hand.wrenches(loads) * SCALE)
+        return np.asarray(hand.wrenches(loads) * WRENCH_SCALE)
 
     def residual(x: Array) -> Array:
-        left = wrenches((x * units)[None])[0] - wanted * SCALE
-        return np.asarray(np.where(np.isfinite(left), left, LOST))
+        left = wrenches((x * units)[None])[0] - wanted * WRENCH_SCALE
+        return np.asarray(np.where(np.isfinite(left), left, 1e6))  # where a phalanx finds no rock
 
     def jacobian(x: Array) -> Array:
         return np.nan_to_num(slopes(wrenches(complex_steps(x * units)))) * units
 
     at = first
-    if np.abs(residual(first / units)).max() > TOLERANCE:
+    if np.abs(residual(first / units)).max() > BASE_TOLERANCES.force:
+        finest = 1e-14  # relative change of pose or residual at which steps end
         found = scipy.optimize.least_squares(
             residual,
             first / units,
             jacobian,
             method="dogbox",
-            ftol=FINEST,
-            xtol=FINEST,
-            gtol=FINEST,
-            max_nfev=STEPS,
+            ftol=finest,
+            xtol=finest,
+            gtol=finest,
+            max_nfev=40,
         )
         at = found.x * units
     left = wanted - hand.wrenches(hand.loads(at[None]))[0]
-    return WristPose(at, left, float(np.abs(left * SCALE).max()) <= TOLERANCE)
+    return WristPose(at, left, float(np.abs(left * WRENCH_SCALE).max()) <= BASE_TOLERANCES.force)

@@ -9,7 +9,6 @@ program that is linear in each set may choose the one that serves it best.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,15 +21,6 @@ from hand_models.compliance.pose_box import search_box
 from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["Piece", "PieceList", "pieces"]
-
-RAYS: Final = 1024
-"""Number of rays of the search from which limiting poses are sought."""
-
-SHRINK: Final = 0.6
-WIDEST: Final = 0.5
-NARROWEST: Final = 0.02
-"""The box of poses about a piece's, in half widths of all that hold: shrunk until it does not
-reach beyond what holds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +93,9 @@ def pieces(
     box = search_box(grasp)
     at = np.zeros(len(box.centre))
     half = np.abs(box.axes) @ box.range
-    limits = _Limits(grasp, np.asarray(directions, dtype=float), boundary(grasp, box, RAYS))
+    # rays of a search from whose ends limiting poses are sought
+    rays = boundary(grasp, box, rays=1024)
+    limits = _Limits(grasp, np.asarray(directions, dtype=float), rays)
     for i, pose in enumerate(limits.poses):
         if progress is not None:
             progress(i, len(limits.poses))
@@ -150,7 +142,7 @@ def _piece(limits: _Limits, at: Array, half: Array, tolerance: float) -> tuple[P
 
     Where it seems to, the exact maximum is looked for again from there.
     """
-    share = WIDEST
+    share, narrowest = 0.5, 0.02  # of the half widths of all that hold
     while True:
         within = share * half
         space = limits.grasp.linearised(at, within=within)
@@ -160,6 +152,6 @@ def _piece(limits: _Limits, at: Array, half: Array, tolerance: float) -> tuple[P
             supports[i] = reach - limits.offset[i]
             if supports[i] > (1.0 + tolerance) * limits.exact[i] and pose is not None:
                 limits.follow(i, pose)
-        if share <= NARROWEST or (supports <= (1.0 + tolerance) * limits.exact).all():
+        if share <= narrowest or (supports <= (1.0 + tolerance) * limits.exact).all():
             return Piece(at, within, space), supports
-        share *= SHRINK
+        share *= 0.6

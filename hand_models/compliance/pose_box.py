@@ -9,38 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, EmptySetError, SolverError
+from hand_models.base import BASE_TOLERANCES, Array, EmptySetError, SolverError
 from hand_models.compliance.directional_limit import pose_units
 from hand_models.compliance.grasp import CompliantGrasp
 from hand_models.wrench_spaces import WrenchSpace, linear_program
 
 __all__ = ["SearchBox", "linear_box", "search_box"]
-
-SPARSE: Final = {3: 13, 6: 5}
-"""Poses per axis of the grids that find the range, by how many axes there are."""
-
-RESIZES: Final = 6
-"""Largest number of times that the range is adapted."""
-
-RECENTRINGS: Final = 6
-"""Largest number of times that the set is linearised again, until its middle holds."""
-
-NEWTON_STEPS: Final = 50
-
-FARTHEST: Final = 20.0
-"""Largest motion that is looked at where no limit ends it, as it loads nothing, in `pose_units`."""
-
-NEAR: Final = 1e-3
-"""Newton decrement of a middle that is good enough where rounding keeps it from being better."""
-
-SINGULAR: Final = 1e12
-"""Condition from which on a matrix of second derivatives counts as singular."""
-
-NOTHING_HOLDS: Final = "no pose of the wrist near rest holds: the preload alone breaks a limit"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +60,14 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
         If no pose near rest holds.
     """
     at = np.zeros(len(grasp.columns))
-    for _ in range(RECENTRINGS):
+    for _ in range(6):  # linearised again, until its middle holds
         space, centre, axes = _ellipsoid(grasp, at)
         holds = grasp.evaluate(np.stack([centre, at])).holds
         if holds.any():
             at = centre if holds[0] else at
             return SearchBox(at, axes, _range(space, at, axes))
         at = centre
-    raise EmptySetError(NOTHING_HOLDS)
+    raise _nothing_holds()
 
 
 def search_box(grasp: CompliantGrasp) -> SearchBox:
@@ -103,9 +80,9 @@ def search_box(grasp: CompliantGrasp) -> SearchBox:
     """
     box = linear_box(grasp)
     centre = box.centre
-    per_axis = SPARSE[len(centre)]
     # odd grids: the middle is among their poses, and it holds
-    for _ in range(RESIZES):
+    per_axis = {3: 13, 6: 5}[len(centre)]  # by how many axes there are
+    for _ in range(6):
         t = box.grid(per_axis, 0, per_axis ** len(centre))
         t = t[grasp.sieve(box.poses(t))]
         held = t[grasp.evaluate(box.poses(t)).holds]
@@ -123,7 +100,7 @@ def search_box(grasp: CompliantGrasp) -> SearchBox:
 def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Array]:
     """Return the set linearised at a pose, its analytic centre and Dikin ellipsoid's axes.
 
-    A set that no limit ends in some direction is kept within `FARTHEST`.
+    A set that no limit ends in some direction is kept within 20 `pose_units`.
 
     Raises
     ------
@@ -134,7 +111,8 @@ def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Ar
     units = pose_units(space.columns)
     found = _analytic_centre(space.A * units, space.b)
     if found is None:
-        space = grasp.linearised(at, within=FARTHEST * units)
+        # the largest motion that is looked at where no limit ends it, as it loads nothing
+        space = grasp.linearised(at, within=20.0 * units)
         found = _analytic_centre(space.A * units, space.b)
     if found is None:
         raise SolverError("search: the middle of the linearised set was not found")
@@ -155,7 +133,7 @@ def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
     """
     size = np.linalg.norm(A, axis=1)
     if (b[size == 0.0] < 0.0).any():
-        raise EmptySetError(NOTHING_HOLDS)
+        raise _nothing_holds()
     keep = size > 0.0
     A, b = A[keep] / size[keep, None], b[keep] / size[keep]
     d = A.shape[1]
@@ -167,20 +145,21 @@ def _analytic_centre(A: Array, b: Array) -> tuple[Array, Array] | None:
         bounds=[(None, None)] * d + [(None, 1e3)],
     )
     if ball is None or not ball[-1] > 0.0:
-        raise EmptySetError(NOTHING_HOLDS)
+        raise _nothing_holds()
     y, hessian, decrement = ball[:-1], np.eye(d), np.inf
-    for _ in range(NEWTON_STEPS):
+    for _ in range(50):  # steps of Newton's method
         gap = b - A @ y
         gradient = A.T @ (1.0 / gap)
         hessian = (A / gap[:, None] ** 2).T @ A
-        if not np.linalg.cond(hessian) < SINGULAR:
+        if not np.linalg.cond(hessian) < 1e12:  # or as good as singular
             return None
         step = -np.linalg.solve(hessian, gradient)
         decrement = math.sqrt(max(-float(gradient @ step), 0.0))
         y = y + step / (1.0 + decrement)
-        if decrement < 1e-9:
+        if decrement < BASE_TOLERANCES.relative:
             break
-    return (y, hessian) if decrement < NEAR else None
+    # good enough where rounding keeps it from being better
+    return (y, hessian) if decrement < 1e-3 else None
 
 
 def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
@@ -190,6 +169,10 @@ def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
     for way in np.vstack([np.eye(len(centre)), -np.eye(len(centre))]):
         end = linear_program(-way, A, b, "search")
         if end is None:
-            raise EmptySetError(NOTHING_HOLDS)
+            raise _nothing_holds()
         reach = np.where(way != 0.0, np.maximum(reach, way * end), reach)
     return reach
+
+
+def _nothing_holds() -> EmptySetError:
+    return EmptySetError("no pose of the wrist near rest holds: the preload alone breaks a limit")

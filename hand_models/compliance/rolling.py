@@ -27,7 +27,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,12 +39,6 @@ __all__ = ["MovedPosture", "Numbers", "RollingContact", "bearing_angle"]
 
 Numbers = NDArray[Any]
 """Real numbers, or complex ones of a complex step."""
-
-FLATTEST: Final = 10.0
-"""Radius from which on rock counts as flat [m]."""
-
-PROBE: Final = 0.5
-"""Distance to both sides of a contact at which the rock is looked at, in half tile lengths."""
 
 
 class MovedPosture(NamedTuple):
@@ -302,7 +296,7 @@ def _link(finger: SettledFinger, section: Section, first: int, bearing: int, dep
     if contact.kind == "frame":
         near, far, depth = far, model.joint_spacing, 0.0
     start, end = (arm.real + (each - contact.along) for each in (near, far))
-    flat = curvature * FLATTEST <= 1.0
+    flat = curvature * 10.0 <= 1.0  # from a radius of 10 m on
     # beyond its radius there is no more of the circle that the rock is taken for
     near_by = not flat and abs(away) < 1.0 / curvature
     rolls = near_by and contact.kind != "edge" and start <= arm.real + away <= end
@@ -346,7 +340,7 @@ def _under_face(
     gap : float
         The middle distance [m].
     """
-    e = PROBE * 0.5 * length
+    e = _probe(length)
     before, here, after = (
         section.clearance((point[0] + s * u.real, point[1] + s * u.imag)) for s in (-e, 0.0, e)
     )
@@ -364,9 +358,14 @@ def _curvature(
     """Return the rock's curvature near a contact, from its distance beside it [1/m]."""
     out = section.normal(point)
     foot = (point[0] - gap * out[0], point[1] - gap * out[1])
-    reach = PROBE * 0.5 * length
+    reach = _probe(length)
     sides: Sequence[float] = (-reach, reach)
     falls = [section.clearance((foot[0] - s * out[1], foot[1] + s * out[0])) for s in sides]
     fall = 0.5 * sum(falls)
     # on a circle of radius R the distance is √(R² + e²) − R
     return 2.0 * fall / (reach**2 - fall**2) if fall > 0.0 else 0.0
+
+
+def _probe(length: float) -> float:
+    """Return how far to both sides of a contact the rock is looked at, of a tile so long [m]."""
+    return 0.25 * length

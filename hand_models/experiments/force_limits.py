@@ -15,7 +15,7 @@ import scipy
 
 from hand_models.base import Array, EmptySetError, Indices, SolverError
 from hand_models.compliance import (
-    PLANAR,
+    PLANAR_COMPONENTS,
     Farthest,
     Gripper,
     boundary,
@@ -201,7 +201,7 @@ def _farther(grasp: Gripper, points: HullPoints, found: Limit, starts: int) -> F
     reached = points.wrenches @ found.direction
     direction = np.zeros(6)
     # to the contract's signs, whose M_y is minus the paper's
-    direction[list(PLANAR)] = found.direction * (1.0, 1.0, -1.0)
+    direction[list(PLANAR_COMPONENTS)] = found.direction * (1.0, 1.0, -1.0)
     first: dict[str | None, int] = {}
     for i in np.argsort(-reached, kind="stable"):
         first.setdefault(points.phalanges[i], int(i))

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, CruxError, SolverError
-from hand_models.compliance import PLANAR, Gripper, boundary, gripper_table, linear_box
+from hand_models.compliance import PLANAR_COMPONENTS, Gripper, boundary, gripper_table, linear_box
 from hand_models.experiments.pulling import held_wrenches, pulled_off_poses
 from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import edge, extents, in_paper_signs, with_mirrored
@@ -179,7 +179,7 @@ class GripperFit:
             return held_wrenches(gripper)
         toward = np.zeros((len(DATA_DIRECTIONS), 6))
         size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
-        toward[:, PLANAR] = DATA_DIRECTIONS / np.abs(size) * (1.0, 1.0, -1.0)
+        toward[:, PLANAR_COMPONENTS] = DATA_DIRECTIONS / np.abs(size) * (1.0, 1.0, -1.0)
         found = boundary(
             gripper, linear_box(gripper), 350, toward
         )  # of the rays, some per cent off

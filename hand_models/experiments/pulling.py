@@ -14,7 +14,14 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array, EmptySetError, Progress
-from hand_models.compliance import SIDES, STEP, Gripper, Numbers, WristSearch, search
+from hand_models.compliance import (
+    COMPLEX_STEP,
+    GRIPPER_SIDES,
+    Gripper,
+    Numbers,
+    WristSearch,
+    search,
+)
 from hand_models.experiments.study_result import part
 from hand_models.experiments.wrench_hull import (
     PLANAR_SCALE,
@@ -116,7 +123,7 @@ def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array,
         [N].
     """
     poses, m = start.copy(), len(start)
-    steps = 1j * STEP * np.eye(3)
+    steps = 1j * COMPLEX_STEP * np.eye(3)
     with np.errstate(invalid="ignore"):
         for _ in range(12):  # Newton steps for each increment of the load, at most
             moved = (poses[:, None, :] + steps).reshape(-1, 3)
@@ -124,7 +131,7 @@ def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array,
             left = found[:, 0].real - wrenches
             residual = np.abs(left * PLANAR_SCALE).max(axis=1)
             # tiny steps move no real part: all three rows have the wrench itself
-            stiffness = found.imag.swapaxes(1, 2) / STEP
+            stiffness = found.imag.swapaxes(1, 2) / COMPLEX_STEP
             going = residual > PULLING_SETTINGS.balance_tolerance
             going &= np.abs(np.linalg.det(stiffness)) > 0.0
             if not going.any():
@@ -184,7 +191,7 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     balanced_to = PULLING_SETTINGS.balance_tolerance
     # [N], halved where the next load does not hold
     loads, increments = np.zeros(m), np.full(m, 1.0)
-    tiles = [(side, phalanx) for side in SIDES for phalanx in PHALANGES]
+    tiles = [(side, phalanx) for side in GRIPPER_SIDES for phalanx in PHALANGES]
     limits = gripper.limits
     fails: list[tuple[str | None, str | None, str]] = [(None, None, "no_pose")] * m
     going = np.ones(m, dtype=bool)

@@ -11,7 +11,7 @@ import numpy as np
 from hand_models.base import InvalidInputError, within
 from hand_models.compliance import Gripper, pulled_off
 from hand_models.parameters import (
-    LARGEST,
+    LARGEST_BY_UNIT,
     ParameterTable,
     Quantity,
     experiment_table,
@@ -127,7 +127,7 @@ class Axis:
             raise InvalidInputError(f"LOW must be below HIGH, got {low:g}:{high:g}", field=entry)
         if low < 0.0 <= np.min(bundled):
             raise InvalidInputError(f"LOW must not be negative, got {low:g}", field=entry)
-        if high > (most := LARGEST.get(axis.unit, math.inf)):
+        if high > (most := LARGEST_BY_UNIT.get(axis.unit, math.inf)):
             raise InvalidInputError(
                 f"HIGH must not exceed {most:.4g} {axis.unit}, got {high:g}", field=entry
             )

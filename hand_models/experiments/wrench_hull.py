@@ -4,8 +4,9 @@ Wrenches are rows (F_x, F_z, M_y) in the paper's signs: its M_y is minus the con
 given by any points whose convex hull it is; what comes back are vertices.
 
 A cut through the origin leaves the origin on a face, where "inside" and "beyond" differ by rounding
-alone. So what is within `TOLERANCE` of a plane, as a share of the hull's size, counts as lying on
-it, and what lies on a face counts as within: nothing jumps where a wrench crosses a face by less.
+alone. So what is within the base tolerance of a plane, as a share of the hull's size, counts as
+lying on it, and what lies on a face counts as within: nothing jumps where a wrench crosses a face
+by less.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, Indices
-from hand_models.compliance import PLANAR
-from hand_models.wrench_spaces import SCALE, TOLERANCE, hull, hull_facets
+from hand_models.base import BASE_TOLERANCES, Array, Indices
+from hand_models.compliance import PLANAR_COMPONENTS
+from hand_models.wrench_spaces import WRENCH_SCALE, hull, hull_facets
 
 __all__ = [
     "PLANAR_SCALE",
@@ -33,7 +34,7 @@ __all__ = [
     "with_mirrored",
 ]
 
-PLANAR_SCALE: Final = SCALE[list(PLANAR)]
+PLANAR_SCALE: Final = WRENCH_SCALE[list(PLANAR_COMPONENTS)]
 """Per newton, newton and newton metre: what makes wrenches commensurate."""
 
 
@@ -47,7 +48,7 @@ class Extents(NamedTuple):
 
 def in_paper_signs(wrenches: Array) -> Array:
     """Return (F_x, F_z, M_y) in the paper's signs of wrenches (n, 6) in the contract's."""
-    return wrenches[:, PLANAR] * (1.0, 1.0, -1.0)
+    return wrenches[:, PLANAR_COMPONENTS] * (1.0, 1.0, -1.0)
 
 
 def extents(points: Array) -> Extents:
@@ -77,7 +78,7 @@ def edge(points: Array, at: Array) -> Array:
     """
     size = np.abs(points).max(axis=0)
     normals, offsets = hull_facets(points / size)
-    above = normals[:, 1] > TOLERANCE
+    above = normals[:, 1] > BASE_TOLERANCES.relative
     heights = (offsets[above] - at[:, None] / size[0] * normals[above, 0]) / normals[above, 1]
     inside = (at >= points[:, 0].min()) & (at <= points[:, 0].max())
     return np.where(inside, heights.min(axis=1) * size[1], np.nan)
@@ -167,7 +168,7 @@ def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> 
 
 def _slack(points: Array) -> float:
     """Return how near wrenches of a hull are that rounding alone may part [N]."""
-    return TOLERANCE * float(np.abs(points * PLANAR_SCALE).max(initial=0.0))
+    return BASE_TOLERANCES.relative * float(np.abs(points * PLANAR_SCALE).max(initial=0.0))
 
 
 def _met(points: Array, height: Array, slack: float) -> Array:

@@ -8,10 +8,8 @@ from .closure import settle_finger as settle_finger
 from .closure_loads import stays as stays, tendon_loads as tendon_loads
 from .fingernail import Fingernail as Fingernail
 from .model import (
-    BALANCE as BALANCE,
-    FREE as FREE,
+    JOINT_STOPS as JOINT_STOPS,
     PHALANGES as PHALANGES,
-    STOPS as STOPS,
     Contact as Contact,
     FingerModel as FingerModel,
     SettledFinger as SettledFinger,
@@ -19,9 +17,7 @@ from .model import (
 from .path_state import OpenFinger as OpenFinger
 from .phalanx_gaps import middle_of_bed as middle_of_bed
 from .sequential_closure import (
-    FACE as FACE,
-    KINDS as KINDS,
-    NONE as NONE,
+    CONTACT_KINDS as CONTACT_KINDS,
     ClosedPhalanx as ClosedPhalanx,
     SequentialClosure as SequentialClosure,
 )

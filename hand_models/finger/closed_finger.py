@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
 from hand_models.finger.closing import follow
 from hand_models.finger.model import (
-    BALANCE,
-    FREE,
-    LOWER,
+    JOINT_STOPS,
     PHALANGES,
-    STOPS,
-    UPPER,
     Contact,
     FingerModel,
     SettledFinger,
 )
 from hand_models.finger.path_state import (
-    JOINTS,
-    OFF,
+    JOINT_COUNT,
     Around,
     Codes,
     Drive,
@@ -32,18 +27,10 @@ from hand_models.finger.path_state import (
     take,
 )
 from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out
+from hand_models.finger.settings import CONTACT_CODES
 from hand_models.sections import Complexes, Face, Flags, Outlines, Section
 
 __all__ = ["ClosedFinger", "Refused", "cling", "close_all"]
-
-FLUSH: Final = 4.0
-"""How deep rock may be in a finger that clings, in parts of a gap's fineness."""
-
-SAMPLES: Final = 24
-"""Places of a phalanx at which an open finger is looked at."""
-
-HALVINGS: Final = 24
-"""Bisections in the search for a lift."""
 
 
 class ClosedFinger(NamedTuple):
@@ -83,15 +70,16 @@ class Refused(NamedTuple):
 
 def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused:
     """Return the straight finger, which carries nothing but by its nail, if no rock is there."""
-    joints, _ = fan_out(np.zeros(JOINTS), model.joint_spacing)
+    joints, _ = fan_out(np.zeros(JOINT_COUNT), model.joint_spacing)
     places = [(joint.real, joint.imag) for joint in joints.tolist()]
     if section is not None:
         tile = Face(*model.tile_range, model.tile_height)
         depth = max(-section.face_clearance(joint, 1.0, tile) for joint in joints.tolist())
-        if depth > FLUSH * PhalanxShape.of(model).fine:
+        # a little, in parts of a gap's fineness, may be in a finger that clings
+        if depth > 4.0 * PhalanxShape.of(model).fine:
             return Refused(depth, np.nan)
     contacts = (Contact(0.0, place, model.tile_centre, "none", "balance") for place in places)
-    nothing = np.zeros((JOINTS, 2))
+    nothing = np.zeros((JOINT_COUNT, 2))
     return ClosedFinger(SettledFinger(model, tuple(contacts)), nothing, nothing, nothing)
 
 
@@ -153,14 +141,14 @@ def _in_rock(
 def _axes(shape: PhalanxShape, q: Array) -> Complexes:
     """Return places along the axes of the phalanges of a finger."""
     joints, u = fan_out(q, shape.end)
-    along = np.linspace(shape.near, shape.end, SAMPLES)
+    along = np.linspace(shape.near, shape.end, 24)
     rise = np.interp(along, [shape.far, shape.end], [shape.lift, 0.0])
     return np.asarray(joints[:, None] + (along + 1j * rise) * u[:, None])
 
 
 def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
     """Return how deep rock is in a finger, and the lift that would clear it."""
-    places, most = _axes(shape, q), JOINTS * shape.end
+    places, most = _axes(shape, q), JOINT_COUNT * shape.end
     rock = Outlines.of([section], 2.0 * most + shape.end, shape.spacing)
 
     def depth(lift: float, *, how_far: bool = False) -> float:
@@ -176,7 +164,7 @@ def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
     now, low, high = max(depth(0.0, how_far=True), shape.closes), 0.0, most
     if depth(high) > 0.0:
         return Refused(now, np.inf)
-    for _ in range(HALVINGS):
+    for _ in range(24):  # halvings of the lift
         middle = 0.5 * (low + high)
         low, high = (middle, high) if depth(middle) > 0.0 else (low, middle)
     return Refused(now, high)
@@ -200,7 +188,7 @@ def _closed(
             continue
         mode, stop = state.mode[row], state.stop[row]
         caught = share[row] > 0.0
-        stops, bears = _stops(mode != OFF, caught, stop)
+        stops, bears = _stops(mode != CONTACT_CODES.off, caught, stop)
         caught &= bears
         contacts = []
         near, far = model.tile_range
@@ -218,7 +206,7 @@ def _closed(
                     (joint.real, joint.imag),
                     along,
                     kind,
-                    STOPS[stops[j]],
+                    JOINT_STOPS[stops[j]],
                     rise,
                     tilt,
                     phi,
@@ -238,11 +226,12 @@ def _stops(presses: Flags, caught: Flags, stop: Codes) -> tuple[list[int], Flags
     stands at a limit. The others are at limits, or balanced by tendon and springs. Those bear that
     press or are held, and those with spines across a gap, for which there is a joint left.
     """
-    codes = [{1: UPPER, -1: LOWER}.get(int(side), BALANCE) for side in stop]
-    bears = np.zeros(JOINTS, dtype=bool)
+    free, upper, lower, balance = range(len(JOINT_STOPS))
+    codes = [{1: upper, -1: lower}.get(int(side), balance) for side in stop]
+    bears = np.zeros(JOINT_COUNT, dtype=bool)
     for j in [*presses.nonzero()[0].tolist(), *(caught & ~presses).nonzero()[0].tolist()]:
         # its own joint, or the nearest one before it that is not at a limit
-        joints = [i for i in range(j, -1, -1) if codes[i] == BALANCE]
+        joints = [i for i in range(j, -1, -1) if codes[i] == balance]
         if joints and (presses[j] or joints[0] == j):
-            codes[joints[0]], bears[j] = FREE, True
+            codes[joints[0]], bears[j] = free, True
     return codes, bears

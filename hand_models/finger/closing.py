@@ -31,23 +31,12 @@ what a finger would come to that is tightened slowly.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from hand_models.base import Array, go_on
-from hand_models.finger.contact_states import RESTS, ROUNDING, contact_states, forces_on
+from hand_models.finger.contact_states import contact_states, forces_on
 from hand_models.finger.path_state import (
-    CAUGHT,
-    FIRST_STRIDE,
-    HELD,
-    JOINTS,
-    LEAST_STRIDE,
-    LOST,
-    MOST_STRIDE,
-    OFF,
-    ON,
-    PULLED,
+    JOINT_COUNT,
     Around,
     Drive,
     State,
@@ -58,52 +47,10 @@ from hand_models.finger.path_state import (
     times,
 )
 from hand_models.finger.phalanx_gaps import PhalanxShape
+from hand_models.finger.settings import CONTACT_CODES, SETTINGS
 from hand_models.sections import Flags, Outlines
 
 __all__ = ["follow"]
-
-MOST_STEPS, LONG = 1200, 600
-"""Increments on a path, and from which on it is a long one; of 9,940 fingers on rough walls that
-come to rest nine had more than 400, and one more than 900."""
-
-INCREMENT: Final = 2.0 / 37.0
-"""Most of the tension in an increment, in parts of the closing tension."""
-
-LEAST_INCREMENT: Final = 1e-4
-"""Least growth of the tension where a contact changes, in the same parts."""
-
-STEADY: Final = 3e-4
-"""Turn at one tension up to which joints are on their path where a gap begins to grow: its spines
-hold at the least there was, and that of an increment may be out by a tenth of the turn's square
-in metres, 10 nm [rad]."""
-
-RESTS_DAMPED: Final = 1e-7
-"""Largest turn in an increment at which a damped finger rests at the end of its path [rad]."""
-
-DAMPING, LEAST_DAMPING, TOUGH = 0.1, 0.025, 4.0
-"""D at first and at last where it is needed, in parts of the torque of the proximal joint at the
-closing tension over a turn of one radian; and by how much it grows."""
-
-EXACT, AGREES, FARTHEST = 0.003, 0.03, 0.3
-"""Largest difference of torques from their linearisation, in parts of the proximal joint's at the
-closing tension: for larger strides, on the path, and in parts of what is left by damping."""
-
-MOST_DAMPING: Final = 1e3
-"""Largest damping D, in the same parts as the first one."""
-
-SLOW, PATIENCE = 0.1, 100
-"""After so many increments in a row with more than this part of the most damping there is no rest;
-those that come to rest had 28 at most on 2,000 rough surfaces."""
-
-DEEPEST, DEEPER = 1.0 / 120.0, 1.0 / 300.0
-"""Most additional depth of a phalanx in rock after an increment, in parts of its tile's length: of
-a finger that comes through the air, and of one on the rock, which goes past its path with more."""
-
-LIFTED: Final = 1.0 / 240.0
-"""How far, in parts of its length, a tile goes from where it was pulled off to catch again."""
-
-BALANCED: Final = 1e-8, 5e-7
-"""Torque left by damping at the end, in the same parts: as a rule, and where rest takes long."""
 
 
 def follow(
@@ -129,11 +76,12 @@ def follow(
     end, beside = state, around = State.at(q), Around.of(rock, shape, drive, q)
     resting, going = np.zeros(len(q), dtype=bool), np.arange(len(q))
     slow = np.zeros(len(q), dtype=np.intp)
-    for step in range(MOST_STEPS):
+    for step in range(SETTINGS.most_increments):
         go_on()
-        after, rests = _increment(shape, drive, state, around, BALANCED[step > LONG])
-        slow = np.where(after.damping > SLOW * MOST_DAMPING * drive.torque, slow + 1, 0)
-        ends = rests | (slow > PATIENCE)
+        balance = SETTINGS.balance if step <= SETTINGS.long_path else SETTINGS.late_balance
+        after, rests = _increment(shape, drive, state, around, balance)
+        slow = np.where(after.damping > 0.1 * SETTINGS.most_damping * drive.torque, slow + 1, 0)
+        ends = rests | (slow > SETTINGS.patience)
         if ends.any():
             resting[going[rests]] = True
             put(end, going[ends], take(after, ends))
@@ -152,12 +100,13 @@ def _increment(
     shape: PhalanxShape, drive: Drive, state: State, around: Around, balanced: float
 ) -> tuple[State, Flags]:
     """Return where fingers come to next, and which of them are at their ends."""
+    code = CONTACT_CODES
     stride, slack = state.stride, shape.closes
     caught = held_share(state, around) > 0.0
     # how far a phalanx may be off the rock
     least = np.where(caught, state.least, np.inf)
     # spines hold no longer than rock is within their travel
-    mode = np.where((state.mode == HELD) & ~caught, OFF, state.mode).astype(np.int8)
+    mode = np.where((state.mode == code.held) & ~caught, code.off, state.mode).astype(np.int8)
     begun = state._replace(mode=mode)
     now = contact_states(drive, begun, around, least, shape.length, slack)
     mode, stop, spines, active = now.mode, now.stop, now.spines, now.active
@@ -166,59 +115,62 @@ def _increment(
     # spines that were pulled off, and where
     pulled = now.off > state.off
     # the least gap is that of the path, to which an increment first brings back the joints
-    near = np.where(mode == HELD, np.inf, np.maximum(around.gap, now.gap).clip(0.0))
+    near = np.where(mode == code.held, np.inf, np.maximum(around.gap, now.gap).clip(0.0))
     least = np.where(caught, np.minimum(state.least, near), state.least)
-    least = np.where(~caught & (spines == CAUGHT), np.inf, least)
+    least = np.where(~caught & (spines == code.caught), np.inf, least)
     least = np.where(pulled, np.maximum(around.gap, 0.0), least)
-    lost = (spines == PULLED) & (around.gap > least + LIFTED * shape.length)
-    spines = np.where(lost, LOST, spines).astype(np.int8)
-    curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > RESTS_DAMPED)
+    lost = (spines == code.pulled) & (around.gap > least + SETTINGS.lost_gap * shape.length)
+    spines = np.where(lost, code.lost, spines).astype(np.int8)
+    curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > SETTINGS.damped_turn)
     waits = curved | ~now.settled
-    waits &= state.damping < MOST_DAMPING * drive.torque
+    waits &= state.damping < SETTINGS.most_damping * drive.torque
     turns_back = (move * state.step).sum(axis=1) < -0.3 * (state.step**2).sum(axis=1)
-    turns_back &= (size > 100.0 * RESTS) & ~waits
+    turns_back &= (size > 100.0 * SETTINGS.still_turn) & ~waits
     # as far as the joints may turn, whose arms are of one, two and three phalanges
     air = ~active.any(axis=1)
-    clear = around.gap.min(axis=1) / (0.5 * JOINTS * (JOINTS + 1) * shape.end)
-    most = np.minimum(stride, np.where(air, np.maximum(clear, FIRST_STRIDE), MOST_STRIDE))
+    clear = around.gap.min(axis=1) / (0.5 * JOINT_COUNT * (JOINT_COUNT + 1) * shape.end)
+    most = np.where(air, np.maximum(clear, SETTINGS.first_stride), SETTINGS.most_stride)
+    most = np.minimum(stride, most)
     rate = times(around.d_gap, grow)
-    opens = caught & (mode == OFF) & (rate > 0.0) & (now.gap < state.least)
+    opens = caught & (mode == code.off) & (rate > 0.0) & (now.gap < state.least)
     until = np.where(~active & (rate < 0.0), (now.gap + 2.0 * slack) / -rate, np.inf).min(axis=1)
     end = drive.end
     target = np.where(state.s < drive.closing, drive.closing, end)
-    more = np.minimum(target - state.s, INCREMENT * drive.closing)
-    more = np.minimum(more, (most - size).clip(0.0) / np.abs(grow).max(axis=1).clip(ROUNDING))
+    more = np.minimum(target - state.s, SETTINGS.most_tension * drive.closing)
+    fastest = np.abs(grow).max(axis=1).clip(SETTINGS.rounding)
+    more = np.minimum(more, (most - size).clip(0.0) / fastest)
     more = np.minimum(more, until.clip(0.0))
     # and no contact pushes across a gap, or pulls where nothing holds it
     force, rate = normals[..., 0], normals[..., 1]
-    ends = np.where(mode == HELD, rate > 0.0, (mode == ON) & ~now.caught & (rate < 0.0))
+    ends = np.where(mode == code.held, rate > 0.0, (mode == code.on) & ~now.caught & (rate < 0.0))
     until = np.where(ends, -force / rate, np.inf).min(axis=1)
-    more = np.minimum(more, until.clip(LEAST_INCREMENT * drive.closing))
+    more = np.minimum(more, until.clip(SETTINGS.least_tension * drive.closing))
     # where a gap begins to grow, its least is to be that of the path, not of an increment beside it
-    beside = (size > STEADY) & opens.any(axis=1) & ~air
+    beside = (size > SETTINGS.path_turn) & opens.any(axis=1) & ~air
     more = np.where(waits | turns_back | beside | (size > most) | (now.clear < 1.0), 0.0, more)
-    part = np.minimum(now.clear, most / np.maximum(size, RESTS)) * np.where(turns_back, 0.5, 1.0)
+    part = np.minimum(now.clear, most / np.maximum(size, SETTINGS.still_turn))
+    part *= np.where(turns_back, 0.5, 1.0)
     step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
     normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
     left = now.torque + more[:, None] * now.slope
     left -= times(now.stiffness, step) + times(around.b, normals)
-    floor = LEAST_DAMPING * drive.torque
+    floor = SETTINGS.least_damping * drive.torque
     shrinks = (size < 0.5 * np.abs(state.step).max(axis=1)) | (state.s < end)
     damping = np.where(shrinks & ~turns_back, _falls(state.damping, floor), state.damping)
-    tougher = _grows(state.damping, DAMPING, drive)
+    tougher = _grows(state.damping, SETTINGS.damping, drive)
     rests = (state.s >= end) & ~waits & now.settled
-    rests &= size < np.where(state.damping > 0.0, RESTS_DAMPED, RESTS)
+    rests &= size < np.where(state.damping > 0.0, SETTINGS.damped_turn, SETTINGS.still_turn)
     rests &= state.damping * size < balanced * drive.torque
     s = state.s + more
-    first = (mode == ON) & np.isnan(state.touches)
+    first = (mode == code.on) & np.isnan(state.touches)
     touches = np.where(first, state.s[:, None], state.touches)
     after = State(
         q=state.q + np.where(rests[:, None], 0.0, step),
-        s=np.where(np.abs(target - s) < ROUNDING, target, s),
+        s=np.where(np.abs(target - s) < SETTINGS.rounding, target, s),
         mode=mode,
         stop=stop,
         spines=spines,
-        been=(state.been | (mode == ON)) & (around.share > now.off),
+        been=(state.been | (mode == code.on)) & (around.share > now.off),
         off=now.off,
         least=least,
         normals=normals,
@@ -242,26 +194,29 @@ def _judged(
     wrong = np.abs(left - after.left).max(axis=1)
     damped, moved = np.abs(after.left).max(axis=1), np.abs(after.step).max(axis=1)
     deeper = np.minimum(around.gap, 0.0) - np.minimum(there.gap, 0.0)
-    too_far = (wrong > AGREES * drive.torque) & (wrong > FARTHEST * damped)
-    most = np.where((state.mode == OFF).all(axis=1), DEEPEST, DEEPER) * shape.length
-    too_far |= deeper.max(axis=1) > most
-    too_far &= moved > 2.0 * LEAST_STRIDE
-    stride = np.where(wrong < EXACT * drive.torque, 2.0, 1.3) * after.stride
+    too_far = wrong > SETTINGS.path_torque * drive.torque
+    too_far &= wrong > SETTINGS.damped_torque * damped
+    air = (state.mode == CONTACT_CODES.off).all(axis=1)
+    most = np.where(air, SETTINGS.air_depth, SETTINGS.rock_depth)
+    too_far |= deeper.max(axis=1) > most * shape.length
+    too_far &= moved > 2.0 * SETTINGS.least_stride
+    stride = np.where(wrong < SETTINGS.exact_torque * drive.torque, 2.0, 1.3) * after.stride
     # a damped increment that was as foreseen may be damped less
-    falls = (wrong <= 0.05 * damped + ROUNDING * drive.torque) & (moved > 0.0)
+    falls = (wrong <= 0.05 * damped + SETTINGS.rounding * drive.torque) & (moved > 0.0)
     falls &= (after.s >= drive.end) & (after.damping <= state.damping)
-    less = _falls(after.damping, LEAST_DAMPING * drive.torque)
+    less = _falls(after.damping, SETTINGS.least_damping * drive.torque)
     damping = np.where(falls, less, after.damping)
-    good = after._replace(stride=np.minimum(stride, MOST_STRIDE), damping=damping)
-    tougher = _grows(after.damping, 0.5 * DAMPING, drive)
+    good = after._replace(stride=np.minimum(stride, SETTINGS.most_stride), damping=damping)
+    tougher = _grows(after.damping, 0.5 * SETTINGS.damping, drive)
     damping = np.where(after.s > state.s, after.damping, tougher)
-    back = state._replace(stride=np.maximum(0.3 * moved, LEAST_STRIDE), damping=damping)
+    back = state._replace(stride=np.maximum(0.3 * moved, SETTINGS.least_stride), damping=damping)
     return choose(too_far, back, good), choose(too_far, around, there)
 
 
 def _grows(damping: Array, least: float, drive: Drive) -> Array:
     """Return more damping; from a least on, in parts of the proximal joint's torque."""
-    return np.clip(TOUGH * damping, least * drive.torque, MOST_DAMPING * drive.torque)
+    most = SETTINGS.most_damping * drive.torque
+    return np.clip(SETTINGS.damping_growth * damping, least * drive.torque, most)
 
 
 def _falls(damping: Array, floor: Array) -> Array:

@@ -15,15 +15,8 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.finger.path_state import (
-    CATCHING,
-    CAUGHT,
-    EYE,
-    HELD,
-    JOINTS,
-    LOST,
-    OFF,
-    ON,
-    PULLED,
+    JOINT_COUNT,
+    UNIT_MATRIX,
     Around,
     Codes,
     Drive,
@@ -34,46 +27,14 @@ from hand_models.finger.path_state import (
     take,
     times,
 )
+from hand_models.finger.settings import CONTACT_CODES, SETTINGS
 from hand_models.sections import Flags
 from hand_models.tile import pull_strength
 
-__all__ = ["RESTS", "ROUNDING", "Linearised", "contact_states", "forces_on"]
+__all__ = ["Linearised", "contact_states", "forces_on"]
 
-RESTS: Final = 1e-10
-"""Turn that counts as none: in an increment at the end of the path, or past a limit [rad]."""
-
-GIVES: Final = 1.0 / 4800.0
-"""Growth of gaps before their spines hold, in parts of a tile's length."""
-
-STEADY: Final = 1e-3
-"""Turn at one tension up to which joints are in balance, so that what pulls spines off is no error
-of an increment [rad]."""
-
-NEARS: Final = 1.0 / 2400.0
-"""Gap, in parts of a tile's length, up to which a phalanx may come to the rock in an increment in
-which others move as well: one after the other, so that the least gaps are those of the path."""
-
-SWITCHES: Final = 20
-"""Most switches of contacts and stops at an increment."""
-
-LONGEST: Final = 4
-"""Length of the longest circle of contact states that is detected [switches]."""
-
-DIGITS: Final = 3 ** np.arange(4 * JOINTS)
+CODE_DIGITS: Final = 3 ** np.arange(4 * JOINT_COUNT)
 """Place values of the codes of a contact state, each of which is one of three."""
-
-SLOWER: Final = 4.0
-"""How much damping takes off the forces of contacts that come back to the rock."""
-
-STIFF: Final = 10.0
-"""Damping with which joints are slow, in parts of the torque of the proximal joint at the
-closing tension over a turn of one radian."""
-
-SOFT: Final = 1e-11
-"""Compliance of contacts, so that those that coincide have forces [m/N]."""
-
-ROUNDING: Final = 1e-9
-"""Rounding of forces [N] and torques [N·m]."""
 
 
 class Forces(NamedTuple):
@@ -151,7 +112,8 @@ def contact_states(
     rows = np.arange(len(state.s))
     found = own = _tried(drive, state, around, least, length, slack)
     codes = np.stack([_code(state, around), _code(own, around)])
-    for left in range(SWITCHES - 1, 0, -1):
+    most_switches, longest_circle = 20, 4
+    for left in range(most_switches - 1, 0, -1):
         # those that go round in a circle, and are now as they will be when the tries are used up
         ends = own.settled.copy()
         for period in range(1, len(codes)):
@@ -160,7 +122,7 @@ def contact_states(
         go = (~ends).nonzero()[0]
         if not len(go):
             break
-        rows, own, codes = rows[go], take(own, go), codes[-LONGEST:, go]
+        rows, own, codes = rows[go], take(own, go), codes[-longest_circle:, go]
         drive, around, least = take(drive, go), take(around, go), least[go]
         state = take(state, go)._replace(
             mode=own.mode, stop=own.stop, spines=own.spines, off=own.off
@@ -175,7 +137,7 @@ def _code(state: State | Linearised, around: Around) -> Indices:
     """Return a number for each contact state."""
     holds = around.share > state.off
     digits = np.concatenate([state.mode, state.stop + 1, state.spines, holds], axis=1)
-    return np.asarray(digits @ DIGITS)
+    return np.asarray(digits @ CODE_DIGITS)
 
 
 def _tried(
@@ -183,51 +145,52 @@ def _tried(
 ) -> Linearised:
     """Return what becomes of fingers in their contact states, and these after the next switch."""
     mode, stop, spines, off = state.mode, state.stop, state.spines, state.off
-    gives = GIVES * length
+    code, gives = CONTACT_CODES, SETTINGS.held_gap * length
     forces = forces_on(drive, state, around)
-    damped = forces.stiffness + state.damping[:, None, None] * EYE
-    active, held = mode != OFF, stop != 0
-    apart = around.gap - np.where(mode == HELD, least, 0.0)
+    damped = forces.stiffness + state.damping[:, None, None] * UNIT_MATRIX
+    active, held = mode != code.off, stop != 0
+    apart = around.gap - np.where(mode == code.held, least, 0.0)
     turn, normals = _solve(drive, state, around, forces, damped, active, apart)
     size = np.abs(turn[..., 0]).max(axis=1)
     # gaps that close, by no more than the first of them has room
     change = times(around.d_gap, turn[..., 0])
-    nears = ~active & (change < 0.0) & (around.gap > NEARS * length)
+    nears = ~active & (change < 0.0) & (around.gap > SETTINGS.near_gap * length)
     clear = np.where(nears, around.gap / -change, 1.0).min(axis=1).clip(0.0, 1.0)
-    part = np.minimum(clear, state.stride / np.maximum(size, RESTS))[:, None]
+    part = np.minimum(clear, state.stride / np.maximum(size, SETTINGS.still_turn))[:, None]
     # contacts that would pull more than they hold, or push across a gap
     share = held_share(state, around)
     caught = share > 0.0
     over = _over(drive, share, active, forces.shears, normals[..., 0])
-    over = np.where(caught & ((part < 1.0) | (size > STEADY)[:, None]), 0.0, over)
-    pushes = (mode == HELD) & (normals[..., 0] > ROUNDING)
+    over = np.where(caught & ((part < 1.0) | (size > SETTINGS.balance_turn)[:, None]), 0.0, over)
+    pushes = (mode == code.held) & (normals[..., 0] > SETTINGS.rounding)
     # gaps that would close, or grow beyond what spines let them
     gap = around.gap + part * change
     # damped joints may be slow in leaving where they should not be
-    slow = (state.damping > STIFF * drive.torque)[:, None]
+    slow = (state.damping > SETTINGS.slow_damping * drive.torque)[:, None]
     closes = ~active & ~nears & (gap < -slack) & ((change < 0.0) | ~slow)
     grows = ~active & caught & (gap > least + gives) & ((change > 0.0) | ~slow)
     balance = forces.torque - times(damped, turn[..., 0])
     balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
-    frees = held & (stop * balance < -ROUNDING * drive.torque[:, None])
+    frees = held & (stop * balance < -SETTINGS.rounding * drive.torque[:, None])
     there = state.q + part * turn[..., 0]
-    high, low = there > drive.upper + RESTS, there < drive.lower - RESTS
-    high, low = ~held & high, ~held & low
+    high = ~held & (there > drive.upper + SETTINGS.still_turn)
+    low = ~held & (there < drive.lower - SETTINGS.still_turn)
     # contacts that joints cannot bring to the rock, as others or stops are in the way
-    cannot = np.where(active & (mode == ON), SOFT * normals[..., 0] - gives, 0.0)
+    gap_left = SETTINGS.contact_compliance * normals[..., 0] - gives
+    cannot = np.where(active & (mode == code.on), gap_left, 0.0)
     switches = (over > 0.0) | pushes | closes | grows | frees | high | low | (cannot > 0.0)
     settled = ~switches.any(axis=1)
     if not settled.all():
         # of contacts one at a time, the worst
         one = largest(over)
-        spines = np.where(one & caught, PULLED, spines).astype(np.int8)
+        spines = np.where(one & caught, code.pulled, spines).astype(np.int8)
         off = np.where(one & caught, around.share, off)
-        mode = np.where((one & ~caught) | (one & (mode == HELD)) | pushes, OFF, mode)
-        mode = np.where(largest(cannot), OFF, mode)
+        mode = np.where((one & ~caught) | (one & (mode == code.held)) | pushes, code.off, mode)
+        mode = np.where(largest(cannot), code.off, mode)
         one = largest(np.where(closes, -gap, np.where(grows, gap - least, 0.0)))
-        mode = np.where(one, np.where(closes, ON, HELD), mode).astype(np.int8)
-        again = one & closes & (spines == LOST)
-        spines = np.where(again, CAUGHT, spines).astype(np.int8)
+        mode = np.where(one, np.where(closes, code.on, code.held), mode).astype(np.int8)
+        again = one & closes & (spines == code.lost)
+        spines = np.where(again, code.caught, spines).astype(np.int8)
         off = np.where(again, 0.0, off)
         stop = np.where(frees, 0, np.where(high, 1, np.where(low, -1, stop))).astype(np.int8)
     return Linearised(
@@ -256,10 +219,10 @@ def forces_on(drive: Drive, state: State, around: Around) -> Forces:
     share = held_share(state, around)
     caught = share > 0.0
     closing = (state.s < drive.closing)[:, None]
-    catching = CATCHING * drive.closing[:, None]
-    dragged = state.been | (mode == ON)
+    catching = SETTINGS.catching_part * drive.closing[:, None]
+    dragged = state.been | (mode == CONTACT_CODES.on)
     # where a joint's stop carries what a phalanx does, its spines are drawn in by nothing
-    bears = (mode != OFF) | (state.stop == 0)
+    bears = (mode != CONTACT_CODES.off) | (state.stop == 0)
     across = (state.s - drive.closing)[:, None].clip(0.0) / catching
     part = np.where(dragged, 1.0, across) * bears
     drag = np.where(caught, drive.drag * part, 0.0)
@@ -269,9 +232,9 @@ def forces_on(drive: Drive, state: State, around: Around) -> Forces:
     late = caught & bears & ~dragged
     grows = np.where(closing, drag, np.where(late, drive.drag * f / catching, 0.0))
     grows = grows * share
-    normals = np.where(mode != OFF, state.normals, 0.0)
+    normals = np.where(mode != CONTACT_CODES.off, state.normals, 0.0)
     stiffness = (
-        EYE * drive.stiffness[:, None, :]
+        UNIT_MATRIX * drive.stiffness[:, None, :]
         + np.einsum("nj,nijk->nik", normals, around.d_b)
         - np.einsum("nj,nijk->nik", shears, around.d_a)
         - around.a @ d_shears
@@ -297,27 +260,30 @@ def _solve(
     """
     n, stop = len(state.s), state.stop
     held = (stop != 0)[..., None]
-    A, b = np.zeros((n, 2 * JOINTS, 2 * JOINTS)), np.zeros((n, 2 * JOINTS, 3))
-    A[:, :JOINTS, :JOINTS] = np.where(held, EYE, damped)
-    A[:, :JOINTS, JOINTS:] = np.where(held, 0.0, around.b * active[:, None, :])
-    A[:, JOINTS:, :JOINTS] = np.where(active[..., None], around.d_gap, 0.0)
-    part = drive.torque / (drive.torque + SLOWER * state.damping)
-    A[:, JOINTS:, JOINTS:] = np.where(active[..., None], -SOFT * part[:, None, None] * EYE, EYE)
+    joints, contacts = slice(JOINT_COUNT), slice(JOINT_COUNT, 2 * JOINT_COUNT)
+    A, b = np.zeros((n, contacts.stop, contacts.stop)), np.zeros((n, contacts.stop, 3))
+    A[:, joints, joints] = np.where(held, UNIT_MATRIX, damped)
+    A[:, joints, contacts] = np.where(held, 0.0, around.b * active[:, None, :])
+    A[:, contacts, joints] = np.where(active[..., None], around.d_gap, 0.0)
+    # how much damping takes off the forces of contacts that come back to the rock
+    part = drive.torque / (drive.torque + 4.0 * state.damping)
+    gives = -SETTINGS.contact_compliance * part[:, None, None] * UNIT_MATRIX
+    A[:, contacts, contacts] = np.where(active[..., None], gives, UNIT_MATRIX)
     limit = np.where(stop > 0, drive.upper, drive.lower)
-    b[:, :JOINTS, 0] = np.where(held[..., 0], limit - state.q, forces.torque)
-    b[:, :JOINTS, 1] = np.where(held[..., 0], 0.0, forces.slope)
+    b[:, joints, 0] = np.where(held[..., 0], limit - state.q, forces.torque)
+    b[:, joints, 1] = np.where(held[..., 0], 0.0, forces.slope)
     # contacts come back to the rock at once, what damping needs for that is no force on them
-    b[:, JOINTS:, 2] = np.where(active, -apart, 0.0)
+    b[:, contacts, 2] = np.where(active, -apart, 0.0)
     found = np.asarray(np.linalg.solve(A, b), dtype=float)
-    found[:, :JOINTS, 0] += found[:, :JOINTS, 2]
-    found[:, JOINTS:, 0] += part[:, None] * found[:, JOINTS:, 2]
-    return found[:, :JOINTS, :2], found[:, JOINTS:, :2]
+    found[:, joints, 0] += found[:, joints, 2]
+    found[:, contacts, 0] += part[:, None] * found[:, contacts, 2]
+    return found[:, joints, :2], found[:, contacts, :2]
 
 
 def _over(drive: Drive, share: Array, active: Flags, shears: Array, normals: Array) -> Array:
     """Return by how much contacts pull more than they hold [N], not above 0 where they hold."""
     pull = np.maximum(-normals, 0.0)
-    caught, share = share > 0.0, np.maximum(share, ROUNDING)
+    caught, share = share > 0.0, np.maximum(share, SETTINGS.rounding)
     most, least, steepest, exponent, friction = (drive.limits[:, i, None] for i in range(5))
     shear, pulls = shears / share, pull / share
     strength = pull_strength(most, least, steepest, exponent, np.arctan2(pulls, shear))
@@ -325,4 +291,4 @@ def _over(drive: Drive, share: Array, active: Flags, shears: Array, normals: Arr
     drag = drive.drag * drive.closing[:, None]
     beyond = np.maximum(np.hypot(shear, pulls) - strength, friction * pulls - drag)
     over = np.where(caught, share * beyond, pull)
-    return np.where(active & (pull > ROUNDING), over - ROUNDING, 0.0)
+    return np.where(active & (pull > SETTINGS.rounding), over - SETTINGS.rounding, 0.0)

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,13 +33,7 @@ from hand_models.finger.model import SettledFinger
 from hand_models.parameters import ParameterTable
 from hand_models.sections import Face, Section, Vector2
 
-__all__ = ["CONE_ROWS", "Cling", "Fingernail", "Hook"]
-
-CONE_ROWS: Final = 3
-"""Rows of a nail's friction cone, the first of them that it cannot pull; after them the joints'."""
-
-ROOT: Final = 1e-4
-"""Rock nearer the pin than this is not looked for [m]."""
+__all__ = ["Cling", "Fingernail", "Hook"]
 
 
 class Hook(NamedTuple):
@@ -79,8 +73,9 @@ class Cling(NamedTuple):
     force : tuple of float
         P, affine in the tendon's tension: at zero [N], per newton.
     H : ndarray, shape (6, 2)
-        The rock and the straight finger bear tension f and A where H (f, A) ≤ h. First `CONE_ROWS`
-        rows, then those of the joints, proximal first, in newtons at the nail's pin.
+        The rock and the straight finger bear tension f and A where H (f, A) ≤ h. First three rows
+        of the friction cone, the first of them that the nail cannot pull, then those of the
+        joints, proximal first, in newtons at the nail's pin.
     h : ndarray, shape (6,)
         [N]
     """
@@ -145,7 +140,8 @@ class Fingernail:
 
     @property
     def _face(self) -> Face:
-        return Face(ROOT, self.length, 0.0)
+        # rock nearer the pin than 0.1 mm is not looked for
+        return Face(1e-4, self.length, 0.0)
 
     def stuck(self, section: Section | None, pin: Vector2) -> bool:
         """Return True if rock is in the nail's way before it turns; arguments as of `hook`."""
@@ -218,7 +214,8 @@ class Fingernail:
         x, z = hook.distance * hook.along
         closing = np.column_stack([z / D, -1.0 - x / D])
         rows = np.vstack([n, slip + side, slip - side, closing]) @ force
-        rows[CONE_ROWS:, 0] -= np.asarray(model.joint_preload) / D
-        rows[CONE_ROWS:, 1] += losses * np.asarray(model.pulley_radii) / D
+        of_joints = rows[3:]  # below those of the cone
+        of_joints[:, 0] -= np.asarray(model.joint_preload) / D
+        of_joints[:, 1] += losses * np.asarray(model.pulley_radii) / D
         made = Cling(hook, (at_zero, per_newton), rows[:, 1:], -rows[:, 0])
         return made if made.lasts(tension) else None

@@ -24,28 +24,15 @@ import numpy as np
 from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable
 
-__all__ = [
-    "BALANCE",
-    "FREE",
-    "LOWER",
-    "PHALANGES",
-    "STOPS",
-    "UPPER",
-    "Contact",
-    "FingerModel",
-    "SettledFinger",
-    "Stop",
-]
+__all__ = ["JOINT_STOPS", "PHALANGES", "Contact", "FingerModel", "SettledFinger", "Stop"]
 
 PHALANGES = ("proximal", "middle", "distal")
 
 Stop = Literal["upper", "lower", "balance"]
 """What holds a joint that no contact holds: its limit of closing or of opening, or nothing."""
 
-STOPS: Final[tuple[Stop | None, ...]] = (None, "upper", "lower", "balance")
+JOINT_STOPS: Final[tuple[Stop | None, ...]] = (None, "upper", "lower", "balance")
 """These by code; None where contacts hold it."""
-
-FREE, UPPER, LOWER, BALANCE = range(len(STOPS))
 
 
 @dataclass(frozen=True)

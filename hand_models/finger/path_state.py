@@ -11,22 +11,13 @@ from numpy.typing import NDArray
 from hand_models.base import Array, Indices
 from hand_models.finger.model import PHALANGES, FingerModel
 from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out, nearest_points
+from hand_models.finger.settings import CONTACT_CODES, SETTINGS
 from hand_models.sections import Complexes, Flags, Outlines, Section
 from hand_models.tile import Surface, engaged_share
 
 __all__ = [
-    "CATCHING",
-    "CAUGHT",
-    "EYE",
-    "FIRST_STRIDE",
-    "HELD",
-    "JOINTS",
-    "LEAST_STRIDE",
-    "LOST",
-    "MOST_STRIDE",
-    "OFF",
-    "ON",
-    "PULLED",
+    "JOINT_COUNT",
+    "UNIT_MATRIX",
     "Around",
     "Codes",
     "Drive",
@@ -40,37 +31,22 @@ __all__ = [
     "times",
 ]
 
-JOINTS: Final = len(PHALANGES)
+JOINT_COUNT: Final = len(PHALANGES)
 
 Codes = NDArray[np.int8]
 
 Rows = TypeVar("Rows", bound=tuple[Any, ...])
 """A tuple of arrays with a row for each finger."""
 
-OFF, ON, HELD = range(3)
-"""Places of a phalanx: off the rock, on it, or held by its spines at the least gap."""
-
-CAUGHT, PULLED, LOST = range(3)
-"""States of a tile's spines: all that reach the rock hold; some were pulled off; some were, and the
-tile has left the place since."""
-
-FIRST_STRIDE, MOST_STRIDE, LEAST_STRIDE = 0.06, 0.3, 1e-4
-"""How far joints turn in an increment [rad]: through the air, at most, and after it was too far."""
-
-CATCHING: Final = 0.25
-"""Part of the path in which spines across gaps are drawn in, relative to the closing tension.
-"""
-
-TINY: Final = 1e-7
-"""Turn of a joint for derivatives [rad]."""
-
-POSES: Final = np.concatenate([np.zeros((1, JOINTS)), TINY * np.eye(JOINTS)])
+SEEN_POSES: Final = np.concatenate(
+    [np.zeros((1, JOINT_COUNT)), SETTINGS.derivative_turn * np.eye(JOINT_COUNT)]
+)
 """Turns of the joints at which a finger is looked at: itself, and with each joint turned."""
 
-LATER: Final = np.triu(np.ones((JOINTS, JOINTS)))
+LATER_PHALANGES: Final = np.triu(np.ones((JOINT_COUNT, JOINT_COUNT)))
 """1 at (i, j) where phalanx j turns joint i: its own and those beyond."""
 
-EYE: Final = np.eye(JOINTS)
+UNIT_MATRIX: Final = np.eye(JOINT_COUNT)
 
 
 class OpenFinger(NamedTuple):
@@ -150,7 +126,7 @@ class Drive(NamedTuple):
     @property
     def end(self) -> Array:
         """Place of the ends of the fingers' paths along them; see `State` [N]."""
-        return (1.0 + CATCHING) * self.closing
+        return (1.0 + SETTINGS.catching_part) * self.closing
 
 
 class Around(NamedTuple):
@@ -182,20 +158,21 @@ class Around(NamedTuple):
     @classmethod
     def of(cls, rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array) -> Around:
         """Look at fingers turned by q."""
-        near = nearest_points(rock, shape, q, drive.depth, TINY)
-        joints, u = fan_out(q + POSES[:, None], shape.end)
+        turn = SETTINGS.derivative_turn
+        near = nearest_points(rock, shape, q, drive.depth, turn)
+        joints, u = fan_out(q + SEEN_POSES[:, None], shape.end)
         depth = np.broadcast_to(drive.depth, u.shape)
-        beside = shape.beside(near.of_poses(len(POSES)), joints, u, depth)
+        beside = shape.beside(near.of_poses(len(SEEN_POSES)), joints, u, depth)
         # a phalanx that presses aside, with its end, has its spines beside the rock
         share = engaged_share(beside.tile_gap, shape.travel)
         share = engaged_share(1.0 - share * beside.push.imag, 1.0)
         # from joint i to contact j, in the axes of its force
         arms = (joints + beside.place * u)[..., None, :] - joints[..., None]
-        arms = LATER * arms * (beside.push * u).conj()[..., None, :]
+        arms = LATER_PHALANGES * arms * (beside.push * u).conj()[..., None, :]
         values = (beside.gap, share, -arms.real, -arms.imag)
         gap, share, a, b = (value[0] for value in values)
         d_gap, d_share, d_a, d_b = (
-            np.moveaxis((value[1:] - value[:1]) / TINY, 0, -1) for value in values
+            np.moveaxis((value[1:] - value[:1]) / turn, 0, -1) for value in values
         )
         place, push = beside.place[0], beside.push[0]
         return cls(gap, share, a, b, d_gap, d_share, d_a, d_b, place, push)
@@ -210,10 +187,10 @@ class State(NamedTuple):
         [rad]
     s : ndarray, shape (n,)
         How far along they are: the tension, up to that of closing, and then, as far again as
-        `CATCHING` of it, how much of their drag tiles across gaps have [N].
+        `catching_part` of it, how much of their drag tiles across gaps have [N].
     mode, stop, spines : ndarray of int, shape (n, 3)
-        `OFF`, `ON` or `HELD`; +1 at an upper limit, −1 at a lower one, or 0; `CAUGHT`, `PULLED` or
-        `LOST`.
+        Off, on or held; +1 at an upper limit, −1 at a lower one, or 0; caught, pulled or lost (by
+        `ContactCodes`).
     been : ndarray of bool, shape (n, 3)
         Whether phalanges have come to the rock since spines have caught.
     off : ndarray, shape (n, 3)
@@ -254,16 +231,16 @@ class State(NamedTuple):
         return cls(
             q=q,
             s=np.zeros(n),
-            mode=np.full(q.shape, OFF, dtype=np.int8),
+            mode=np.full(q.shape, CONTACT_CODES.off, dtype=np.int8),
             stop=np.zeros(q.shape, dtype=np.int8),
-            spines=np.full(q.shape, CAUGHT, dtype=np.int8),
+            spines=np.full(q.shape, CONTACT_CODES.caught, dtype=np.int8),
             been=np.zeros(q.shape, dtype=bool),
             off=np.zeros(q.shape),
             least=np.full(q.shape, np.inf),
             normals=np.zeros(q.shape),
             touches=np.full(q.shape, np.nan),
             damping=np.zeros(n),
-            stride=np.full(n, FIRST_STRIDE),
+            stride=np.full(n, SETTINGS.first_stride),
             step=np.zeros(q.shape),
             left=np.zeros(q.shape),
         )
@@ -305,4 +282,4 @@ def times(A: Array, x: Array) -> Array:
 def largest(values: Array) -> Flags:
     """Return which value of each finger is the largest, if that is above zero."""
     most = values.max(axis=1, keepdims=True)
-    return np.asarray((np.arange(JOINTS) == values.argmax(axis=1)[:, None]) & (most > 0.0))
+    return np.asarray((np.arange(JOINT_COUNT) == values.argmax(axis=1)[:, None]) & (most > 0.0))

@@ -26,14 +26,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices
+from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.sections import BLOCK, Complexes, Outlines, stretch_minima
+from hand_models.sections import SECTION_SETTINGS, Complexes, Outlines, stretch_minima
 
 __all__ = [
     "Beside",
@@ -43,22 +43,6 @@ __all__ = [
     "middle_of_bed",
     "nearest_points",
 ]
-
-POINTS: Final = 192
-"""Points of rock for the length of a tile, so near each other that the round end of a phalanx
-slides over them as over the rock between."""
-
-FINENESS: Final = 4800.0
-"""Length of a tile over the fineness of the gap."""
-
-ROUNDINGS: Final = 2.4e6
-"""Gaps that may be negative without being closed, in as many parts of it."""
-
-MOST_STEPS: Final = 20
-LEVEL: Final = 1e-12
-"""Steps of the search for a level, and its tolerance in parts of a tile's length."""
-
-TINY: Final = 1e-30
 
 Pressed = TypeVar("Pressed", float, NDArray[Any])
 
@@ -165,17 +149,18 @@ class PhalanxShape(NamedTuple):
     @property
     def spacing(self) -> float:
         """Largest spacing of the points that rock is made of [m]."""
-        return self.length / POINTS
+        # so near that the round end of a phalanx slides over points as over the rock between
+        return self.length / 192
 
     @property
     def fine(self) -> float:
         """Largest difference of the gap from the least distance, about [m]."""
-        return self.length / FINENESS
+        return self.length / 4800.0
 
     @property
     def closes(self) -> float:
         """Largest depth of a negative gap that need not be closed [m]."""
-        return self.length / ROUNDINGS
+        return self.length / 2.4e6
 
     def beside(self, near: NearPoints, joint: Complexes, u: Complexes, depth: Array) -> Beside:
         """Return how phalanges are beside rock.
@@ -196,15 +181,16 @@ class PhalanxShape(NamedTuple):
         depths = size - self.radius
         gap = self._level(depths, near) - self.fine
         pressed = np.maximum((gap + depth.ravel())[of] - depths, 0.0) * near.lengths
-        total = np.maximum(near.sums(pressed), TINY)
-        out = away / np.maximum(size, TINY)
+        tiny = 1e-30  # divides what is zero
+        total = np.maximum(near.sums(pressed), tiny)
+        out = away / np.maximum(size, tiny)
         place = near.sums(pressed * (seen - away + self.radius * out)) / total
         push = near.sums(pressed * out) / total
         return Beside(
             gap.reshape(u.shape),
             (near.least(from_tile) - self.radius).reshape(u.shape),
             place.reshape(u.shape),
-            (push / np.maximum(np.abs(push), TINY)).reshape(u.shape),
+            (push / np.maximum(np.abs(push), tiny)).reshape(u.shape),
         )
 
     def may_press(self, seen: Complexes, near: NearPoints, within: Array) -> NearPoints:
@@ -256,13 +242,13 @@ class PhalanxShape(NamedTuple):
         root = self._root
         first = stretch_minima(depths, near.first)
         level = depths[first] + self.alone(near.lengths[first])
-        for _ in range(MOST_STEPS):
+        for _ in range(20):
             sunk = np.maximum(level[near.phalanx] - depths, 0.0)
             load = near.lengths * sunk
             norm = np.sqrt(near.sums(load * sunk))
-            step = (root - norm) * norm / np.maximum(near.sums(load), TINY)
+            step = (root - norm) * norm / np.maximum(near.sums(load), 1e-30)
             # each as far as it needs, whatever others do
-            going = np.abs(step) > LEVEL * self.far
+            going = np.abs(step) > BASE_TOLERANCES.rounding * self.far
             level = np.where(going, level + step, level)
             if not going.any():
                 break
@@ -330,10 +316,11 @@ def nearest_points(
     blocks_each = rock.centres.shape[-1]
     phalanx, block = np.divmod(np.flatnonzero(chosen), blocks_each)
     block += phalanx // q.shape[-1] * blocks_each
-    points = rock.points.reshape(-1, BLOCK)[block].ravel()
-    lengths = rock.lengths.reshape(-1, BLOCK)[block].ravel()
-    count = BLOCK * np.bincount(phalanx, minlength=q.size)
-    phalanx = np.repeat(phalanx, BLOCK)
+    each = SECTION_SETTINGS.points_per_circle
+    points = rock.points.reshape(-1, each)[block].ravel()
+    lengths = rock.lengths.reshape(-1, each)[block].ravel()
+    count = each * np.bincount(phalanx, minlength=q.size)
+    phalanx = np.repeat(phalanx, each)
     near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count)
     seen = (points - joints.ravel()[phalanx]) * u.ravel().conj()[phalanx]
     return shape.may_press(seen, near, within.ravel())

@@ -16,12 +16,10 @@ from hand_models.finger.model import FingerModel
 from hand_models.finger.phalanx_gaps import PhalanxShape, middle_of_bed
 from hand_models.sections import Face, SmoothSection
 
-__all__ = ["EDGE", "FACE", "FRAME", "KINDS", "NONE", "ClosedPhalanx", "SequentialClosure"]
+__all__ = ["CONTACT_KINDS", "ClosedPhalanx", "SequentialClosure"]
 
-KINDS: Final = ("face", "edge", "frame", "none")
+CONTACT_KINDS: Final = ("face", "edge", "frame", "none")
 """Part of a phalanx that touches the rock, by code."""
-
-FACE, EDGE, FRAME, NONE = range(len(KINDS))
 
 
 class ClosedPhalanx(NamedTuple):

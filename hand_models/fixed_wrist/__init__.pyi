@@ -1,14 +1,14 @@
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
-    WAYS as WAYS,
+    TRIAL_WAYS as TRIAL_WAYS,
     FoundHold as FoundHold,
     Trial as Trial,
     grid_of_trials as grid_of_trials,
     try_holds as try_holds,
 )
 from .placing import (
-    SEATS as SEATS,
-    UP as UP,
+    ALONG_FINGERS as ALONG_FINGERS,
+    SEAT_RULES as SEAT_RULES,
     SeatRule as SeatRule,
     approach_frame as approach_frame,
     place as place,
@@ -23,14 +23,13 @@ from .row_layout import (
     named_row as named_row,
 )
 from .seat_scatter import (
-    HUNDREDTH as HUNDREDTH,
-    PLACES as PLACES,
-    TENTH as TENTH,
+    SCATTER_SETTINGS as SCATTER_SETTINGS,
     Robustness as Robustness,
+    ScatterSettings as ScatterSettings,
     closed_about as closed_about,
     robustness as robustness,
     scattered_places as scattered_places,
 )
-from .seat_search import BEST as BEST, PULL_OFF as PULL_OFF, best_seats as best_seats
+from .seat_search import PULL_OFF as PULL_OFF, best_seats as best_seats
 from .space import wrench_space as wrench_space, wrench_spaces as wrench_spaces
 from .tension_box import TensionLimit as TensionLimit, tension_limits as tension_limits

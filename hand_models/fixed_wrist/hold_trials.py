@@ -17,33 +17,22 @@ from hand_models.base import (
     Progress,
     check_positive,
 )
-from hand_models.finger import NONE
-from hand_models.fixed_wrist.placing import UP, approach_frame
+from hand_models.finger import CONTACT_KINDS
+from hand_models.fixed_wrist.placing import ALONG_FINGERS, approach_frame
 from hand_models.fixed_wrist.seat_scatter import robustness
-from hand_models.fixed_wrist.seat_search import BEST, best_seats
+from hand_models.fixed_wrist.seat_search import best_seats
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["AT_BORDER", "WAYS", "FoundHold", "Trial", "grid_of_trials", "try_holds"]
+__all__ = ["AT_BORDER", "TRIAL_WAYS", "FoundHold", "Trial", "grid_of_trials", "try_holds"]
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
 """Why a hand is not asked for there."""
 
-WAYS: Final = {"-fz": 2, "-fx": 0, "+fx": 0, "-fy": 1, "+fy": 1}
+TRIAL_WAYS: Final = {"-fz": 2, "-fx": 0, "+fx": 0, "-fy": 1, "+fy": 1}
 """Wrenches on the rock, in H: the pull-off, and shear to all sides; and their axes."""
-
-DIRECTIONS: Final = np.array(
-    [np.eye(6)[axis] * (1.0 if way[0] == "+" else -1.0) for way, axis in WAYS.items()]
-)
-
-
-INTO: Final = (0.0, 0.0, 1.0)
-"""z of a rock\'s frame."""
-
-RAYS: Final = 5
-"""Along each side of the square in which the plane of the rock about a point is found."""
 
 
 class Trial(NamedTuple):
@@ -74,7 +63,7 @@ class FoundHold(NamedTuple):
     backed_off : float
         Distance that its seating backed off [m].
     support : ndarray, shape (5,)
-        Reach in each of `WAYS`, with whatever else [N]; NaN if it holds nothing.
+        Reach in each of `TRIAL_WAYS`, with whatever else [N]; NaN if it holds nothing.
     pure : float
         Reach in pull-off with every other component zero [N]; NaN if nowhere.
     worst, tenth, hundredth : ndarray, shape (5,), or None
@@ -134,7 +123,8 @@ def grid_of_trials(
         raise InvalidInputError(f"at least one is needed, got {angles}", field="angles")
     low, high = (end(rock.triangles.vertices, axis=0) for end in (np.min, np.max))
     above = float(low[2]) - spacing
-    beside = np.stack(np.meshgrid(*[np.linspace(-radius, radius, RAYS)] * 2), axis=-1)
+    # five rays along each side of the square in which the plane of the rock is found
+    beside = np.stack(np.meshgrid(*[np.linspace(-radius, radius, 5)] * 2), axis=-1)
     each_way = [math.floor((b - a) / spacing) + 1 for a, b in zip(low[:2], high[:2], strict=True)]
     count = math.prod(each_way) * angles * len(rotations)
     if most is not None and count > most:
@@ -150,18 +140,19 @@ def grid_of_trials(
         for a, b, number in zip(low[:2], high[:2], each_way, strict=True)
     ]
     found: list[Trial] = []
+    into = (0.0, 0.0, 1.0)  # z of a rock's frame
     points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist()
     for number, (x, y) in enumerate(points):
         if report is not None:
             report(number, len(points))
-        depth = rock.entry((x, y, above), INTO)
+        depth = rock.entry((x, y, above), into)
         if not math.isfinite(depth):
             continue
         point = x, y, above + depth
         toward = approach
         if toward is None:
             around = beside.reshape(-1, 2) + np.array([x, y])
-            depths = np.array([rock.entry((*each, above), INTO) for each in around.tolist()])
+            depths = np.array([rock.entry((*each, above), into) for each in around.tolist()])
             met = np.isfinite(depths)
             plane = np.column_stack([around[met], np.ones(met.sum())])
             slope = np.linalg.lstsq(plane, depths[met])[0]
@@ -179,7 +170,7 @@ def _at_border(hand: SpinyHand, settled: SettledHand) -> bool:
     """Return True if a scan ends within a finger's reach, or has no rock at all for one."""
     if min(settled.rock_ends) < hand.finger.reach:
         return True
-    off = (settled.postures.kinds == NONE).all(axis=1)
+    off = (settled.postures.kinds == CONTACT_KINDS.index("none")).all(axis=1)
     at = settled.hold, settled.grasp, settled.seating.pose
     return bool(len(settled.hold.border)) and any(
         hand.section(name, *at) is None for name in np.array(FINGERS)[off].tolist()
@@ -219,13 +210,15 @@ def try_holds(
             surface,
             Grasp(each.outer_rotation),
             None,
-            approach_frame(each.point, each.approach, each.wrist_angle, UP),
+            approach_frame(each.point, each.approach, each.wrist_angle, ALONG_FINGERS),
         )
         for each in trials
     ]
-    outcomes = best_seats(hand, placements) if seat == BEST else hand.settle_each(placements)
+    outcomes = best_seats(hand, placements) if seat == "best" else hand.settle_each(placements)
     spaces = iter(wrench_spaces([each for each in outcomes if isinstance(each, SettledHand)]))
     found: list[FoundHold | InvalidInputError] = []
+    axes = np.eye(6)[list(TRIAL_WAYS.values())]
+    directions = axes * [[1.0 if way[0] == "+" else -1.0] for way in TRIAL_WAYS]
     for outcome in outcomes:
         if isinstance(outcome, InvalidInputError):
             found.append(outcome)
@@ -234,17 +227,17 @@ def try_holds(
         if _at_border(hand, outcome):
             found.append(InvalidInputError(AT_BORDER, field="place.point"))
             continue
-        support, pure = np.full(len(WAYS), math.nan), math.nan
+        support, pure = np.full(len(TRIAL_WAYS), math.nan), math.nan
         try:
-            support = np.array([space.support(way) for way in DIRECTIONS])
-            ends = space.capability(DIRECTIONS[0])
+            support = np.array([space.support(way) for way in directions])
+            ends = space.capability(directions[0])
             pure = math.nan if ends is None else ends[1]
         except EmptySetError:
             pass
         seating = outcome.seating
         made = FoundHold(seating.pose.inverse(), seating.rule, seating.backed_off, support, pure)
         if robust:
-            left = robustness(hand, outcome, DIRECTIONS)
+            left = robustness(hand, outcome, directions)
             made = made._replace(worst=left.worst, tenth=left.tenth, hundredth=left.hundredth)
         found.append(made)
     return found

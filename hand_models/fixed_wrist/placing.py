@@ -9,27 +9,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import InvalidInputError, Pose, finite_vector, turns_about
-from hand_models.fixed_wrist.seat_search import BEST, PULL_OFF, best_seats
+from hand_models.fixed_wrist.seat_search import PULL_OFF, best_seats
 from hand_models.hand import Grasp, Placement, SettledHand, SpinyHand, spiny_hand
 from hand_models.rock import Hold
 from hand_models.tile import Surface
 
-__all__ = ["SEATS", "UP", "SeatRule", "approach_frame", "place"]
+__all__ = ["ALONG_FINGERS", "SEAT_RULES", "SeatRule", "approach_frame", "place"]
 
-UP: Final = (1.0, 0.0, 0.0)
+ALONG_FINGERS: Final = (1.0, 0.0, 0.0)
 """Direction along the fingers of a hand that is seated at a rock's origin, in the rock's frame."""
 
 SeatRule = Literal["rest", "best"]
 
-SEATS: Final = get_args(SeatRule)
+SEAT_RULES: Final = get_args(SeatRule)
 """How a hand is seated: as its grasp would have it, or near there where it holds most."""
-
-APART: Final = 1e-6
-"""Least sine of the angle between approach and up."""
 
 
 def approach_frame(
-    point: ArrayLike, approach: ArrayLike, wrist_angle: float = 0.0, up: ArrayLike = UP
+    point: ArrayLike, approach: ArrayLike, wrist_angle: float = 0.0, up: ArrayLike = ALONG_FINGERS
 ) -> Pose:
     """Return the frame of a point that a hand approaches.
 
@@ -60,7 +57,7 @@ def approach_frame(
     z, above = (value / np.abs(value).max() for value in (z, above))
     z, above = z / np.linalg.norm(z), above / np.linalg.norm(above)
     across = np.cross(z, above)
-    if np.linalg.norm(across) < APART:
+    if np.linalg.norm(across) < 1e-6:  # sine of the angle between them
         raise InvalidInputError(
             f"is along up, {above.tolist()}, so that a wrist angle says nothing: give another up",
             field="approach",
@@ -79,7 +76,7 @@ def place(
     grasp: Grasp | None = None,
     surface: Surface | None = None,
     *,
-    up: ArrayLike = UP,
+    up: ArrayLike = ALONG_FINGERS,
     seat: SeatRule = "rest",
     direction: ArrayLike = PULL_OFF,
     hand: SpinyHand | None = None,
@@ -115,15 +112,15 @@ def place(
     InvalidInputError
         If a number is impossible, or the hand cannot be there.
     """
-    if seat not in SEATS:
+    if seat not in SEAT_RULES:
         raise InvalidInputError(
-            f"unknown seat {seat!r}; known are {', '.join(SEATS)}", field="seat"
+            f"unknown seat {seat!r}; known are {', '.join(SEAT_RULES)}", field="seat"
         )
     at = approach_frame(point, approach, wrist_angle, up)
     rock.check_place(at)
     kind = hand or spiny_hand()
     placement = Placement(rock, surface or Surface.named("rock"), grasp or Grasp(), None, at)
-    if seat == BEST:
+    if seat == "best":
         (found,) = best_seats(kind, [placement], direction)
     else:
         (found,) = kind.settle_each([placement])

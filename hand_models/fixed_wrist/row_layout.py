@@ -9,13 +9,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
-from hand_models.hand import FINGERS, FINGERTIP_FORCE, HELD, NAIL, NAIL_SHEAR, SettledHand, Tile
+from hand_models.hand import (
+    FINGERS,
+    FINGERTIP_FORCE,
+    HELD_DIRECTIONS,
+    NAIL,
+    NAIL_SHEAR,
+    SettledHand,
+    Tile,
+)
 from hand_models.tile import Surface, inner_half_planes
 from hand_models.wrench_spaces import Row
 
@@ -34,14 +42,6 @@ PALM_SHEAR = "palm_shear"
 PALM_PRESSING = "palm_pressing"
 HAND_LOAD = "hand_load"
 TENDON_TENSION = "tendon_tension"
-TENDON_LIMITS = (TENDON_TENSION, "motor_torque", "motor_current")
-"""Limits of each tendon, in the order of their rows."""
-
-
-KEPT: Final = 512
-"""Layouts that are kept, those used last; each takes some 30 kB."""
-
-
 _Name = tuple[str | None, str | None, str, str]
 """Finger, phalanx and limit of a row, and what distinguishes it from others of these names."""
 
@@ -129,7 +129,7 @@ def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
     )
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=512)  # layouts of some 30 kB each
 def row_layout(
     tiles: tuple[Tile, ...],
     lateral: bool,
@@ -179,7 +179,8 @@ def row_layout(
         for sign, _ in signs
     ]
     planes = [(i, k, sign) for i in touching for k in range(len(pieces)) for _, sign in signs]
-    limits += [(finger, None, name, "") for name in TENDON_LIMITS for finger in FINGERS]
+    of_tendons = (TENDON_TENSION, "motor_torque", "motor_current")
+    limits += [(finger, None, name, "") for name in of_tendons for finger in FINGERS]
     limits += [(FINGERS[i], None, "finger_shear", "") for i in engaged]
     limits += [(FINGERS[i], None, "finger_lateral", sign) for i in reacting for sign in "+-"]
     limits += [(tiles[i].finger, "distal", FINGERTIP_FORCE, "") for i in tips]
@@ -200,7 +201,7 @@ def row_layout(
         columns += [PALM_SHEAR, PALM_PRESSING]
         limits += [(None, None, name, "") for name in (PALM_SHEAR, PALM_PRESSING)]
         hard += [(None, None, f"{name}_reversed", "") for name in (PALM_SHEAR, PALM_PRESSING)]
-    limits += [(None, None, HAND_LOAD, f"/{k + 1}") for k in range(len(HELD))]
+    limits += [(None, None, HAND_LOAD, f"/{k + 1}") for k in range(len(HELD_DIRECTIONS))]
     limit_rows = tuple([named_row(*each[:3], "limit", each[3]) for each in limits])
     hard_rows = tuple([named_row(*each[:3], "hard", each[3]) for each in hard])
     plane_tiles, plane_pieces, plane_signs = np.array(planes, dtype=np.intp).reshape(-1, 3).T

@@ -8,7 +8,8 @@ other hands there are, nor on their order, nor on the machine.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -19,27 +20,30 @@ from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
 __all__ = [
-    "HUNDREDTH",
-    "PLACES",
-    "TENTH",
+    "SCATTER_SETTINGS",
     "Robustness",
+    "ScatterSettings",
     "closed_about",
     "robustness",
     "scattered_places",
 ]
 
-PLACES: Final = 128
-"""Places of a hand, unless another number is asked for: a power of two, as Sobol sequences want it.
-With 64 the tenth of a slab's load factors changes by 7 % (rms) with the seed, with 128 by 2 %."""
 
-TENTH: Final = 10.0
-"""Percentile that is exceeded at nine in ten places."""
+@dataclass(frozen=True, slots=True)
+class ScatterSettings:
+    """Numbers of a scatter of places."""
 
-HUNDREDTH: Final = 1.0
-"""Percentile that stands for the worst, which itself would hang on the number of places."""
+    places: int = 128
+    """Of a hand, unless another number is asked for: a power of two, as Sobol sequences want it.
+    With 64 the tenth of a slab's load factors changes by 7 % (rms) with the seed, with 128 by
+    2 %."""
+    tenth: float = 10.0
+    """Percentile that is exceeded at nine in ten places."""
+    hundredth: float = 1.0
+    """Percentile that stands for the worst, which itself would hang on the number of places."""
 
-AT_ONCE: Final = 64
-"""Hands that are closed together."""
+
+SCATTER_SETTINGS = ScatterSettings()
 
 
 class Robustness(NamedTuple):
@@ -75,7 +79,7 @@ def robustness(
     hand: SpinyHand,
     settled: SettledHand,
     directions: ArrayLike,
-    draws: int = PLACES,
+    draws: int = SCATTER_SETTINGS.places,
     seed: int = 0,
     scatter: tuple[float, float] | None = None,
 ) -> Robustness:
@@ -119,7 +123,9 @@ def robustness(
             continue
     without = draws - len(reaches)
     reaches += [[0.0] * len(ways)] * without
-    hundredth, tenth = np.percentile(reaches, [HUNDREDTH, TENTH], axis=0)
+    hundredth, tenth = np.percentile(
+        reaches, [SCATTER_SETTINGS.hundredth, SCATTER_SETTINGS.tenth], axis=0
+    )
     return Robustness(draws, without, position, angle, seed, hundredth, tenth, hundredth)
 
 
@@ -159,10 +165,11 @@ def closed_about(
         Of some places after the other; an error in place of a hand that cannot be there.
     """
     position, angle = scatter
-    for first in range(0, len(places), AT_ONCE):
+    at_once = 64  # hands that are closed together
+    for first in range(0, len(places), at_once):
         frames = (
             Pose(position * by[:3], turns_about(angle * by[3:]))
-            for by in places[first : first + AT_ONCE]
+            for by in places[first : first + at_once]
         )
         yield hand.settle_each(
             [

@@ -34,25 +34,10 @@ from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, PlacementKey, Seating, SettledHand, SpinyHand, seated
 from hand_models.wrench_spaces import WrenchSpace
 
-__all__ = ["BEST", "PULL_OFF", "best_seats"]
-
-BEST: Final = "best"
-"""The rule of a seat that was searched for."""
+__all__ = ["PULL_OFF", "best_seats"]
 
 PULL_OFF: Final = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
 """The wrench on the rock of a hand that is pulled off it, in H."""
-
-OFFS: Final = (0.0, 0.125, 0.25, 0.5, 1.0)
-"""Stand-offs of the first stage, in parts of the farthest."""
-
-TURNS: Final = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Turns of the first stage, in parts of the largest."""
-
-TILTS: Final = (-1.0, 0.0, 1.0)
-"""Tilts of the second stage about each axis, in parts of the largest."""
-
-NEARER: Final = ((-0.125, 0.0), (0.125, 0.0), (0.0, -0.25), (0.0, 0.25))
-"""Smaller steps of the second stage, of stand-off and turn, in the same parts."""
 
 
 class _Move(NamedTuple):
@@ -69,13 +54,12 @@ class _Move(NamedTuple):
         return Pose(np.array([0.0, 0.0, -hand.back_off * self.off]), turned @ tilted)
 
 
-FIRST: Final = tuple(itertools.starmap(_Move, itertools.product(OFFS, TURNS)))
-
-
 def _about(move: _Move) -> list[_Move]:
     """Return the moves of the second stage."""
-    tilted = [move._replace(tilt=tilt) for tilt in itertools.product(TILTS, TILTS) if any(tilt)]
-    moved = [move._replace(off=move.off + off, turn=move.turn + turn) for off, turn in NEARER]
+    tilts = (-1.0, 0.0, 1.0)
+    tilted = [move._replace(tilt=tilt) for tilt in itertools.product(tilts, tilts) if any(tilt)]
+    nearer = ((-0.125, 0.0), (0.125, 0.0), (0.0, -0.25), (0.0, 0.25))
+    moved = [move._replace(off=move.off + off, turn=move.turn + turn) for off, turn in nearer]
     return tilted + [each for each in moved if 0.0 <= each.off <= 1.0 and abs(each.turn) <= 1.0]
 
 
@@ -172,12 +156,14 @@ def _searched(
             if known is None or reach > known.reach:
                 best[i] = _Found(reach, move, outcome)
 
+    offs, turns = (0.0, 0.125, 0.25, 0.5, 1.0), (-1.0, -0.5, 0.0, 0.5, 1.0)
+    first = tuple(itertools.starmap(_Move, itertools.product(offs, turns)))
     # first also where a hand comes to rest that backs off for that
     rests = [
         each.seating.backed_off / hand.back_off if isinstance(each, SettledHand) else 0.0
         for each in hand.settle_each(placements)
     ]
-    look([FIRST if off in OFFS else (*FIRST, _Move(off, 0.0)) for off in rests])
+    look([first if off in offs else (*first, _Move(off, 0.0)) for off in rests])
     look([[] if found is None else _about(found.move) for found in best])
     outcomes: list[SettledHand | InvalidInputError] = []
     for found, error in zip(best, refused, strict=True):
@@ -185,6 +171,6 @@ def _searched(
             assert error is not None
             outcomes.append(error)
             continue
-        seating = Seating(found.settled.seating.pose, BEST, hand.back_off * found.move.off)
+        seating = Seating(found.settled.seating.pose, "best", hand.back_off * found.move.off)
         outcomes.append(replace(found.settled, seating=seating))
     return outcomes

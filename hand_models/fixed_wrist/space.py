@@ -24,9 +24,9 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, check_positive, skew
+from hand_models.base import BASE_TOLERANCES, Array, check_positive, skew
 from hand_models.fixed_wrist.row_layout import RowLayout, layout_of
-from hand_models.hand import FINGERS, HELD, HandModel, SettledHand
+from hand_models.hand import FINGERS, HELD_DIRECTIONS, HandModel, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = [
@@ -38,32 +38,18 @@ __all__ = [
     "wrench_spaces",
 ]
 
-LEAST_SLOPE: Final = 1e-6
-"""Torque on a joint's stop per newton of tension by which its row is divided, at least [m]."""
+TENDON_COUNT: Final = len(FINGERS)
 
-TENDONS: Final = len(FINGERS)
+EACH_TENDON: Final = np.eye(TENDON_COUNT)
 
-EACH_TENDON: Final = np.eye(TENDONS)
-
-EACH_PALM_LOAD: Final = np.eye(2)
-
-SIDES: Final = (1.0, -1.0)
-"""Signs of a lateral reaction."""
-
-WRENCH_PARTS: Final = 6 + len(HELD)
-"""A wrench, and what of its force is held along each of `HELD`."""
-
-ROUNDING: Final = 1e-14
-"""Residual of forces that cancel [N per newton, N·m per newton]; it counts as zero."""
-
-HELD_ROWS: Final = np.hstack([HELD, np.zeros_like(HELD)])
-"""D of every hand: the rows of `HELD` of a wrench."""
+HELD_ROWS: Final = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
+"""D of every hand: the rows of `HELD_DIRECTIONS` of a wrench."""
 
 HELD_ROWS.setflags(write=False)
 
 
 def _moments() -> Array:
-    """Return the matrix (`WRENCH_PARTS`, 12) from (1, p) ⊗ F to a wrench and what is held of it."""
+    """Return the matrix (p, 12) from (1, p) ⊗ F to a wrench and what is held of it."""
     wrench = np.zeros((6, 4, 3))
     wrench[:3, 0] = np.eye(3)
     for axis in range(3):
@@ -72,14 +58,15 @@ def _moments() -> Array:
     return np.vstack([flat, HELD_ROWS @ flat])
 
 
-MOMENTS: Final = _moments()
-"""Map from (1, p) ⊗ F to a wrench and what of it is held along `HELD`."""
+MOMENT_MAP: Final = _moments()
+"""Map from (1, p) ⊗ F to a wrench and what of it is held along `HELD_DIRECTIONS`."""
 
 
 def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:
     """Return wrenches at zero tension (h, p), and those of the m columns (h, p, m), of h hands.
 
-    Below each of the p = `WRENCH_PARTS` what of its force is held: the last limit rows.
+    Below the six parts of each what of its force is held, along `HELD_DIRECTIONS`: the last limit
+    rows.
     """
     axes, places, shares = (_of_tiles(hands, n) for n in ("axes", "positions", "lateral_shares"))
     # F three times, first in the tile's axes, then in H
@@ -91,22 +78,23 @@ def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Arr
     arms[..., 1:] = places
     of_tiles = (arms[..., None] * forces).reshape(*shares.shape, 36)
     # not as a product of matrices: its last digits would depend on how many hands there are
-    sums = _of_fingers(layout, of_tiles).reshape(len(hands), TENDONS, 4, 3, 3)
-    wrenches = MOMENTS @ sums.transpose(0, 3, 2, 4, 1).reshape(len(hands), 3, 12, -1)
-    V = np.zeros((len(hands), WRENCH_PARTS, len(layout.columns)))
-    V[:, :, :TENDONS] = wrenches[:, 1]
+    sums = _of_fingers(layout, of_tiles).reshape(len(hands), TENDON_COUNT, 4, 3, 3)
+    wrenches = MOMENT_MAP @ sums.transpose(0, 3, 2, 4, 1).reshape(len(hands), 3, 12, -1)
+    V = np.zeros((len(hands), len(MOMENT_MAP), len(layout.columns)))
+    V[:, :, :TENDON_COUNT] = wrenches[:, 1]
     V[:, :, list(layout.lateral_columns)] = wrenches[:, 2][:, :, list(layout.reacting)]
     if layout.nail_columns:
         axial = arms[:, layout.nails, :, None] * axes[:, layout.nails, :1]
         flat = axial.reshape(*axial.shape[:2], 12)
-        V[:, :, list(layout.nail_columns)] = (flat @ MOMENTS.T).swapaxes(1, 2)
+        V[:, :, list(layout.nail_columns)] = (flat @ MOMENT_MAP.T).swapaxes(1, 2)
     if layout.palm:
         x, y, z = np.array([hand.palm.centre for hand in hands]).T
         shear, pressing = V[:, :, -2], V[:, :, -1]
         shear[:, 0], shear[:, 4], shear[:, 5] = -1.0, -z, y
         pressing[:, 2], pressing[:, 3], pressing[:, 4] = 1.0, y, -x
-        shear[:, 6:], pressing[:, 6:] = -HELD[:, 0], HELD[:, 2]
-    V[np.abs(V) < ROUNDING] = 0.0
+        shear[:, 6:], pressing[:, 6:] = -HELD_DIRECTIONS[:, 0], HELD_DIRECTIONS[:, 2]
+    # residuals of forces that cancel [N/N, N·m/N]
+    V[np.abs(V) < 0.01 * BASE_TOLERANCES.rounding] = 0.0
     return np.add.reduce(wrenches[:, 0], axis=2), V
 
 
@@ -132,7 +120,7 @@ def limit_rows(
     l0[:, :k], L[:, row, of] = planar.transpose(2, 0, 1)
     s[:, :k] = planes[:, :, 3] * _of_tiles(hands, "limit_shares")[:, tile]
     if layout.reacting:
-        column = np.zeros(TENDONS, dtype=np.intp)
+        column = np.zeros(TENDON_COUNT, dtype=np.intp)
         column[list(layout.reacting)] = layout.lateral_columns
         shares = _of_tiles(hands, "lateral_shares")[:, tile]
         L[:, row, column[of]] = planes[:, :, 2] * shares
@@ -140,16 +128,17 @@ def limit_rows(
         (1.0, 0.0, most[:, None]),
         *model.drive.limits,
     ):
-        own = slice(k, k + TENDONS)
-        L[:, own, :TENDONS], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end
-        k += TENDONS
+        own = slice(k, k + TENDON_COUNT)
+        L[:, own, :TENDON_COUNT], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end
+        k += TENDON_COUNT
     engaged, tips = np.array(layout.engaged, dtype=np.intp), layout.tips
+    signs = (1.0, -1.0)  # of a lateral reaction
     sideways, reacting = (
-        np.repeat(np.array(each, dtype=np.intp), len(SIDES))
+        np.repeat(np.array(each, dtype=np.intp), len(signs))
         for each in (layout.lateral_columns, layout.reacting)
     )
     shears = _of_fingers(layout, loads[:, :, 0])[:, engaged].transpose(2, 0, 1)
-    either_way = np.array([np.zeros(len(sideways)), np.resize(SIDES, len(sideways))])
+    either_way = np.array([np.zeros(len(sideways)), np.resize(signs, len(sideways))])
     for of, (start, slope), end in (
         (engaged, shears, structure.finger_shear),
         (sideways, either_way, np.array([hand.lateral_limits[reacting] for hand in hands])),
@@ -166,7 +155,7 @@ def limit_rows(
                 l0[h, i], s[h, i] = limit.a_normal * t0, limit.capacity
         k += 2
     if layout.palm:
-        L[:, k : k + 2, -2:] = EACH_PALM_LOAD
+        L[:, k : k + 2, -2:] = np.eye(2)
         s[:, k : k + 2] = [(hand.palm.shear_limit, hand.palm.pressing_limit) for hand in hands]
         k += 2
     L[:, k:], l0[:, k:], s[:, k:] = V[:, 6:], at_zero[:, 6:], structure.hand_load
@@ -182,8 +171,8 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     drags = loads[:, :, 0] + friction * pressed
     drags[:, :, 0] += _of_tiles(hands, "drag_allowances")
     H, h = np.zeros((*shape, len(layout.columns))), np.zeros(shape)
-    H[:, :TENDONS, :TENDONS] = -EACH_TENDON
-    k = TENDONS
+    H[:, :TENDON_COUNT, :TENDON_COUNT] = -EACH_TENDON
+    k = TENDON_COUNT
     for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
         row, along = k + np.arange(len(tiles)), kept[:, tiles]
         H[:, row, layout.finger_of[tiles]], h[:, row] = -along[:, :, 1], along[:, :, 0]
@@ -192,7 +181,7 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
         row, stopped = k + np.arange(len(layout.stops)), [finger for finger, _ in layout.stops]
         torques = np.array([[torque for _, _, torque in hand.stops] for hand in hands])
         # in newtons of tension, so that rows stay commensurate
-        torques /= np.maximum(np.abs(torques[..., 1:]), LEAST_SLOPE)
+        torques /= np.maximum(np.abs(torques[..., 1:]), 1e-6)
         H[:, row, stopped], h[:, row] = -torques[..., 1], torques[..., 0]
         k += len(row)
     for i, (_, columns) in enumerate(_nails(layout)):
@@ -205,7 +194,7 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
         H[:, row, drawing] = -1.0
         h[:, row] = [[-hand.closing_tension] for hand in hands]
     if layout.palm:
-        H[:, -2:, -2:] = -EACH_PALM_LOAD
+        H[:, -2:, -2:] = -np.eye(2)
     return H, h
 
 
@@ -224,7 +213,7 @@ def _of_tiles(hands: Sequence[SettledHand], name: str) -> Array:
 
 def _of_fingers(layout: RowLayout, tiles: Array) -> Array:
     """Return sums (h, 4, …) over each finger's tiles (h, n, …)."""
-    starts = np.searchsorted(layout.finger_of, np.arange(TENDONS))
+    starts = np.searchsorted(layout.finger_of, np.arange(TENDON_COUNT))
     return np.asarray(np.add.reduceat(tiles, starts, axis=1))
 
 
@@ -243,7 +232,7 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
         Columns: four tensions, the lateral reactions, palm shear and palm pressing [N]. Limit rows:
         each tile's half-planes (with both signs of its lateral load); each tendon's tension, motor
         torque [N·m] and motor current [A]; the shear of a finger's tiles together, the pressing of
-        its tip; the palm; and, as wrench rows, what the hand holds in the directions `HELD`. Hard
+        its tip; the palm; and, as wrench rows, what the hand holds in the `HELD_DIRECTIONS`. Hard
         rows: tension, palm loads not negative; no tile dragged backwards; a joint's stop and a
         frame beside its tile only push; a nail that clings neither lifts nor slips nor closes its
         finger; with friction in the tendons, no tension below closing, where they would stick. A

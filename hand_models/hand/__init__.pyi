@@ -2,7 +2,6 @@ from .finger_frames import FingerFrame as FingerFrame
 from .grasp import Grasp as Grasp
 from .model import HandModel as HandModel
 from .names import (
-    CLOSURES as CLOSURES,
     FINGERS as FINGERS,
     FINGERTIP_FORCE as FINGERTIP_FORCE,
     NAIL as NAIL,
@@ -18,5 +17,5 @@ from .spinyhand import (
     nearby_closures as nearby_closures,
     spiny_hand as spiny_hand,
 )
-from .structure import HELD as HELD
+from .structure import HELD_DIRECTIONS as HELD_DIRECTIONS
 from .tightening import closing_sequence as closing_sequence

@@ -16,11 +16,9 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from hand_models.finger import (
-    FACE,
-    FREE,
-    KINDS,
+    CONTACT_KINDS,
+    JOINT_STOPS,
     PHALANGES,
-    STOPS,
     ClosedFinger,
     ClosedPhalanx,
     OpenFinger,
@@ -40,21 +38,12 @@ __all__ = ["ClosedFingers", "close_fingers"]
 FingerNumbers = list[float]
 """All numbers of a closed finger, phalanx by phalanx; see `ClosedFingers`."""
 
-ANGLE, ALONG, RISE, TILT, JOINT = 0, 1, 2, 3, slice(4, 6)
-LOADS, ENGAGEMENT, CODES, PLACES = slice(6, 10), 10, slice(11, 13), 13
+PHALANX_NUMBERS: Final = 22
 """Numbers of a phalanx: its angle [rad], its contact's place along and above it [m] and tilt [rad],
 its joint [m]; its shear and normal load, each at zero tension [N] and per newton; the share of its
 tile's spines that are on the rock; the codes of its contact and its joint's stop; and in the
 finger's plane, each in homogeneous coordinates, its contact and its axes of shear and of normal
 load."""
-
-TILE: Final = slice(LOADS.start, CODES.stop - 1)
-"""Those that are its tile's as they are: the loads, the share, and the code of the contact."""
-
-NUMBERS: Final = PLACES + 9
-
-NOWHERE: Final = [0.0] * (len(PHALANGES) * NUMBERS)
-"""Numbers that stand for a finger of a hand that cannot be where it is."""
 
 
 class ClosedFingers:
@@ -93,15 +82,16 @@ class ClosedFingers:
     ) -> None:
         self.alone, self.lifts = alone, lifts
         count = len(FINGERS)
-        shape = len(row_of) // count, count, len(PHALANGES), NUMBERS
+        shape = len(row_of) // count, count, len(PHALANGES), PHALANX_NUMBERS
         table = np.array(rows).take(row_of, axis=0).reshape(shape)
-        codes = table[..., CODES].astype(np.int8)
+        codes = table[..., 11:13].astype(np.int8)  # of the `PHALANX_NUMBERS`
         for array in (table, codes):
             array.setflags(write=False)
-        self.places = table[..., PLACES:].reshape(-1, count, 3 * len(PHALANGES), 3)
-        self.tiles = table[..., TILE]
-        angle, along, rise, tilt = (table[..., i] for i in (ANGLE, ALONG, RISE, TILT))
-        joint, share = table[..., JOINT].view(complex)[..., 0], table[..., ENGAGEMENT]
+        self.places = table[..., 13:].reshape(-1, count, 3 * len(PHALANGES), 3)
+        # the loads, the share and the code of the contact
+        self.tiles = table[..., 6:12]
+        angle, along, rise, tilt = (table[..., i] for i in range(4))
+        joint, share = table[..., 4:6].view(complex)[..., 0], table[..., 10]
         self.postures = HandPostures(
             angle, joint, along, rise, tilt, share, codes[..., 0], codes[..., 1]
         )
@@ -142,7 +132,9 @@ def close_fingers(
     errors : dict of int to InvalidInputError
         Why hands cannot be where they are; those that cannot close are added.
     """
-    hand, rows, row_of = placed.hand, [NOWHERE], [0] * (len(FINGERS) * len(laid))
+    # the first stands for a finger of a hand that cannot be where it is
+    rows = [[0.0] * (len(PHALANGES) * PHALANX_NUMBERS)]
+    hand, row_of = placed.hand, [0] * (len(FINGERS) * len(laid))
     left: list[int] = []
     for i, (placement, tension) in enumerate(zip(placed.placements, tensions, strict=True)):
         if i in errors:
@@ -246,11 +238,12 @@ def _row(
 ) -> FingerNumbers:
     """Return the numbers of a finger that is laid; ``height`` of its tiles [m]."""
     row: FingerNumbers = []
+    laid = CONTACT_KINDS.index("face"), JOINT_STOPS.index(None)
     for (angle, u, joint, along, _), t, n in zip(phalanges, shears, normals, strict=True):
         place = joint + complex(along, height) * u
         # the tile of a phalanx that is laid is on the rock with all its spines
         row += (angle, along, 0.0, 0.0, joint.real, joint.imag)
-        row += (t.real, t.imag, n.real, n.imag, 1.0, FACE, FREE)
+        row += (t.real, t.imag, n.real, n.imag, 1.0, *laid)
         row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
     return row
 
@@ -269,6 +262,7 @@ def _row_alone(closed: ClosedFinger) -> FingerNumbers:
         strict=True,
     ):
         row += (contact.angle, contact.along, contact.rise, contact.tilt, *contact.joint)
-        row += (*shear, *normal, share, KINDS.index(contact.kind), STOPS.index(contact.stop))
+        kind, stop = CONTACT_KINDS.index(contact.kind), JOINT_STOPS.index(contact.stop)
+        row += (*shear, *normal, share, kind, stop)
         row += (*place, 1.0, -x, -z, 0.0, -z, x, 0.0)
     return row

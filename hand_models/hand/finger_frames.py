@@ -4,66 +4,75 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Pose
-from hand_models.finger import NONE, PHALANGES
+from hand_models.finger import CONTACT_KINDS, PHALANGES
 from hand_models.hand.names import FINGERS
 from hand_models.rock import Hold
 from hand_models.sections import Section
 
-__all__ = [
-    "ALONG",
-    "AXES",
-    "BASES",
-    "COLUMNS",
-    "ENGAGEMENT",
-    "INTO",
-    "JOINTS",
-    "KIND",
-    "NORMAL",
-    "OUTER",
-    "POSITION",
-    "SHEAR",
-    "TILES",
-    "UP",
-    "FingerFrame",
-    "FrameStack",
-]
+__all__ = ["HAND_Z", "OUTER_FINGERS", "STACK_ROWS", "TILE_COLUMNS", "FingerFrame", "FrameStack"]
 
-OUTER: Final = slice(0, len(FINGERS), len(FINGERS) - 1)
+OUTER_FINGERS: Final = slice(0, len(FINGERS), len(FINGERS) - 1)
 """Fingers with a base tile, the first and the last."""
 
-BASES: Final = len(FINGERS[OUTER])
-"""How many these are."""
-
-TILES: Final = slice(0, -2 * len(FINGERS) - 1)
-"""Rows of `FrameStack.rows` that are tiles which do not turn toward the rock: the two base tiles,
-then the palm's."""
-
-JOINTS: Final = slice(TILES.stop, TILES.stop + len(FINGERS))
-"""Those that are the fingers' proximal joints."""
-
-ALONG: Final = slice(JOINTS.stop, -1)
-"""Those that are the directions of the fingers."""
-
-INTO: Final = -1
-"""The one that is the direction z of H, into the rock."""
-
-POSITION, AXES, SHEAR, NORMAL = slice(0, 3), slice(3, 12), slice(12, 14), slice(14, 16)
-ENGAGEMENT, KIND = 16, 17
-"""Numbers of a tile: where it is [m], its axes row by row, its loads at zero tension [N] and per
-newton, the share of its spines that are on the rock, and the code of its contact; as of
-`SettledHand`."""
-
-COLUMNS: Final = KIND + 1
-
-UP: Final = np.array([0.0, 0.0, 1.0])
+HAND_Z: Final = np.array([0.0, 0.0, 1.0])
 """z of H."""
 
-UP.setflags(write=False)
+HAND_Z.setflags(write=False)
+
+
+class StackRows(NamedTuple):
+    """Rows of `FrameStack.rows`, by what they are.
+
+    Attributes
+    ----------
+    tiles : slice
+        Tiles which do not turn toward the rock: those of the bases, then the palm's.
+    base_count : int
+        How many are those of the bases.
+    joints, alongs : slice
+        The fingers' proximal joints, and their directions.
+    into : int
+        The direction z of H, into the rock.
+    """
+
+    tiles: slice = slice(0, -2 * len(FINGERS) - 1)
+    base_count: int = len(FINGERS[OUTER_FINGERS])
+    joints: slice = slice(-2 * len(FINGERS) - 1, -len(FINGERS) - 1)
+    alongs: slice = slice(-len(FINGERS) - 1, -1)
+    into: int = -1
+
+
+class TileColumns(NamedTuple):
+    """Numbers of a tile, as of `SettledHand`.
+
+    Attributes
+    ----------
+    position, axes : slice
+        Where it is [m], and its axes row by row.
+    shear, normal : slice
+        Its loads at zero tension [N] and per newton.
+    engagement, kind : int
+        The share of its spines that are on the rock, and the code of its contact.
+    total : int
+        How many numbers these are.
+    """
+
+    position: slice = slice(0, 3)
+    axes: slice = slice(3, 12)
+    shear: slice = slice(12, 14)
+    normal: slice = slice(14, 16)
+    engagement: int = 16
+    kind: int = 17
+    total: int = 18
+
+
+STACK_ROWS = StackRows()
+TILE_COLUMNS = TileColumns()
 
 
 @dataclass(frozen=True)
@@ -90,15 +99,15 @@ class FrameStack:
     hands : tuple of tuple of FingerFrame
         Of each hand, in the order of `FINGERS`.
     rows : ndarray, shape (n, t + 11, 4)
-        All that is seen from a hold, see `TILES` and its like, in homogeneous coordinates: (p, 1)
+        All that is seen from a hold, see `StackRows`, in homogeneous coordinates: (p, 1)
         for a place p [m], (d, 0) for a direction d.
     planes : ndarray, shape (n, 4, 3, 3)
         Fingers' planes F: along, into the rock, the joint; (x, z, 1) there is the place x, z, and
         (x, z, 0) is a direction.
     across : ndarray, shape (n, 4, 3, 3)
         Across the fingers, for each of their phalanges.
-    base_tiles : ndarray, shape (n, 2, `COLUMNS`)
-        Numbers of the base tiles where they touch nothing.
+    base_tiles : ndarray, shape (n, 2, 18)
+        `TileColumns` of the base tiles where they touch nothing.
     """
 
     hands: tuple[tuple[FingerFrame, ...], ...]
@@ -120,16 +129,18 @@ class FrameStack:
         palm : ndarray, shape (t, 3)
             The palm's tiles [m].
         """
-        count, into = len(joints), np.broadcast_to(UP, alongs.shape)
+        count, into = len(joints), np.broadcast_to(HAND_Z, alongs.shape)
         acrosses = np.stack(
             [-alongs[..., 1], alongs[..., 0], np.zeros_like(alongs[..., 0])], axis=-1
         )
         palms = np.broadcast_to(palm, (count, *palm.shape))
         places = np.insert(np.concatenate([bases, palms, joints], axis=1), 3, 1.0, axis=2)
         directions = np.insert(np.concatenate([alongs, into[:, :1]], axis=1), 3, 0.0, axis=2)
-        tiles = np.zeros((count, BASES, COLUMNS))
-        tiles[..., POSITION], tiles[..., KIND] = bases, NONE
-        tiles[..., AXES] = np.concatenate([-alongs, into, acrosses], axis=2)[:, OUTER]
+        column = TILE_COLUMNS
+        tiles = np.zeros((count, STACK_ROWS.base_count, column.total))
+        tiles[..., column.position], tiles[..., column.kind] = bases, CONTACT_KINDS.index("none")
+        axes = np.concatenate([-alongs, into, acrosses], axis=2)
+        tiles[..., column.axes] = axes[:, OUTER_FINGERS]
         stacks = (
             np.concatenate([places, directions], axis=1),
             np.stack([alongs, into, joints], axis=2),

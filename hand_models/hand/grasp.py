@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final
+from dataclasses import dataclass
+from typing import Annotated
 
 from msgspec import Meta
 from msgspec.structs import force_setattr
@@ -12,16 +13,26 @@ from hand_models.base import InvalidFieldError, Strict, Tension, check_positive
 
 __all__ = ["Grasp"]
 
-OPPOSED: Final = 1e-6
-"""How close to π an outer rotation counts as a pinch [rad]."""
 
-ROUNDED: Final = 5e-4
-"""How far above π an outer rotation is taken for it [rad]: π rounded to three decimals is."""
+@dataclass(frozen=True, slots=True)
+class RotationTolerances:
+    """Tolerances of an outer rotation near π [rad]."""
 
+    pinch: float = 1e-6
+    """How close to π it counts as a pinch."""
+    rounded: float = 5e-4
+    """How far above π it is taken for it: π rounded to three decimals is."""
+
+
+ROTATION_TOLERANCES = RotationTolerances()
 
 OuterRotation = Annotated[
     float,
-    Meta(ge=0.0, le=math.pi + ROUNDED, description="[rad]; what rounding puts above π is π"),
+    Meta(
+        ge=0.0,
+        le=math.pi + ROTATION_TOLERANCES.rounded,
+        description="[rad]; what rounding puts above π is π",
+    ),
 ]
 
 
@@ -31,7 +42,7 @@ class Grasp(Strict, frozen=True):
     Attributes
     ----------
     outer_rotation : float
-        Rotation of the outer fingers, in [0, π] [rad]; up to `ROUNDED` above π counts as π.
+        Rotation of the outer fingers, in [0, π] [rad]; up to 5e-4 above π counts as π.
     closing_tension : float, optional
         Tension of each tendon at the moment the tiles caught the rock [N]; by default that of the
         parameter file.
@@ -52,11 +63,11 @@ class Grasp(Strict, frozen=True):
     ] = False
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.outer_rotation <= math.pi + ROUNDED:
+        if not 0.0 <= self.outer_rotation <= math.pi + ROTATION_TOLERANCES.rounded:
             raise InvalidFieldError(
                 f"must be in [0, pi] rad, got {self.outer_rotation:g}", field="outer_rotation"
             )
-        if self.outer_rotation > math.pi + OPPOSED:
+        if self.outer_rotation > math.pi + ROTATION_TOLERANCES.pinch:
             force_setattr(self, "outer_rotation", math.pi)
         if self.closing_tension is not None:
             check_positive(self.closing_tension, "N", "closing_tension")
@@ -64,4 +75,4 @@ class Grasp(Strict, frozen=True):
     @property
     def pinch(self) -> bool:
         """True if the outer fingers oppose the inner ones."""
-        return self.outer_rotation >= math.pi - OPPOSED
+        return self.outer_rotation >= math.pi - ROTATION_TOLERANCES.pinch

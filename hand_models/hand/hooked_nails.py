@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.finger import NONE
+from hand_models.finger import CONTACT_KINDS
 from hand_models.hand.closed_fingers import ClosedFingers
-from hand_models.hand.finger_frames import AXES, COLUMNS, KIND, NORMAL, POSITION, UP
-from hand_models.hand.names import CONTACTS, FINGERS, NAIL
+from hand_models.hand.finger_frames import HAND_Z, TILE_COLUMNS
+from hand_models.hand.names import CONTACT_NAMES, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
 
 __all__ = ["Nails", "hook_nails"]
@@ -25,8 +25,8 @@ class Nails(NamedTuple):
     angles : ndarray, shape (4,)
     normals : ndarray, shape (4, 3)
     rows : tuple of (ndarray, ndarray)
-    tiles : ndarray, shape (4, `COLUMNS`)
-        Numbers of the nails as tiles; empty of a hand that does not cling with them.
+    tiles : ndarray, shape (4, 18)
+        `TileColumns` of the nails as tiles; empty of a hand that does not cling with them.
     """
 
     angles: Array
@@ -55,8 +55,9 @@ def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: 
     nail = placed.hand.nail
     angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))
     clinging = len(FINGERS) if placed.placements[index].grasp.fingernail else 0
-    rows, tiles = [], np.zeros((clinging, COLUMNS))
-    tiles[:, KIND] = NONE
+    column = TILE_COLUMNS
+    rows, tiles = [], np.zeros((clinging, column.total))
+    tiles[:, column.kind] = CONTACT_KINDS.index("none")
     frames = placed.frames.hands[index]
     for i, (name, frame, tip) in enumerate(zip(FINGERS, frames, tiles, strict=False)):
         section = placed.section(index, i)
@@ -72,13 +73,13 @@ def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: 
         if cling is not None:
             angles[i], reach = cling.hook.angle, cling.hook.distance
             s, t = cling.hook.normal
-            normals[i] = s * frame.along + t * UP
+            normals[i] = s * frame.along + t * HAND_Z
             rows.append((cling.H, cling.h))
-            tip[KIND], tip[NORMAL] = CONTACTS.index(NAIL), cling.force
+            tip[column.kind], tip[column.normal] = CONTACT_NAMES.index(NAIL), cling.force
         cosine, sine = math.cos(angles[i]), math.sin(angles[i])
-        w = cosine * frame.along + sine * UP
-        tip[POSITION] = frame.joint + finger.pin[0] * frame.along + reach * w
-        tip[AXES] = np.concatenate([-w, cosine * UP - sine * frame.along, frame.across])
+        w = cosine * frame.along + sine * HAND_Z
+        tip[column.position] = frame.joint + finger.pin[0] * frame.along + reach * w
+        tip[column.axes] = np.concatenate([-w, cosine * HAND_Z - sine * frame.along, frame.across])
     for array in (angles, normals, *(part for pair in rows for part in pair)):
         array.setflags(write=False)
     return Nails(angles, normals, tuple(rows), tiles)

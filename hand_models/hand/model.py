@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from hand_models.base import BoundedStore, InvalidInputError, Pose
 from hand_models.finger import FingerModel, Fingernail, SequentialClosure
-from hand_models.hand.finger_frames import OUTER, FingerFrame, FrameStack
+from hand_models.hand.finger_frames import OUTER_FINGERS, FingerFrame, FrameStack
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.names import FINGERS
 from hand_models.hand.structure import Structure
@@ -30,9 +30,6 @@ from hand_models.sections import Section
 from hand_models.tendon import TendonDrive, check_palm, shear_capacity
 
 __all__ = ["HandModel"]
-
-ROTATIONS: Final = 64
-"""Choices of outer rotations for which frames are kept, those used last."""
 
 
 class HandModel:
@@ -55,7 +52,8 @@ class HandModel:
         self.table = table = table or hand_table()
         self._hash = hash(table)
         self._frames: BoundedStore[tuple[float, ...], FrameStack] = BoundedStore(
-            "frames of fingers", ROTATIONS
+            "frames of fingers",
+            most=64,  # choices of outer rotations
         )
         self.finger = FingerModel.from_table(table)
         self.drive = TendonDrive.from_table(table)
@@ -161,7 +159,7 @@ class HandModel:
         joints = np.where(
             outer, self.outer_axis * mirror + self.outer_reach * alongs, self.inner_joint * mirror
         )
-        bases = (joints + alongs * (self.base_tile_reach - self.outer_reach))[:, OUTER]
+        bases = (joints + alongs * (self.base_tile_reach - self.outer_reach))[:, OUTER_FINGERS]
         bases[..., 2] = self.base_tile_surface
         return FrameStack.of(joints, alongs, bases, self.palm_tiles)
 

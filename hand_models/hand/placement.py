@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Pose
-from hand_models.hand.finger_frames import ALONG, INTO, JOINTS, TILES
+from hand_models.hand.finger_frames import STACK_ROWS
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.seating import Seating
@@ -18,12 +18,6 @@ from hand_models.sections import FingerPlane, Section, Swept, entry_distances
 from hand_models.tile import Surface
 
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
-
-DIGITS: Final = 15
-"""Digits that count of lengths in metres, and of directions."""
-
-NOTHING: Final = Swept(0.0, 0.0, 0.0, 0.0, 0.0)
-"""Shape that stands for a hold that is not swept."""
 
 
 class Placement(NamedTuple):
@@ -102,7 +96,8 @@ class PlacedHands:
         self.seatings = seatings
         self._shapes = [each.hold.swept for each in placements]
         self.frames = hand.frame_stack(tuple([each.grasp.outer_rotation for each in placements]))
-        swept = np.array([shape or NOTHING for shape in self._shapes])
+        # zeros stand for a hold that is not swept
+        swept = np.array([shape or Swept(0.0, 0.0, 0.0, 0.0, 0.0) for shape in self._shapes])
         poses = [seating.pose for seating in seatings]
         rotations = np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
         positions = np.concatenate([pose.position for pose in poses]).reshape(-1, 1, 3)
@@ -110,8 +105,8 @@ class PlacedHands:
         there = np.empty((len(poses), 4, 3))
         there[:, :3], there[:, 3:] = rotations, -positions @ rotations
         there[:, 3, 2] -= swept[:, 3]
-        # fingers that are alike but for rounding are alike
-        seen = (self.frames.rows @ there).round(DIGITS)
+        # fingers that are alike but for rounding are alike: lengths in metres have 15 digits
+        seen = (self.frames.rows @ there).round(15)
         self._seen: list[list[list[float]]] = (seen * swept[:, None, :3]).tolist()
 
     def cuts(self, index: int) -> tuple[Swept, list[FingerPlane]] | None:
@@ -123,9 +118,9 @@ class PlacedHands:
         shape, rows = self._shapes[index], self._seen[index]
         if shape is None:
             return None
-        into = rows[INTO]
+        into = rows[STACK_ROWS.into]
         planes: list[FingerPlane] = []
-        for origin, along in zip(rows[JOINTS], rows[ALONG], strict=True):
+        for origin, along in zip(rows[STACK_ROWS.joints], rows[STACK_ROWS.alongs], strict=True):
             (a, b, c), (d, e, f), (x, y, z) = along, into, origin
             # every swept hold is its own mirror image in x and in y
             if (a or d or x) < 0.0:
@@ -141,8 +136,9 @@ class PlacedHands:
 
         Infinite where there is no rock.
         """
+        tiles, into = STACK_ROWS.tiles, STACK_ROWS.into
         return [
-            self._gaps_on(i) if shape is None else entry_distances(shape, seen[TILES], seen[INTO])
+            self._gaps_on(i) if shape is None else entry_distances(shape, seen[tiles], seen[into])
             for i, (shape, seen) in enumerate(zip(self._shapes, self._seen, strict=True))
         ]
 
@@ -151,7 +147,7 @@ class PlacedHands:
         there = self.seatings[index].pose.inverse()
         into = there.rotation[:, 2]
         hold = self.placements[index].hold
-        places = there.apply(self.frames.rows[index, TILES, :3])
+        places = there.apply(self.frames.rows[index, STACK_ROWS.tiles, :3])
         return [hold.entry(place, into) for place in places]
 
     def section(self, index: int, finger: int) -> Section | None:

@@ -32,39 +32,12 @@ from hand_models.hand.model import HandModel
 from hand_models.rock import Hold, Plane
 from hand_models.sections import Face, PolylineSection, Section
 
-__all__ = ["CENTRED", "RockUnder", "Seating", "propose", "seating_given", "touches_seat"]
+__all__ = ["CENTRED_SEATING", "RockUnder", "Seating", "propose", "seating_given", "touches_seat"]
 
 Angle = TypeVar("Angle", float, Array)
 
 Place = tuple[float, float]
 """(x, z) of a hold's frame in H [m]."""
-
-PLACED: Final = 1e-6
-"""How near c₁ a settled proximal contact must be for a seat to count [m]."""
-
-LEVEL: Final = 1e-3
-"""How far a finger that lies flat may be out of the palm's plane [rad]."""
-
-SPACING: Final = 5e-4
-"""Spacing of the points of outlines that are made of smooth rock [m]."""
-
-LINES: Final = 5
-"""Lines along the palm on which the highest rock under it is looked for."""
-
-NEAR: Final = 5e-5
-"""The same on an outline, on which a contact moves in small steps [m]."""
-
-TRIES: Final = 24
-"""Places tried to bracket a seat."""
-
-PARTS: Final = 17
-"""Places tried at once within a bracket."""
-
-ABOUT: Final = np.array([-(2.0**-7), -(2.0**-11), 2.0**-11, 2.0**-7])
-"""Others, about where a straight line between its ends is zero, in parts of the bracket."""
-
-NARROW: Final = 1e-8
-"""Width of a bracket in the end [m]."""
 
 
 @dataclass(frozen=True)
@@ -101,15 +74,11 @@ def seating_given(pose: Pose) -> Seating:
     return Seating(Pose(position, rotation), "given")
 
 
-LIKE_HAND: Final = np.eye(3)
-"""Axes of a hold that is seated."""
-
-LIKE_HAND.setflags(write=False)
-
-CENTRED: Final = Seating(Pose(np.zeros(3), LIKE_HAND), "palm_on_rock_centred")
+CENTRED_SEATING: Final = Seating(Pose.identity(), "palm_on_rock_centred")
 """The palm on the rock, with the crest under its centre."""
 
-CENTRED.pose.position.setflags(write=False)
+CENTRED_SEATING.pose.position.setflags(write=False)
+CENTRED_SEATING.pose.rotation.setflags(write=False)
 
 
 def propose(
@@ -121,7 +90,7 @@ def propose(
 ) -> tuple[Seating, bool]:
     """Return where a hand would be seated, and whether c₁ is meant to be a contact there.
 
-    If it is, and the hand does not touch there (`touches_seat`), it is seated `CENTRED` instead.
+    If it is, and the hand does not touch there (`touches_seat`), it is seated centred instead.
 
     Parameters
     ----------
@@ -151,22 +120,22 @@ def propose(
         return _on_outline(hand, RockUnder(hand, hold, Pose.identity()), crest), False
     place = _smooth(hand, hold, crest) if circle is None else _round(hand, *circle, crest)
     if place is None:
-        return CENTRED, False
+        return CENTRED_SEATING, False
     possible = place[1] >= 0.0 if pinch else abs(place[0]) <= 0.5 * hand.palm_length
     if not possible:
-        return CENTRED, False
+        return CENTRED_SEATING, False
     return Seating(_shifted(*place), "pinch" if pinch else "palm_on_rock"), True
 
 
 def touches_seat(hand: HandModel, along: float) -> bool:
     """Return True if an inner finger's proximal tile touches where a seat meant it to."""
-    return abs(along - hand.seated_contact) < PLACED
+    return abs(along - hand.seated_contact) < 1e-6  # [m]
 
 
 def _shifted(x: float, z: float) -> Pose:
     position = np.array([x, 0.0, z])
     position.setflags(write=False)
-    return Pose(position, LIKE_HAND)
+    return Pose(position, CENTRED_SEATING.pose.rotation)
 
 
 def _round(hand: HandModel, depth: float, radius: float, crest: float | None) -> Place | None:
@@ -229,7 +198,8 @@ class RockUnder:
         y = hand.inner_place[1]
         across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
         self.under = self._cut((y, -y))
-        self._lines = self._cut(np.linspace(-across, across, LINES).tolist()) if self.under else []
+        # lines along the palm on which the highest rock under it is looked for
+        self._lines = self._cut(np.linspace(-across, across, 5).tolist()) if self.under else []
 
     def _cut(self, offsets: Sequence[float]) -> list[PolylineSection]:
         """Return the rock in planes along x, each so far beside the frame's origin."""
@@ -244,7 +214,7 @@ class RockUnder:
     def _outline(self, section: Section) -> PolylineSection | None:
         if isinstance(section, PolylineSection):
             return section
-        chains = section.outline(self._reach, SPACING)
+        chains = section.outline(self._reach, spacing=5e-4)
         pieces = [np.column_stack([chain.real, chain.imag]) for chain in chains]
         return PolylineSection(pieces) if pieces else None
 
@@ -264,7 +234,7 @@ def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seatin
     """Seat a hand on rock that is known by its outlines; centred if there is none under it."""
     under = rock.under
     if not under:
-        return CENTRED
+        return CENTRED_SEATING
     x, _, z = hand.inner_joint.tolist()
     model = hand.finger
     face = Face(model.tile_range[0], model.joint_spacing, model.tile_height)
@@ -289,17 +259,19 @@ def _on_outline(hand: HandModel, rock: RockUnder, crest: float | None) -> Seatin
 
     centre = resting(np.zeros(1), np.zeros(1))
     if np.isnan(centre).any():
-        return CENTRED
+        return CENTRED_SEATING
     level = centre[0] + [0.0, z + model.tile_height]
     lying = [section.rest(complex(x, z - level[1]), face, *limits) for section in under]
-    if all(rest is not None and rest.flat and abs(rest.angle) < LEVEL for rest in lying):
+    # in the palm's plane, but for a milliradian
+    if all(rest is not None and rest.flat and abs(rest.angle) < 1e-3 for rest in lying):
         return Seating(_shifted(*level.tolist()), "flat")
+    count = 24  # places tried to bracket a seat
     if crest is None:
         half = 0.5 * hand.palm_length
-        tries, rule = np.linspace(-half, half, TRIES), "palm_on_rock"
+        tries, rule = np.linspace(-half, half, count), "palm_on_rock"
         place = _first(miss, lambda along: resting(along, np.zeros(len(along))), tries)
     else:
-        tries, rule = np.linspace(0.0, hand.finger.joint_spacing, TRIES), "pinch"
+        tries, rule = np.linspace(0.0, hand.finger.joint_spacing, count), "pinch"
         place = _first(miss, lambda off: resting(np.full(len(off), crest), off), tries)
     if place is None:
         place, rule = centre[0], "palm_on_rock_centred"
@@ -314,16 +286,18 @@ def _first(
     turns = np.flatnonzero(np.abs(np.diff(np.sign(misses))) > 0.0)
     # how near zero a place in each bracket may be
     least = np.abs(np.clip(0.0, tries[turns], tries[turns + 1]))
+    # about where a straight line between its ends is zero, in parts of the bracket
+    parts = np.array([-(2.0**-7), -(2.0**-11), 2.0**-11, 2.0**-7])
     best: tuple[float, Array] | None = None
     for which in np.argsort(least, kind="stable").tolist():
         if best is not None and best[0] <= least[which]:
             break
         ends, off = (values[turns[which] : turns[which] + 2] for values in (tries, misses))
-        while ends[1] - ends[0] > NARROW:
+        while ends[1] - ends[0] > 1e-8:  # [m]
             # everywhere in the bracket, and about where a straight line has it
             line = ends[0] - off[0] * (ends[1] - ends[0]) / (off[1] - off[0])
-            about = np.clip(line + ABOUT * (ends[1] - ends[0]), *ends)
-            between = np.unique(np.concatenate([np.linspace(ends[0], ends[1], PARTS), about]))
+            about = np.clip(line + parts * (ends[1] - ends[0]), *ends)
+            between = np.unique(np.concatenate([np.linspace(ends[0], ends[1], 17), about]))
             missed = miss(places(between))
             inside = np.flatnonzero(np.abs(np.diff(np.sign(missed))) > 0.0)
             if not len(inside):
@@ -332,7 +306,8 @@ def _first(
         root = ends[:1] - off[:1] * (ends[1] - ends[0]) / (off[1] - off[0])
         there = places(root)
         # where the contact jumps over c₁ there is no root
-        met = np.abs(off).max() < NEAR or abs(miss(there)[0]) < NEAR
+        near = 5e-5  # [m] on an outline a contact moves in small steps
+        met = np.abs(off).max() < near or abs(miss(there)[0]) < near
         if met and (best is None or abs(root[0]) < best[0]):
             best = abs(root[0]), there[0]
     return None if best is None else best[1]

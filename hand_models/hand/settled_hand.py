@@ -6,25 +6,22 @@ import itertools
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array, BoundedStore, Indices
-from hand_models.finger import BALANCE, NONE, STOPS, Contact, FingerModel, SettledFinger
+from hand_models.finger import CONTACT_KINDS, JOINT_STOPS, Contact, FingerModel, SettledFinger
 from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
-from hand_models.hand.names import CLOSURES, CONTACTS, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
+from hand_models.hand.names import CONTACT_NAMES, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
 __all__ = ["HandPostures", "Palm", "SettledHand", "Tile"]
-
-KEPT: Final = 4
-"""Sets that are kept of one settled hand, for different tension limits."""
 
 
 class HandPostures(NamedTuple):
@@ -40,7 +37,7 @@ class HandPostures(NamedTuple):
         Of each contact: along its phalanx from the joint, above the tile's face [m], from the
         phalanx's normal [rad], and the share of the tile's spines on the rock.
     kinds, stops : ndarray of int8
-        Codes of `CONTACTS` and `hand_models.finger.STOPS`.
+        Codes of `CONTACT_NAMES` and `hand_models.finger.JOINT_STOPS`.
     """
 
     angles: Array
@@ -62,8 +59,8 @@ class HandPostures(NamedTuple):
                         angle,
                         (joint.real, joint.imag),
                         along,
-                        CONTACTS[kind],
-                        STOPS[stop],
+                        CONTACT_NAMES[kind],
+                        JOINT_STOPS[stop],
                         rise,
                         tilt,
                         share,
@@ -202,7 +199,7 @@ class SettledHand:
     stops: tuple[tuple[int, int, Array], ...]
     palm: Palm
     sets: BoundedStore[float, WrenchSpace] = field(
-        default_factory=lambda: BoundedStore("sets of hands", KEPT), init=False, repr=False
+        default_factory=lambda: BoundedStore("sets of hands", most=4), init=False, repr=False
     )
 
     @cached_property
@@ -212,10 +209,15 @@ class SettledHand:
 
     @cached_property
     def closures(self) -> tuple[str, ...]:
-        """Closure of each finger, one of `CLOSURES`."""
-        laid, hooked, wedged, curled, stopped, straight = CLOSURES
+        """Closure of each finger.
+
+        Laid with all of its tiles on the rock; hooked with some of them; wedged with bare phalanges
+        or its tip only; curled in the air between its springs and its tendon; stopped there with
+        all joints at limits; or held straight to cling with its nail.
+        """
         if self.grasp.fingernail:
-            return (straight,) * len(FINGERS)
+            return ("straight",) * len(FINGERS)
+        none, balance = CONTACT_KINDS.index("none"), JOINT_STOPS.index("balance")
         postures = self.postures
         words = []
         for shares, kinds, stops in zip(
@@ -225,11 +227,11 @@ class SettledHand:
             strict=True,
         ):
             if any(shares):
-                words.append(laid if all(shares) else hooked)
-            elif any(kind != NONE for kind in kinds):
-                words.append(wedged)
+                words.append("laid" if all(shares) else "hooked")
+            elif any(kind != none for kind in kinds):
+                words.append("wedged")
             else:
-                words.append(curled if BALANCE in stops else stopped)
+                words.append("curled" if balance in stops else "stopped")
         return tuple(words)
 
     @cached_property

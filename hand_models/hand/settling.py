@@ -9,20 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Sequence
-from typing import Final
 
 import numpy as np
 
 from hand_models.base import InvalidInputError, go_on
-from hand_models.finger import BALANCE, NONE, PHALANGES, ClosedPhalanx
+from hand_models.finger import CONTACT_KINDS, JOINT_STOPS, PHALANGES, ClosedPhalanx
 from hand_models.hand.closed_fingers import ClosedFingers, close_fingers
-from hand_models.hand.finger_frames import BASES
+from hand_models.hand.finger_frames import STACK_ROWS
 from hand_models.hand.hooked_nails import Nails, hook_nails
 from hand_models.hand.model import HandModel
 from hand_models.hand.names import FINGERS
 from hand_models.hand.placement import PlacedHands, Placement
 from hand_models.hand.seating import (
-    CENTRED,
+    CENTRED_SEATING,
     RockUnder,
     Seating,
     propose,
@@ -35,12 +34,6 @@ from hand_models.hand.tiles_on_rock import hand_tiles, palms_on_rock, tiles_on_r
 from hand_models.sections import FingerPlane, cut_of
 
 __all__ = ["seated", "settle_hands"]
-
-CLEAR: Final = 1e-6
-"""Clearance from rock of a hand that backs off [m]."""
-
-SEATED: Final = FINGERS.index("inner_left")
-"""The finger whose proximal contact seats a hand."""
 
 
 def settle_hands(
@@ -69,7 +62,8 @@ def settle_hands(
         if placements[i].hold_in_hand is None and lift < hand.back_off
     ]
     if backing:
-        seatings = [placed.seatings[i].off(lifts[i] + CLEAR) for i in backing]
+        clear = 1e-6  # [m] of the rock, of a hand that backs off
+        seatings = [placed.seatings[i].off(lifts[i] + clear) for i in backing]
         off = PlacedHands(hand, [placements[i] for i in backing], seatings)
         again, _ = _close(off, _laid(off, range(len(backing))), [tensions[i] for i in backing])
         for i, outcome in zip(backing, again, strict=True):
@@ -96,8 +90,8 @@ def _close(
                 f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g}",
                 field="grasp.closing_tension",
             )
-        elif min(gaps[BASES:]) < -hand.spine_travel:
-            errors[i] = _in_palm(hand, min(gaps[BASES:]))
+        elif min(gaps[STACK_ROWS.base_count :]) < -hand.spine_travel:
+            errors[i] = _in_palm(hand, min(gaps[STACK_ROWS.base_count :]))
     closed = close_fingers(placed, laid, tensions, errors)
     for i, error in _too_slack(placed, laid, closed, tensions):
         errors.setdefault(i, error)
@@ -157,7 +151,8 @@ def _too_slack(
     hand, placements = placed.hand, placed.placements
     stops, kinds = closed.postures.stops, closed.postures.kinds
     # fingers that are laid on the rock, or would be, without asking for the path to it
-    angles, closes = closed.postures.angles.copy(), (kinds != NONE).all(axis=2)
+    none = CONTACT_KINDS.index("none")
+    angles, closes = closed.postures.angles.copy(), (kinds != none).all(axis=2)
     for k in closed.alone:
         i, finger = divmod(k, len(FINGERS))
         phalanges = laid[i][finger]
@@ -180,7 +175,8 @@ def _too_slack(
                 field="grasp.closing_tension",
             ),
         )
-    idle = (kinds == NONE).all(axis=(1, 2)) & (stops == BALANCE).any(axis=(1, 2))
+    balance = JOINT_STOPS.index("balance")
+    idle = (kinds == none).all(axis=(1, 2)) & (stops == balance).any(axis=(1, 2))
     slack = [
         i
         for i in idle.nonzero()[0].tolist()
@@ -217,7 +213,7 @@ def _closed_by_more(
     again = PlacedHands(hand, which, [placed.seatings[i] for i in slack])
     refused: dict[int, InvalidInputError] = {}
     closed = close_fingers(again, [laid[i] for i in slack], [most] * len(slack), refused)
-    near = (closed.postures.kinds != NONE).any(axis=(1, 2))
+    near = (closed.postures.kinds != CONTACT_KINDS.index("none")).any(axis=(1, 2))
     near[[*refused]] = True
     for finger, each in closed.alone.items():
         k = finger // len(FINGERS)
@@ -244,10 +240,11 @@ def _seated(
     placed = PlacedHands(hand, placements, seatings)
     laid = _laid(placed, range(len(placements)))
     # where a finger's proximal contact is not where the seat meant it to be
-    off = [i for i in meant if not (on := laid[i][SEATED]) or not touches_seat(hand, on[0].along)]
+    inner = FINGERS.index("inner_left")
+    off = [i for i in meant if not (on := laid[i][inner]) or not touches_seat(hand, on[0].along)]
     if off:
         for i in off:
-            seatings[i] = CENTRED
+            seatings[i] = CENTRED_SEATING
         placed = PlacedHands(hand, placements, seatings)
         for i, fingers in zip(off, _laid(placed, off), strict=True):
             laid[i] = fingers

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,19 +19,6 @@ from hand_models.tile import Surface
 
 __all__ = ["NearbyClosure", "SpinyHand", "nearby_closures", "spiny_hand"]
 
-KEPT: Final = 256
-"""Settled hands that are kept, those used last: sixty-four stances of four hands."""
-
-SCANNED: Final = 150_000_000
-"""Bytes of triangles that hands are kept on: twenty scans of 200,000, or the largest mesh that a
-request may have. A hand itself takes 20 kB."""
-
-NEARBY: Final = 1e-4
-"""How far the rock is moved to see whether fingers end otherwise there [m]."""
-
-REFUSED: Final = "refused"
-"""Where a hand cannot be, in place of how its fingers end."""
-
 
 class NearbyClosure(NamedTuple):
     """Closures of a finger where the rock is a little elsewhere.
@@ -39,7 +26,7 @@ class NearbyClosure(NamedTuple):
     Attributes
     ----------
     closures : tuple of str
-        Ends other than where it is, of `hand_models.hand.CLOSURES`, and ``refused`` where the hand
+        Ends other than where it is, as of `SettledHand.closures`, and ``refused`` where the hand
         cannot be there.
     turn : float
         Largest change of the angle at which any of its joints ends [rad].
@@ -73,12 +60,15 @@ class SpinyHand(HandModel):
 
     def __init__(self, table: ParameterTable | None = None) -> None:
         super().__init__(table)
-        self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore("settled hands", KEPT)
+        most = 256  # hands: sixty-four stances of four; each takes 20 kB
+        # of triangles: twenty scans of 200,000, or the largest mesh that a request may have
+        most_bytes = 150_000_000
+        self.settled: BoundedStore[Hashable, SettledHand] = BoundedStore("settled hands", most)
         self.settled_scans: BoundedStore[Hashable, SettledHand] = BoundedStore(
-            "settled hands on scans", KEPT, _rock_bytes, SCANNED
+            "settled hands on scans", most, _rock_bytes, most_bytes
         )
         self.seated_best: BoundedStore[Hashable, SettledHand] = BoundedStore(
-            "best seats", KEPT, _rock_bytes, SCANNED
+            "best seats", most, _rock_bytes, most_bytes
         )
 
     def __reduce__(self) -> tuple[Callable[[ParameterTable], SpinyHand], tuple[ParameterTable]]:
@@ -122,9 +112,9 @@ class SpinyHand(HandModel):
     def settle_each(self, placements: Sequence[Placement]) -> list[SettledHand | InvalidInputError]:
         """Close hands like this one on their holds, all at once.
 
-        Of the hands that were settled last, `KEPT` are kept, and found again where hold, place,
+        Of the hands that were settled last, 256 are kept, and found again where hold, place,
         grasp and surface are the same: holds given by numbers where these are equal, meshes and
-        profiles where they are the same object (fewer if these have more than `SCANNED` bytes in
+        profiles where they are the same object (fewer if these have more than 150 MB in
         all). Their arrays are read-only.
 
         Parameters
@@ -177,7 +167,7 @@ def _rock_bytes(hands: Iterable[SettledHand]) -> int:
     return sum({hand.hold: hand.hold.nbytes for hand in hands}.values())
 
 
-def nearby_closures(settled: SettledHand, distance: float = NEARBY) -> tuple[NearbyClosure, ...]:
+def nearby_closures(settled: SettledHand, distance: float = 1e-4) -> tuple[NearbyClosure, ...]:
     """Return how each finger of a settled hand ends where the rock is a little elsewhere.
 
     Closed anew with the hold moved by a distance to and fro along each axis of H. Where two
@@ -204,7 +194,7 @@ def nearby_closures(settled: SettledHand, distance: float = NEARBY) -> tuple[Nea
         [Placement(settled.hold, settled.surface, settled.grasp, at) for at in places],
     )
     hands = [each for each in there if isinstance(each, SettledHand)]
-    refused = {REFUSED} if len(hands) < len(there) else set()
+    refused = {"refused"} if len(hands) < len(there) else set()
     bent = [np.diff(hand.postures.angles, prepend=0.0) for hand in (settled, *hands)]
     turns = np.abs(np.array(bent) - bent[0]).max(axis=(0, 2))
     return tuple(

@@ -7,7 +7,7 @@ rock and away from it,
     |(F_x, F_y, min(F_z, 0))| ≤ R,
 
 but not how hard it presses. As rows of a wrench space that is a polyhedron inside of it: ``d_k · F
-≤ R`` for the `HELD` directions d_k, longer than unit vectors by the little that puts the
+≤ R`` for the `HELD_DIRECTIONS` directions d_k, longer than unit vectors by the little that puts the
 polyhedron's corners on the ball.
 """
 
@@ -22,10 +22,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.parameters import ParameterTable
 
-__all__ = ["HELD", "Structure"]
-
-ELEVATION: Final = math.radians(40.7)
-"""Elevation of the second ring of directions, at which the polyhedron is closest to the ball."""
+__all__ = ["HELD_DIRECTIONS", "Structure"]
 
 
 def _held() -> Array:
@@ -37,7 +34,8 @@ def _held() -> Array:
     """
     turn = np.arange(8) * math.pi / 4.0
     half = turn + math.pi / 8.0
-    c, s, near = math.cos(ELEVATION), math.sin(ELEVATION), math.cos(math.pi / 8.0)
+    elevation = math.radians(40.7)  # at which the polyhedron is closest to the ball
+    c, s, near = math.cos(elevation), math.sin(elevation), math.cos(math.pi / 8.0)
     across = np.column_stack([np.cos(half), np.sin(half), np.zeros(8)])
     below = np.column_stack([c * np.cos(turn), c * np.sin(turn), np.full(8, -s)])
     corners = (
@@ -49,7 +47,7 @@ def _held() -> Array:
     return np.vstack([across, below, [[0.0, 0.0, -1.0]]]) / min(corners)
 
 
-HELD: Final = _held()
+HELD_DIRECTIONS: Final = _held()
 """Directions (17, 3) in H whose largest product with a hand's force is at least what the hand
 holds, and at most 1.12 times as much; 1.04 times straight along x or y."""
 

@@ -23,10 +23,7 @@ from hand_models.finger import PHALANGES, FingerModel
 from hand_models.hand.names import FINGERS, NAIL
 from hand_models.hand.settled_hand import SettledHand
 
-__all__ = ["TILES", "ClosingSequence", "ClosingStage", "closing_sequence", "resting_tensions"]
-
-TILES = "tiles"
-"""Name of the last stage."""
+__all__ = ["ClosingSequence", "ClosingStage", "closing_sequence", "resting_tensions"]
 
 
 class ClosingStage(NamedTuple):
@@ -57,7 +54,7 @@ class ClosingSequence(NamedTuple):
         Whether nail and joints move one after the other, as Section 3.2 wants it: each starts no
         sooner than the one before it ends.
     closure : str
-        How it has ended, one of `hand_models.hand.CLOSURES`.
+        How it has ended, as of `SettledHand.closures`.
     """
 
     finger: str
@@ -109,7 +106,7 @@ def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
         for phalanx, start, end in zip(PHALANGES, starts, ends, strict=True):
             start = max(0.0, start)
             stages.append(ClosingStage(phalanx, start, max(start, end)))
-        stages.append(ClosingStage(TILES, 0.0, settled.closing_tension))
+        stages.append(ClosingStage("tiles", 0.0, settled.closing_tension))
         ordered = all(
             later.starts >= earlier.ends for earlier, later in itertools.pairwise(stages[:-1])
         )

@@ -6,27 +6,17 @@ For palms it finds which of their tiles are engaged, and what these bear togethe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.finger import FACE, PHALANGES
+from hand_models.finger import CONTACT_KINDS, PHALANGES
 from hand_models.hand.closed_fingers import ClosedFingers
-from hand_models.hand.finger_frames import (
-    AXES,
-    BASES,
-    COLUMNS,
-    ENGAGEMENT,
-    KIND,
-    NORMAL,
-    OUTER,
-    POSITION,
-    SHEAR,
-)
+from hand_models.hand.finger_frames import OUTER_FINGERS, STACK_ROWS, TILE_COLUMNS
 from hand_models.hand.hooked_nails import Nails
-from hand_models.hand.names import CONTACTS, FINGERS, NAIL
+from hand_models.hand.names import CONTACT_NAMES, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
 from hand_models.hand.settled_hand import Palm, Tile
 from hand_models.tile import engaged_share
@@ -36,32 +26,26 @@ __all__ = ["HandTiles", "hand_tiles", "palms_on_rock", "tiles_on_rock"]
 
 def _names() -> list[tuple[str, str]]:
     """Return finger and phalanx of each tile as they are worked out: base tiles, others, nails."""
-    bases = [(finger, "base") for finger in FINGERS[OUTER]]
+    bases = [(finger, "base") for finger in FINGERS[OUTER_FINGERS]]
     bodies = [(finger, phalanx) for finger in FINGERS for phalanx in PHALANGES]
     return [*bases, *bodies, *[(finger, NAIL) for finger in FINGERS]]
 
 
-NAMES: Final = _names()
+TILE_NAMES: Final = _names()
 """Finger and phalanx of each tile as they are worked out: first the base tiles, last the nails."""
 
 
-def _order(*, nails: bool) -> Indices:
-    tiles = len(NAMES) if nails else len(NAMES) - len(FINGERS)
-    # finger by finger, and of each the base, the phalanges, the nail
-    return np.array(sorted(range(tiles), key=lambda i: FINGERS.index(NAMES[i][0])))
+@cache
+def _order(*, nails: bool) -> tuple[Indices, Indices]:
+    """Return the order of the tiles of hands that cling or do not, and the finger of each.
 
-
-ORDER: Final = {nails: _order(nails=nails) for nails in (False, True)}
-"""Finger by finger, and of each from the base outward, the tiles of hands that cling or do not."""
-
-FINGER_OF: Final = {
-    nails: np.array([FINGERS.index(NAMES[i][0]) for i in order.tolist()])
-    for nails, order in ORDER.items()
-}
-"""Index of each tile's finger, of hands that cling or do not."""
-
-for finger_of in FINGER_OF.values():
+    Finger by finger, and of each the base, the phalanges, the nail.
+    """
+    tiles = len(TILE_NAMES) if nails else len(TILE_NAMES) - len(FINGERS)
+    order = sorted(range(tiles), key=lambda i: FINGERS.index(TILE_NAMES[i][0]))
+    finger_of = np.array([FINGERS.index(TILE_NAMES[i][0]) for i in order])
     finger_of.setflags(write=False)
+    return np.array(order), finger_of
 
 
 class HandTiles(NamedTuple):
@@ -87,31 +71,32 @@ def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence
 
     Returns
     -------
-    ndarray, shape (n, 14, `COLUMNS`)
+    ndarray, shape (n, 14, 18)
     """
     count, frames = len(tensions), placed.frames
     # each phalanx's contact, axis of shear and axis of normal load, from the finger's plane to H
     places = (closed.places @ frames.planes).reshape((*frames.across.shape[:3], 9))
     bodies = np.concatenate([places, frames.across, closed.tiles], axis=3)
     bases = _base_tiles(placed, tensions)
-    return np.concatenate([bases, bodies.reshape(count, -1, COLUMNS)], axis=1)
+    return np.concatenate([bases, bodies.reshape(count, -1, TILE_COLUMNS.total)], axis=1)
 
 
 def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
     """Return the base tiles, which carry shear where rock is within the spines' travel."""
     model, tiles = placed.hand.finger, placed.frames.base_tiles
-    depths = np.array(placed.gaps)[:, :BASES]
+    depths = np.array(placed.gaps)[:, : STACK_ROWS.base_count]
     shares = engaged_share(np.abs(depths), placed.hand.spine_travel)
     shares[[placement.grasp.fingernail for placement in placed.placements]] = 0.0
     engaged = shares.nonzero()
     if not len(engaged[0]):
         return tiles
+    column = TILE_COLUMNS
     own, gain = tiles[engaged], model.shear_gain[0]
-    own[:, POSITION.stop - 1] += depths[engaged]
-    own[:, SHEAR.start] = (model.base_engagement - gain) * np.array(tensions)[engaged[0]]
-    own[:, SHEAR.stop - 1] = gain
-    own[:, SHEAR] *= shares[engaged][:, None]
-    own[:, ENGAGEMENT], own[:, KIND] = shares[engaged], FACE
+    own[:, column.position.stop - 1] += depths[engaged]
+    own[:, column.shear.start] = (model.base_engagement - gain) * np.array(tensions)[engaged[0]]
+    own[:, column.shear.stop - 1] = gain
+    own[:, column.shear] *= shares[engaged][:, None]
+    own[:, column.engagement], own[:, column.kind] = shares[engaged], CONTACT_KINDS.index("face")
     tiles = tiles.copy()
     tiles[engaged] = own
     return tiles
@@ -119,11 +104,11 @@ def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
 
 def hand_tiles(tiles: Array, nails: Mapping[int, Nails]) -> list[HandTiles]:
     """Return the tiles of each hand, arrays read-only; of those that cling, their nails too."""
-    gripping = tiles.take(ORDER[False], axis=1)
+    gripping = tiles.take(_order(nails=False)[0], axis=1)
     made = _each_hand(gripping, nails=False)
     for i, each in nails.items():
         if len(each.tiles):
-            clinging = np.concatenate([tiles[i], each.tiles]).take(ORDER[True], axis=0)
+            clinging = np.concatenate([tiles[i], each.tiles]).take(_order(nails=True)[0], axis=0)
             made[i : i + 1] = _each_hand(clinging[None], nails=True)
     return made
 
@@ -132,15 +117,16 @@ def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
     """Return the tiles of hands that all cling, or all do not, from their numbers."""
     count, tiles, _ = numbers.shape
     numbers.setflags(write=False)
-    kinds = numbers[..., KIND].astype(np.int8)
+    column = TILE_COLUMNS
+    kinds = numbers[..., column.kind].astype(np.int8)
     codes = kinds.tobytes()
-    axes = numbers[..., AXES].reshape(count, tiles, 3, 3)
-    loads = numbers[..., SHEAR.start : NORMAL.stop].reshape(count, tiles, 2, 2)
+    axes = numbers[..., column.axes].reshape(count, tiles, 3, 3)
+    loads = numbers[..., column.shear.start : column.normal.stop].reshape(count, tiles, 2, 2)
     return [
-        HandTiles(_named(codes[i : i + tiles], nails), FINGER_OF[nails], *of_hand)
+        HandTiles(_named(codes[i : i + tiles], nails), _order(nails=nails)[1], *of_hand)
         for i, *of_hand in zip(
             range(0, count * tiles, tiles),
-            *(numbers[..., POSITION], axes, loads, numbers[..., ENGAGEMENT]),
+            *(numbers[..., column.position], axes, loads, numbers[..., column.engagement]),
             strict=True,
         )
     ]
@@ -149,9 +135,9 @@ def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
 @lru_cache(maxsize=4096)
 def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
     """Return tiles from the codes of their contacts."""
-    names = [NAMES[i] for i in ORDER[nails].tolist()]
+    names = [TILE_NAMES[i] for i in _order(nails=nails)[0].tolist()]
     return tuple(
-        Tile(finger, part, CONTACTS[kind])
+        Tile(finger, part, CONTACT_NAMES[kind])
         for (finger, part), kind in zip(names, kinds, strict=True)
     )
 
@@ -159,7 +145,7 @@ def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
 def palms_on_rock(placed: PlacedHands) -> list[Palm]:
     """Return the palm of each hand; a tile is engaged with rock within the spines' travel."""
     hand = placed.hand
-    gaps = np.array(placed.gaps)[:, BASES:]
+    gaps = np.array(placed.gaps)[:, STACK_ROWS.base_count :]
     shares = engaged_share(gaps, hand.spine_travel)
     gaps.setflags(write=False)
     places = np.zeros((len(gaps), 3))

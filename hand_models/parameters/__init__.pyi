@@ -6,7 +6,7 @@ from .draws import (
     own_draw as own_draw,
 )
 from .own import (
-    LARGEST as LARGEST,
+    LARGEST_BY_UNIT as LARGEST_BY_UNIT,
     load_own_hand as load_own_hand,
     own_hand as own_hand,
     own_surfaces as own_surfaces,

@@ -34,19 +34,10 @@ from hand_models.parameters.tables import (
 
 __all__ = ["Draw", "bundled_draws", "draws_of", "even_quantiles", "own_draw"]
 
-LEAST_SETS: Final = 30
-"""Least number of sets; fewer leave a 5 % quantile too uncertain."""
-
-FITTED: Final = "sandpaper-36"
+FITTED_SURFACE: Final = "sandpaper-36"
 """The surface on which a set's tile was fitted; the strength on it is the set's own."""
 
-RATIO: Final = "rock"
-"""The surface that is so many times as strong as the fitted one."""
-
-OF_FIT: Final = ("misfit", "valley")
-"""Entries of the section ``fit``: of each set how far it is from the data, and where it lies."""
-
-PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
+ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
 """An entry, or one number of an entry that is a list."""
 
 
@@ -164,7 +155,7 @@ def even_quantiles(count: int, ranges: int) -> Array:
 def _ranged() -> list[str]:
     """Return the surfaces whose strength is drawn from a range."""
     presets = surface_table().sections
-    return [name for name in presets if name not in ("bounds", "defaults", FITTED)]
+    return [name for name in presets if name not in ("bounds", "defaults", FITTED_SURFACE)]
 
 
 def _fitted(sets: ParameterTable) -> Iterator[tuple[str, str, Quantity]]:
@@ -174,8 +165,9 @@ def _fitted(sets: ParameterTable) -> Iterator[tuple[str, str, Quantity]]:
 
 def _checked_count(sets: ParameterTable) -> int:
     """Return how many sets there are."""
-    counts = {f"fit.{name}": len(sets.vector("fit", name)) for name in OF_FIT}
-    sets.vector(FITTED, "shear_limit")
+    # of each set how far it is from the data, and where it lies
+    counts = {f"fit.{name}": len(sets.vector("fit", name)) for name in ("misfit", "valley")}
+    sets.vector(FITTED_SURFACE, "shear_limit")
     for section, name, quantity in _fitted(sets):
         _check_entry(section, name, quantity)
         counts[f"{section}.{name}"] = len(sets.vector(section, name))
@@ -185,8 +177,9 @@ def _checked_count(sets: ParameterTable) -> int:
             raise InvalidInputError(
                 f"must have a number for each of the {count} sets, got {other}", field=field
             )
-    if count < LEAST_SETS:
-        raise InvalidInputError(f"at least {LEAST_SETS} sets are needed, got {count}", field="fit")
+    least = 30  # fewer leave a 5 % quantile too uncertain
+    if count < least:
+        raise InvalidInputError(f"at least {least} sets are needed, got {count}", field="fit")
     for k, misfit in enumerate(sets.vector("fit", "misfit")):
         if not 0.0 <= misfit <= 1.0:
             raise InvalidInputError(
@@ -201,9 +194,9 @@ def _checked_count(sets: ParameterTable) -> int:
 def _check_entry(section: str, name: str, quantity: Quantity) -> None:
     """Refuse a list over the sets of what is no number of a hand, or of a fitted tile."""
     field, hand, surfaces = f"{section}.{name}", hand_table().sections, surface_table().sections
-    of_tile = {**surfaces["defaults"], **surfaces[FITTED]}
-    entries = of_tile if section in ("defaults", FITTED) else hand.get(section, {})
-    found = PATH.fullmatch(name)
+    of_tile = {**surfaces["defaults"], **surfaces[FITTED_SURFACE]}
+    entries = of_tile if section in ("defaults", FITTED_SURFACE) else hand.get(section, {})
+    found = ENTRY_PATH.fullmatch(name)
     entry, index = (name, None) if found is None else (found[1], found[2])
     if entry not in entries:
         raise InvalidInputError("no number of hand.toml or of a tile's law", field=field)
@@ -231,7 +224,7 @@ def _hand_of(
 
     for section, name, quantity in _fitted(sets):
         if section in hand_table().sections:
-            path = PATH.fullmatch(name)
+            path = ENTRY_PATH.fullmatch(name)
             assert path is not None  # of a checked table
             value = sets.vector(section, name)[k]
             change(section, path[1], value, quantity, int(path[2] or 0))
@@ -258,12 +251,12 @@ def _strengths(sets: ParameterTable, k: int, quantiles: Array) -> ParameterTable
         if section in table.sections:
             value = sets.vector(section, name)[k]
             found.setdefault(section, {})[name] = structs.replace(quantity, value=value)
-    tile = sets.vector(FITTED, "shear_limit")[k]
+    tile = sets.vector(FITTED_SURFACE, "shear_limit")[k]
     least, most = sets.vector("ranges", "rock_ratio")
     floor = sets.scalar("ranges", "least_strength")
     for name, u in zip(_ranged(), quantiles.tolist(), strict=True):
         usual = table.quantity(name, "shear_limit")
-        if name == RATIO:
+        if name == "rock":  # so many times as strong as the fitted one
             strength, source = tile * (least + (most - least) * u), "ranges.rock_ratio"
         else:
             scatter = table.scalar(name, "scatter_ratio")

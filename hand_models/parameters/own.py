@@ -27,16 +27,8 @@ from hand_models.parameters.tables import (
 
 __all__ = ["load_own_hand", "own_hand", "own_surfaces"]
 
-LARGEST: Final = {"m": 1.0, "rad": 2.0 * math.pi}
+LARGEST_BY_UNIT: Final = {"m": 1.0, "rad": 2.0 * math.pi}
 """Largest number of a hand, by unit; larger ones are in millimetres or degrees."""
-
-LARGEST_FACTOR: Final = 1e4
-"""How many times the bundled number, or one, any other may be: beyond, arithmetic loses its
-digits."""
-
-
-ONE_FOR_ALL: Final = frozenset({"tile.contact_stiffness"})
-"""Lists that may be given as one number, which then stands for all of them."""
 
 
 def load_own_hand(path: Path) -> ParameterTable:
@@ -131,7 +123,7 @@ def _known(given: str, known: Iterable[str]) -> str:
 
 def _of_all(own: Quantity, bundled: Quantity, field: str) -> Quantity:
     """Return a list of one number for all, where that is meant by it."""
-    if field not in ONE_FOR_ALL or isinstance(own.value, list):
+    if field != "tile.contact_stiffness" or isinstance(own.value, list):
         return own
     assert isinstance(bundled.value, list)
     return structs.replace(own, value=[own.value] * len(bundled.value))
@@ -151,7 +143,9 @@ def _check(own: Quantity, bundled: Quantity, field: str) -> None:
         )
     # no bundled length is zero, but a coordinate may be, and then has either sign
     coordinate = own.unit == "m" and usual.min() == 0.0
-    largest = LARGEST.get(own.unit, LARGEST_FACTOR * max(float(np.abs(usual).max()), 1.0))
+    # others than lengths and angles up to so many times the bundled one: then digits are lost
+    beyond = 1e4 * max(float(np.abs(usual).max()), 1.0)
+    largest = LARGEST_BY_UNIT.get(own.unit, beyond)
     least = 0.0 if usual.min() >= 0.0 and not coordinate else -largest
     if not (least <= got.min() and got.max() <= largest):
         raise InvalidInputError(

@@ -38,17 +38,6 @@ Source = Literal["paper", "measured", "calibrated", "assumed"]
 Units = Mapping[str, Mapping[str, str]]
 """Units by section and name."""
 
-ENTRY: Final = "{ value, unit, source, note (optional) }"
-"""Form of an entry."""
-
-VALID: Final[Mapping[str, str]] = {
-    "value": "a number or a list of numbers",
-    "unit": "text",
-    "source": f"one of {', '.join(get_args(Source))}",
-    "note": "text",
-}
-"""Valid values of each part of an entry."""
-
 LONGEST_QUOTE: Final = 200
 """Characters of a complaint about an entry: it may quote it."""
 
@@ -239,14 +228,21 @@ def _quantity(raw: Any, field: str, unit: str | None) -> Quantity:
 
 def _refusal(raw: Any, complaint: str, field: str) -> InvalidInputError:
     """Return the error of an entry that is no quantity, from msgspec's complaint about it."""
-    for name, valid in VALID.items():
+    valid_parts = {
+        "value": "a number or a list of numbers",
+        "unit": "text",
+        "source": f"one of {', '.join(get_args(Source))}",
+        "note": "text",
+    }
+    for name, valid in valid_parts.items():
         # msgspec ends in the place of what is wrong
         if isinstance(raw, Mapping) and f"`$.{name}" in complaint:
             got = repr(raw[name])
             got = got if len(got) <= LONGEST_QUOTE else f"{got[:LONGEST_QUOTE]} …"
             return InvalidInputError(f"must be {valid}, got {got}", field=f"{field}.{name}")
+    form = "{ value, unit, source, note (optional) }"
     said = shorten(complaint.replace("`", ""), LONGEST_QUOTE, placeholder=" …")
-    return InvalidInputError(f"{said[:1].lower()}{said[1:]}; an entry is {ENTRY}", field=field)
+    return InvalidInputError(f"{said[:1].lower()}{said[1:]}; an entry is {form}", field=field)
 
 
 @cache

@@ -6,7 +6,7 @@ one coordinate, seen from the side from which the rock is, and joined to it by c
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,6 @@ from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import edges_of
 
 __all__ = ["FilledCells", "filled_cells"]
-
-FEW: Final = 2
-"""Levels that cliffs of a drawn shape end at; those of rough rock end at more."""
 
 
 class FilledCells(NamedTuple):
@@ -67,7 +64,8 @@ def filled_cells(triangles: Triangles) -> list[FilledCells]:
         for k in np.flatnonzero((counts >= least) & (ways > 0) & (cliffs >= share * ways)):
             beyond = np.unique(ends[leaves & (ends == k).any(axis=1)])
             floor = (level[faces] == k).all(axis=1)
-            if len(beyond) - 1 > FEW and _seen_alike(vertices, faces, axis, floor):
+            # cliffs of a drawn shape end at two levels, those of rough rock at more
+            if len(beyond) - 1 > 2 and _seen_alike(vertices, faces, axis, floor):
                 found.append(FilledCells(axis, float(values[k]), int(counts[k])))
     return found
 

@@ -17,20 +17,14 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError, Pose, check_positive
 from hand_models.parameters import scan_table
 from hand_models.rock.surface import Triangles, drawn_out, grid
-from hand_models.sections import PARALLEL, Section, Swept, cut_of, entry_distances
+from hand_models.sections import SECTION_SETTINGS, Section, Swept, cut_of, entry_distances
 
 __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]
 
 Angle = TypeVar("Angle", float, Array)
 
-LARGEST: Final = 1e6
-"""Size of a hold above which its curve is lost in rounding [m]."""
-
-STEPS: Final = 28
+CURVE_PIECES: Final = 28
 """Pieces of a curve in a hold's surface."""
-
-RAYS: Final = 41
-"""Rays along each side of a region, of rock whose surface is known by rays alone."""
 
 
 class Hold(ABC):
@@ -100,7 +94,7 @@ class Hold(ABC):
         Triangles
             Counterclockwise from outside; none where there is no rock.
         """
-        x, y = np.meshgrid(*np.linspace(low[:2], high[:2], RAYS).T)
+        x, y = np.meshgrid(*np.linspace(low[:2], high[:2], 41).T)
         begins = [(*place, low[2]) for place in zip(x.flat, y.flat, strict=True)]
         z = low[2] + np.array([self.entry(place, (0.0, 0.0, 1.0)) for place in begins])
         found = grid(np.stack([x, y, z.reshape(x.shape)], axis=2))
@@ -184,7 +178,7 @@ class SweptHold(Hold):
         over = min(max(math.atan2(aside, -below), -end), end)
         size = shape.radius / float(stretch.max())
         half = min(math.pi, reach / size) if size else 0.0
-        count = STEPS + 1 if size else 1
+        count = CURVE_PIECES + 1 if size else 1
         t = np.linspace(max(over - half, -end), min(over + half, end), count)
         circle = shape.radius * np.column_stack([np.sin(t), -np.cos(t)])
         arc: Array = circle / stretch + (0.0, shape.depth)
@@ -204,8 +198,8 @@ class SweptHold(Hold):
         pole = pole / length if length > 0.0 else np.array([0.0, 0.0, -1.0])
         aside = np.linalg.svd(pole[None])[2][1]
         across = np.array([aside, np.cross(pole, aside)])
-        t = np.linspace(0.0, min(math.pi, reach / float(semi_axes.min())), STEPS + 1)
-        turn = np.linspace(0.0, 2.0 * math.pi, STEPS + 1)
+        t = np.linspace(0.0, min(math.pi, reach / float(semi_axes.min())), CURVE_PIECES + 1)
+        turn = np.linspace(0.0, 2.0 * math.pi, CURVE_PIECES + 1)
         around = np.column_stack([np.cos(turn), np.sin(turn)]) @ across
         unit = np.cos(t)[:, None, None] * pole + np.sin(t)[:, None, None] * around
         return grid(centre + unit * semi_axes)
@@ -225,7 +219,7 @@ class Plane(SweptHold):
 
     @property
     def swept(self) -> Swept:
-        return Swept(0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, PARALLEL)
+        return Swept(0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, SECTION_SETTINGS.parallel_sine)
 
 
 @dataclass(frozen=True)
@@ -242,7 +236,7 @@ class Cylinder(SweptHold):
     shape = "cylinder"
 
     def __post_init__(self) -> None:
-        check_positive(self.diameter, "m", "diameter", LARGEST)
+        _check_size(self.diameter, "diameter")
 
     @property
     def swept(self) -> Swept:
@@ -270,7 +264,7 @@ class Edge(SweptHold):
     shape = "edge"
 
     def __post_init__(self) -> None:
-        check_positive(self.fillet_radius, "m", "fillet_radius", LARGEST)
+        _check_size(self.fillet_radius, "fillet_radius")
         if not 0.0 < self.angle < math.pi:
             raise InvalidInputError(f"must be in (0, pi) rad, got {self.angle:g}", field="angle")
 
@@ -297,7 +291,7 @@ class Sphere(SweptHold):
     shape = "sphere"
 
     def __post_init__(self) -> None:
-        check_positive(self.diameter, "m", "diameter", LARGEST)
+        _check_size(self.diameter, "diameter")
 
     @property
     def swept(self) -> Swept:
@@ -328,7 +322,7 @@ class Ellipsoid(SweptHold):
                 f"three numbers are needed, got {len(self.semi_axes)}", field="semi_axes"
             )
         for i, value in enumerate(self.semi_axes):
-            check_positive(value, "m", f"semi_axes[{i}]", LARGEST)
+            _check_size(value, f"semi_axes[{i}]")
 
     @property
     def swept(self) -> Swept:
@@ -343,3 +337,8 @@ class Ellipsoid(SweptHold):
         x, z = a * shrink * np.sin(angle), -c * shrink * np.cos(angle)
         length = np.hypot(x, z)
         return a * shrink * x / length, c + c * shrink * z / length
+
+
+def _check_size(value: float, field: str) -> None:
+    """Refuse a size [m] that is not positive, or above which a hold's curve is lost in rounding."""
+    check_positive(value, "m", field, 1e6)

@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, InvalidInputError, Pose, go_on
+from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError, Pose, go_on
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
 from hand_models.rock.smoothing import OutlinedHold
@@ -33,12 +32,6 @@ from hand_models.rock.triangles import (
 )
 
 __all__ = ["Mesh"]
-
-RAYS: Final = 5
-"""Rays along each side of the palm that look which way triangles face."""
-
-EDGE: Final = 1e-9
-"""Tolerance of a ray that passes beside a triangle, relative to its size."""
 
 
 class Mesh(OutlinedHold):
@@ -134,10 +127,11 @@ class Mesh(OutlinedHold):
                 f"the rock under the palm; at most {near:g} m is possible",
                 field="vertices",
             )
+        rays = 5  # along each side of the palm
         met = [
             self._first_side(there.apply((x, y, 0.0)), there.rotation[:, 2])
-            for x in np.linspace(-view[0], view[0], RAYS)
-            for y in np.linspace(-view[1], view[1], RAYS)
+            for x in np.linspace(-view[0], view[0], rays)
+            for y in np.linspace(-view[1], view[1], rays)
         ]
         if sum(met) < 0:
             raise InvalidInputError(
@@ -185,7 +179,8 @@ class Mesh(OutlinedHold):
         a, b, c = corners.transpose(1, 0, 2)
         weights = np.stack([_area(b, c), _area(c, a), _area(a, b)])
         area = weights.sum(axis=0)
-        slack = EDGE * np.abs(area)
+        # a ray may pass beside a triangle by rounding
+        slack = BASE_TOLERANCES.relative * np.abs(area)
         met = ((weights >= -slack).all(axis=0) | (weights <= slack).all(axis=0)) & (area != 0.0)
         depth = np.stack([a[:, 2], b[:, 2], c[:, 2]])
         where = (weights * depth).sum(axis=0)[met] / area[met]

@@ -20,19 +20,6 @@ __all__ = ["MESH_ENDINGS", "read_mesh", "read_vertices"]
 
 MESH_ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
 
-SIZES: Final = {"short": 2, "int": 4, "uint": 4, "float": 4, "double": 8, "ushort": 2} | {
-    f"{kind}{bits}": bits // 8 for kind in ("int", "uint", "float") for bits in (8, 16, 32, 64)
-}
-"""Bytes of a PLY's types; those of one byte, and what is no type, are left out."""
-
-RELATIVE: Final = re.compile(
-    rb"^[ \t]*f[ \t](?:[^\n]*[ \t])?(?:-|0+(?:[ \t/\r\n]|$))", re.MULTILINE
-)
-"""A face of an OBJ one of whose vertices is not counted from the first, which is 1."""
-
-MOST_PROPERTIES: Final = 1000
-"""Properties of a PLY's elements: reading takes as long as the square of their number."""
-
 
 def read_mesh(path: Path) -> tuple[Array, Indices]:
     """Return vertices [m] and faces of an STL, PLY, OBJ or OFF file.
@@ -122,7 +109,9 @@ def _absolute(content: bytes) -> bytes:
 
     The loader would count back from the last of all.
     """
-    if RELATIVE.search(content) is None:
+    # a face one of whose vertices is not counted from the first, which is 1
+    relative = rb"^[ \t]*f[ \t](?:[^\n]*[ \t])?(?:-|0+(?:[ \t/\r\n]|$))"
+    if re.search(relative, content, re.MULTILINE) is None:
         return content
     lines, count = content.splitlines(), 0
     for i, line in enumerate(lines):
@@ -147,7 +136,11 @@ def _check_counts(content: bytes) -> None:
     ascii_ = ["format", "ascii"] in [line[:2] for line in words]
     counts: list[int] = []
     least: list[int] = []
-    properties = 0
+    properties, most_properties = 0, 1000  # reading takes as long as the square of their number
+    # bytes of the types; those of one byte, and what is no type, are left out
+    sizes = {"short": 2, "int": 4, "uint": 4, "float": 4, "double": 8, "ushort": 2} | {
+        f"{kind}{bits}": bits // 8 for kind in ("int", "uint", "float") for bits in (8, 16, 32, 64)
+    }
     for line in words:
         if line[:1] == ["element"] and len(line) == 3:
             counts.append(int(line[2]))
@@ -156,10 +149,10 @@ def _check_counts(content: bytes) -> None:
             properties += 1
             # of a list at least the number that says how long it is; in a text a digit and a blank
             kind = line[2] if line[1] == "list" and len(line) > 2 else line[1]
-            least[-1] += 2 if ascii_ else SIZES.get(kind, 1)
+            least[-1] += 2 if ascii_ else sizes.get(kind, 1)
     needed = sum(count * max(size, 1) for count, size in zip(counts, least, strict=True))
-    if not end or properties > MOST_PROPERTIES or min(counts, default=0) < 0:
-        raise ValueError(f"no header of a PLY, or more than {MOST_PROPERTIES} properties")
+    if not end or properties > most_properties or min(counts, default=0) < 0:
+        raise ValueError(f"no header of a PLY, or more than {most_properties} properties")
     if needed > len(rest) + 1:  # a text may end without a blank
         raise ValueError(
             f"its header names at least {needed:,} bytes, and {len(rest):,} are there: cut short?"

@@ -22,15 +22,12 @@ from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.rock.smoothing import OutlinedHold, Scale
 from hand_models.rock.surface import Triangles, drawn_out
-from hand_models.sections import PARALLEL
+from hand_models.sections import SECTION_SETTINGS
 
-__all__ = ["STRIPS", "Profile"]
+__all__ = ["STRIP_NAMES", "Profile"]
 
-STRIPS: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
+STRIP_NAMES: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
 """Names of the strips from +y to −y: those of the fingers over them."""
-
-MOST_POINTS: Final = 5000
-"""Points of an outline, at most."""
 
 
 class Profile(OutlinedHold):
@@ -39,8 +36,8 @@ class Profile(OutlinedHold):
     Parameters
     ----------
     points : array_like, shape (n, 2), or mapping of str to array_like
-        The outline (x, z) of all rock, or one for each of `STRIPS`. Rock is on the side of larger
-        z: on the left going from the end with smaller x to that with larger x [m].
+        The outline (x, z) of all rock, or one for each of `STRIP_NAMES`. Rock is on the side of
+        larger z: on the left going from the end with smaller x to that with larger x [m].
     hand : ParameterTable, optional
         As of `OutlinedHold`; the strips lie under its fingers.
 
@@ -62,14 +59,14 @@ class Profile(OutlinedHold):
         super().__init__(hand)
         largest = scan_table().scalar("scan", "largest_outline")
         if isinstance(points, Mapping):
-            if set(points) != set(STRIPS):
+            if set(points) != set(STRIP_NAMES):
                 raise InvalidInputError(
-                    f"one outline for each of {', '.join(STRIPS)} is needed, "
+                    f"one outline for each of {', '.join(STRIP_NAMES)} is needed, "
                     f"got {', '.join(map(str, points)) or 'none'}",
                     field="profiles",
                 )
             self.outlines = tuple(
-                _checked(points[name], f"profiles.{name}", largest) for name in STRIPS
+                _checked(points[name], f"profiles.{name}", largest) for name in STRIP_NAMES
             )
         else:
             self.outlines = (_checked(points, "points", largest),)
@@ -106,7 +103,7 @@ class Profile(OutlinedHold):
         M = np.array([[s[0], t[0]], [s[2], t[2]]])
         outline = self._outline(float(o[1]))
         determinant = float(np.linalg.det(M))
-        if abs(determinant) < PARALLEL:
+        if abs(determinant) < SECTION_SETTINGS.parallel_sine:
             return self._along_axis(o, s, t)
         pieces = np.linalg.solve(M, (outline - o[[0, 2]]).T).T
         return [pieces if determinant > 0.0 else pieces[::-1]]
@@ -125,7 +122,7 @@ class Profile(OutlinedHold):
         p, d = np.asarray(point, dtype=float), np.asarray(direction, dtype=float)
         outline = self._outline(float(p[1]))
         ray = d[[0, 2]]
-        if math.hypot(*ray) < PARALLEL:
+        if math.hypot(*ray) < SECTION_SETTINGS.parallel_sine:
             return math.inf
         start, step = outline[:-1] - p[[0, 2]], np.diff(outline, axis=0)
         # start + u step = λ ray
@@ -149,9 +146,10 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
         outline = np.asarray(points, dtype=float)
     except (TypeError, ValueError):
         raise InvalidInputError("two numbers each are needed", field=field) from None
-    if outline.ndim != 2 or outline.shape[1:] != (2,) or not 2 <= len(outline) <= MOST_POINTS:
+    most = 5000
+    if outline.ndim != 2 or outline.shape[1:] != (2,) or not 2 <= len(outline) <= most:
         raise InvalidInputError(
-            f"2 to {MOST_POINTS} points [x, z] are needed, got shape {outline.shape}", field=field
+            f"2 to {most} points [x, z] are needed, got shape {outline.shape}", field=field
         )
     bad = np.flatnonzero(~(np.abs(outline) <= largest).all(axis=1))
     if len(bad):

@@ -21,33 +21,18 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, Indices, InvalidInputError
+from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.rock.holds import Hold
 from hand_models.sections import PolylineSection, Section
 
 __all__ = ["OutlinedHold", "Scale", "smooth"]
-
-STANDS_OUT: Final = 1e-5
-"""How far raw points may stand out of a raised curve [m]."""
-
-RAISES: Final = 4
-"""How often a curve is raised at most; each time far less is left."""
-
-STRAIGHT: Final = 1e-7
-"""Sine of a turn that is none."""
-
-FEWEST: Final = 5
-"""Points that a smoothed piece has at least."""
-
-ROUNDING: Final = 1e-9
-"""Rounding of the number of steps of a piece."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +110,9 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     closed = np.array_equal(points[0], points[-1])
     place = np.concatenate([[0.0], np.cumsum(lengths)])
     # steps from its beginning, whatever its length, as that changes with every move of the plane
-    step = min(scale.spacing, total / (FEWEST - 1))
-    count = round(total / step) if closed else math.floor(total / step + ROUNDING) + 1
+    step = min(scale.spacing, total / 4)  # of five points at least
+    rounding = BASE_TOLERANCES.relative
+    count = round(total / step) if closed else math.floor(total / step + rounding) + 1
     half = min(round(0.5 * scale.tile / step), (count - 1) // 2)
     over = 2 * half if closed else 0
     at = step * np.arange(-over, count + over)
@@ -138,7 +124,7 @@ def smooth(points: Array, scale: Scale) -> Array | None:
         curve = _fitted(curve, part)
     raw, curve = raw[over : over + count], curve[over : over + count]
     rest = total / step - (count - 1)
-    if not closed and rest > ROUNDING:
+    if not closed and rest > rounding:
         curve = np.vstack([curve, curve[-1] + rest * (curve[-1] - curve[-2])])
     curve = _raised(curve, np.vstack([raw, points]), half, closed)
     return np.vstack([curve, curve[:1]]) if closed else curve
@@ -172,13 +158,13 @@ def _weights(part: int) -> Array:
 def _raised(curve: Array, raw: Array, half: int, closed: bool) -> Array:
     """Move a curve outward, smoothly, until no raw point stands out of it."""
     mode: Literal["wrap", "nearest"] = "wrap" if closed else "nearest"
-    for _ in range(RAISES):
+    for _ in range(4):  # each time far less is left
         outward = _outward(curve, closed)
         nearest: Indices = np.asarray(scipy.spatial.cKDTree(curve).query(raw)[1], dtype=np.intp)
         excess = np.zeros(len(curve))
         out = np.einsum("ij,ij->i", raw - curve[nearest], outward[nearest])
         np.maximum.at(excess, nearest, out)
-        if excess.max() <= STANDS_OUT:
+        if excess.max() <= 1e-5:  # [m]
             break
         rise = scipy.ndimage.maximum_filter1d(excess, 2 * half + 1, mode=mode)
         # two moving means whose widths add up to that of the maximum leave no point below it
@@ -209,7 +195,8 @@ def _corners(points: Array) -> Array:
     steps = steps / np.hypot(*steps.T)[:, None]
     turns = np.abs(steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0])
     onward = np.einsum("ni,ni->n", steps[:-1], steps[1:]) > 0.0
-    return np.asarray(points[np.concatenate([[True], (turns > STRAIGHT) | ~onward, [True]])])
+    bends = (turns > 1e-7) | ~onward  # sine of no turn
+    return np.asarray(points[np.concatenate([[True], bends, [True]])])
 
 
 def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:

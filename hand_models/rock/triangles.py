@@ -8,8 +8,6 @@ another, so that the chains of a cut follow from the edges' names, without compa
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -29,13 +27,6 @@ __all__ = [
     "without_spikes",
     "wound_alike",
 ]
-
-COINCIDE: Final = 1e-8
-"""Vertices on the same multiple of this along each axis are one [m]: far below what any scan
-resolves, and above the rounding of coordinates of 10⁴ m."""
-
-SIDE: Final = 0.03
-"""Side of a cell of triangles; what is found does not depend on it [m]."""
 
 
 def edges_of(faces: Indices) -> Indices:
@@ -82,7 +73,8 @@ def _merged(triangles: Triangles) -> Triangles:
     used[faces] = True
     named = np.flatnonzero(used)
     go_on()
-    cells = np.round(vertices[named] / COINCIDE).astype(np.int64)
+    # [m] far below what any scan resolves, above the rounding of coordinates of 10⁴ m
+    cells = np.round(vertices[named] / 1e-8).astype(np.int64)
     order = np.arange(len(named))
     for column in cells.T:
         go_on()
@@ -323,7 +315,8 @@ class TriangleCells:
     def __init__(self, triangles: Triangles) -> None:
         corners = triangles.vertices[triangles.faces]
         low, high = corners.min(axis=1), corners.max(axis=1)
-        where = np.floor(0.5 * (low + high) / SIDE).astype(np.intp)
+        side = 0.03  # [m] of a cell; what is found does not depend on it
+        where = np.floor(0.5 * (low + high) / side).astype(np.intp)
         where -= where.min(axis=0)
         name = np.ravel_multi_index(tuple(where.T), tuple(where.max(axis=0) + 1))
         self._order = np.argsort(name, kind="stable")

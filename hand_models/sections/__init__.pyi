@@ -1,8 +1,7 @@
 from .boundary import stretch_minima as stretch_minima
-from .outlines import BLOCK as BLOCK, Outlines as Outlines
+from .outlines import Outlines as Outlines
 from .polyline import PolylineSection as PolylineSection
 from .section import (
-    LEVEL as LEVEL,
     Complexes as Complexes,
     Face as Face,
     Flags as Flags,
@@ -10,9 +9,9 @@ from .section import (
     Section as Section,
     Vector2 as Vector2,
 )
+from .settings import SECTION_SETTINGS as SECTION_SETTINGS
 from .smooth import Disc as Disc, SmoothSection as SmoothSection, Wall as Wall
 from .swept_cuts import (
-    PARALLEL as PARALLEL,
     FingerPlane as FingerPlane,
     Swept as Swept,
     cut_of as cut_of,

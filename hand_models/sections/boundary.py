@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Indices
+from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.sections.section import Complexes, Flags
 
 __all__ = ["Boundary", "Window", "stretch_minima"]
-
-SLACK: Final = 1e-9
-"""Margin in which segments beside the nearest are looked at as well, for rounding [m]."""
 
 
 class Window(NamedTuple):
@@ -97,7 +94,7 @@ class Boundary:
         ends = broken.nonzero()[0]
         begins = np.append(0, ends + 1)[:-1]
         first, last = np.repeat([begins, ends], ends + 1 - begins, axis=1)
-        longest = 2.0 * float(self._half[near].max(initial=0.0)) + SLACK
+        longest = 2.0 * float(self._half[near].max(initial=0.0)) + BASE_TOLERANCES.length
         return Window(self._vertices[vertices], first, last, ~broken, longest)
 
     def nearest(self, points: Complexes) -> tuple[Indices, Array, Complexes]:
@@ -110,7 +107,8 @@ class Boundary:
         middle, longest = self._middle[few], float(self._half[few].max())
         s, t = points.real[:, None] - middle.real, points.imag[:, None] - middle.imag
         square = s * s + t * t
-        least = (np.sqrt(square.min(axis=1)) + 2.0 * longest + SLACK) ** 2
+        # for rounding, segments a little beside the nearest are looked at as well
+        least = (np.sqrt(square.min(axis=1)) + 2.0 * longest + BASE_TOLERANCES.length) ** 2
         row, segment = (square <= least[:, None]).nonzero()
         segment = few[segment]
         away, step = points[row] - self._start[segment], self._step[segment]

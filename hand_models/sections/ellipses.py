@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import BASE_TOLERANCES, Array
 from hand_models.sections.section import Complexes, Face
+from hand_models.sections.settings import SECTION_SETTINGS
 from hand_models.sections.smooth import (
     SmoothSection,
     Tangent,
@@ -29,31 +30,6 @@ from hand_models.sections.smooth import (
 )
 
 __all__ = ["Ellipse", "arc", "radii", "rock_left"]
-
-LAST_STEP: Final = 1e-8
-"""Change of a direction after which the next one would be lost in rounding."""
-
-NEAR: Final = 1e-5
-"""The same for a distance, which changes with the square of the direction."""
-
-CIRCLES: Final = 10
-"""How many circles are fitted in turn, at most; two or three are mostly enough."""
-
-STEPS: Final = 60
-"""How many points are tried in turn where circles do not lead on."""
-
-BESIDE: Final = 1e-3
-"""How far from the unit circle a root may be that rounding has moved off it."""
-
-POLISHES: Final = 3
-"""Steps of Newton's method on the crossings."""
-
-ROUNDING: Final = 1e-13
-"""Rounding of what is zero at a crossing, in parts of its terms."""
-
-
-ROUGH: Final = 256
-"""Parts of a curve of which those near a finger are looked at closely."""
 
 
 class _Nearest(NamedTuple):
@@ -119,12 +95,13 @@ class Ellipse(SmoothSection):
         away = self.centre - joint
         normal = away / abs(away) if self._near is None else self._near.normal
         near = None
-        for _ in range(CIRCLES):
+        for _ in range(SECTION_SETTINGS.most_circles):
             point, bend = self._foremost(normal)
             place = away + point
             middle = place + bend * normal
             before, normal = normal, middle / abs(middle)
-            if abs(normal - before) < NEAR:
+            # a distance changes with the square of the direction [rad]
+            if abs(normal - before) < 1e-5:
                 distance = (normal.conjugate() * place).real
                 near = _Nearest(distance, normal, middle, bend)
                 break
@@ -141,11 +118,13 @@ class Ellipse(SmoothSection):
         else:
             # no line at that height parts the joint from rock that comes nearer to it
             return None
-        for step in range(STEPS):
+        for step in range(60):  # points in turn, where circles do not lead on
             normal = 1j * found[0]
             point, bend = self._foremost(normal)
             point += away
-            circle = past_circle(point + bend * normal, bend + height) if step < CIRCLES else None
+            circle = None
+            if step < SECTION_SETTINGS.most_circles:
+                circle = past_circle(point + bend * normal, bend + height)
             if circle is None:
                 # past the point alone: from there on each is met sooner than the last one
                 square = abs(point) ** 2
@@ -154,7 +133,7 @@ class Ellipse(SmoothSection):
                 reach = math.sqrt(square - height * height)
                 circle = point * complex(reach, -height) / square, reach
             before, found = found, circle
-            if abs(found[0] - before[0]) < LAST_STEP:
+            if abs(found[0] - before[0]) < SECTION_SETTINGS.last_turn:
                 return found
         return None
 
@@ -168,7 +147,7 @@ class Ellipse(SmoothSection):
         if way is None or self._sharpest < arm:
             return self._crossings(away, arm)
         mean, uneven, rho = self._mean, self._uneven, self._rho
-        for _ in range(CIRCLES):
+        for _ in range(SECTION_SETTINGS.most_circles):
             there = arm * way
             v = there - away
             w = mean * v.conjugate() + uneven * v
@@ -178,7 +157,7 @@ class Ellipse(SmoothSection):
             root = math.sqrt((w * v).real)
             step = (rho - root) * root / inward
             way *= complex(math.cos(step), -math.sin(step))
-            if abs(step) < LAST_STEP:
+            if abs(step) < SECTION_SETTINGS.last_turn:
                 return [way]
         return self._crossings(away, arm)
 
@@ -197,12 +176,14 @@ class Ellipse(SmoothSection):
         ends, beside = 0.25 * (A - B), complex(D, -E)
         middle = 0.5 * (A + B) + rest
         e = np.roots([ends, beside, middle, beside.conjugate(), ends])
-        angles = np.angle(e[np.abs(np.abs(e) - 1.0) < BESIDE])
-        for _ in range(POLISHES):
+        off = 1e-3  # from the unit circle, as far as rounding may have moved a root
+        angles = np.angle(e[np.abs(np.abs(e) - 1.0) < off])
+        for _ in range(3):  # steps of Newton's method
             f, slope = _conic(A, B, D, E, rest, angles)
-            angles = angles - np.clip(f / slope, -BESIDE, BESIDE)
+            angles = angles - np.clip(f / slope, -off, off)
         f, slope = _conic(A, B, D, E, rest, angles)
-        crosses = (np.abs(f) <= ROUNDING * (A + abs(D) + abs(E) + abs(rest))) & (slope < 0.0)
+        rounding = 0.1 * BASE_TOLERANCES.rounding
+        crosses = (np.abs(f) <= rounding * (A + abs(D) + abs(E) + abs(rest))) & (slope < 0.0)
         return [axis * complex(math.cos(t), math.sin(t)) for t in angles[crosses].tolist()]
 
     def partings(self, joint: complex, u: complex, face: Face) -> Iterator[complex]:
@@ -250,7 +231,8 @@ def arc(
     def places(turns: Array) -> Complexes:
         return np.asarray(centre + axes[0] * np.sin(turns) - axes[1] * np.cos(turns))
 
-    turns = np.linspace(-most, most, ROUGH + 1)
+    # 256 parts, of which those near a finger are looked at closely
+    turns = np.linspace(-most, most, 257)
     rough = places(turns)
     steps = np.abs(np.diff(rough))
     near = np.abs(rough[:-1]) <= reach + steps

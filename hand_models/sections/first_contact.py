@@ -19,25 +19,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, Indices
+from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.sections.boundary import Boundary, Window, stretch_minima
 from hand_models.sections.section import Complexes, Face, Flags
+from hand_models.sections.settings import SECTION_SETTINGS
 
 __all__ = ["TurningFaces"]
 
-FLAT: Final = 5e-7
-"""Rock within this of a face that rests on it counts as touched [m]."""
-
-FITTED: Final = 2e-3
-"""How far on both sides of a contact the rock is fitted with a parabola to place it [m]."""
-
-ROUNDING: Final = 1e-12
-"""Tolerance of an angle that falls short of a bound [rad]."""
-
-SLACK: Final = 1e-12
-"""Margin in which vertices beside a face are looked at as well, for rounding [m²]."""
-
-PARTS: Final = np.linspace(0.0, 1.0, 17)[:, None]
+FACE_PARTS: Final = np.linspace(0.0, 1.0, 17)[:, None]
 """Where along a face that cuts a boundary its distance from the rock is taken."""
 
 
@@ -88,7 +77,7 @@ class TurningFaces:
         clear = self._boundary.clearances(points).min(axis=0)
         cut = cuts.nonzero()[0]
         if len(cut):
-            points = points[0, cut] + PARTS * (points[1, cut] - points[0, cut])
+            points = points[0, cut] + FACE_PARTS * (points[1, cut] - points[0, cut])
             clear[cut] = self._boundary.clearances(points).min(axis=0)
         return np.asarray(clear)
 
@@ -147,7 +136,8 @@ class TurningFaces:
     def _on_face(self) -> Meetings:
         """Return where a vertex is first on a face."""
         start, end, h, _ = self._face
-        nearest, farthest = start * start + h * h - SLACK, end * end + h * h + SLACK
+        slack = 1e-12  # [m²] for rounding, vertices beside the face are looked at as well
+        nearest, farthest = start * start + h * h - slack, end * end + h * h + slack
         near = (self._square >= nearest) & (self._square <= farthest)
         row, vertex = near.nonzero()
         place = row * near.shape[1] + vertex
@@ -173,7 +163,7 @@ class TurningFaces:
         level = np.where(by_end, 0.0, gap[rows, vertex])
         sides = _Sides.of(self._window, vertex, by_end)
         # how far the rock stays at the face on both sides, the last step of it taken as straight
-        limit = level + FLAT
+        limit = level + 5e-7  # [m] so near rock counts as touched
         apart = (gap > limit[:, None]) | (along < start) | (along > end)
         reaches = []
         for out, inner, own, ends in sides.stretches(apart):
@@ -184,10 +174,11 @@ class TurningFaces:
             reach = np.minimum(np.maximum(reach, start), end)
             reaches.append(np.where(ends, near, reach))
         near, far = np.minimum(*reaches), np.maximum(*reaches)
-        flat, short = (near <= start) & (far >= end), far - near < 2.0 * FITTED
+        fitted = SECTION_SETTINGS.fitted_length
+        flat, short = (near <= start) & (far >= end), far - near < 2.0 * fitted
         place = np.where(short, here, 0.5 * (near + far))
         if not faceted:
-            few = (short & ~flat & ~(by_end & (far - near < FITTED))).nonzero()[0]
+            few = (short & ~flat & ~(by_end & (far - near < fitted))).nonzero()[0]
             place[few] = _lowest(sides.take(few), along[few], gap[few], here[few], by_end[few])
         return np.minimum(np.maximum(place, start), end), flat
 
@@ -200,10 +191,11 @@ def _first(count: int, row: Indices, x: Array, y: Array, vertex: Indices) -> Mee
     begin = np.append(0, np.diff(row).nonzero()[0] + 1)
     # grows with the angle, from 0 to 4 in a turn
     quarter = 1.0 - x / np.maximum(np.abs(x) + np.abs(y), np.finfo(float).tiny)
-    at = stretch_minima(np.where(y < -ROUNDING * x, 4.0 - quarter, quarter), begin)
+    rounding = BASE_TOLERANCES.rounding  # [rad] an angle may fall short of the bound by it
+    at = stretch_minima(np.where(y < -rounding * x, 4.0 - quarter, quarter), begin)
     row = row[at]
-    angle = (np.arctan2(y[at], x[at]) + ROUNDING) % math.tau
-    turn[row] = np.maximum(angle - ROUNDING, 0.0)
+    angle = (np.arctan2(y[at], x[at]) + rounding) % math.tau
+    turn[row] = np.maximum(angle - rounding, 0.0)
     first[row] = vertex[at]
     return turn, first
 
@@ -262,11 +254,12 @@ class _Sides(NamedTuple):
 
 def _lowest(sides: _Sides, along: Array, gap: Array, here: Array, by_end: Flags) -> Array:
     """Return where parabolas fitted to the rock near places on it are lowest."""
-    low, high = sides.nearest(np.abs(along - here[:, None]) > FITTED)
+    fitted = SECTION_SETTINGS.fitted_length
+    low, high = sides.nearest(np.abs(along - here[:, None]) > fitted)
     count = high - low - 1
     row = np.repeat(np.arange(len(here)), count)
     column = np.arange(len(row)) + np.repeat(low + 1 - (np.cumsum(count) - count), count)
-    t, g = (along[row, column] - here[row]) / FITTED, gap[row, column]
+    t, g = (along[row, column] - here[row]) / fitted, gap[row, column]
     # the place itself, at zero, counts too where it is no vertex
     square = t * t
     s_0, s_1, s_2, s_3, s_4, g_0, g_1, g_2 = (
@@ -279,4 +272,4 @@ def _lowest(sides: _Sides, along: Array, gap: Array, here: Array, by_end: Flags)
     bend = g_2 * c_0 + g_1 * c_1 + g_0 * c_2
     slope = g_2 * c_1 + g_1 * (s_4 * s_0 - s_2 * s_2) + g_0 * (s_3 * s_2 - s_4 * s_1)
     way = np.minimum(np.maximum(-0.5 * slope / bend, -1.0), 1.0)
-    return np.where((bend > 0.0) & (s_0 >= 3.0), here + FITTED * way, here)
+    return np.where((bend > 0.0) & (s_0 >= 3.0), here + fitted * way, here)

@@ -4,29 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import BASE_TOLERANCES, Array
 from hand_models.sections.section import Complexes, Section
+from hand_models.sections.settings import SECTION_SETTINGS
 
-__all__ = ["BLOCK", "Outlines"]
-
-BLOCK: Final = 16
-"""Points that are looked for together: 2 mm of rock for a finger's phalanges."""
-
-FAR: Final = 1e3
-"""Where points are that stand for no rock [m]."""
-
-NOTHING: Final = 1e-12
-"""Their lengths [m]."""
-
-ROUNDING: Final = 1e-9
-"""Rounding of the number of parts of a piece."""
-
-SHARP: Final = math.radians(15.0)
-"""Least turn of an outline that is a corner [rad]."""
+__all__ = ["Outlines"]
 
 
 class Outlines(NamedTuple):
@@ -38,10 +24,10 @@ class Outlines(NamedTuple):
         s + i t of places on the rock, chain by chain [m].
     lengths : ndarray, shape (n, p)
         Of the rock's boundary that each stands for [m].
-    centres : ndarray of complex, shape (n, p / `BLOCK`)
-    radii : ndarray, shape (n, p / `BLOCK`)
-        Circles around each `BLOCK` points in order [m].
-    longest : ndarray, shape (n, p / `BLOCK`)
+    centres : ndarray of complex, shape (n, p / 16)
+    radii : ndarray, shape (n, p / 16)
+        Circles around each 16 points in order (`points_per_circle`) [m].
+    longest : ndarray, shape (n, p / 16)
         The largest of their lengths [m].
     """
 
@@ -63,14 +49,16 @@ class Outlines(NamedTuple):
         spacing : float
             Of the points, at most [m].
         """
+        block = SECTION_SETTINGS.points_per_circle
         taken = [_points(section, reach, spacing) for section in sections]
-        blocks = math.ceil(max([1, *(len(points) for points, _ in taken)]) / BLOCK)
-        points = np.full((len(taken), blocks * BLOCK), complex(FAR))
-        lengths = np.full(points.shape, NOTHING)
+        blocks = math.ceil(max([1, *(len(points) for points, _ in taken)]) / block)
+        # what stands for no rock is 1 km away, and next to nothing long
+        points = np.full((len(taken), blocks * block), complex(1e3))
+        lengths = np.full(points.shape, 1e-12)
         for i, each in enumerate(taken):
             for values, own in zip((points, lengths), each, strict=True):
                 values[i, : len(own)] = own
-        in_blocks = points.reshape(len(taken), blocks, BLOCK)
+        in_blocks = points.reshape(len(taken), blocks, block)
         centres = in_blocks.mean(axis=-1)
         radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
         longest = lengths.reshape(in_blocks.shape).max(axis=-1)
@@ -83,11 +71,11 @@ def _points(section: Section | None, reach: float, spacing: float) -> tuple[Comp
     for chain in () if section is None else section.outline(reach, spacing):
         begin, step = chain[:-1], np.diff(chain)
         size = np.abs(step)
-        part = -(begin * step.conj()).real / np.maximum(size * size, NOTHING**2)
+        part = -(begin * step.conj()).real / np.maximum(size * size, 1e-12**2)
         near = np.abs(begin + np.clip(part, 0.0, 1.0) * step) <= reach
         # runs of pieces that come within reach, from corner to corner
         ends = np.diff(near.astype(np.int8), prepend=0, append=0).nonzero()[0]
-        turns = np.abs(np.angle(step[1:] * step[:-1].conj())) > SHARP
+        turns = np.abs(np.angle(step[1:] * step[:-1].conj())) > math.radians(15.0)
         corners = (turns & near[1:] & near[:-1]).nonzero()[0] + 1
         stops = np.sort(np.concatenate([ends, corners, corners]))
         for first, last in stops.reshape(-1, 2).tolist():
@@ -100,7 +88,7 @@ def _points(section: Section | None, reach: float, spacing: float) -> tuple[Comp
 def _parts(chain: Complexes, size: Array, spacing: float) -> tuple[Complexes, Array]:
     """Return the ends of equal parts of a chain whose pieces have these lengths, and theirs [m]."""
     at = np.append(0.0, np.cumsum(size))
-    count = max(math.ceil(at[-1] / spacing - ROUNDING), 1)
+    count = max(math.ceil(at[-1] / spacing - BASE_TOLERANCES.relative), 1)
     places = np.linspace(0.0, at[-1], count + 1)
     lengths = np.full(count + 1, at[-1] / count)
     lengths[[0, -1]] *= 0.5

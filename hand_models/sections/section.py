@@ -14,29 +14,21 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array
+from hand_models.sections.settings import SECTION_SETTINGS
 
-__all__ = ["LEVEL", "Complexes", "Face", "Flags", "Rest", "Section", "Vector2"]
+__all__ = ["Complexes", "Face", "Flags", "Rest", "Section", "Vector2"]
 
 Vector2 = tuple[float, float]
 
 Complexes = NDArray[np.complex128]
 
 Flags = NDArray[np.bool_]
-
-LEVEL: Final = 1e-4
-"""A face both of whose ends are this close to the rock when the first touches lies flat [m]."""
-
-FACE_SAMPLES: Final = 9
-"""Points of a face at which its distance from the rock is taken."""
-
-STEP: Final = 1e-7
-"""For the gradient of a distance [m]."""
 
 
 class Face(NamedTuple):
@@ -55,7 +47,7 @@ class Face(NamedTuple):
     start: float
     end: float
     height: float
-    level: float = LEVEL
+    level: float = SECTION_SETTINGS.level_distance
 
 
 class Rest(NamedTuple):
@@ -129,13 +121,14 @@ class Section(ABC):
 
         Negative where it cuts into it.
         """
-        along = np.linspace(face.start, face.end, FACE_SAMPLES).tolist()
+        along = np.linspace(face.start, face.end, 9).tolist()
         return min(self.distance(joint + complex(a, face.height) * u) for a in along)
 
     def normal(self, point: Vector2) -> Vector2:
         """Return the unit vector out of the rock at the place nearest a point."""
         s, t = point
-        ds = self.clearance((s + STEP, t)) - self.clearance((s - STEP, t))
-        dt = self.clearance((s, t + STEP)) - self.clearance((s, t - STEP))
+        step = 1e-7  # [m] of the gradient's differences
+        ds = self.clearance((s + step, t)) - self.clearance((s - step, t))
+        dt = self.clearance((s, t + step)) - self.clearance((s, t - step))
         length = math.hypot(ds, dt)
         return (ds / length, dt / length) if length > 0.0 else (0.0, -1.0)

@@ -17,18 +17,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from hand_models.base import BASE_TOLERANCES
 from hand_models.sections.ellipses import Ellipse, arc, radii, rock_left
 from hand_models.sections.section import Complexes, Face
+from hand_models.sections.settings import SECTION_SETTINGS
 from hand_models.sections.smooth import Disc, SmoothSection, Tangent, Wall
 
-__all__ = ["PARALLEL", "FingerPlane", "Swept", "cut_of", "entry_distances"]
-
-PARALLEL: Final = 1e-3
-"""Below this sine, a finger plane counts as parallel to the axis of an extruded hold."""
+__all__ = ["FingerPlane", "Swept", "cut_of", "entry_distances"]
 
 Vector3 = Sequence[float]
 """Three numbers."""
@@ -36,15 +35,6 @@ Vector3 = Sequence[float]
 FingerPlane = tuple[float, float, float, float, float, float, float, float, float]
 """Axes of a finger's plane, along the finger and into the rock, and its origin from the centre of
 the hold's ball, all scaled."""
-
-SKEW: Final = 1e-3
-"""Square of the least sine of the angle between a finger's plane and the axis of what it cuts."""
-
-ROUND: Final = 1e-12
-"""Ratio of |A| and |B| up to which an ellipse counts as a circle."""
-
-BESIDE: Final = -1e-9
-"""How far on the inner side of a line through the ball's centre counts as beside it [m]."""
 
 
 class Swept(NamedTuple):
@@ -128,7 +118,9 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
     a, b, c, d, e, f, x, y, z = plane
     if not shape.radius:
         steep = math.hypot(c, f)
-        return None if steep < PARALLEL else Wall(complex(c, f) / steep, -z / steep)
+        if steep < SECTION_SETTINGS.parallel_sine:
+            return None
+        return Wall(complex(c, f) / steep, -z / steep)
     if shape.scale_y:
         # Cholesky's factor of the ellipsoid's quadratic form in the plane
         g11, g12, g22 = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
@@ -143,7 +135,7 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
         d, f = g12 / a, math.sqrt(determinant) / a
     else:
         turned = a * f - c * d
-        if abs(turned) < PARALLEL:
+        if abs(turned) < SECTION_SETTINGS.parallel_sine:
             return _along_axis(shape, plane)
         centre = complex(d * z - f * x, c * x - a * z) / turned
         rho, size = shape.radius, 1.0
@@ -152,12 +144,13 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
     core: Disc | Ellipse
     # a boulder's cut is an ellipse wherever it is, round or not
     less, more = sorted((abs(A), abs(B)))
-    if less <= ROUND * more and shape.scale_y in (0.0, 1.0):
+    if less <= BASE_TOLERANCES.rounding * more and shape.scale_y in (0.0, 1.0):
         core = Disc(centre, rho / more)
     else:
         # an ellipsoid's mean radius turns distances to its section into metres
         core = Ellipse(centre, (A, B), rho, size)
-        core.skew = (more**2 - less**2) ** 2 <= SKEW * (more**2 + less**2) ** 2
+        # square of the least sine of the angle between the plane and the axis of what it cuts
+        core.skew = (more**2 - less**2) ** 2 <= 1e-3 * (more**2 + less**2) ** 2
     if not shape.sine:
         return core
     lines = (_line(shape, plane, side) for side in (1.0, -1.0))
@@ -307,7 +300,7 @@ class _Edge(SmoothSection):
 
     def straight(self, point: complex) -> bool:
         return any(
-            line.beside(point) >= 0.0 and line.beyond(point) + line.ball >= BESIDE
+            line.beside(point) >= 0.0 and line.beyond(point) + line.ball >= -BASE_TOLERANCES.length
             for line in (self._first, self._second)
         )
 

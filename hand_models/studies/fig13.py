@@ -16,7 +16,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from trimesh.remesh import subdivide
 
 from hand_models.base import Array, Progress
-from hand_models.compliance import PLANAR, Gripper, gripper_table, linear_extreme, pieces
+from hand_models.compliance import PLANAR_COMPONENTS, Gripper, gripper_table, linear_extreme, pieces
 from hand_models.experiments import (
     FIT_TOLERANCES,
     PLANAR_SCALE,
@@ -159,9 +159,9 @@ def _linear_pieces(
     """
     ways = _sphere(STUDY_SETTINGS.fig13_piece_directions) / size
     directions = np.zeros((len(ways), 6))
-    directions[:, PLANAR] = ways * (1.0, 1.0, -1.0)
+    directions[:, PLANAR_COMPONENTS] = ways * (1.0, 1.0, -1.0)
     found = pieces(gripper, directions[::2], progress=progress)
-    rest = gripper.evaluate(np.zeros((1, len(PLANAR)))).wrenches[0]
+    rest = gripper.evaluate(np.zeros((1, len(PLANAR_COMPONENTS)))).wrenches[0]
     reached = [max(linear_extreme(piece.space, d)[1] for piece in found.pieces) for d in directions]
     exact = (full @ ways.T).max(axis=0)
     off = (np.array(reached) - directions @ rest) / (exact - directions @ rest) - 1.0

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from hand_models.base import Array, Progress
+from hand_models.base import BASE_TOLERANCES, Array, Progress
 from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     PHALANX_COLOURS,
@@ -35,7 +35,6 @@ from hand_models.experiments import (
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 from hand_models.studies.settings import STUDY_SETTINGS
-from hand_models.wrench_spaces import TOLERANCE
 
 __all__ = ["loading_planes", "plot", "run"]
 
@@ -130,7 +129,7 @@ def _best(points: Array) -> dict[str, dict[str, Any]]:
     for name, strengths in _strengths(points).items():
         # of a wrench and its mirror image, which are as strong, that to the right
         most = strengths.max()
-        alike = points[strengths >= (1.0 - TOLERANCE) * most]
+        alike = points[strengths >= (1.0 - BASE_TOLERANCES.relative) * most]
         best = alike[alike[:, 0].argmax()]
         found[name] = {
             "wrench": best,

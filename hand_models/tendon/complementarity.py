@@ -20,22 +20,11 @@ Lemke's method always finds a solution.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from hand_models.base import Array, SolverError
 
 __all__ = ["solve_lcp", "stick_slip"]
-
-PIVOT: Final = 1e-10
-"""Entries and differences of ratios below it count as zero in a tableau of order one."""
-
-FEASIBILITY: Final = 1e-7
-"""How negative w and z, and how large w∘z, may be in an answer, relative to the size of q."""
-
-MOST_PIVOTS: Final = 50
-"""Pivots per unknown: far beyond any seen (about 2), a guard against rounding."""
 
 
 def solve_lcp(M: Array, q: Array, cover: Array) -> Array:
@@ -66,7 +55,8 @@ def solve_lcp(M: Array, q: Array, cover: Array) -> Array:
     z = _follow(M, q / size, cover)
     if z is not None:
         w = M @ z + q / size
-        if min(w.min(), z.min()) >= -FEASIBILITY and np.abs(w * z).max() <= FEASIBILITY:
+        off = 1e-7  # how negative w and z, and how large w∘z, may be, relative to the size of q
+        if min(w.min(), z.min()) >= -off and np.abs(w * z).max() <= off:
             return size * np.maximum(z, 0.0)
     raise SolverError(f"a complementarity problem of size {n} ended without a solution")
 
@@ -80,7 +70,8 @@ def _follow(M: Array, q: Array, cover: Array) -> Array | None:
     entering = 2 * n
     covered = np.flatnonzero(cover > 0.0)
     row = int(covered[np.argmin(q[covered] / cover[covered])])
-    for _ in range(MOST_PIVOTS * n):
+    # far beyond any number of pivots seen (about 2 n), a guard against rounding
+    for _ in range(50 * n):
         tableau[row] /= tableau[row, entering]
         factors = tableau[:, entering].copy()
         factors[row] = 0.0
@@ -102,12 +93,13 @@ def _ratio_test(tableau: Array, basis: list[int], entering: int) -> int | None:
     """Return the row whose variable leaves: lexicographically least, the covering one in a tie."""
     n = len(basis)
     column = tableau[:, entering]
-    rows = np.flatnonzero(column > PIVOT)
+    rounding = 1e-10  # entries and differences of ratios below it count as zero
+    rows = np.flatnonzero(column > rounding)
     for j in (2 * n + 1, *range(n)):
         if len(rows) < 2:
             break
         ratios = tableau[rows, j] / column[rows]
-        rows = rows[ratios <= ratios.min() + PIVOT]
+        rows = rows[ratios <= ratios.min() + rounding]
         for row in rows:
             if basis[row] == 2 * n:
                 return int(row)

@@ -28,7 +28,7 @@ from hand_models.parameters import ParameterTable
 
 __all__ = ["TendonDrive"]
 
-T = TypeVar("T", float, Array)
+Values = TypeVar("Values", float, Array)
 """One tendon's number, or an array of several's."""
 
 
@@ -121,11 +121,11 @@ class TendonDrive:
         """(I − I_0) / f [A/N]."""
         return self.torque_per_newton / self.torque_constant
 
-    def torque(self, tension: T) -> T:
+    def torque(self, tension: Values) -> Values:
         """Return the motor's torque τ that tightens a tendon to a tension [N·m]."""
         return tension * self.torque_per_newton
 
-    def current(self, tension: T) -> T:
+    def current(self, tension: Values) -> Values:
         """Return the current I that the motor draws then [A]."""
         return tension * self.current_per_newton + self.no_load_current
 
@@ -142,8 +142,13 @@ class TendonDrive:
         return np.array([self.torque(tensions), self.current(tensions), self.winch_angle(*wound)])
 
     def winch_angle(
-        self, joints: T, tension: T, shears: T, losses: T, nail_drawn: T | float = 0.0
-    ) -> T:
+        self,
+        joints: Values,
+        tension: Values,
+        shears: Values,
+        losses: Values,
+        nail_drawn: Values | float = 0.0,
+    ) -> Values:
         """Return how far winches turn from the open finger to a tension [rad].
 
         The open finger is straight (q = 0), its tiles at rest. The motor turns ``gear_ratio`` times

@@ -28,18 +28,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
 from hand_models.parameters import ParameterTable
 from hand_models.tendon.complementarity import stick_slip
 
 __all__ = ["FingerTendon", "TendonState"]
 
-FRICTIONLESS: Final = 1e-8
-"""A coefficient of friction that is as good as none: such a boundary never sticks."""
+LEAST_FRICTION = 10.0 * BASE_TOLERANCES.relative
+"""A coefficient of friction up to it is as good as none: such a boundary never sticks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +197,7 @@ class FingerTendon:
         unit = c**2 * float(give.mean())
         # t_i = (1 − μ_i) t_{i−1} + 2 μ_i a_i by t_0 and the a of boundaries that have friction
         mu = np.append(0.0, np.full(n - 1, self.friction))
-        rubs, columns = mu > FRICTIONLESS, np.eye(n + 1)
+        rubs, columns = mu > LEAST_FRICTION, np.eye(n + 1)
         rows = [columns[0]]
         for mu_i, column in zip(mu, columns[1:], strict=True):
             rows.append((1.0 - mu_i) * rows[-1] + 2.0 * mu_i * column)

@@ -24,17 +24,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.tendon.complementarity import stick_slip
+from hand_models.tendon.finger_tendon import LEAST_FRICTION
 
 __all__ = ["PalmSharing", "check_palm", "share_load", "shear_capacity"]
-
-FRICTIONLESS: Final = 1e-8
-"""A coefficient of friction that is as good as none: such pulleys are left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +156,7 @@ def _thread(n: int, of_tiles: float, of_palm: float) -> tuple[Array, Array, Indi
     travels[1::2] = 2.0 * np.tril(np.ones((n - 1, n)))
     friction = np.full(2 * n - 1, of_tiles, dtype=float)
     friction[1::2] = of_palm
-    rubs = friction > FRICTIONLESS
+    rubs = friction > LEAST_FRICTION
     after = np.cumsum(rubs)
     strands = np.stack([np.concatenate([[0], after[:-1]])[::2], after[::2]], axis=1)
     half = friction[rubs] / 2.0

@@ -16,21 +16,18 @@ those of the regime.
 from __future__ import annotations
 
 import itertools
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices
-from hand_models.tendon.finger_tendon import FRICTIONLESS, FingerTendon, TendonState
+from hand_models.base import BASE_TOLERANCES, Array, Indices
+from hand_models.tendon.finger_tendon import LEAST_FRICTION, FingerTendon, TendonState
 
 __all__ = ["MotorScheme", "TendonRegimes", "TendonResponse"]
 
 MotorScheme = Literal["held", "tension"]
 """Motor while the load changes: it stands still (held), or keeps its tension."""
-
-CONSISTENT: Final = 1e-9
-"""Tolerance of a regime's consistency, for rounding [N]."""
 
 
 class TendonResponse(NamedTuple):
@@ -69,7 +66,7 @@ class TendonRegimes:
         n = len(tendon.pulley_radii)
         mu = np.full(n, tendon.friction)
         mu[0] = tendon.entry_friction
-        self._mu = np.where(mu > FRICTIONLESS, mu, 0.0)
+        self._mu = np.where(mu > LEAST_FRICTION, mu, 0.0)
         stiffness = np.array(tendon.contact_stiffness)
         self._stiffness = stiffness
         self._radii = np.array(tendon.pulley_radii)
@@ -134,7 +131,7 @@ class TendonRegimes:
         tensions = first.tensions(pushed, wound)
         regime = np.zeros(len(slips), dtype=np.intp)
         wrong: Indices = np.flatnonzero(
-            ~(self._contradiction(first, tensions, pushed, wound) <= CONSISTENT)
+            ~(self._contradiction(first, tensions, pushed, wound) <= BASE_TOLERANCES.force)
         )
         least = np.full(len(wrong), np.inf)
         left = np.arange(len(wrong))
@@ -146,7 +143,7 @@ class TendonRegimes:
             least[left[better]] = off[better]
             tensions[those[better]] = tried[better]
             regime[those[better]] = k
-            left = left[~(off <= CONSISTENT)]
+            left = left[~(off <= BASE_TOLERANCES.force)]
             if not len(left):
                 break
         rise = self.tendon.pulley_ratio * (tensions - self.state.tensions)

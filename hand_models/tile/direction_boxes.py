@@ -13,25 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
 
 __all__ = ["DirectionBoxes", "bounded"]
-
-STRIPS: Final = 256
-"""Boxes side by side, to begin with; of rectangles the square root of it along each side."""
-
-PARTS: Final = 8
-"""Number of boxes into which one is divided."""
-
-DIVISIONS: Final = 24
-"""Most divisions of boxes; what is still open after them is bounded all the same."""
-
-MOST_BOXES: Final = 20_000
-"""Most boxes at a time, as well."""
 
 
 class DirectionBoxes(NamedTuple):
@@ -54,7 +42,8 @@ class DirectionBoxes(NamedTuple):
     def over(cls, sides: tuple[float, float], turns: tuple[float, float]) -> DirectionBoxes:
         """Return boxes that fill two ranges, of ω and of η; either may be one value."""
         wide = [low < high for low, high in (sides, turns)]
-        count = round(STRIPS ** (1.0 / sum(wide)))
+        # side by side, to begin with; of rectangles the square root of it along each side
+        count = round(256 ** (1.0 / sum(wide)))
         ends = [
             np.linspace(*pair, count + 1) if each else np.array(pair)
             for pair, each in zip((sides, turns), wide, strict=True)
@@ -89,11 +78,11 @@ class DirectionBoxes(NamedTuple):
             most = np.sin(self.far) / (np.cos(self.steep) + np.cos(self.far) * np.cos(self.last))
         return least, np.fmin(most, 1.0)
 
-    def divided(self) -> DirectionBoxes:
-        """Return the parts of each box, across its longer side."""
+    def divided(self, count: int) -> DirectionBoxes:
+        """Return so many parts of each box, across its longer side."""
         flat = self.last - self.first > self.far - self.near
         w, e = (
-            low + np.where(along, high - low, 0.0) * np.arange(PARTS + 1)[:, None] / PARTS
+            low + np.where(along, high - low, 0.0) * np.arange(count + 1)[:, None] / count
             for low, high, along in (
                 (self.first, self.last, flat),
                 (self.near, self.far, ~flat),
@@ -121,12 +110,14 @@ def bounded(bound: Callable[[DirectionBoxes], Array], boxes: DirectionBoxes, mos
     most : float
         What the values are thought not to be larger than, by a margin.
     """
-    for _ in range(DIVISIONS):
+    parts, most_boxes = 8, 20_000
+    # what is still open after 24 divisions is bounded all the same
+    for _ in range(24):
         upper = bound(boxes)
         left = upper > most
         if not left.any():
             return most
-        if PARTS * left.sum() > MOST_BOXES:
+        if parts * left.sum() > most_boxes:
             break
-        boxes = DirectionBoxes(*np.array(boxes)[:, left]).divided()
+        boxes = DirectionBoxes(*np.array(boxes)[:, left]).divided(parts)
     return float(upper.max())

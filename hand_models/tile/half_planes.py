@@ -32,7 +32,7 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array
+from hand_models.base import BASE_TOLERANCES, Array
 from hand_models.tile.direction_boxes import DirectionBoxes, bounded
 
 __all__ = [
@@ -44,32 +44,8 @@ __all__ = [
     "outer_half_planes",
 ]
 
-GRID: Final = (129, 33)
-"""Samples of φ and of θ in a search for a largest value."""
-
-FINE_GRID: Final = (17, 17)
-"""Samples each time that such a search begins anew around the best."""
-
-NEAR: Final = 2.0
-"""How many samples to either side it then looks."""
-
-ZOOMS: Final = 8
-"""Grids of a search in all."""
-
-MARGIN: Final = 1e-4
+SEARCH_MARGIN: Final = 1e-4
 """Relative allowance for what a search may have missed, and up to which bounds are brought."""
-
-WIDE_MARGIN: Final = 2e-3
-"""The same for tiles that hold more sideways than along the drag, bounded in a whole sector."""
-
-ROUNDING: Final = 1e-12
-"""The same for chords whose ends, on the curve, are what comes nearest."""
-
-SAMPLES: Final = 2049
-"""Angles at which a chord is held against the curve, before that is bounded."""
-
-LEAST_LATERAL: Final = 1e-3
-"""Share of a load out of the finger plane from which on the search looks."""
 
 
 class TileLaw(Protocol):
@@ -266,13 +242,15 @@ def _inside(
     def over(box: DirectionBoxes) -> Array:
         return c / (surface.straight_strength(box.steep) * box.line(a, b)[0])
 
-    ends = np.linspace(*sector, SAMPLES)
+    # angles at which a chord is held against the curve, before that is bounded
+    ends = np.linspace(*sector, 2049)
     found = float(over(DirectionBoxes(ends, ends, 0.0 * ends, 0.0 * ends)).max())
-    near = 1.0 + ROUNDING
+    # for chords whose ends, on the curve, are what comes nearest
+    near = 1.0 + BASE_TOLERANCES.rounding
     most = bounded(
         over,
         DirectionBoxes.over(sector, (0.0, 0.0)),
-        near if found <= near else found * (1.0 + MARGIN),
+        near if found <= near else found * (1.0 + SEARCH_MARGIN),
     )
     return chord if most <= near else (a, b, c / most)
 
@@ -306,15 +284,18 @@ def _lateral_coefficient(
     def at(angle: Array, azimuth: Array) -> Array:
         t, p, y = _direction(angle, azimuth)
         need = c / surface.strength(angle, azimuth) - (a * t + b * p)
-        # close to the finger plane the chord is inside anyway
-        return np.where(y > LEAST_LATERAL, need / np.maximum(y, LEAST_LATERAL), -np.inf)
+        # closer to the finger plane than this share of a load the chord is inside anyway
+        least = 1e-3
+        return np.where(y > least, need / np.maximum(y, least), -np.inf)
 
     found, turns = _largest(at, surface.pull_off_angle, sector), (0.0, math.pi / 2)
     if surface.lateral_limit > surface.shear_limit:
         boxes = DirectionBoxes.over(sector, turns)
-        return bounded(needed, boxes, found * (1.0 + WIDE_MARGIN))
+        # bounded in a whole sector, and so not as closely
+        return bounded(needed, boxes, found * (1.0 + 2e-3))
     edges = [DirectionBoxes.over((end, end), turns) for end in sector if end > 0.0]
-    return bounded(needed, DirectionBoxes(*np.concatenate(edges, axis=1)), found * (1.0 + MARGIN))
+    boxes = DirectionBoxes(*np.concatenate(edges, axis=1))
+    return bounded(needed, boxes, found * (1.0 + SEARCH_MARGIN))
 
 
 def _support(surface: TileLaw, normal: tuple[float, float, float]) -> float:
@@ -325,7 +306,7 @@ def _support(surface: TileLaw, normal: tuple[float, float, float]) -> float:
         a, b, sideways = normal
         return np.asarray(surface.strength(angle, azimuth) * (a * t + b * p + sideways * y))
 
-    return _largest(along, surface.pull_off_angle, (0.0, math.pi / 2)) * (1.0 + MARGIN)
+    return _largest(along, surface.pull_off_angle, (0.0, math.pi / 2)) * (1.0 + SEARCH_MARGIN)
 
 
 def _direction(angle: Array, azimuth: Array) -> tuple[Array, Array, Array]:
@@ -352,16 +333,16 @@ def _largest_between(
 ) -> float:
     bounds = (angles, (0.0, 1.0))
     ranges = list(bounds)
-    best, counts = -math.inf, GRID
-    for _ in range(ZOOMS):
+    best, counts = -math.inf, (129, 33)  # samples of φ and of θ, at first
+    for _ in range(8):
         axes = [np.linspace(*ends, n) for ends, n in zip(ranges, counts, strict=True)]
         angle = axes[0][:, None]
         first, last = (_azimuth(angle, side) for side in sector)
         values = function(angle, first + (last - first) * axes[1][None, :])
         place = np.unravel_index(int(values.argmax()), values.shape)
-        best, counts = max(best, float(values[place])), FINE_GRID
+        best, counts = max(best, float(values[place])), (17, 17)
         for k, axis in enumerate(axes):
-            step = NEAR * (axis[1] - axis[0])
+            step = 2.0 * (axis[1] - axis[0])  # so many samples to either side of the best
             low, high = bounds[k]
             ranges[k] = (max(low, axis[place[k]] - step), min(high, axis[place[k]] + step))
     return best

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
 from hand_models.parameters import spine_table
 from hand_models.tile.spine_array import SpineArray
 
@@ -24,9 +24,6 @@ __all__ = [
     "measured_tile_shear",
     "within_law",
 ]
-
-ANGLE_ROUNDING: Final = 1e-9
-"""How far an angle may be beyond φ_max and count as φ_max [rad]."""
 
 LEAST_SPINES: Final = 20
 """Smaller tiles are not fitted: their bars are as long as their means."""
@@ -114,7 +111,7 @@ def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
 
 def within_law(angles: Array, pull_off_angle: float) -> Array:
     """Return which loading angles are in [0, φ_max], where Eq. 21 is published."""
-    return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + ANGLE_ROUNDING))
+    return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + BASE_TOLERANCES.angle))
 
 
 def fit_line(angles: Array, strengths: Array, pull_off_angle: float) -> LineFit:

@@ -35,7 +35,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,12 +44,6 @@ from hand_models.parameters import ParameterTable, surface_table
 from hand_models.tile.half_planes import HalfPlane, inner_half_planes
 
 __all__ = ["Surface", "engaged_share", "pull_strength", "surface_names"]
-
-NO_PRESETS: Final = ("bounds", "defaults")
-"""Sections of ``surfaces.toml`` that are no kind of rock."""
-
-LEAST: Final = 1e-6
-"""Share of spines that counts as none: far less than one, and too little to divide loads by."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +161,7 @@ class Surface:
         InvalidInputError
             If there is no such preset; the message lists them.
         """
-        if name in NO_PRESETS or name not in surface_table().sections:
+        if name not in surface_names():
             raise InvalidInputError(
                 f"unknown surface {name!r}; known are {', '.join(surface_names())}"
             )
@@ -306,7 +299,8 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
     off = np.asarray(gap, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(off > 0.0, np.minimum(1.0 - off / travel, 1.0), 1.0)
-    return np.where(share > LEAST, share, 0.0)
+    # a millionth counts as none: far less than one spine, and too little to divide loads by
+    return np.where(share > 1e-6, share, 0.0)
 
 
 def _by_ratios(shear_limit: float, section: str, table: ParameterTable) -> dict[str, float]:
@@ -336,7 +330,8 @@ def _bound(name: str) -> float:
 
 def surface_names() -> tuple[str, ...]:
     """Return the names of the surface presets."""
-    return tuple(name for name in surface_table().sections if name not in NO_PRESETS)
+    no_rock = ("bounds", "defaults")
+    return tuple(name for name in surface_table().sections if name not in no_rock)
 
 
 def _from_table(name: str, table: ParameterTable) -> Surface:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, LimitError
-from hand_models.wrench_spaces.half_spaces import SCALE, Facets, affine_hull
+from hand_models.wrench_spaces.half_spaces import WRENCH_SCALE, Facets, affine_hull
 from hand_models.wrench_spaces.minkowski_sums import (
     Summand,
     about_facets,
@@ -21,12 +21,10 @@ from hand_models.wrench_spaces.minkowski_sums import (
     sum_vertices,
     sums,
 )
-from hand_models.wrench_spaces.polytopes import TOLERANCE, hull_facets
+from hand_models.wrench_spaces.polytopes import hull_facets
+from hand_models.wrench_spaces.settings import SETTINGS
 
 __all__ = ["Block", "BlockSum", "Sizes", "coupled_columns"]
-
-MOST_CANDIDATES: Final = 500_000
-"""How many sums of the blocks' vertices are looked through; that many take some 20 s."""
 
 
 class Block(NamedTuple):
@@ -90,14 +88,14 @@ class BlockSum:
         """The blocks' images that are more than a point, about `base`."""
         summands = []
         for columns, vertices, *_ in self.blocks:
-            image = (vertices @ self.generators[:, columns].T) * SCALE
+            image = (vertices @ self.generators[:, columns].T) * WRENCH_SCALE
             summands.append(extreme_points(image, len(columns)))
         return tuple(summands)
 
     @property
     def base(self) -> Array:
         """A scaled wrench of the set."""
-        start = self.origin * SCALE
+        start = self.origin * WRENCH_SCALE
         return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
 
     @cached_property
@@ -126,9 +124,10 @@ class BlockSum:
         directions, reach = self.axes
         summands = [s for s in self._summands if s.dimension]
         candidates = math.prod(len(s.points) for s in summands)
-        if candidates > MOST_CANDIDATES:
+        most = 500_000  # that many take some 20 s
+        if candidates > most:
             raise LimitError(
-                f"{candidates} candidate vertices are too many (at most {MOST_CANDIDATES}): "
+                f"{candidates} candidate vertices are too many (at most {most}): "
                 "use fewer half_planes, or leave lateral out"
             )
         return [
@@ -150,7 +149,7 @@ class BlockSum:
     def rounding(self) -> float:
         """Distance that rounding may move points in coordinates of `axes`: more in a thin set."""
         reach = self.axes[1]
-        return max(TOLERANCE, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
+        return max(SETTINGS.tolerance, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
 
     def extreme(self, slopes: Array) -> Array:
         """Return the loads y, shape (m,), with the largest slopes · y in the sum."""
@@ -167,7 +166,7 @@ class BlockSum:
             return Facets(np.zeros((0, 0)), np.zeros(0))
         if self._whole is not None:
             directions, reach = self.axes
-            own = self.generators[:, self._whole.columns] * SCALE[:, None]
+            own = self.generators[:, self._whole.columns] * WRENCH_SCALE[:, None]
             image = directions @ own / reach[:, None]
             normals = np.linalg.solve(image.T, self._whole.A.T).T
             normals /= np.linalg.norm(normals, axis=1)[:, None]

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import scipy
 
-from hand_models.base import Array, Indices, LimitError, go_on
+from hand_models.base import BASE_TOLERANCES, Array, Indices, LimitError, go_on
 from hand_models.wrench_spaces.half_spaces import Facets
 from hand_models.wrench_spaces.polytopes import distinct
+from hand_models.wrench_spaces.settings import SETTINGS
 
 __all__ = ["clipped"]
-
-SPANNING: Final = 1e-13
-"""Squares of unit normals that span a direction sum to more than this in it."""
-
-MOST_PAIRS: Final = 100_000
-"""Pairs of vertices that a cut looks through for edges that it crosses, or `A_VERTEX` for each
-vertex if that is more. A set of 20,000 vertices has some 60,000."""
-
-A_VERTEX: Final = 5
-
-MOST_VERTICES: Final = 20_000
-"""Vertices that cuts may leave, or `GROWTH` times those before if that is more. There are twice as
-many at most, unless rounding takes diagonals of a facet for edges."""
-
-GROWTH: Final = 3
 
 
 def clipped(
@@ -59,8 +43,10 @@ def clipped(
     """
     if not len(cuts.offsets):
         return vertices, faces
-    most_pairs = max(MOST_PAIRS, A_VERTEX * len(vertices))
-    most_vertices = max(MOST_VERTICES, GROWTH * len(vertices))
+    settings = SETTINGS
+    most_pairs = max(settings.most_pairs, settings.pairs_per_vertex * len(vertices))
+    # cuts leave twice as many at most, unless rounding takes diagonals of a facet for edges
+    most_vertices = max(20_000, 3 * len(vertices))
     slack = 10.0 * rounding * (1.0 + float(np.abs(faces.offsets).max()))
     lies = _incidence(vertices, faces, slack)
     beyond = vertices @ cuts.normals.T > cuts.offsets
@@ -111,7 +97,8 @@ def _edges(
     i, j = shared.row[enough], shared.col[enough]
     squares = np.einsum("kr,ks->krs", faces.normals, faces.normals).reshape(-1, r * r)
     spans = np.linalg.eigvalsh((one[i].multiply(other[j]) @ squares).reshape(-1, r, r))
-    edge = spans[:, 1] > SPANNING
+    # squares of unit normals that span a direction sum to more than rounding in it
+    edge = spans[:, 1] > 0.1 * BASE_TOLERANCES.rounding
     return starts[i[edge]], ends[j[edge]]
 
 

@@ -11,17 +11,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array
+from hand_models.wrench_spaces.settings import SETTINGS
 
-__all__ = ["FLATNESS", "SCALE", "Facets", "HalfSpaces", "affine_hull", "lifted"]
-
-MOMENT_ARM: Final = 0.1
-"""Makes newton-metres commensurate with newtons: about the size of a hand [m]."""
-
-SCALE: Final = np.array([1.0, 1.0, 1.0, *[1.0 / MOMENT_ARM] * 3])
-"""Factors of a scaled wrench [N]: moments over a length, so that all six are in newtons."""
-
-FLATNESS: Final = 1e-9
-"""A set is flat in a direction in which it reaches less than this times its longest reach."""
+__all__ = ["WRENCH_SCALE", "Facets", "HalfSpaces", "affine_hull", "lifted"]
+WRENCH_SCALE: Final = np.array([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
+"""Factors of a scaled wrench [N]: moments over 0.1 m, about the size of a hand."""
 
 
 class Facets(NamedTuple):
@@ -53,7 +47,8 @@ def affine_hull(edges: Array) -> tuple[Array, Array]:
     if not len(edges):
         return np.zeros((0, edges.shape[1])), np.zeros(0)
     _, reach, directions = np.linalg.svd(edges, full_matrices=False)
-    rank = int((reach > FLATNESS * reach[0]).sum())
+    # flat where it reaches next to nothing of its longest reach
+    rank = int((reach > SETTINGS.tolerance * reach[0]).sum())
     return directions[:rank], reach[:rank]
 
 

@@ -5,7 +5,7 @@ Among them: how far { o + V y : A y ≤ b } reaches.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import scipy
@@ -13,11 +13,6 @@ import scipy
 from hand_models.base import Array, SolverError, UnsupportedError
 
 __all__ = ["ends_along", "linear_program"]
-
-SOLVED, EMPTY, UNBOUNDED = 0, 2, 3
-"""Statuses of `scipy.optimize.linprog`."""
-
-PRESOLVED: Final = (True, False)
 
 
 def linear_program(
@@ -50,15 +45,16 @@ def linear_program(
             "dual_feasibility_tolerance": tolerance,
         }
     more = {"bounds": [(None, None)] * len(cost), **more}
-    for presolve in PRESOLVED:
+    for presolve in (True, False):
         found: Any = scipy.optimize.linprog(
             cost, A_ub=A, b_ub=b, method="highs", options=options | {"presolve": presolve}, **more
         )
-        if found.status == SOLVED and found.x is not None:
+        # of linprog's statuses 0 is solved, 2 empty, 3 unbounded
+        if found.status == 0 and found.x is not None:
             return np.asarray(found.x)
-        if found.status == EMPTY:
+        if found.status == 2:
             return None
-    if found.status == UNBOUNDED:
+    if found.status == 3:
         raise UnsupportedError(f"{what} has no bound: fingers that resist sideways would give one")
     raise SolverError(f"{what}: {found.message}")
 

@@ -10,22 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, go_on
 from hand_models.wrench_spaces.half_spaces import Facets
-from hand_models.wrench_spaces.polytopes import TOLERANCE, hull
+from hand_models.wrench_spaces.polytopes import hull
+from hand_models.wrench_spaces.settings import SETTINGS
 
 __all__ = ["Summand", "about_facets", "extreme_points", "facets", "sum_vertices", "sums"]
-
-CHOICES: Final = 10_000
-"""Choices of edges whose normals are found at once: some hundredths of a second's work."""
-
-DEPENDENT: Final = 1e-8
-"""Unit vectors that span no more volume than this count as dependent."""
 
 
 class Summand(NamedTuple):
@@ -45,10 +40,10 @@ def extreme_points(image: Array, columns: int) -> Summand:
     centred = image - image.mean(axis=0)
     size = 1.0 + float(np.abs(image).max())
     if len(image) == 2:
-        apart = float(np.linalg.norm(centred)) > TOLERANCE * size
+        apart = float(np.linalg.norm(centred)) > SETTINGS.tolerance * size
         return Summand(image, 1) if apart else Summand(image[:1], 0)
     _, values, basis = np.linalg.svd(centred, full_matrices=False)
-    rank = int((values > TOLERANCE * size).sum())
+    rank = int((values > SETTINGS.tolerance * size).sum())
     if rank == 0:
         return Summand(image[:1], 0)
     flat = centred @ basis[:rank].T
@@ -96,7 +91,7 @@ def facets(parts: Sequence[Summand], r: int, rounding: float) -> Facets:
     lengths = np.linalg.norm(normals, axis=1)
     # of choices that span the same facet, or nearly, the roundest: its normal is the most exact
     order = np.argsort(-lengths, kind="stable")
-    order = order[lengths[order] > DEPENDENT]
+    order = order[lengths[order] > 1e-8]  # unit vectors that span less volume are dependent
     normals, choices = normals[order] / lengths[order, None], choices[order]
     normals, choices = np.vstack([normals, -normals]), np.vstack([choices, choices])
     offsets, lie = np.zeros(len(normals)), []
@@ -120,9 +115,10 @@ def _cross_products(vectors: Array, choices: Indices) -> Array:
     Each is as long as the volume that they span.
     """
     found = [np.zeros((0, vectors.shape[1]))]
-    for start in range(0, len(choices), CHOICES):
+    at_once = 10_000  # choices of edges: some hundredths of a second's work
+    for start in range(0, len(choices), at_once):
         go_on()
-        some = vectors[choices[start : start + CHOICES]]
+        some = vectors[choices[start : start + at_once]]
         turned, spread = np.linalg.qr(some.swapaxes(1, 2), mode="complete")
         volumes = np.abs(np.diagonal(spread, axis1=1, axis2=2).prod(axis=1))
         found.append(volumes[:, None] * turned[:, :, -1])

@@ -3,33 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices, SolverError, go_on
 from hand_models.wrench_spaces.linear_programs import linear_program
+from hand_models.wrench_spaces.settings import SETTINGS
 
-__all__ = ["TOLERANCE", "Polytope", "distinct", "hull", "hull_facets", "polytope"]
-
-TOLERANCE: Final = 1e-9
-"""Relative tolerance of the geometry of polytopes."""
-
-TIGHT: Final = 1e-10
-"""Tolerance of linear programs that measure a polytope."""
-
-JOGGLED: Final = "QJ"
-"""Option of Qhull: to move points a little until it succeeds."""
-
-SLIVER: Final = 1e-6
-"""Least singular value of a facet's edges, relative to the largest, at which they span a plane."""
-
-BEYOND: Final = 1e-6
-"""Distance by which a row must clear a bounding box to be left out at once."""
-
-CHUNK: Final = 2_000_000
-"""Numbers of a table that is worked through part by part."""
+__all__ = ["Polytope", "distinct", "hull", "hull_facets", "polytope"]
 
 
 class Polytope(NamedTuple):
@@ -55,7 +38,7 @@ def polytope(A: Array, b: Array) -> Polytope:
             raise unbounded
         upper = b[A[:, 0] > 0.0].min()
         lower = -b[A[:, 0] < 0.0].min()
-        slack = TOLERANCE * (1.0 + abs(lower) + abs(upper))
+        slack = SETTINGS.tolerance * (1.0 + abs(lower) + abs(upper))
         if lower > upper + slack:
             return Polytope(np.zeros((0, 1)), everything)
         ends = [[lower], [upper]] if upper > lower + slack else [[lower]]
@@ -82,16 +65,16 @@ def polytope(A: Array, b: Array) -> Polytope:
     cost[-1] = -1.0
     what, bounds = f"a block of {d} columns", [(None, None)] * d + [(0.0, None)]
     ball = linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
-    if ball is None or ball[-1] <= TOLERANCE:
+    if ball is None or ball[-1] <= SETTINGS.tolerance:
         raise SolverError(f"a block of {d} columns has no interior")
     go_on()
     cut = scipy.spatial.HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
-    return Polytope(middle + half * distinct(cut.intersections, TOLERANCE), rows)
+    return Polytope(middle + half * distinct(cut.intersections, SETTINGS.tolerance), rows)
 
 
 def _touching(vertices: Array, A: Array, b: Array) -> Polytope:
     """Return a polytope with all rows that touch it; with all of them if it is empty."""
-    slack = BEYOND * (1.0 + np.abs(b) + np.max(np.abs(vertices), initial=0.0))
+    slack = SETTINGS.row_clearance * (1.0 + np.abs(b) + np.max(np.abs(vertices), initial=0.0))
     reach = np.max(vertices @ A.T, axis=0, initial=-np.inf)
     return Polytope(vertices, np.flatnonzero((reach >= b - slack) | (len(vertices) == 0)))
 
@@ -99,12 +82,13 @@ def _touching(vertices: Array, A: Array, b: Array) -> Polytope:
 def _corners(A: Array, b: Array) -> Array:
     """Return the corners (n, 2) of { y : A y ≤ b }, bounded; rows of unit length."""
     # each row by its own size: one that is far away must not loosen the others
-    loosened = b + TOLERANCE * (1.0 + np.abs(b))
+    loosened = b + SETTINGS.tolerance * (1.0 + np.abs(b))
     found = []
     first, second = _meeting(A, b, loosened)
-    for start in range(0, len(first), max(1, CHUNK // len(b))):
+    at_once = max(1, SETTINGS.numbers_at_once // len(b))
+    for start in range(0, len(first), at_once):
         go_on()
-        one, two = (each[start : start + max(1, CHUNK // len(b))] for each in (first, second))
+        one, two = (each[start : start + at_once] for each in (first, second))
         det = A[one, 0] * A[two, 1] - A[one, 1] * A[two, 0]
         points = np.column_stack(
             [
@@ -114,7 +98,7 @@ def _corners(A: Array, b: Array) -> Array:
         )
         found.append(points[(points @ A.T <= loosened).all(axis=1)])
     points = np.vstack([np.zeros((0, 2)), *found])
-    return distinct(points, TOLERANCE * (1.0 + np.max(np.abs(points), initial=0.0)))
+    return distinct(points, SETTINGS.tolerance * (1.0 + np.max(np.abs(points), initial=0.0)))
 
 
 def _meeting(A: Array, b: Array, loosened: Array) -> tuple[Indices, Indices]:
@@ -126,13 +110,13 @@ def _meeting(A: Array, b: Array, loosened: Array) -> tuple[Indices, Indices]:
     # along the line of row i, b_i A_i + t (−A_i1, A_i0), row j asks for slope_ij t ≤ room_ij
     slope = A[:, :1] * A[:, 1] - A[:, 1:] * A[:, 0]
     across = A @ A.T * b[:, None]
-    slanted = np.abs(slope) > TOLERANCE
+    slanted = np.abs(slope) > SETTINGS.tolerance
     steep = np.where(slanted, slope, 1.0)
-    room = (loosened + TOLERANCE * (1.0 + np.abs(b)) - across) / steep
+    room = (loosened + SETTINGS.tolerance * (1.0 + np.abs(b)) - across) / steep
     upper = np.where(slanted & (slope > 0.0), room, np.inf).min(axis=1)
     lower = np.where(slanted & (slope < 0.0), room, -np.inf).max(axis=1)
     t = ((b - across) / steep)[first, second]
-    size = TOLERANCE * (1.0 + np.abs(t))
+    size = SETTINGS.tolerance * (1.0 + np.abs(t))
     left = slanted[first, second] & (t >= lower[first] - size) & (t <= upper[first] + size)
     return first[left], second[left]
 
@@ -146,8 +130,9 @@ def _bounding_box(A: Array, b: Array) -> tuple[Array, Array] | None:
     for j in range(d):
         for k, sign in enumerate((1.0, -1.0)):
             go_on()
+            # tighter than the polytope that it measures
             found = linear_program(
-                sign * np.eye(d)[j], A, b / unit, f"a block of {d} columns", tolerance=TIGHT
+                sign * np.eye(d)[j], A, b / unit, f"a block of {d} columns", tolerance=1e-10
             )
             if found is None:
                 return None
@@ -158,7 +143,7 @@ def _bounding_box(A: Array, b: Array) -> tuple[Array, Array] | None:
 def _irredundant(A: Array, b: Array) -> Indices:
     """Return rows of { y : A y ≤ b }, within the box |y| ≤ 1, that are enough for it."""
     # the others hold in the whole box, and a little beyond
-    rows = list(np.flatnonzero(np.abs(A).sum(axis=1) >= b - BEYOND))
+    rows = list(np.flatnonzero(np.abs(A).sum(axis=1) >= b - SETTINGS.row_clearance))
     for row in list(rows):
         go_on()
         others = [k for k in rows if k != row]
@@ -169,7 +154,8 @@ def _irredundant(A: Array, b: Array) -> Indices:
             bounds=[(-2.0, 2.0)] * A.shape[1],
             method="highs",
         )
-        if result.status == 0 and result.fun is not None and -result.fun <= b[row] + TOLERANCE:
+        most = b[row] + SETTINGS.tolerance
+        if result.status == 0 and result.fun is not None and -result.fun <= most:
             rows.remove(row)
     return np.array(rows, dtype=np.intp)
 
@@ -198,7 +184,7 @@ def hull(points: Array, options: str | None = None) -> scipy.spatial.ConvexHull:
     """
     failed = ""
     # not merged where they are wide (Q12), which costs vertices and makes facets that are none
-    for tried in (options, JOGGLED):
+    for tried in (options, "QJ"):  # at last with points moved a little until it succeeds
         go_on()
         try:
             return scipy.spatial.ConvexHull(points, qhull_options=tried)
@@ -214,7 +200,7 @@ def hull_facets(points: Array) -> tuple[Array, Array]:
     try:
         equations = scipy.spatial.ConvexHull(points).equations
     except scipy.spatial.QhullError:
-        equations = _planes(points, hull(points, JOGGLED))
+        equations = _planes(points, hull(points, "QJ"))
     _, first = np.unique(np.round(equations, 7) + 0.0, axis=0, return_index=True)
     equations = equations[np.sort(first)]
     return equations[:, :-1], -equations[:, -1]
@@ -233,11 +219,12 @@ def _planes(points: Array, found: scipy.spatial.ConvexHull) -> Array:
     inside = normals @ points.mean(axis=0) > offsets
     normals[inside] *= -1.0
     offsets[inside] *= -1.0
-    spans = sizes[:, -1] > SLIVER * sizes[:, 0]
-    chunk, reach = max(1, CHUNK // len(points)), []
+    # edges of slivers do not span a plane
+    spans = sizes[:, -1] > 1e-6 * sizes[:, 0]
+    chunk, reach = max(1, SETTINGS.numbers_at_once // len(points)), []
     for k in range(0, len(normals), chunk):
         go_on()
         reach.append(np.max(normals[k : k + chunk] @ points.T, axis=1))
     beyond = np.concatenate(reach) - offsets
-    spans &= beyond <= TOLERANCE * np.abs(points).max()
+    spans &= beyond <= SETTINGS.tolerance * np.abs(points).max()
     return np.column_stack([normals, -offsets])[spans]

@@ -17,12 +17,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import (
+    BASE_TOLERANCES,
     Array,
     EmptySetError,
     Indices,
@@ -32,17 +33,12 @@ from hand_models.base import (
 )
 from hand_models.wrench_spaces.block_sum import Block, BlockSum, Sizes, coupled_columns
 from hand_models.wrench_spaces.clipping import clipped
-from hand_models.wrench_spaces.half_spaces import FLATNESS, SCALE, Facets, HalfSpaces, lifted
+from hand_models.wrench_spaces.half_spaces import WRENCH_SCALE, Facets, HalfSpaces, lifted
 from hand_models.wrench_spaces.linear_programs import ends_along, linear_program
-from hand_models.wrench_spaces.polytopes import TOLERANCE, hull, polytope
+from hand_models.wrench_spaces.polytopes import hull, polytope
+from hand_models.wrench_spaces.settings import SETTINGS
 
 __all__ = ["Row", "WrenchSpace"]
-
-EXACT: Final = 1e-9
-"""Tolerance of the linear program of a support function [N]."""
-
-MOST_ROWS: Final = 250
-"""Rows of more than two coupled columns whose polytope is listed: each takes a linear program."""
 
 
 class Row(NamedTuple):
@@ -153,7 +149,7 @@ class WrenchSpace:
         b = np.concatenate([(self.s - self.l0)[:apart], self.h])
         used = np.abs(A) > 0.0
         idle = ~used.any(axis=1)
-        if (b[idle] < -TOLERANCE * (1.0 + np.abs(b[idle]))).any():
+        if (b[idle] < -SETTINGS.tolerance * (1.0 + np.abs(b[idle]))).any():
             raise self._empty()
         # what moves nothing, and nothing holds, adds nothing: a wrist without lateral reactions
         groups = [
@@ -189,7 +185,7 @@ class WrenchSpace:
     @property
     def listed(self) -> bool:
         """True if rows couple few enough others for their loads' polytopes to be listed."""
-        return self._most_rows <= MOST_ROWS
+        return self._most_rows <= SETTINGS.most_rows
 
     @property
     def _enough(self) -> tuple[Array, Array]:
@@ -228,7 +224,7 @@ class WrenchSpace:
         reach = self.D @ self.origin
         for columns, vertices, *_ in self._blocks:
             reach = reach + (slopes[:, columns] @ vertices.T).max(axis=1)
-        cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + TOLERANCE))
+        cuts: Indices = np.flatnonzero(reach > self._held * (1.0 + SETTINGS.tolerance))
         # where the sum reaches least far along the cuts is most often a wrench of the set
         within = not len(cuts) or self._obeys(self._sum.extreme(-slopes[cuts].sum(axis=0)))
         if not within and self._farthest(np.zeros(6)) is None:
@@ -238,7 +234,7 @@ class WrenchSpace:
 
     def _obeys(self, y: Array) -> bool:
         """Return True if loads of the sum of the blocks also keep to the wrench rows."""
-        return bool((self.D @ self.wrench(y) <= self._held * (1.0 + TOLERANCE)).all())
+        return bool((self.D @ self.wrench(y) <= self._held * (1.0 + SETTINGS.tolerance)).all())
 
     @property
     def _held(self) -> Array:
@@ -248,18 +244,18 @@ class WrenchSpace:
     def _farthest(self, direction: Array) -> Array | None:
         """Return the wrench farthest along d over all rows at u = 1, by linear programming."""
         cost = -(self.generators.T @ direction)
-        y = linear_program(cost, *self._enough, "support", tolerance=EXACT)
+        y = linear_program(cost, *self._enough, "support", tolerance=BASE_TOLERANCES.force)
         return None if y is None else self.wrench(y)
 
     @cached_property
     def _clipped(self) -> tuple[Array, Facets]:
         """Vertices (n, r) and facets where wrench rows cut the sum of the blocks."""
         directions, reach = self._sum.axes
-        rows, held = self.D[self._cuts] / SCALE, self._held[self._cuts]
+        rows, held = self.D[self._cuts] / WRENCH_SCALE, self._held[self._cuts]
         normals = rows @ directions.T * reach
         lengths = np.linalg.norm(normals, axis=1)
         # what is constant on the set, and yet beyond its capacity, is so by rounding
-        turns = lengths > FLATNESS * held
+        turns = lengths > SETTINGS.tolerance * held
         room = held - np.asarray(rows @ self._sum.base)
         cuts = Facets(normals[turns] / lengths[turns, None], room[turns] / lengths[turns])
         found = clipped(self._sum.vertices, self._sum.facets, cuts, self._sum.rounding)
@@ -287,7 +283,7 @@ class WrenchSpace:
         if not self.listed:
             raise LimitError(
                 f"{self._most_rows} rows of loads that are coupled are too many (at most "
-                f"{MOST_ROWS})"
+                f"{SETTINGS.most_rows})"
             )
         sizes = self._sum.sizes
         return sizes._replace(half_spaces=max(sizes)) if len(self._cuts) else sizes
@@ -304,13 +300,14 @@ class WrenchSpace:
         """
         scaled = lifted(self._facets, *self._sum.axes, self._sum.base)
         return scaled._replace(
-            normals=scaled.normals * SCALE, equation_normals=scaled.equation_normals * SCALE
+            normals=scaled.normals * WRENCH_SCALE,
+            equation_normals=scaled.equation_normals * WRENCH_SCALE,
         )
 
     def vertices(self) -> Array:
         """Return the extreme wrenches of the set at u = 1 (n, 6); raises as `half_spaces`."""
         directions, reach = self._sum.axes
-        return np.asarray(((self._vertices * reach) @ directions + self._sum.base) / SCALE)
+        return np.asarray(((self._vertices * reach) @ directions + self._sum.base) / WRENCH_SCALE)
 
     @property
     def _vertices(self) -> Array:
@@ -369,7 +366,11 @@ class WrenchSpace:
         """
         d = finite_vector(direction, 6, "direction")
         return ends_along(
-            d * SCALE, self.origin * SCALE, self.generators * SCALE[:, None], self.A, self.b
+            d * WRENCH_SCALE,
+            self.origin * WRENCH_SCALE,
+            self.generators * WRENCH_SCALE[:, None],
+            self.A,
+            self.b,
         )
 
     def volume(self) -> tuple[float, int]:

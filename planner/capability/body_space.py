@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, finite_vector
-from hand_models.wrench_spaces import SCALE
+from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.capability.body_programs import BodyPrograms, End, size_of
 from planner.capability.polygon import POLYGON_SETTINGS, Polygon, SupportPoint, enclose
 from planner.programs import WRENCH_UNIT, Reached
@@ -136,7 +136,7 @@ class BodySpace(BodyPrograms):
         start = self.needed if others == "needed" else np.zeros(6)
         at = np.where(np.isin(np.arange(6), plane), 0.0, start)
         columns = np.eye(6) if others == "free" else np.eye(6)[:, plane]
-        units = (SCALE * WRENCH_UNIT)[plane]
+        units = (WRENCH_SCALE * WRENCH_UNIT)[plane]
         cap = self.cap_at_needed if others == "needed" else None
 
         def touching(normal: Array) -> SupportPoint | None:
@@ -144,11 +144,11 @@ class BodySpace(BodyPrograms):
             found = self.reached(goal, columns, at, cap)
             if found is None:
                 return None
-            point = (SCALE * self.wrench(found))[plane]
+            point = (WRENCH_SCALE * self.wrench(found))[plane]
             return SupportPoint(normal, point, self.limiting(found.outcome))
 
         polygon = enclose(touching)
-        scaled = None if polygon is None else polygon.scaled(1.0 / SCALE[plane])
+        scaled = None if polygon is None else polygon.scaled(1.0 / WRENCH_SCALE[plane])
         return BodySection((one, two), others, scaled)
 
     @property

@@ -28,7 +28,7 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array
-from hand_models.wrench_spaces import SCALE, WrenchSpace
+from hand_models.wrench_spaces import WRENCH_SCALE, WrenchSpace
 from planner import deadline, programs
 from planner.deadline import Budget
 from planner.floating.goals import LEAST_USE, RANK, Goal
@@ -283,7 +283,7 @@ def disagreements(
 ) -> list[float]:
     """Return how far sets of floating hands are off at loads where others are exact [N]."""
     return [
-        float(np.abs((a.wrench(y) - b.wrench(y)) * SCALE).max())
+        float(np.abs((a.wrench(y) - b.wrench(y)) * WRENCH_SCALE).max())
         for wrist, a, b, y in zip(hands.wrists, spaces, there, loads, strict=True)
         if wrist is not None
     ]

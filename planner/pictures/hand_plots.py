@@ -22,7 +22,7 @@ from hand_models.base import Array, whole_file
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL, SettledHand
 from hand_models.sections import Section
-from hand_models.wrench_spaces import SCALE, WrenchSpace
+from hand_models.wrench_spaces import WRENCH_SCALE, WrenchSpace
 from planner.capability import WRENCH_COMPONENTS, SupportPoint, enclose
 from planner.pictures.body_plots import symbol_of
 from planner.pictures.settings import PICTURE_SETTINGS
@@ -335,7 +335,7 @@ def _draw_from_above(axes: Axes, settled: SettledHand) -> None:
 
 def _outline(space: WrenchSpace, i: int, j: int) -> Array:
     """Return points, shape (n, 2), of which the hull is a set's projection or all but that."""
-    units = SCALE[[i, j]]
+    units = WRENCH_SCALE[[i, j]]
 
     def touching(normal: Array) -> SupportPoint:
         direction = np.zeros(6)

@@ -241,7 +241,7 @@ class HandBatch:
 
     @property
     def stops(self) -> NDArray[np.int8]:
-        """Limit that each joint stands at, codes of `STOPS`, shape (F, 3)."""
+        """Limit that each joint stands at, codes of `JOINT_STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])
 
 

@@ -17,7 +17,7 @@ import scipy
 from hand_models.base import Array, InvalidInputError, UnsupportedError
 from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
 from hand_models.hand import SettledHand
-from hand_models.wrench_spaces import SCALE, WrenchSpace
+from hand_models.wrench_spaces import WRENCH_SCALE, WrenchSpace
 from planner import programs
 from planner.prepare.stance_constraints import StanceConstraints
 from planner.programs import (
@@ -322,7 +322,7 @@ def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
             continue
         twist = result.x * TWIST_UNIT
         exact = wrist.hand.wrenches(wrist.hand.loads(twist[None]))[0]
-        off = np.abs((space.wrench(twist) - exact) * SCALE).max()
+        off = np.abs((space.wrench(twist) - exact) * WRENCH_SCALE).max()
         error = max(error, float(off)) if math.isfinite(off) else error
     return palms[best], space, error
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array
-from hand_models.hand import FINGERS, HELD
+from hand_models.hand import FINGERS, HELD_DIRECTIONS
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.programs import JOINT_FORCE, JOINT_TORQUE
 
@@ -46,9 +46,9 @@ PASSIVE_JOINT: Final = "passive_joint"
 AXES: Final = ("fx+", "fx-", "fy+", "fy-", "fz+", "fz-")
 """Both ways along the axes of a cap's frame."""
 
-BALL: Final = np.vstack([HELD, HELD[8:] * [1.0, 1.0, -1.0]])
-"""Directions (26, 3) whose largest product with a force is at least its size: `HELD` and, toward
-the rock, its mirror image."""
+BALL: Final = np.vstack([HELD_DIRECTIONS, HELD_DIRECTIONS[8:] * [1.0, 1.0, -1.0]])
+"""Directions (26, 3) whose largest product with a force is at least its size: `HELD_DIRECTIONS`
+and, toward the rock, its mirror image."""
 
 BALL_NAMES: Final = tuple(str(k + 1) for k in range(len(BALL)))
 

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.compliance import WRIST, pose_units
+from hand_models.compliance import WRIST_COLUMNS, pose_units
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, TENDON_TENSION
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.programs.conic import Columns
@@ -42,7 +42,7 @@ __all__ = [
 LOAD_UNIT: Final = 100.0
 """Scale of a hand's loads y [N]."""
 
-TWIST_UNIT: Final = pose_units(WRIST)
+TWIST_UNIT: Final = pose_units(WRIST_COLUMNS)
 """Scale of a floating wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
 
 WRIST_RANGE: Final = "wrist_range"
@@ -156,7 +156,7 @@ class _Roles(NamedTuple):
 def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Roles:
     """Return the roles of names; ``count`` of the rows are limits."""
     limits = rows[:count]
-    floats = columns == WRIST
+    floats = columns == WRIST_COLUMNS
     tensions = np.array([name.endswith("/tension") for name in columns])
     place = {name: j for j, name in enumerate(columns)}
     measures = {}

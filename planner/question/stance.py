@@ -10,7 +10,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose, finite_vector
-from hand_models.fixed_wrist import SEATS, SeatRule
+from hand_models.fixed_wrist import SEAT_RULES, SeatRule
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Hold
 from hand_models.tile import Surface
@@ -169,7 +169,7 @@ class HandOnHold:
             _possible(self.hold_in_hand, "hold.pose_in_hand")
 
     def _check_seat(self) -> None:
-        known_choice(self.seat, SEATS, "seat")
+        known_choice(self.seat, SEAT_RULES, "seat")
         posed = self.hold_pose is not None or self.hold_in_hand is not None
         given = {"seat": self.seat == "best", "at": self.at is not None}
         for name, left_out in (("seat", "the seat"), ("at", "where it is seated")):

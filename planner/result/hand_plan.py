@@ -78,7 +78,7 @@ class HandPlan:
     seating : Seating
         Where the hold is in H.
     closures : tuple of str
-        How each finger has ended on the hold, of `hand_models.hand.CLOSURES`.
+        How each finger has ended on the hold, as of `SettledHand.closures`.
     space : WrenchSpace
         The set that the program used; of a floating hand linearised where its wrist goes.
     laws : ndarray, shape (n, 2, 2), or None

@@ -1,6 +1,6 @@
 """Robust load factor: over places of the hands near the given ones.
 
-Every hand is closed at `PLACES` places about its own, whichever other hands there are. A sample
+Every hand is closed at 128 places about its own, whichever other hands there are. A sample
 puts each hand at one of its places, so that over all samples each place is taken equally often and
 hands are combined at random: closing costs most, and what hands do together needs more samples than
 places. A sample in which a hand cannot be, or nothing is held at any multiple, counts as zero.
@@ -26,9 +26,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.fixed_wrist import (
-    HUNDREDTH,
-    PLACES,
-    TENTH,
+    SCATTER_SETTINGS,
     closed_about,
     scattered_places,
     wrench_spaces,
@@ -85,7 +83,8 @@ def find_robust_load_factor(
         if None in own
     }
     position, angle = prepared.question.stance.robot.hand.seat_scatter
-    hundredth, tenth = np.percentile(factors, [HUNDREDTH, TENTH]).tolist()
+    quantiles = [SCATTER_SETTINGS.hundredth, SCATTER_SETTINGS.tenth]
+    hundredth, tenth = np.percentile(factors, quantiles).tolist()
     return RobustLoadFactor(
         draws=len(factors),
         without=int((factors <= 0.0).sum()),
@@ -95,10 +94,10 @@ def find_robust_load_factor(
         seed=SEED,
         worst=hundredth,
         tenth=tenth,
-        tenth_interval=_interval(factors, taken, TENTH),
+        tenth_interval=_interval(factors, taken, SCATTER_SETTINGS.tenth),
         hundredth=hundredth,
-        hundredth_interval=_interval(factors, taken, HUNDREDTH),
-        places=PLACES,
+        hundredth_interval=_interval(factors, taken, SCATTER_SETTINGS.hundredth),
+        places=SCATTER_SETTINGS.places,
         reasons=reasons,
     )
 
@@ -111,7 +110,7 @@ def _places(prepared: PreparedStance, i: int, reasons: dict[str, str]) -> Places
     stance, settled = prepared.question.stance, prepared.batch.hands[i]
     hand, cap = stance.robot.hand, prepared.question.limits.tendon_tension
     added, found = prepared.hands.added[i], list[WrenchSpace | None]()
-    where = scattered_places(prepared.limbs[i], PLACES, SEED)
+    where = scattered_places(prepared.limbs[i], SCATTER_SETTINGS.places, SEED)
     for outcomes in closed_about(hand, settled, where, hand.seat_scatter):
         there = [each for each in outcomes if isinstance(each, SettledHand)]
         for each in outcomes:
@@ -128,7 +127,7 @@ def _places(prepared: PreparedStance, i: int, reasons: dict[str, str]) -> Places
 def _taken(limb: str) -> Indices:
     """Return which place of a hand each sample takes, shape (samples,)."""
     own = np.random.default_rng([SEED, crc32(limb.encode()), ROUNDS])
-    return np.concatenate([own.permutation(PLACES) for _ in range(ROUNDS)])
+    return np.concatenate([own.permutation(SCATTER_SETTINGS.places) for _ in range(ROUNDS)])
 
 
 def _factors(
@@ -160,11 +159,11 @@ def _interval(factors: Array, taken: Indices, percent: float) -> list[float]:
     whole = share * (1.0 - share)
     between = 0.0
     for own in taken:
-        means = np.bincount(own, below, PLACES) / ROUNDS
+        means = np.bincount(own, below, SCATTER_SETTINGS.places) / ROUNDS
         # what so few samples at each place vary by themselves is taken off
         between += max(float(means.var(ddof=1)) - whole / ROUNDS, 0.0) / (1.0 - 1.0 / ROUNDS)
     between = min(between, whole)
-    off = SURE * math.sqrt(between / PLACES + (whole - between) / samples)
+    off = SURE * math.sqrt(between / SCATTER_SETTINGS.places + (whole - between) / samples)
     ends = np.clip([share - off, share + off], 0.0, 1.0)
     found: list[float] = np.quantile(factors, ends).tolist()
     return found

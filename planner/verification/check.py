@@ -21,7 +21,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import SKEW, Array, BoundedStore
+from hand_models.base import SKEW_MATRICES, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
 from planner.question import HandOnHold, Question
 from planner.result import PlanArrays
@@ -147,7 +147,7 @@ class Check:
         levers = (np.array([pose.position for pose in poses]) - stance.body.position) @ into_body.T
         carry = np.zeros((len(poses), 6, 6))
         carry[:, :3, :3] = carry[:, 3:, 3:] = turns
-        carry[:, 3:, :3] = (levers @ SKEW.reshape(3, 9)).reshape(-1, 3, 3) @ turns
+        carry[:, 3:, :3] = (levers @ SKEW_MATRICES.reshape(3, 9)).reshape(-1, 3, 3) @ turns
         self.carry = -carry.transpose(1, 0, 2).reshape(6, -1)
 
     def problems(

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import Array
-from hand_models.hand import HELD
+from hand_models.hand import HELD_DIRECTIONS
 from planner.result import PlanArrays
 from planner.verification.joint_balance import wrenches_of
 from planner.verification.residuals import (
@@ -56,7 +56,7 @@ class HandLimits(Limits):
         pressing, numbers = palms[:, ::2], (palms[:, 0], palms[:, 1], palms[:, 2])
         used, said = pressing * self._palm_shares, planned.palm_utilisations
         most = np.maximum.reduce(used, axis=1)
-        along = planned.wrenches[:, :3] @ HELD.T
+        along = planned.wrenches[:, :3] @ HELD_DIRECTIONS.T
         disagree = ": force and loads disagree"
         no_sum = "the wrench is not the sum of its tiles' and palm's forces"
         cannot = "the palm cannot exert {:.6g}, {:.6g}, {:.6g} N"
@@ -75,7 +75,7 @@ class HandLimits(Limits):
         forces = wrenches[:, :3]
         held = np.minimum(forces, PULLING)
         size = np.sqrt(np.add.reduce(held * held, axis=1))
-        left, limb = np.maximum.reduce(forces @ HELD.T, axis=1) - size, self._names.limb
+        left, limb = np.maximum.reduce(forces @ HELD_DIRECTIONS.T, axis=1) - size, self._names.limb
         text = "the hand holds {:.6g} N, more than its rows say"
         return [Residual("least", left, self._each, limb, text, (size,), affine=False)]
 

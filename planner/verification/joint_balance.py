@@ -23,8 +23,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import SKEW, Array
-from hand_models.finger import PHALANGES, STOPS
+from hand_models.base import SKEW_MATRICES, Array
+from hand_models.finger import JOINT_STOPS, PHALANGES
 from hand_models.hand import HandModel
 from planner.prepare import NONE, NOTHING, TileIndex
 from planner.verification.residuals import COUNT, Limits, Names, Recomputed, Residual
@@ -33,8 +33,8 @@ __all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
 
 JOINTS: Final = len(PHALANGES)
 
-SIDES: Final = np.array([{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in STOPS])
-"""Signs of a joint's torque on the limit at which it stands, by code of `STOPS`."""
+SIDES: Final = np.array([{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in JOINT_STOPS])
+"""Signs of a joint's torque on the limit at which it stands, by code of `JOINT_STOPS`."""
 
 STOP: Final = 1e-6
 """Largest torque that a joint's stop may seem to pull with, by rounding [N·m]."""
@@ -45,7 +45,7 @@ BEFORE: Final = np.tri(JOINTS, k=-1)
 OUTWARD: Final = np.tri(JOINTS).T
 """Ones where a joint (row) turns a phalanx (column)."""
 
-CROSS: Final = SKEW.transpose(0, 2, 1).reshape(9, 3)
+CROSS: Final = SKEW_MATRICES.transpose(0, 2, 1).reshape(9, 3)
 """The map of p ⊗ F to the moment p × F."""
 
 

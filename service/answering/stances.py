@@ -13,7 +13,7 @@ import numpy as np
 
 from hand_models import rock
 from hand_models.base import Array, BoundedStore, InvalidInputError, LimitError, Pose, within
-from hand_models.fixed_wrist import UP, approach_frame
+from hand_models.fixed_wrist import ALONG_FINGERS, approach_frame
 from hand_models.hand import SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
 from hand_models.rock import Mesh, Profile
@@ -222,7 +222,7 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
         from_world = rock_pose.inverse()
         axes, point, up = from_world.rotation, from_world.apply(place.point), up or (0.0, 0.0, 1.0)
     else:
-        axes, point, up = np.eye(3), np.array(place.point), up or UP
+        axes, point, up = np.eye(3), np.array(place.point), up or ALONG_FINGERS
     with within("place"):
         return approach_frame(point, axes @ place.approach, place.wrist_angle, axes @ up)
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import msgspec
 
-from hand_models.base import DISTRIBUTION, BoundedStore, CruxError, installed_version
+from hand_models.base import DISTRIBUTION_NAME, BoundedStore, CruxError, installed_version
 from hand_models.parameters import ParameterTable
 from service.requests import PlanRequest, RouteRequest
 from service.wire import Answer, Format, MalformedError, ServiceName
@@ -98,7 +98,8 @@ class Setting(NamedTuple):
 
 def own_versions() -> dict[str, str | None]:
     """Return the versions of the packages on which the last digits of answers depend."""
-    return {name: installed_version(name) for name in (DISTRIBUTION, "numpy", "scipy", "clarabel")}
+    names = DISTRIBUTION_NAME, "numpy", "scipy", "clarabel"
+    return {name: installed_version(name) for name in names}
 
 
 def answer_chunk(setting: bytes, chunk: list[bytes]) -> list[Answer]:

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 import click
 
-from hand_models.base import DISTRIBUTION
+from hand_models.base import DISTRIBUTION_NAME
 from service.tables.command_line import VERBOSITY_KEY, ExitStatus
 
 __all__ = ["COMMANDS_BY_NAME", "crux", "run"]
@@ -216,7 +216,7 @@ def _hint(error: click.ClickException) -> str:
 @click.group(
     cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False
 )
-@click.version_option(package_name=DISTRIBUTION, message="%(prog)s %(version)s")
+@click.version_option(package_name=DISTRIBUTION_NAME, message="%(prog)s %(version)s")
 def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 

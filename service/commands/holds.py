@@ -244,7 +244,7 @@ def _entry(trial: fixed_wrist.Trial, found: fixed_wrist.FoundHold) -> dict[str, 
             return None
         return {
             way: value if math.isfinite(value) else None
-            for way, value in zip(fixed_wrist.WAYS, values.tolist(), strict=True)
+            for way, value in zip(fixed_wrist.TRIAL_WAYS, values.tolist(), strict=True)
         }
 
     return {

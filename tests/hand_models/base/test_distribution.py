@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from hand_models.base import DISTRIBUTION, installed_version, to_install
+from hand_models.base import DISTRIBUTION_NAME, installed_version, to_install
 from tests.suite.helpers.checkout import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -27,7 +27,7 @@ ELSEWHERE = re.compile(r"\binstall\b[^\n]*\b(?:crux|crux-climb)\[")
 
 
 def test_the_name_is_that_of_the_project() -> None:
-    assert PROJECT["name"] == DISTRIBUTION
+    assert PROJECT["name"] == DISTRIBUTION_NAME
     assert installed_version() == PROJECT["version"]
     assert installed_version("no-distribution-of-this-name") is None
 
@@ -57,4 +57,4 @@ def test_nothing_is_said_to_be_on_the_index_of_packages() -> None:
         text = path.read_text("utf-8")
         assert not ELSEWHERE.search(text), path
         targets = {target.strip("'\"") for target in INSTALLED.findall(text)}
-        assert not targets & {"crux", DISTRIBUTION}, path
+        assert not targets & {"crux", DISTRIBUTION_NAME}, path

@@ -8,7 +8,7 @@ import pytest
 
 from hand_models import InvalidInputError
 from hand_models.base import UnsupportedError
-from hand_models.compliance import PALM_MODES, STEP, CompliantHand, FloatingWrist
+from hand_models.compliance import COMPLEX_STEP, PALM_MODES, CompliantHand, FloatingWrist
 from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
@@ -82,7 +82,8 @@ def test_a_finger_stiffens_the_grasp_through_its_twist(name, finger):
         [[*frame.across, *np.cross(p, frame.across)] for p in hand.settled.positions[own]]
     )
     lateral = slopes(lambda twists: hand.lateral_loads(finger, twists), np.zeros(6))
-    in_plane = hand.fingers[finger].loads(*(1j * STEP * np.eye(3))).planar_wrench.imag.T / STEP
+    steps = 1j * COMPLEX_STEP * np.eye(3)
+    in_plane = hand.fingers[finger].loads(*steps).planar_wrench.imag.T / COMPLEX_STEP
     expected = J.T @ in_plane @ J + across.T @ lateral
 
     def wrenches(twists):
@@ -107,7 +108,7 @@ def test_pulling_off_drags_the_tiles_and_takes_their_pressing():
 def test_a_held_motor_is_stiffer_than_one_that_keeps_its_tension():
     # without friction in the tendon, only the motor keeps it from running
     finger = compliant("pinch", hand=changed_hand("tendon", "holding_friction", 0.0)).fingers[1]
-    steps = 1j * STEP * np.eye(3)
+    steps = 1j * COMPLEX_STEP * np.eye(3)
     pulled = np.array([[0.0], [-3e-4], [0.0]])
     held = finger.loads(*steps).planar_wrench.imag, finger.loads(*pulled).tensions
     assert finger.regimes.scheme == "held"

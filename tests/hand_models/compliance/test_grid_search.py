@@ -9,7 +9,7 @@ from scipy.optimize import brentq, minimize
 from hand_models import InvalidInputError
 from hand_models.base import EmptySetError
 from hand_models.compliance import (
-    PLANAR,
+    PLANAR_COMPONENTS,
     CompliantHand,
     FloatingWrist,
     Gripper,
@@ -28,7 +28,7 @@ from hand_models.parameters import ParameterTable, Quantity, experiment_table, h
 from hand_models.rock import Cylinder, Plane, Sphere
 from hand_models.tendon import FingerTendon
 from hand_models.tile import Surface
-from hand_models.wrench_spaces import SCALE
+from hand_models.wrench_spaces import WRENCH_SCALE
 from tests.hand_models.tendon.test_finger_tendon import by_enumeration
 from tests.suite.helpers.hands import HAND
 
@@ -50,7 +50,7 @@ def floating(hold=None, grasp=PINCH, surface="rock", palm=False):
 
 def planar(way):
     direction = np.zeros(6)
-    direction[list(PLANAR)] = way
+    direction[list(PLANAR_COMPONENTS)] = way
     return direction
 
 
@@ -115,7 +115,9 @@ def test_mirrored_poses_have_mirrored_wrenches():
     straight = GRIPPER.evaluate(TWISTS)
     mirrored = GRIPPER.evaluate(TWISTS * MIRROR)
     np.testing.assert_allclose(
-        mirrored.wrenches[:, PLANAR], straight.wrenches[:, PLANAR] * MIRROR, atol=1e-9
+        mirrored.wrenches[:, PLANAR_COMPONENTS],
+        straight.wrenches[:, PLANAR_COMPONENTS] * MIRROR,
+        atol=1e-9,
     )
     np.testing.assert_allclose(mirrored.utilisation, straight.utilisation, atol=1e-9)
 
@@ -184,7 +186,7 @@ def test_the_search_finds_what_a_plain_grid_finds_and_more():
 def test_a_finer_search_and_rays_agree():
     coarse, rays = search(CAPPED, 40), boundary(CAPPED, search_box(CAPPED), 3000)
     for way in np.random.default_rng(0).normal(size=(50, 3)):
-        direction = planar(way / np.linalg.norm(way) * SCALE[list(PLANAR)])
+        direction = planar(way / np.linalg.norm(way) * WRENCH_SCALE[list(PLANAR_COMPONENTS)])
         # in shares of the set's size: both miss the very corners
         size = 0.5 * (rays.support(direction) + rays.support(-direction))
         assert coarse.support(direction) == pytest.approx(rays.support(direction), abs=0.05 * size)
@@ -194,8 +196,8 @@ def test_a_finer_search_and_rays_agree():
 def test_the_set_is_skew_symmetric():
     found = boundary(CAPPED, search_box(CAPPED), 16000)
     for way in np.random.default_rng(1).normal(size=(50, 3)):
-        direction = planar(way * SCALE[list(PLANAR)])
-        mirrored = planar(way * MIRROR * SCALE[list(PLANAR)])
+        direction = planar(way * WRENCH_SCALE[list(PLANAR_COMPONENTS)])
+        mirrored = planar(way * MIRROR * WRENCH_SCALE[list(PLANAR_COMPONENTS)])
         size = 0.5 * (found.support(direction) + found.support(-direction))
         assert found.support(direction) == pytest.approx(found.support(mirrored), abs=0.05 * size)
 
@@ -259,7 +261,7 @@ def pulls(n, seed):
     ways = np.random.default_rng(seed).normal(size=(n, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     ways *= np.where(ways[:, 1:2] > 0.0, -1.0, 1.0)
-    return np.array([planar(way * SCALE[list(PLANAR)]) for way in ways])
+    return np.array([planar(way * WRENCH_SCALE[list(PLANAR_COMPONENTS)]) for way in ways])
 
 
 @pytest.mark.slow
@@ -324,7 +326,7 @@ def test_newton_finds_the_pose_of_a_thousand_wrenches(name):
     found = [wrist_pose(wrist.hand, wrench) for wrench in wrenches]
     assert all(pose.converged for pose in found)
     back = wrist.evaluate(np.array([pose.twist for pose in found])).wrenches
-    np.testing.assert_allclose(back * SCALE, wrenches * SCALE, atol=1e-6)
+    np.testing.assert_allclose(back * WRENCH_SCALE, wrenches * WRENCH_SCALE, atol=1e-6)
 
 
 def test_the_rest_wrench_needs_no_step():

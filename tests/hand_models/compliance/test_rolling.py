@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from hand_models.compliance import STEP
+from hand_models.compliance import COMPLEX_STEP
 from hand_models.compliance.rolling import RollingContact, bearing_angle
 from hand_models.finger import settle_finger
 from hand_models.hand import FINGERS, Grasp
@@ -113,20 +113,24 @@ def test_a_base_too_far_off_finds_no_rock():
 def test_complex_steps_give_the_slopes_of_everything():
     resettling, _ = moving(Cylinder(0.3))
     at, small = np.array([2e-4, -3e-4, 0.004]), 1e-7
-    exact = resettling.move(*(at[:, None] + 1j * STEP * np.eye(3)))
+    exact = resettling.move(*(at[:, None] + 1j * COMPLEX_STEP * np.eye(3)))
     ends = [resettling.move(*(at[:, None] + side * small * np.eye(3))) for side in (1.0, -1.0)]
     for name in ("angles", "turns", "slips", "points", "joints"):
         slope = (getattr(ends[0], name) - getattr(ends[1], name)) / (2.0 * small)
-        np.testing.assert_allclose(getattr(exact, name).imag / STEP, slope, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(
+            getattr(exact, name).imag / COMPLEX_STEP, slope, rtol=1e-6, atol=1e-6
+        )
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_the_complex_angle_is_analytic(x, z, dx, dz):
     if math.hypot(x, z) < 1e-3:
         return
-    value = bearing_angle(np.array(x + 1j * STEP * dx), np.array(z + 1j * STEP * dz))
+    value = bearing_angle(
+        np.array(x + 1j * COMPLEX_STEP * dx), np.array(z + 1j * COMPLEX_STEP * dz)
+    )
     assert value.real == pytest.approx(math.atan2(z, x), abs=1e-15)
-    assert value.imag / STEP == pytest.approx((x * dz - z * dx) / (x * x + z * z), abs=1e-9)
+    assert value.imag / COMPLEX_STEP == pytest.approx((x * dz - z * dx) / (x * x + z * z), abs=1e-9)
 
 
 def test_an_edge_hold_is_met_with_points_that_slide():

@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 from hand_models import Plane, spiny_hand
 from hand_models.finger import Contact, SettledFinger, settle_finger
-from hand_models.sections import LEVEL, Disc, Wall
+from hand_models.sections import SECTION_SETTINGS, Disc, Wall
 from tests.suite.helpers.rocks import distance, random_axes, random_hold
 
 MODEL = spiny_hand().finger
@@ -89,7 +89,8 @@ def test_contacts_lie_on_the_rock_and_tangent_faces_do_not_cut_it(seed):
             assert -1e-9 < gap < MODEL.spine_travel + 1e-9
             assert contact.along in (near, far)
         else:
-            assert -1e-9 < gap < (LEVEL if contact.along == MODEL.tile_centre else 1e-9)
+            lies = contact.along == MODEL.tile_centre
+            assert -1e-9 < gap < (SECTION_SETTINGS.level_distance if lies else 1e-9)
             assert (near < contact.along < far) == (contact.kind == "face")
             assert contact.along <= L
         face = point + np.linspace(near - contact.along, L - contact.along, 41)[:, None] * u

@@ -8,7 +8,7 @@ import trimesh
 
 from hand_models import Grasp, InvalidInputError, place
 from hand_models.fixed_wrist import (
-    WAYS,
+    TRIAL_WAYS,
     FoundHold,
     Trial,
     approach_frame,
@@ -74,7 +74,7 @@ def test_what_is_found_is_what_a_hand_placed_there_can_carry(wall):
         hand = place(wall, trial.point, trial.approach, trial.wrist_angle, Grasp(), ROCK)
         np.testing.assert_allclose(hand.seating.pose.inverse().position, each.pose.position)
         space = wrench_space(hand)
-        for way, reach in zip(WAYS, each.support, strict=True):
+        for way, reach in zip(TRIAL_WAYS, each.support, strict=True):
             axis, sign = DIRECTIONS[way]
             assert space.support(sign * np.eye(6)[axis]) == pytest.approx(reach, rel=1e-9)
     # where fingers point outward at the border they are too near it

@@ -17,7 +17,7 @@ from hand_models import (
     Profile,
     Sphere,
 )
-from hand_models.fixed_wrist import BEST, PULL_OFF, best_seats, wrench_space
+from hand_models.fixed_wrist import PULL_OFF, best_seats, wrench_space
 from hand_models.hand import Placement
 from hand_models.rock import Mesh
 from tests.suite.helpers.hands import HAND, ROCK, seating_on
@@ -66,7 +66,7 @@ def test_the_best_seat_holds_no_less_and_is_as_near_as_it_says(seeds):
         if rest > NOTHING and not HAND.settle(*each).seating.backed_off:
             assert reach(best) >= rest
         more += reach(best) > rest
-        assert best.seating.rule == BEST
+        assert best.seating.rule == "best"
         moved = seat.pose @ best.seating.pose.inverse()
         assert moved.position == pytest.approx([0.0, 0.0, -best.seating.backed_off], abs=1e-12)
         assert 0.0 <= best.seating.backed_off <= HAND.back_off
@@ -141,4 +141,4 @@ def test_the_best_seat_holds_no_less_than_one_that_a_hand_backs_off_to():
     assert rest.seating.backed_off > 0.0
     (best,) = best_seats(HAND, [each], up)
     assert reach(best, up) >= reach(rest, up)
-    assert best.seating.rule == BEST
+    assert best.seating.rule == "best"

@@ -26,7 +26,7 @@ from hand_models import (
     WrenchSpace,
 )
 from hand_models.fixed_wrist import wrench_space, wrench_spaces
-from hand_models.hand import HELD
+from hand_models.hand import HELD_DIRECTIONS
 from hand_models.tile import inner_half_planes
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, pinch, settled_at
 
@@ -189,7 +189,7 @@ class ByHand:
             self.hard[f"{name}_reversed"] = {name: -1.0}, 0.0, 0.0
 
     def add_hand_load(self) -> None:
-        for k, direction in enumerate(HELD):
+        for k, direction in enumerate(HELD_DIRECTIONS):
             self.limits[f"hand_load/{k + 1}"] = (
                 {name: direction @ wrench[:3] for name, wrench in self.columns.items()},
                 direction @ self.origin[:3],

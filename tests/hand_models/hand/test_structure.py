@@ -10,7 +10,7 @@ from msgspec import structs
 from hand_models import InvalidInputError
 from hand_models.base import Pose
 from hand_models.fixed_wrist import wrench_space
-from hand_models.hand import HELD
+from hand_models.hand import HELD_DIRECTIONS
 from planner.result import LimitName
 from planner.solving import plan
 from tests.suite.helpers.hands import HAND, changed_hand, settled_at
@@ -40,33 +40,33 @@ def used(space, y, limit):
 
 def test_no_direction_says_less_than_what_is_held_nor_an_eighth_more():
     forces = np.random.default_rng(1).normal(size=(20_000, 3)) * [1.0, 1.0, 1.5]
-    ratio = (forces @ HELD.T).max(axis=1) / held(forces)
+    ratio = (forces @ HELD_DIRECTIONS.T).max(axis=1) / held(forces)
     assert ratio.min() >= 1.0 - 1e-12
     assert ratio.max() <= 1.12
 
 
 def test_along_the_hands_axes_the_directions_say_four_per_cent_more_at_most():
     axes = np.vstack([np.eye(3)[:2], -np.eye(3)[:2]])
-    assert (axes @ HELD.T).max() <= 1.04
+    assert (axes @ HELD_DIRECTIONS.T).max() <= 1.04
 
 
 def test_the_corners_of_what_they_allow_lie_on_the_ball():
     """A corner where three rows meet, in or under the plane of the rock, is one newton away."""
-    triples = [HELD[[i, j, k]] for i in range(17) for j in range(i) for k in range(j)]
+    triples = [HELD_DIRECTIONS[[i, j, k]] for i in range(17) for j in range(i) for k in range(j)]
     corners = []
     for triple in triples:
         if abs(np.linalg.det(triple)) > 1e-6:
             corner = np.linalg.solve(triple, np.ones(3))
-            if (HELD @ corner <= 1.0 + 1e-9).all() and corner[2] <= 1e-9:
+            if (HELD_DIRECTIONS @ corner <= 1.0 + 1e-9).all() and corner[2] <= 1e-9:
                 corners.append(np.linalg.norm(corner))
     assert len(corners) >= 24
     assert max(corners) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_pressing_counts_for_nothing_and_both_sides_of_the_hand_are_alike():
-    assert (HELD[:, 2] <= 0.0).all()
+    assert (HELD_DIRECTIONS[:, 2] <= 0.0).all()
     for mirror in ([-1.0, 1.0, 1.0], [1.0, -1.0, 1.0]):
-        gaps = np.linalg.norm(HELD[:, None] * mirror - HELD, axis=2)
+        gaps = np.linalg.norm(HELD_DIRECTIONS[:, None] * mirror - HELD_DIRECTIONS, axis=2)
         assert gaps.min(axis=1).max() < 1e-12
 
 
@@ -89,10 +89,10 @@ def test_rows_say_what_the_tiles_and_the_whole_wrench_say(seed):
         )
         assert u == pytest.approx(tip[1] / 600.0, abs=1e-9)
     names = [row.limit for row in space.rows[: len(space.s)]]
-    assert names[-len(HELD) :] == ["hand_load"] * len(HELD)
+    assert names[-len(HELD_DIRECTIONS) :] == ["hand_load"] * len(HELD_DIRECTIONS)
     force = space.wrench(y)[:3]
-    most = space.utilisations(y)[-len(HELD) :].max()
-    assert most == pytest.approx((HELD @ force).max() / LIMIT, abs=1e-9)
+    most = space.utilisations(y)[-len(HELD_DIRECTIONS) :].max()
+    assert most == pytest.approx((HELD_DIRECTIONS @ force).max() / LIMIT, abs=1e-9)
     assert held(force) / LIMIT - 1e-9 <= most
     assert max(most, 0.0) <= 1.12 * held(force) / LIMIT + 1e-9
 
@@ -174,7 +174,7 @@ def test_rows_of_a_hand_in_the_air_are_constant_and_leave_its_only_wrench():
     hand = replace(stance.hands[0], hold_in_hand=away)
     answer = plan(ask(replace(stance, hands=(hand,)), body_wrench=np.zeros(6)))
     space = answer.hands[0].space
-    assert not (space.L[-len(HELD) :]).any()
+    assert not (space.L[-len(HELD_DIRECTIONS) :]).any()
     assert {row.limit for row in space.rows}.isdisjoint({"finger_shear", "fingertip_force"})
     np.testing.assert_array_equal(space.vertices(), np.zeros((1, 6)))
     assert space.volume() == (0.0, 0)

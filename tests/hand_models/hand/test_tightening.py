@@ -9,11 +9,10 @@ from msgspec import structs
 from hand_models import Cylinder, Grasp, InvalidInputError, Plane, Pose, Profile, Sphere
 from hand_models.finger import PHALANGES
 from hand_models.hand import closing_sequence, nearby_closures
-from hand_models.hand.tightening import TILES
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, changed_hand, pinch
 from tests.suite.helpers.rocks import random_profile
 
-PARTS = ["nail", "proximal", "middle", "distal", TILES]
+PARTS = ["nail", "proximal", "middle", "distal", "tiles"]
 
 
 def test_each_stage_ends_where_the_tendons_moment_equals_the_springs():
@@ -29,7 +28,7 @@ def test_each_stage_ends_where_the_tendons_moment_equals_the_springs():
     ):
         assert stage.starts == 0.0
         assert stage.ends * radius == pytest.approx(0.05 * angle)
-    assert tiles == (TILES, 0.0, 37.0)
+    assert tiles == ("tiles", 0.0, 37.0)
 
 
 def test_the_published_springs_alone_do_not_keep_the_order():

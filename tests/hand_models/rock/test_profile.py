@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 
 from hand_models import Cylinder, Grasp, InvalidInputError, Plane
 from hand_models.rock import Profile
-from hand_models.rock.profile import STRIPS
+from hand_models.rock.profile import STRIP_NAMES
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import distance, random_axes, random_profile
 from tests.suite.helpers.shares import given_some
@@ -52,7 +52,7 @@ def test_it_may_be_drawn_from_either_end():
 
 @pytest.mark.parametrize("rotation", [0.0, math.pi])
 def test_every_finger_has_the_strip_of_its_name(rotation):
-    radii = dict(zip(STRIPS, (0.1, 0.15, 0.2, 0.3), strict=True))
+    radii = dict(zip(STRIP_NAMES, (0.1, 0.15, 0.2, 0.3), strict=True))
     # pulled harder than usual, so that no phalanx is held off the rock by more than is said below
     grasp = Grasp(rotation, closing_tension=50.0)
     # and whatever is drawn holds on, so that its path ends as the closed form of a cylinder does
@@ -67,7 +67,7 @@ def test_every_finger_has_the_strip_of_its_name(rotation):
         np.testing.assert_allclose(
             got.fingers[i].joint_angles, alone.fingers[i].joint_angles, atol=2e-2
         )
-        base = next(t for t in range(14) if got.tiles[t].finger == STRIPS[i])
+        base = next(t for t in range(14) if got.tiles[t].finger == STRIP_NAMES[i])
         if got.tiles[base].phalanx == "base":
             np.testing.assert_allclose(got.positions[base], alone.positions[base], atol=1e-4)
     # palm tiles: left ones over inner_left's strip, right ones over inner_right's
@@ -126,7 +126,7 @@ def test_a_section_never_leaves_raw_rock_outside(seed):
         (np.column_stack([np.arange(50) / 100, np.arange(50) % 2]), "points", "at most 10 times"),
         ({"outer_left": [[0.0, 0.0], [0.1, 0.0]]}, "profiles", "one outline for each of"),
         (
-            {name: [[0.0, 0.0], [0.1, 0.0]][: 1 + (name != "inner_right")] for name in STRIPS},
+            {name: [[0.0, 0.0], [0.1, 0.0]][: 1 + (name != "inner_right")] for name in STRIP_NAMES},
             "profiles.inner_right",
             "2 to 5000 points",
         ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from hand_models.compliance import STEP
+from hand_models.compliance import COMPLEX_STEP
 from hand_models.tendon import FingerTendon, TendonRegimes
 from tests.hand_models.tendon.test_finger_tendon import by_enumeration
 
@@ -67,6 +67,6 @@ def test_slopes_are_those_of_the_regime(scheme):
     for size in (1e-4, 2e-3):
         at, way = size * rng.normal(size=(1, n)), rng.normal(size=(1, n))
         none = np.zeros((1, n))
-        exact = regimes.respond(at + 1j * STEP * way, none).shears.imag / STEP
+        exact = regimes.respond(at + 1j * COMPLEX_STEP * way, none).shears.imag / COMPLEX_STEP
         ends = [regimes.respond(at + side * small * way, none).shears for side in (1.0, -1.0)]
         np.testing.assert_allclose(exact, (ends[0] - ends[1]) / (2.0 * small), rtol=1e-5, atol=1e-3)

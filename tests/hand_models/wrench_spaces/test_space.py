@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 from hand_models import Cylinder, EmptySetError, Grasp, Plane
 from hand_models.fixed_wrist import wrench_space
-from hand_models.wrench_spaces import SCALE
+from hand_models.wrench_spaces import WRENCH_SCALE
 from tests.suite.helpers.hands import HAND, ROCK, pinch, settled_at, without_hand_load
 
 EXACT = {"primal_feasibility_tolerance": 1e-9, "dual_feasibility_tolerance": 1e-9}
@@ -56,7 +56,7 @@ def each_set(seeds=SEEDS):
         if is_empty(seed):
             continue
         space = space_of(seed)
-        size = 1.0 + float(np.abs(space.vertices() * SCALE).max())
+        size = 1.0 + float(np.abs(space.vertices() * WRENCH_SCALE).max())
         yield space, size, np.random.default_rng(seed)
 
 
@@ -75,8 +75,8 @@ def reach(space, start, direction):
         np.append(np.zeros(m), -1.0),
         np.hstack([space.A, np.zeros((len(space.b), 1))]),
         space.b,
-        np.hstack([space.generators, -direction[:, None]]) * SCALE[:, None],
-        (start - space.origin) * SCALE,
+        np.hstack([space.generators, -direction[:, None]]) * WRENCH_SCALE[:, None],
+        (start - space.origin) * WRENCH_SCALE,
         bounds=(None, None),
         options=EXACT,
     )
@@ -131,8 +131,8 @@ def test_support_is_that_of_the_linear_program_and_of_the_vertices(seeds):
     for space, size, rng in each_set(seeds):
         vertices = space.vertices()
         for _ in range(3):
-            direction = rng.normal(size=6) * SCALE
-            direction /= np.linalg.norm(direction / SCALE)
+            direction = rng.normal(size=6) * WRENCH_SCALE
+            direction /= np.linalg.norm(direction / WRENCH_SCALE)
             expected = largest(space, direction)
             assert space.support(direction) == pytest.approx(expected, abs=1e-7 * size)
             assert (vertices @ direction).max() == pytest.approx(expected, abs=1e-7 * size)
@@ -145,7 +145,7 @@ def test_every_vertex_satisfies_every_face_and_every_face_is_met_by_its_share_of
         assert len(faces.equation_normals) == 6 - r
         off = vertices @ faces.equation_normals.T - faces.equation_offsets
         np.testing.assert_allclose(off, 0.0, atol=1e-7 * size)
-        np.testing.assert_allclose(np.linalg.norm(faces.normals / SCALE, axis=1), 1.0)
+        np.testing.assert_allclose(np.linalg.norm(faces.normals / WRENCH_SCALE, axis=1), 1.0)
         if len(vertices) > 4000:
             continue
         slack = faces.offsets - vertices @ faces.normals.T
@@ -155,7 +155,7 @@ def test_every_vertex_satisfies_every_face_and_every_face_is_met_by_its_share_of
 
 def test_no_vertex_is_a_mixture_of_others(seeds):
     for space, size, rng in each_set(seeds):
-        vertices = space.vertices() * SCALE
+        vertices = space.vertices() * WRENCH_SCALE
         if not 2 <= len(vertices) <= 400:
             continue
         for i in rng.choice(len(vertices), min(len(vertices), 3), replace=False):
@@ -179,7 +179,7 @@ def test_containment_changes_where_the_linear_program_says_the_set_ends(seeds):
         assert space.contains(centre)
         for _ in range(2):
             direction = mixture(rng, vertices) - centre
-            length = np.linalg.norm(direction * SCALE)
+            length = np.linalg.norm(direction * WRENCH_SCALE)
             if length < 1e-3 * size:
                 continue
             end = reach(space, centre, direction)
@@ -201,10 +201,10 @@ def test_off_a_flat_set_nothing_is_contained():
     for space, size, rng in each_set():
         faces = space.half_spaces()
         inside = mixture(rng, space.vertices())
-        for normal in faces.equation_normals / SCALE:
+        for normal in faces.equation_normals / WRENCH_SCALE:
             flat += 1
             assert space.contains(inside)
-            assert not space.contains(inside + 1e-4 * size * normal / SCALE)
+            assert not space.contains(inside + 1e-4 * size * normal / WRENCH_SCALE)
     assert flat >= 50
 
 
@@ -217,7 +217,7 @@ def test_capability_ends_where_the_set_does(seeds):
             assert space.dimension < 6
             continue
         low, high = ends
-        margin = 1e-4 * size / np.linalg.norm(direction * SCALE)
+        margin = 1e-4 * size / np.linalg.norm(direction * WRENCH_SCALE)
         assert low - 1e-6 <= 1.0 <= high + 1e-6
         for t, past in ((low, -margin), (high, margin)):
             assert space.contains(t * direction, tolerance=1e-5 * size)
@@ -255,7 +255,7 @@ def segments_volume(space):
             for k in range(len(space.columns))
         ]
     )
-    edges = space.generators.T * SCALE * (ends[:, 1] - ends[:, 0])[:, None]
+    edges = space.generators.T * WRENCH_SCALE * (ends[:, 1] - ends[:, 0])[:, None]
     r = np.linalg.matrix_rank(edges, tol=1e-7 * np.abs(edges).max())
     total = 0.0
     for chosen in itertools.combinations(edges, r):
@@ -294,13 +294,13 @@ def test_what_wrench_rows_cut_off_is_the_share_of_random_points_beyond_them(seed
         whole = without_hand_load(space)
         faces = whole.half_spaces()
         # points of the whole set, from a box about it in its own flat
-        corners = whole.vertices() * SCALE
+        corners = whole.vertices() * WRENCH_SCALE
         base = corners.mean(axis=0)
         _, _, axes = np.linalg.svd(corners - base, full_matrices=False)
         axes = axes[: space.dimension]
         inside = (corners - base) @ axes.T
         points = rng.uniform(inside.min(axis=0), inside.max(axis=0), (40_000, space.dimension))
-        points = (base + points @ axes) / SCALE
+        points = (base + points @ axes) / WRENCH_SCALE
         points = points[(points @ faces.normals.T <= faces.offsets).all(axis=1)]
         held = space.s[len(space.s) - len(space.D) :]
         share = (points @ space.D.T <= held).all(axis=1).mean()

@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 from scipy.optimize import linprog
 from scipy.spatial import KDTree
 
-from hand_models.wrench_spaces import SCALE, Row, WrenchSpace, hull_facets
+from hand_models.wrench_spaces import WRENCH_SCALE, Row, WrenchSpace, hull_facets
 from hand_models.wrench_spaces.half_spaces import affine_hull
 from tests.suite.helpers.shares import given_some
 from tests.suite.helpers.zonotopes import half_spaces
@@ -148,7 +148,7 @@ def test_more_than_64_generators_in_the_plane():
 def twelve(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Twelve generators in 6-D, their moments ten times smaller, with bounds."""
     rng = np.random.default_rng(seed)
-    G = rng.normal(size=(6, 12)) / SCALE[:, None]
+    G = rng.normal(size=(6, 12)) / WRENCH_SCALE[:, None]
     lower = rng.uniform(-1.0, 0.0, 12)
     return G, lower, lower + rng.uniform(0.5, 2.0, 12)
 
@@ -181,9 +181,9 @@ def test_a_wrench_space_of_independent_loads_is_a_zonotope_in_scaled_wrenches():
         h=-lower,
     )
     found = space.half_spaces()
-    expected = half_spaces(G * SCALE[:, None], lower, upper, np.arange(6.0) * SCALE)
+    expected = half_spaces(G * WRENCH_SCALE[:, None], lower, upper, np.arange(6.0) * WRENCH_SCALE)
     same_rows(
-        np.column_stack([found.normals / SCALE, found.offsets]),
+        np.column_stack([found.normals / WRENCH_SCALE, found.offsets]),
         np.column_stack([expected.normals, expected.offsets]),
         1e-9,
     )

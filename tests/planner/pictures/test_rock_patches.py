@@ -12,7 +12,7 @@ import trimesh
 from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
 from hand_models.base import Pose
 from hand_models.rock import Mesh, Profile
-from hand_models.rock.profile import STRIPS
+from hand_models.rock.profile import STRIP_NAMES
 from planner.pictures.plan_scene import scene_of
 from planner.pictures.rock_patches import rock_patch
 from planner.pictures.settings import PICTURE_SETTINGS
@@ -22,7 +22,7 @@ from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import cylinder_mesh
 from tests.suite.helpers.stances import on_wall
 
-OUTLINES = dict(zip(STRIPS, (0.0, 0.002, 0.001, 0.003), strict=True))
+OUTLINES = dict(zip(STRIP_NAMES, (0.0, 0.002, 0.001, 0.003), strict=True))
 HOLDS = {
     "plane": Plane(),
     "log": Cylinder(0.3),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hand_models.base import InvalidInputError
-from hand_models.hand import FINGERS, HELD
+from hand_models.hand import FINGERS, HELD_DIRECTIONS
 from hand_models.rock import Cylinder, Plane
 from hand_models.tile import inner_half_planes
 from planner.deadline import DeadlineError
@@ -139,7 +139,7 @@ def test_utilisations_follow_from_the_loads_and_none_exceeds_the_plans(seeds):
         used = []
         for hand, place in zip(answer.hands, question.stance.hands, strict=True):
             mine = [hand.palm.utilisation]
-            mine.append((HELD @ hand.wrench[:3]).max() / robot_hand.structure.hand_load)
+            mine.append((HELD_DIRECTIONS @ hand.wrench[:3]).max() / robot_hand.structure.hand_load)
             shares = _shares(place, question.stance)
             for finger in hand.fingers:
                 mine.append(finger.tendon_tension / robot_hand.maximum_tension)
@@ -201,7 +201,7 @@ def test_limiting_names_a_row_at_the_plans_utilisation(seeds):
         name = answer.limiting
         hand = next(hand for hand in answer.hands if hand.limb == name.limb)
         if name.limit == "hand_load":
-            part = (HELD @ hand.wrench[:3]).max() / (50.0 * 9.80665)
+            part = (HELD_DIRECTIONS @ hand.wrench[:3]).max() / (50.0 * 9.80665)
         elif name.limit == "finger_lateral":
             place = next(each for each in question.stance.hands if each.limb == name.limb)
             shares = _shares(place, question.stance)[name.finger]

@@ -32,7 +32,7 @@ def factors_one_by_one(asked: Question) -> list[float]:
     stance = asked.stance
     seats = [settle_hand(hand, stance).seating.pose for hand in stance.hands]
     limbs = [hand.limb for hand in stance.hands]
-    places = [scattered_places(limb, robust.PLACES, 0) for limb in limbs]
+    places = [scattered_places(limb, robust.SCATTER_SETTINGS.places, 0) for limb in limbs]
     taken = [robust._taken(limb) for limb in limbs]
     factors = []
     for sample in zip(*taken, strict=True):
@@ -63,7 +63,8 @@ def factors_one_by_one(asked: Question) -> list[float]:
 
 def few(monkeypatch, places: int, rounds: int) -> None:
     """Let there be fewer samples."""
-    monkeypatch.setattr(robust, "PLACES", places)
+    settings = replace(robust.SCATTER_SETTINGS, places=places)
+    monkeypatch.setattr(robust, "SCATTER_SETTINGS", settings)
     monkeypatch.setattr(robust, "ROUNDS", rounds)
 
 
@@ -158,7 +159,9 @@ def test_the_interval_is_that_of_a_binomial_where_places_say_nothing_and_wider_w
     rng = np.random.default_rng(hands)
     taken = np.array(
         [
-            np.concatenate([rng.permutation(robust.PLACES) for _ in range(robust.ROUNDS)])
+            np.concatenate(
+                [rng.permutation(robust.SCATTER_SETTINGS.places) for _ in range(robust.ROUNDS)]
+            )
             for _ in range(hands)
         ]
     )
@@ -169,8 +172,8 @@ def test_the_interval_is_that_of_a_binomial_where_places_say_nothing_and_wider_w
     assert low == pytest.approx(np.quantile(apart, 0.1 - off), abs=0.01)
     assert high == pytest.approx(np.quantile(apart, 0.1 + off), abs=0.01)
     # the first hand's place alone says how much is held: as many samples as places count
-    by_place = np.sort(rng.uniform(size=robust.PLACES))[taken[0]]
-    off = 1.96 * math.sqrt(0.09 / robust.PLACES)
+    by_place = np.sort(rng.uniform(size=robust.SCATTER_SETTINGS.places))[taken[0]]
+    off = 1.96 * math.sqrt(0.09 / robust.SCATTER_SETTINGS.places)
     low, high = robust._interval(by_place, taken, 10.0)
     assert low == pytest.approx(np.quantile(by_place, 0.1 - off), abs=0.02)
     assert high == pytest.approx(np.quantile(by_place, 0.1 + off), abs=0.02)

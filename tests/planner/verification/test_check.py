@@ -166,7 +166,7 @@ def test_half_planes_that_promise_more_than_the_limit_curve_are_found():
 
 
 def test_rows_that_promise_more_than_a_hand_holds_are_found(monkeypatch):
-    monkeypatch.setattr(hand_limits, "HELD", 0.5 * hand_limits.HELD)
+    monkeypatch.setattr(hand_limits, "HELD_DIRECTIONS", 0.5 * hand_limits.HELD_DIRECTIONS)
     assert any("more than its rows say" in each for each in complaints(honest()))
 
 

@@ -185,7 +185,7 @@ def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes(monkeyp
 
 def test_a_hand_holds_no_more_than_its_rows_say(monkeypatch):
     loads, _ = honest()
-    monkeypatch.setattr(hand_limits, "HELD", 0.9 * hand_limits.HELD)
+    monkeypatch.setattr(hand_limits, "HELD_DIRECTIONS", 0.9 * hand_limits.HELD_DIRECTIONS)
     known = StreamStance(WALL)
     used = honest()[1].utilisation
     assert fault(known, loads, known.first, utilisation=used).endswith("more than its rows say")

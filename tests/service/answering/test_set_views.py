@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from hand_models.wrench_spaces import clipping
 from planner import programs
 from planner.programs import Outcome, Reached
 from service import answering
@@ -102,8 +104,8 @@ def test_without_lateral_many_half_planes_have_their_views() -> None:
 def test_a_cut_that_turns_out_too_dear_is_left_out_or_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("hand_models.wrench_spaces.clipping.MOST_PAIRS", 1000)
-    monkeypatch.setattr("hand_models.wrench_spaces.clipping.A_VERTEX", 0)
+    few = replace(clipping.SETTINGS, most_pairs=1000, pairs_per_vertex=0)
+    monkeypatch.setattr(clipping, "SETTINGS", few)
     assert answered(asked(2))["warnings"] == []  # nothing cuts this one
     reply = answered(asked(3))
     assert [reply[view] for view in VIEWS] == [None, None]

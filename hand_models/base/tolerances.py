@@ -1,0 +1,28 @@
+"""Base tolerances: what rooms count as equal, as zero or as exact, where nothing else is said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["BASE_TOLERANCES", "BaseTolerances"]
+
+
+@dataclass(frozen=True, slots=True)
+class BaseTolerances:
+    """Tolerances that rooms use as they are, or derive their own from."""
+
+    length: float = 1e-9
+    """A distance that is none [m]: far below any part of a hand, far above the rounding of it."""
+    angle: float = 1e-9
+    """A turn that is none [rad]: over the length of a hand it is less than `length`."""
+    force: float = 1e-9
+    """A force that is none [N]: far below what matters, and as exact as linear programs are."""
+    relative: float = 1e-9
+    """Share of a size up to which numbers count as equal that took many operations."""
+    rounding: float = 1e-12
+    """Share of its terms that a sum of a few may lose by rounding alone."""
+    unit_norm: float = 1e-3
+    """How far a quaternion's norm may be from one before it is refused: the contract's figure."""
+
+
+BASE_TOLERANCES = BaseTolerances()
