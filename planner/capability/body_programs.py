@@ -16,7 +16,7 @@ from msgspec import structs
 
 from hand_models.base import Array, CruxError, InvalidInputError, SolverError, UnsupportedError
 from planner import deadline, programs
-from planner.explanation import ALIKE, BINDING, joint_name, limit_name
+from planner.explanation import TOLERANCES, joint_name, limit_name
 from planner.floating import disagreements
 from planner.prepare import (
     HandSets,
@@ -185,8 +185,10 @@ class BodyPrograms:
         for names, duals in zip(self._names, outcome.limit_duals, strict=True):
             for name, multiplier in zip(names, duals, strict=True):
                 worth[name] = worth.get(name, 0.0) + float(multiplier)
-        most = max(worth, key=lambda name: round(worth[name], ALIKE), default=None)
-        return most if most is not None and worth[most] > BINDING else None
+        most = max(
+            worth, key=lambda name: round(worth[name], TOLERANCES.ranking_digits), default=None
+        )
+        return most if most is not None and worth[most] > TOLERANCES.binding_multiplier else None
 
     def linearisation_error(self, ends: Sequence[End]) -> float:
         """Return how far floating hands' sets are off at most at some ends [N].

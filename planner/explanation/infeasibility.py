@@ -29,14 +29,13 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array
 from planner import deadline
-from planner.explanation.active_limits import ALIKE
+from planner.explanation.active_limits import TOLERANCES
 from planner.programs import UNLIMITED, SilentHighs
 from planner.result import LimitName
 
 __all__ = [
-    "BODY",
+    "BODY_ROWS",
     "HELD_WRENCH",
-    "WEIGHS",
     "Chosen",
     "FarkasProgram",
     "HardRowSystem",
@@ -50,24 +49,8 @@ Chosen = NDArray[np.bool_]
 HELD_WRENCH: Final = "held_wrench"
 """Name of the constraint that a given wrench of a hand is."""
 
-BODY: Final = 6
+BODY_ROWS: Final = 6
 """Rows of the balance that are the body's."""
-
-WEIGHS: Final = 1e-6
-"""Multipliers below this, of which all add up to about one, do not count."""
-
-EXACT: Final = 1e-10
-"""Tolerance of the linear programs."""
-
-OPTIONS: Final[dict[str, float | str]] = {
-    "presolve": "off",
-    "parallel": "off",
-    "solver": "simplex",
-    "simplex_scale_strategy": 0,
-    "primal_feasibility_tolerance": EXACT,
-    "dual_feasibility_tolerance": EXACT,
-}
-"""Options of HiGHS. Presolving would lose the basis; the rows have their physical scaling."""
 
 
 class Multipliers(NamedTuple):
@@ -195,7 +178,15 @@ class FarkasProgram:
 
 def _solver_of(A: Array) -> SilentHighs:
     """Return a solver of programs with rows A, all of whose columns are above zero."""
-    solver, zeros = SilentHighs(OPTIONS), np.zeros(max(A.shape))
+    options: dict[str, float | str] = {
+        "presolve": "off",  # would lose the basis
+        "parallel": "off",
+        "solver": "simplex",
+        "simplex_scale_strategy": 0,  # rows have their physical scaling
+        "primal_feasibility_tolerance": 1e-10,
+        "dual_feasibility_tolerance": 1e-10,
+    }
+    solver, zeros = SilentHighs(options), np.zeros(max(A.shape))
     rows, columns = zeros[: len(A)], zeros[: A.shape[1]]
     solver.load(A, (columns, np.full(A.shape[1], np.inf)), (rows, rows))
     return solver
@@ -257,7 +248,7 @@ class HardRowSystem:
         chosen = np.zeros(len(self._places), dtype=bool)
         chosen[[self._places[name] for name in constraints if name in self._places]] = True
         rows = chosen[self.owners]
-        return np.append(np.full(BODY, balance), rows[len(self.h) :]), rows[: len(self.h)]
+        return np.append(np.full(BODY_ROWS, balance), rows[len(self.h) :]), rows[: len(self.h)]
 
     def bound(self, direction: Array, multipliers: Array) -> float:
         """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `UNLIMITED`.
@@ -285,10 +276,10 @@ class HardRowSystem:
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
         """Return the weights of constraints by their multipliers, those that count alone."""
-        shares = np.append(multipliers, np.abs(direction[BODY:]))
+        shares = np.append(multipliers, np.abs(direction[BODY_ROWS:]))
         weights = np.bincount(self.owners, shares, len(self.constraints)).tolist()
         pairs = zip(self.constraints, weights, strict=True)
-        return {name: weight for name, weight in pairs if weight > WEIGHS}
+        return {name: weight for name, weight in pairs if weight > TOLERANCES.weighing_multiplier}
 
     def least_violation(
         self, constraints: Iterable[LimitName], *, balance: bool = True
@@ -327,4 +318,4 @@ def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitNa
 
 def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
     """Return constraints, the weightiest first."""
-    return sorted(weights, key=lambda name: -round(weights[name], ALIKE))
+    return sorted(weights, key=lambda name: -round(weights[name], TOLERANCES.ranking_digits))

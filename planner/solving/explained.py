@@ -15,10 +15,6 @@ from planner import deadline
 from planner.advice import Attempt
 from planner.deadline import Unfinished, late, late_sentence
 from planner.explanation import (
-    LEAST_FACTOR,
-    NO_FACTOR,
-    UNKNOWN,
-    UNPROVEN,
     ActiveLimits,
     LimitUse,
     certify,
@@ -166,7 +162,9 @@ def _of_plan(
         parts["path"] = path = tension_path(prepared, solution.sets, solution.loads, idle)
         unfinished += late("path") if path is None else ()
         if path is None and not unfinished:
-            warnings.append(UNKNOWN)
+            warnings.append(
+                "whether the straight way from the present tensions is safe was not found out"
+            )
         elif path is not None and not path.safe:
             warnings.append(unsafe_sentence(path))
     if found.whole > cap + SLACK:
@@ -241,16 +239,19 @@ def _wrist_warnings(prepared: PreparedStance, answer: Answer) -> Iterator[str]:
         if isinstance(answer, Verified):
             yield from far_wrists(answer.by_hand())
     if not answer.solution.proven:
-        yield UNPROVEN
+        yield (
+            "the floating wrists are where their hands' stiffness jumps or the search ended: the "
+            "loads are exact, but that no other pose uses less is not proven"
+        )
 
 
 def _factor_warnings(prepared: PreparedStance, factor: LoadFactor) -> Iterator[str]:
     """Yield what a caller should know of the load factor."""
     if "load_factor" in prepared.question.want:
         if prepared.hands.floating and factor.status == "none":
-            yield NO_FACTOR
+            yield "no load factor was found; with floating wrists that is no proof of none"
         if factor.least:
-            yield LEAST_FACTOR
+            yield ("the load factor is a lower bound: beyond it no plan was found, nor proven away")
 
 
 def _residual(prepared: PreparedStance, found: Verified) -> Array:
