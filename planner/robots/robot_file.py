@@ -18,7 +18,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 from textwrap import shorten
-from typing import Any, Final
+from typing import Any
 
 from hand_models.base import InvalidInputError, Pose, in_file, within
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
@@ -281,7 +281,8 @@ def _capsules(entries: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
         if not (rows and all(sound)):
             raise InvalidInputError(
                 f"must be {size} numbers a capsule, the ends of its segment within "
-                f"±{TOLERANCES.mount_distance:g} m and a radius up to {TOLERANCES.link_radius:g} m, got {_quoted(values)}",
+                f"±{TOLERANCES.mount_distance:g} m and a radius up to "
+                f"{TOLERANCES.link_radius:g} m, got {_quoted(values)}",
                 field=f"capsules.{name}",
             )
         found[name] = rows
