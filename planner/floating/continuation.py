@@ -19,7 +19,7 @@ from planner import deadline
 from planner.deadline import Budget
 from planner.floating.palm_modes import NEARBY, exchanged, first_plan, starts
 from planner.floating.wrist_iteration import WristSolution, solve_wrists
-from planner.prepare import NO_WRENCH, HandSets
+from planner.prepare import TOLERANCES, HandSets
 from planner.programs import SLACK
 
 __all__ = ["PROGRAMS", "LargestFactor", "least_use", "most_load"]
@@ -112,7 +112,7 @@ def least_use(
     if deadline.expired():
         return plan, None
     most: LargestFactor | None = None
-    if not _held(plan) and np.abs(hands.wrench[:6]).max() > NO_WRENCH:
+    if not _held(plan) and np.abs(hands.wrench[:6]).max() > TOLERANCES.body_wrench:
         along = budget.part(ALONG)
         for way in _ways(hands, plan, along, up=near is None):
             if most is None or way.most.factor > most.factor:

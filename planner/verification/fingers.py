@@ -11,7 +11,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.hand import FINGERS, NAIL
-from planner.prepare import CONTACTS
+from planner.prepare import CONTACT_CODES
 from planner.result import PlanArrays
 from planner.verification.residuals import (
     FINGER_COUNT,
@@ -133,7 +133,7 @@ class NailLimits:
 
     def __init__(self, names: Names) -> None:
         known, self._names = names.known, names
-        self.tiles = np.flatnonzero(known.touch.contacts == CONTACTS[NAIL])
+        self.tiles = np.flatnonzero(known.touch.contacts == CONTACT_CODES[NAIL])
         self.fingers = known.places.finger[self.tiles]
         if not len(self.tiles):
             return

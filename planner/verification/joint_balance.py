@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from hand_models.base import SKEW, Array
 from hand_models.finger import PHALANGES, STOPS
 from hand_models.hand import HandModel
-from planner.prepare import NONE, NOTHING, TileIndex
+from planner.prepare import CONTACT_CODES, TileIndex
 from planner.verification.residuals import FINGER_COUNT, Limits, Names, Recomputed, Residual
 
 __all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
@@ -145,10 +145,10 @@ class JointBalance(Limits):
         self._hand_of_finger = np.arange(len(hands)).repeat(FINGER_COUNT)
 
         self.held: NDArray[np.bool_] | None = None
-        self.stop_fingers = self.stop_joints = NONE
+        self.stop_fingers = self.stop_joints = np.zeros(0, dtype=np.intp)
         self._sides = np.zeros(0)
         if len(touch.touching) < len(places.hand):
-            self._bears = touch.contacts[places.phalanges] != NOTHING
+            self._bears = touch.contacts[places.phalanges] != CONTACT_CODES["none"]
             alone = ~self._bears.any(axis=1, keepdims=True)
             self.held = (known.stops > 0) | alone
             # of a joint's torque on the limit at which it stands

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices
-from planner.prepare import BALL, Posture
+from planner.prepare import FORCE_DIRECTIONS, Posture
 from planner.question import ForceCap, Question
 from planner.result import PlanArrays
 from planner.robots import LimbTorques, LinkTree
@@ -192,7 +192,7 @@ class _Cap(NamedTuple):
 def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
     stance, hand = question.stance, np.array([h])
     if not isinstance(cap.most, tuple):
-        return _Cap(hand, BALL / cap.most, np.zeros((0, 3)), (), ball=True)
+        return _Cap(hand, FORCE_DIRECTIONS / cap.most, np.zeros((0, 3)), (), ball=True)
     turn = np.eye(3) if cap.frame == "hand" else stance.hands[h].pose.rotation
     if cap.frame == "body":
         turn = stance.body.rotation.T @ turn
@@ -269,7 +269,7 @@ class AskedLimits(Limits):
             if cap.ball:
                 force, limb = wrenches[cap.hand, :3], self._names.limb_of(cap.hand)
                 size = np.linalg.norm(force, axis=1)
-                left = (force @ BALL.T).max(axis=1) - size
+                left = (force @ FORCE_DIRECTIONS.T).max(axis=1) - size
                 text, by = "the hand exerts {:.6g} N, more than its rows say", (size,)
                 residuals.append(Residual("least", left, cap.hand, limb, text, by, affine=False))
         return residuals
