@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -51,9 +51,6 @@ from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
 
 __all__ = ["explained_plan", "unexplained"]
-
-LEFT: Final = 0.5
-"""Distance from the closing tension up to which a tension stays [N]: finer than motors hold."""
 
 
 def explained_plan(
@@ -219,7 +216,7 @@ def _spare_findings(prepared: PreparedStance, found: Verified) -> Iterator[Findi
             f"{without:.4g}, with it {solution.least.value:.4g}"
         )
         off = np.abs(solution.loads[i][: len(FINGERS)] - closing[i]).max()
-        if off <= LEFT:
+        if off <= 0.5:  # [N]: finer than motors hold
             message += f"; its tendons are left at their closing tension of {closing[i]:g} N"
         field = f"stance.hands[{i}]"
         yield Finding("hand_adds_nothing", field, message, without, "1")

@@ -12,7 +12,7 @@ from planner.programs import SLACK
 from planner.programs.conic import ConicProgram
 from planner.programs.stance_program import Definition, StanceProgram
 from planner.question import Limits, Load
-from planner.solving import OBJECTIVES, CappedObjective, plan
+from planner.solving import NAMED_OBJECTIVES, CappedObjective, plan
 from planner.streaming import WrenchStream
 from tests.suite.helpers.stances import ask, on_wall, program_data
 
@@ -79,7 +79,7 @@ def test_plans_are_the_best_in_it_within_the_cap():
     assert answer.utilisation <= CAP + SLACK
 
     tensions = [float(hand.tensions.sum()) for hand in answer.hands]
-    for other in OBJECTIVES:
+    for other in NAMED_OBJECTIVES:
         there = plan(replace(QUESTION, objective=other))
         assert sum(tensions) <= sum(float(hand.tensions.sum()) for hand in there.hands) + 1e-3
     defined, _ = LeastSumProgram(data, CAP).by_definition()
