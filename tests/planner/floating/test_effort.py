@@ -11,6 +11,7 @@ from msgspec import structs
 from scipy.optimize import minimize
 
 from hand_models.base import wrench_transport
+from planner.floating import SETTINGS
 from planner.prepare import posture
 from planner.programs import SLACK, TWIST_UNIT, WRENCH_UNIT
 from planner.question import ForceCap, Limits, Load, Question
@@ -176,7 +177,7 @@ def test_beyond_the_cap_the_least_utilisation_is_told():
 
 def test_an_ended_budget_leaves_a_plan_and_says_so(monkeypatch):
     question, margin, _ = both("with joints")
-    monkeypatch.setattr("planner.floating.effort.PROGRAMS", 0)
+    monkeypatch.setattr("planner.floating.effort.SETTINGS", replace(SETTINGS, effort_programs=0))
     answer = least(question)
     assert answer.status == "optimal"
     assert answer.verified
