@@ -12,7 +12,7 @@ from planner.advice.new_holds import try_new_holds
 from planner.advice.strength import lighter, stronger
 from planner.advice.trials import Attempt, Trial, Trials, Tried
 from planner.deadline import DeadlineError
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import Question
 from planner.result import Advice
 
@@ -103,9 +103,9 @@ def _ranked(trials: Trials) -> list[Tried]:
     holds = trials.holds(base)
 
     def rank(tried: Tried) -> tuple[bool, float]:
-        gain = 1.0 / max(tried.utilisation, SLACK) - 1.0 / max(base, SLACK)
+        gain = 1.0 / max(tried.utilisation, CAP_SLACK) - 1.0 / max(base, CAP_SLACK)
         does = not holds and trials.holds(tried.utilisation)
-        return not does, tried.change.size if does else -gain / max(tried.change.size, SLACK)
+        return not does, tried.change.size if does else -gain / max(tried.change.size, CAP_SLACK)
 
     def worthwhile(tried: Tried) -> bool:
         # on its way to one that holds the search tries others

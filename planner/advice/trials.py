@@ -15,7 +15,7 @@ from planner import deadline, programs
 from planner.advice.changes import SETTINGS, Change, changed
 from planner.explanation import LimitUse, scene_findings
 from planner.prepare import PreparedStance, prepare_stance, settle_each
-from planner.programs import SLACK, WRENCH_UNIT, Outcome, StanceData
+from planner.programs import CAP_SLACK, WRENCH_UNIT, Outcome, StanceData
 from planner.question import Objective, OwnObjective, Question
 from planner.result import LoadFactor
 from planner.scene import body_clearance, scene_of
@@ -114,7 +114,7 @@ class Trials:
 
     def holds(self, utilisation: float) -> bool:
         """Return whether a utilisation is within the question's cap."""
-        return utilisation <= self.question.limits.utilisation + SLACK
+        return utilisation <= self.question.limits.utilisation + CAP_SLACK
 
     @property
     def helped(self) -> bool:

@@ -26,7 +26,7 @@ from planner.prepare import (
     posture_at,
     widest_at_rest,
 )
-from planner.programs import SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
+from planner.programs import CAP_SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
 from planner.question import Question
 from planner.result import LimitName, Plan
 from planner.solving import plan
@@ -141,12 +141,12 @@ class BodyPrograms:
         """Return the utilisation to go up to, where a balance can be had within it."""
         outcome = programs.margin(data)
         if not outcome.solved:
-            if outcome.status not in programs.PROVEN:
+            if outcome.status not in programs.INFEASIBLE_STATUSES:
                 raise _unsolved(outcome)
             return None
         # where the least utilisation is the cap itself, rounding must not empty the set
-        within = outcome.value <= self.cap + SLACK
-        return max(self.cap, outcome.value + SLACK) if within else None
+        within = outcome.value <= self.cap + CAP_SLACK
+        return max(self.cap, outcome.value + CAP_SLACK) if within else None
 
     def reached(
         self, goal: Array, columns: Array, start: Array, cap: float | None = None
@@ -221,10 +221,10 @@ def _solved(
     K = None if K is None else [torque / unit for torque in K]
     found = programs.reach(data, goal / size_of(goal), B, cap, K)
     if not found.outcome.solved:
-        if found.outcome.status not in programs.PROVEN:
+        if found.outcome.status not in programs.INFEASIBLE_STATUSES:
             raise _unsolved(found.outcome)
         return None
-    if _error(data, found, B, cap, K) > SLACK * max(1.0, float(np.abs(found.t).max())):
+    if _error(data, found, B, cap, K) > CAP_SLACK * max(1.0, float(np.abs(found.t).max())):
         raise SolverError("body space: the solver's answer does not pass the checks")
     return found._replace(t=found.t / unit)
 
@@ -307,7 +307,7 @@ def _error(
 
 def _unsolved(outcome: Outcome) -> CruxError:
     deadline.check(MISSING)
-    if outcome.status in programs.UNBOUNDED:
+    if outcome.status in ("unbounded", "unbounded_inaccurate"):
         return UnsupportedError(
             "what the hands hold has no bound some way: sets of floating wrists, taken about this "
             "body wrench, do not hold them everywhere; ask about one that can nearly be held"

@@ -13,7 +13,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.prepare import KEPT_NAMES
-from planner.programs import JOINT_FORCE, JOINT_TORQUE, SLACK
+from planner.programs import CAP_SLACK, JOINT_FORCE, JOINT_TORQUE
 from planner.result import LimitName, Price
 
 __all__ = [
@@ -79,7 +79,7 @@ class LimitUse(NamedTuple):
 
 def close_to(utilisation: float) -> float:
     """Return the utilisation from which on a limit ties with the most used ones."""
-    return utilisation - 2.0 * SLACK * max(1.0, utilisation)
+    return utilisation - 2.0 * CAP_SLACK * max(1.0, utilisation)
 
 
 class ActiveLimits:

@@ -5,7 +5,7 @@ constraint. Whether some of them leave loads that balance the body is a linear p
 
     min t  with  |W − Σ g − G z| ≤ t,  H z − h ≤ t,  |z| ≤ X,
 
-whose multipliers d, λ are a proof (Farkas) where t is above zero. The box X of `UNLIMITED`, far
+whose multipliers d, λ are a proof (Farkas) where t is above zero. The box X of `LOAD_BOX`, far
 beyond any strength, always counts.
 
 These multipliers are a linear program of as many equations as loads, however many rows, and it is
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from hand_models.base import Array
 from planner import deadline
 from planner.explanation.active_limits import TOLERANCES
-from planner.programs import UNLIMITED, SilentHighs
+from planner.programs import LOAD_BOX, SilentHighs
 from planner.result import LimitName
 
 __all__ = [
@@ -139,7 +139,7 @@ class FarkasProgram:
 
     def _priced(self, more: Array, less: Array) -> Array:
         """Return the columns' costs; what d⁺ and d⁻ gain is given."""
-        box = np.full(2 * self.G.shape[1], UNLIMITED)
+        box = np.full(2 * self.G.shape[1], LOAD_BOX)
         return np.concatenate([-more, -less, self.h, box])
 
     def _solved(self, costs: Array, most: Array, start: Array, total: float) -> Multipliers | None:
@@ -251,13 +251,13 @@ class HardRowSystem:
         return np.append(np.full(BODY_ROWS, balance), rows[len(self.h) :]), rows[: len(self.h)]
 
     def bound(self, direction: Array, multipliers: Array) -> float:
-        """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `UNLIMITED`.
+        """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `LOAD_BOX`.
 
         By hand: with H z ≤ h and λ ≥ 0
 
             d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h.
         """
-        leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * UNLIMITED
+        leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * LOAD_BOX
         return float(direction @ self.g + multipliers @ self.h + leak)
 
     def proves(self, direction: Array, multipliers: Array) -> bool:

@@ -19,7 +19,7 @@ import scipy
 from hand_models.base import Array, Indices
 from planner.explanation.active_limits import TOLERANCES
 from planner.explanation.infeasibility import BODY_ROWS, Chosen, HardRowSystem, Multipliers, ranked
-from planner.programs import UNLIMITED
+from planner.programs import LOAD_BOX
 from planner.result import LimitName
 
 __all__ = ["balance_alone", "blocks_up_to", "irreducible_set", "sufficient_alone"]
@@ -81,13 +81,13 @@ def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...
 def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
     """Return the size of loads |z| up to which constraints without any are proven to have none.
 
-    At least `UNLIMITED`, the box in which they were found to; infinite where no box is needed.
+    At least `LOAD_BOX`, the box in which they were found to; infinite where no box is needed.
     """
     proof = system.least_violation(names)
     if proof is None:
-        return UNLIMITED
+        return LOAD_BOX
     tied, rows = system.rows_of(names)
-    return max(system.proven_up_to(proof.direction * tied, proof.multipliers * rows), UNLIMITED)
+    return max(system.proven_up_to(proof.direction * tied, proof.multipliers * rows), LOAD_BOX)
 
 
 def sufficient_alone(
@@ -187,7 +187,7 @@ class _Rows(NamedTuple):
         over = self.M @ loads - self.right
         over[:BODY_ROWS] = np.abs(over[:BODY_ROWS])
         over[self.whose == but] = 0.0
-        small = np.abs(loads).max(initial=0.0) <= UNLIMITED
+        small = np.abs(loads).max(initial=0.0) <= LOAD_BOX
         return bool(small and over.max() <= TOLERANCES.kept)
 
     def loads_without(self, places: Iterable[int]) -> Iterator[tuple[int, Array]]:

@@ -30,7 +30,7 @@ from planner.explanation.active_limits import TOLERANCES, LimitUse, close_to, li
 from planner.explanation.infeasibility import ranked, summed
 from planner.explanation.sentences import blocking_sentence
 from planner.prepare import PreparedStance, Sets
-from planner.programs import LOAD_UNIT, SLACK, Outcome, StanceData
+from planner.programs import CAP_SLACK, LOAD_UNIT, Outcome, StanceData
 from planner.result import LimitName, TensionPath
 
 __all__ = ["tension_path", "unsafe_sentence"]
@@ -89,7 +89,7 @@ def tension_path(
         if change <= TOLERANCES.tension_change
         else _least(start.turned(start.wrench + way), still)
     )
-    if here > cap + SLACK:
+    if here > cap + CAP_SLACK:
         close = close_to(here)
         names = [
             limit_name(limb, space.rows[i])
@@ -102,16 +102,16 @@ def tension_path(
         return TensionPath(True, 1.0, at_present, change)
     # rounding must not leave the plan itself outside
     most = max(cap, *used)
-    reached = programs.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * SLACK)
+    reached = programs.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * CAP_SLACK)
     if not reached.outcome.solved:
         return None
     part = float(reached.t[0]) / size
     if not programs.holds(
-        start.turned(start.wrench + part * way), reached.outcome.loads, most + SLACK
+        start.turned(start.wrench + part * way), reached.outcome.loads, most + CAP_SLACK
     ):
         return None
     part = min(max(part, 0.0), 1.0)
-    if part >= 1.0 - SLACK:
+    if part >= 1.0 - CAP_SLACK:
         return TensionPath(True, part, at_present, change)
     ends = _ends([limbs[i] for i in fixed], [spaces[i] for i in fixed], reached.outcome)
     return TensionPath(False, part, at_present, change, ends)
@@ -184,6 +184,6 @@ def _pinned(
 def _least(data: StanceData, still: float) -> float | None:
     """Return the least utilisation; ``still`` is what hands use that are left out."""
     outcome = programs.margin(data)
-    if not (outcome.solved and programs.holds(data, outcome.loads, outcome.value + SLACK)):
+    if not (outcome.solved and programs.holds(data, outcome.loads, outcome.value + CAP_SLACK)):
         return None
     return max(outcome.value, still)

@@ -21,7 +21,7 @@ from planner.floating.goals import SETTINGS
 from planner.floating.palm_modes import exchanged, first_plan, starts
 from planner.floating.wrist_iteration import WristSolution, solve_wrists
 from planner.prepare import TOLERANCES, HandSets
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 
 __all__ = ["LargestFactor", "least_use", "most_load"]
 
@@ -124,7 +124,7 @@ def most_load(
 
 def _held(found: WristSolution) -> bool:
     """Return whether a solution is a plan within its limits."""
-    return found.exact and found.measure.utilisation <= 1.0 + SLACK
+    return found.exact and found.measure.utilisation <= 1.0 + CAP_SLACK
 
 
 def _better(plan: WristSolution, other: WristSolution | None) -> WristSolution:
@@ -175,14 +175,14 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
         used, factor = now.measure.utilisation, now.point.factor
         whole = now if factor == 1.0 else whole
         low = 0.0 if best is None else best.point.factor
-        if used <= 1.0 + SLACK:
+        if used <= 1.0 + CAP_SLACK:
             if factor >= low:
                 best, low = now, factor
         elif factor < high:
             high, overloaded = factor, True
         if budget.ended:
             break
-        if abs(used - 1.0) <= SLACK:
+        if abs(used - 1.0) <= CAP_SLACK:
             better = exchanged(hands, now, budget)
             if better is now:
                 sure = True

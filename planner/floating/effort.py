@@ -27,7 +27,7 @@ from planner.floating.goals import SETTINGS, Goal, bent_root
 from planner.floating.palm_modes import exchanged
 from planner.floating.wrist_iteration import WristSolution, solve_wrists
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
-from planner.programs import SLACK, TWIST_UNIT, Outcome, StanceData
+from planner.programs import CAP_SLACK, TWIST_UNIT, Outcome, StanceData
 
 __all__ = ["LeastEffort", "best_within", "with_room"]
 
@@ -110,7 +110,7 @@ class LeastEffort(Goal):
 
 def with_room(cap: float, used: float) -> float:
     """Return a cap at which a plan that uses just as much leaves room for rounding."""
-    return max(cap, min(used + 0.5 * SLACK, cap + SLACK - SETTINGS.cap_excess))
+    return max(cap, min(used + 0.5 * CAP_SLACK, cap + CAP_SLACK - SETTINGS.cap_excess))
 
 
 def best_within(

@@ -18,7 +18,7 @@ import scipy
 from hand_models.base import Array
 from planner import programs
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
-from planner.programs import SLACK, Outcome, StanceData
+from planner.programs import CAP_SLACK, Outcome, StanceData
 
 __all__ = ["LEAST_USE", "SETTINGS", "FloatingSettings", "Goal", "LeastUse", "bent_root"]
 
@@ -42,7 +42,7 @@ class FloatingSettings:
     effort_nearness: float = 2e-4
     """Weight with which rounds stay near the point, for one unit of z: what an effort may be below
     which is not worth a way of several units."""
-    cap_excess: float = 0.25 * SLACK  # of a plan's utilisation over the cap, at most
+    cap_excess: float = 0.25 * CAP_SLACK  # of a plan's utilisation over the cap, at most
 
 
 SETTINGS: Final = FloatingSettings()
@@ -140,7 +140,7 @@ class LeastUse(Goal):
         return float(np.abs(outcome.balance_dual).max())
 
     def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
-        cap = outcome.value + SLACK * max(1.0, abs(outcome.value))
+        cap = outcome.value + CAP_SLACK * max(1.0, abs(outcome.value))
         return programs.tie_break(data, cap)
 
     def root(

@@ -19,7 +19,7 @@ from planner.deadline import Budget
 from planner.floating.goals import LEAST_USE, SETTINGS, Goal
 from planner.floating.wrist_iteration import WristSolution, solve_wrists
 from planner.prepare import HandSets
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 
 __all__ = ["exchanged", "first_plan", "starts"]
 
@@ -93,7 +93,7 @@ def exchanged(
         turned = replace(found.point, palms=new)
         there = solve_wrists(hands, turned, budget, SETTINGS.rounds_nearby, goal)
         value = goal.value(found.measure)
-        lower = value - SLACK * max(1.0, value)
+        lower = value - CAP_SLACK * max(1.0, value)
         if there.exact and goal.value(there.measure) < lower:
             found = there
     return found

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs import TIE, Outcome, StanceData, tie_weight
+from planner.programs import TIE_WEIGHT, Outcome, StanceData, tie_weight
 from planner.solving.active_set import TOLERANCES
 
 __all__ = [
@@ -51,13 +51,14 @@ def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> floa
         u ≥ [least of u + ∇f(z₁)·z] + f(z₁) − ∇f(z₁)·z₁ − f(z),
 
     the first as in `least_bound`. Of a plan with at most the utilisation u₁ of z₁, f(z) is at most
-    `TIE` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to none).
+    `TIE_WEIGHT` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to
+    none).
     ``share``: how much of its weight the second term had.
     """
     rows = data.rows
     z = np.concatenate(outcome.loads) / rows.unit
     small = share * tie_weight(len(data.hands)) * rows.tie * z
-    value = -float(small @ z) - share * TIE * outcome.value**2
+    value = -float(small @ z) - share * TIE_WEIGHT * outcome.value**2
     slopes = 2.0 * small
     return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value
 

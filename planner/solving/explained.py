@@ -30,7 +30,7 @@ from planner.explanation import (
     unsafe_sentence,
 )
 from planner.prepare import PreparedStance
-from planner.programs import SLACK, SOLVER
+from planner.programs import CAP_SLACK
 from planner.result import (
     Certificate,
     Clearance,
@@ -113,7 +113,7 @@ def explained_plan(
         load_factor_status=factor.status if "load_factor" in question.want else "not_asked",
         findings=(*checks.findings, *odd),
         warnings=warnings,
-        solver=Solver(SOLVER, solution.least.status, solution.least.iterations),
+        solver=Solver("CLARABEL", solution.least.status, solution.least.iterations),
         time=Time(prepared_at - start, solved - prepared_at, time.perf_counter() - start),
         unfinished=unfinished,
         **parts,
@@ -164,7 +164,7 @@ def _of_plan(
             )
         elif path is not None and not path.safe:
             warnings.append(unsafe_sentence(path))
-    if found.whole > cap + SLACK:
+    if found.whole > cap + CAP_SLACK:
         parts["status"] = "overloaded"
         if question.explain:
             proof = _overload(prepared, found, idle)
@@ -191,11 +191,11 @@ def _overload(
     """
     cap, used = prepared.question.limits.utilisation, found.utilisation
     most = max(idle, key=lambda each: each.utilisation, default=None)
-    beyond = [each for each in idle if each.utilisation > cap + SLACK]
+    beyond = [each for each in idle if each.utilisation > cap + CAP_SLACK]
     proven = found.solution.proven
     if most is not None and beyond and most.utilisation >= used:
         alone: bool | None = len(beyond) == 1
-        if used > cap + SLACK:
+        if used > cap + CAP_SLACK:
             alone = False if proven else None
         return certify_idle(most, cap, alone)
     if not proven:
@@ -279,10 +279,10 @@ def _explain(
     most = binding.limiting(found.used, found.whole, idle)
     if most is None:
         return None, "nothing limits this stance"
-    held = found.whole <= 1.0 + SLACK
+    held = found.whole <= 1.0 + CAP_SLACK
     hand = next((hand for hand in hands if hand.limb == most.name.limb), None)
     sentence = limit_sentence(most, hand, held=held)
-    if held and found.whole > cap + SLACK:
+    if held and found.whole > cap + CAP_SLACK:
         sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
     return most.name, sentence
 
@@ -290,7 +290,7 @@ def _explain(
 def _prices(binding: ActiveLimits, found: Verified, idle: Sequence[LimitUse]) -> tuple[Price, ...]:
     """Return what more of each limit that binds would take off the utilisation."""
     most = max(idle, key=lambda used: used.utilisation, default=None)
-    if most is not None and most.utilisation > found.utilisation + SLACK:
+    if most is not None and most.utilisation > found.utilisation + CAP_SLACK:
         # a limb without a hand bears the most: nothing else counts
         price = most.utilisation / most.capacity
         return (Price.of(most.name, price, unit_of(most.name.limit)),)

@@ -16,7 +16,7 @@ from planner.deadline import Budget, late_sentence
 from planner.explanation import LimitUse, certify
 from planner.floating import SETTINGS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
-from planner.programs import LOAD_UNIT, UNLIMITED
+from planner.programs import LOAD_BOX, LOAD_UNIT
 from planner.question import Question, checked_body_wrench
 from planner.result import LoadFactor, Plan, Time
 from planner.solving.explained import explained_plan, unexplained
@@ -125,7 +125,7 @@ def _first_verified(prepared: PreparedStance, checks: Checks, found: Iterable[So
 
 
 def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
-    """Return whether loads of a plan of fixed wrists exceed `UNLIMITED`, and the need by far.
+    """Return whether loads of a plan of fixed wrists exceed `LOAD_BOX`, and the need by far.
 
     With such loads the body is balanced where the hard rows nearly contradict the balance.
     """
@@ -134,7 +134,7 @@ def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
     most = max(np.abs(loads).max(initial=0.0) for loads in found.solution.least.loads)
     needed = float(np.linalg.norm(prepared.wrench[:3]))
     # beyond, hands do little but squeeze each other
-    return bool(most > max(UNLIMITED * LOAD_UNIT, 1e3 * needed))
+    return bool(most > max(LOAD_BOX * LOAD_UNIT, 1e3 * needed))
 
 
 def _second_look(

@@ -23,7 +23,7 @@ import numpy as np
 from hand_models.base import Array
 from planner import deadline, programs
 from planner.programs import (
-    TIE,
+    TIE_WEIGHT,
     Outcome,
     StanceData,
     TensionTrade,
@@ -75,7 +75,8 @@ def least_utilisation(
     """Return the least utilisation, and the plan that is meant.
 
     What makes the plan of `programs.unique` unique exceeds the least utilisation by up to
-    `program.TIE` times its square: far beyond the limits it is asked for again with less weight.
+    `program.TIE_WEIGHT` times its square: far beyond the limits it is asked for again with
+    less weight.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def least_utilisation(
 
 def _far_beyond(outcome: Outcome) -> bool:
     """Return whether the term that makes a plan unique may cost more utilisation than counts."""
-    return TOLERANCES.optimality * outcome.value < TIE * outcome.value**2
+    return TOLERANCES.optimality * outcome.value < TIE_WEIGHT * outcome.value**2
 
 
 class ActiveSetOptimum(NamedTuple):
@@ -157,7 +158,7 @@ def active_set_optimum(
         return None
     # with exact multipliers the bound of `unique_bound` is the optimum but for second terms
     point = found.point
-    second = 0.5 * float(Q @ point.z**2) - share * TIE * point.u**2
+    second = 0.5 * float(Q @ point.z**2) - share * TIE_WEIGHT * point.u**2
     outcome = _outcome(data, point)
     return ActiveSetOptimum(outcome, point.u + second, found, rows, weight)
 

@@ -6,7 +6,7 @@ every plan z of a body wrench W has
     u ≥ λ·(L z + l0) + μ·(H z − h) + ν·(G z + g − W) = λ·l0 − μ·h + ν·(g − W) + r·z,
 
 r = Lᵀλ + Hᵀμ + Gᵀν. A solver's multipliers leave a small r; they are repaired so that it is zero
-but for rounding. The bound is lowered by what is left of it, with no load above `UNLIMITED`. So the
+but for rounding. The bound is lowered by what is left of it, with no load above `LOAD_BOX`. So the
 bound holds exactly, and for every W, not only that of the program.
 """
 
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs import UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+from planner.programs import LOAD_BOX, WRENCH_UNIT, Outcome, StanceData
 
 __all__ = ["AffineBound", "affine_bound"]
 
@@ -67,7 +67,7 @@ def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
     for _ in range(3):  # each takes nearly all of what is left
         error = goal - rows @ multipliers
         # of the utilisation: a price that needs no further step
-        if UNLIMITED * float(np.abs(error).sum()) <= 1e-9:
+        if LOAD_BOX * float(np.abs(error).sum()) <= 1e-9:
             break
         # each changes in proportion to its size, so that none of the signed ones turns over
         weights = multipliers.copy()
@@ -79,7 +79,7 @@ def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
         np.maximum(multipliers[: len(signed)], 0.0, out=multipliers[: len(signed)])
     multipliers /= multipliers[: len(limit)].sum()
     left = (rows @ multipliers)[:-1]
-    price = UNLIMITED * float(np.abs(left).sum())
+    price = LOAD_BOX * float(np.abs(left).sum())
     if not price <= 1e-6:  # of the utilisation; dearer there is no bound
         return None
     nu = multipliers[len(signed) :]

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, check_positive, finite_vector
 from hand_models.hand import FINGERS
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import Question, checked_body_wrench
 from planner.result import SetPoints, SetPointSource
 from planner.streaming.interpolation import Interpolation
@@ -182,7 +182,7 @@ class WrenchStream:
         tensions = loads[:, : len(FINGERS)]
         used = float(max(utilisation, check.idle))
         return SetPoints(
-            status="optimal" if used <= stance.cap + SLACK else "overloaded",
+            status="optimal" if used <= stance.cap + CAP_SLACK else "overloaded",
             body_wrench=wrench,
             utilisation=used,
             gap=float(max(used - max(bound, check.idle), 0.0)),

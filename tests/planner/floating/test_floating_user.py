@@ -93,7 +93,7 @@ def test_utilisation_and_load_factor_agree(limbs, preload):
     else:
         answer = plan(question(request(limbs, preload, want=["load_factor"])))
     assert answer.load_factor is not None
-    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + solvers.SLACK)
+    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + solvers.CAP_SLACK)
 
 
 def test_budget_ends_a_search(monkeypatch):
