@@ -82,9 +82,8 @@ def _try_all(trials: Trials) -> None:
     try_new_holds(trials)
     if trials.holds(base.utilisation):
         return
-    lighter(trials, base.load_factor().factor, min(5, trials.left))  # plans
-    # plans for stronger holds, at most
-    # plans for stronger holds where combinations are tried, too, at most
+    lighter(trials, base.load_factor().factor, min(5, trials.left))
+    # fewer plans where combinations are tried, too
     stronger(trials, order, min(14 if trials.helped else 5, trials.left))
     if not trials.helped:
         CombinationSearch(trials).run()
@@ -110,8 +109,7 @@ def _ranked(trials: Trials) -> list[Tried]:
     def worthwhile(tried: Tried) -> bool:
         # on its way to one that holds the search tries others
         found = not trials.helped or trials.holds(tried.utilisation)
-        # less of a decrease is not worth a word
-        # of what does not make the stance hold
+        # a decrease by 1 % at least; beyond 5 what does not make it hold is no help
         enough = tried.utilisation < min((1.0 - 0.01) * base, 5.0)
         # kinds of several changes together
         return enough and (found or tried.change.kind not in ("pair", "combination"))

@@ -92,7 +92,7 @@ class BodySearch:
     def run(self) -> None:
         """Look for the best shift."""
         self._keep(np.zeros(3), self.trials.base)
-        for _ in range(14):  # plans, at most
+        for _ in range(14):  # plans
             shift, bound = self._next(LEVEL_TILT)
             best = self._best
             if shift is None or self.trials.left <= 0:
@@ -205,7 +205,7 @@ class BodySearch:
         nothing = np.zeros(len(cost) - 3)
         rows += [(*normal, *nothing, bound) for normal, bound in self._rock.get(tilt, [])]
         bounds = [(-most, most)] * 3 + [(0.0, None)] * (len(cost) - 3)
-        for _ in range(30):  # planes that stand for the reaches, at most
+        for _ in range(30):  # planes that stand for the reaches
             table = np.array(rows).reshape(-1, len(cost) + 1)
             found = scipy.optimize.linprog(
                 cost, table[:, :-1], table[:, -1], bounds=bounds, method="highs"
@@ -214,7 +214,7 @@ class BodySearch:
                 return None
             away = found.x[:3] - centres
             far = np.sqrt(np.einsum("nx,nx->n", away, away))
-            # of a limb's reach, relative: that of the linear program
+            # the linear program keeps to the reaches by so much only
             beyond = far > (1.0 + 1e-6) * radii
             if not beyond.any():
                 cut = self._rock_plane(found.x[:3], tilt)

@@ -53,8 +53,8 @@ class AdviceSettings:
     quarter_turns: tuple[float, ...] = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
     """First turns of a new hand from the one that it is like [rad]."""
     strongest: float = 4.0  # times a hold's strength, at most
-    share_step: float = 0.01  # of the factor of strength [1], and of mass, relative
-    strength_plans: int = 4  # with which a factor of strength is found, at most
+    share_step: float = 0.01  # [1] resolution of the factors of strength and mass
+    strength_plans: int = 4  # to find a factor of strength, at most
     late: str = "all changes were tried"  # what a deadline leaves unfinished
     shift_unit: float = 0.1  # [m] of the body
     tilt_unit: float = 0.2  # [rad] of the body

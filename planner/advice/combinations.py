@@ -169,7 +169,7 @@ class CombinationSearch:
 
     def anywhere(self) -> Iterator[Choice]:
         """Yield choices to begin at."""
-        for _ in range(8):  # besides what is near
+        for _ in range(8):  # random choices to begin at
             hands = tuple(int(self._random.choice(slot)) for slot in self.slots)
             yield Choice(hands, int(self._random.integers(len(self._shifts))))
 
@@ -273,7 +273,7 @@ def _worth(given: Array, sizes: Array, smallest: bool) -> Array:
     price = 0.02  # of a change of size 1, in parts of what is needed
     if smallest:
         return np.where(part >= 1.0, -price * sizes, part - SETTINGS.most_given).round(digits)
-    # of what is needed: beyond this no choice is better
+    # half as much again as is needed is enough: more is no better
     return np.asarray(np.minimum(part, 1.5) - price * sizes).round(digits)
 
 

@@ -62,7 +62,7 @@ def _other_grasps(hand: HandOnHold) -> list[float]:
     """Return turns of the outer fingers that are not the hand's; a fingernail has none [rad]."""
     if hand.grasp.fingernail:
         return []
-    # [rad]; nearer it is the same grasp
+    # within 0.05 rad it is the same grasp
     return [turn for turn in SETTINGS.outer_turns if abs(hand.grasp.outer_rotation - turn) > 0.05]
 
 
@@ -91,7 +91,7 @@ def closings(prepared: PreparedStance) -> Iterator[Change]:
     known = [hand.closing_tension for hand in prepared.batch.hands]
     for tension in (20.0, 50.0):  # [N] of all hands
         changes = {hand_path(i, "grasp.closing_tension"): tension for i in range(len(known))}
-        size = sum(abs(tension - each) for each in known) / 10.0  # [N] of size 1
+        size = sum(abs(tension - each) for each in known) / 10.0  # 10 N are of size 1
         limbs = tuple(hand.limb for hand in stance.hands)
         yield Change("grasp", limbs, f"close all hands with {tension:g} N", changes, size)
 

@@ -257,7 +257,7 @@ def _polished(system: HardRowSystem, missing: Array) -> tuple[Array, Array]:
     parts of d for given wrenches are free.
     """
     length = float(np.linalg.norm(missing))
-    turning = 0.1  # what the direction must gain, of what is missing, to turn by a unit
+    turning = 0.1  # part of what is missing that a turn by a unit must gain
     if length > 1e-9:  # nearer there is nothing to prove
         # in smaller units of the gain the box costs more than solvers have digits for
         found = system.program.near(

@@ -134,7 +134,7 @@ def _ends(limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome)
     ]
     duals = zip(outcome.limit_duals, outcome.hard_duals, strict=True)
     weights = summed(names, np.concatenate([part for pair in duals for part in pair]).tolist())
-    # a smaller part of the largest multiplier ends nothing
+    # multipliers below a thousandth of the largest end nothing
     least = 1e-3 * max(weights.values(), default=0.0)
     return [name for name in ranked(weights) if weights[name] > least]
 

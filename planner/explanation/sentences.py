@@ -238,7 +238,7 @@ def _missing(shortfall: Array) -> str:
     """Name the components of what is missing that matter, the largest first."""
     axes, units = ("fx", "fy", "fz", "mx", "my", "mz"), ("N",) * 3 + ("N·m",) * 3
     size = np.abs(shortfall / WRENCH_UNIT)
-    # relative to the largest; smaller ones are not named
+    # components of less than 0.3 of the largest are not named
     order = [int(i) for i in np.argsort(-size) if size[i] >= 0.3 * size.max()]
     # three digits, and no exponents
     values = [f"{x:+.0f}" if abs(x) >= 1000.0 else f"{x:+.3g}" for x in shortfall.tolist()]

@@ -211,7 +211,7 @@ def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
             at_zero, per_newton = (float(value) for value in drag)
             at_zero += float(hand.drag_allowances[t])
             shear = at_zero + per_newton * float(wrist.hand.preload[finger])
-            if shear < -1e-3 and per_newton > 0.0:  # [N]; less is rounding
+            if shear < -1e-3 and per_newton > 0.0:  # [N] less does not count
                 needs.append((-at_zero / per_newton, finger, hand.tiles[t].phalanx))
         if needs:
             need, finger, phalanx = max(needs)

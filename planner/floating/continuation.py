@@ -170,8 +170,8 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
     """
     now, best, whole = start, None, None
     high, sure, overloaded = math.inf, False, False
-    least = 0.02  # factor that is tried
-    for _ in range(10):  # of the body wrench
+    least = 0.02  # of the factors that are tried
+    for _ in range(10):  # factors of the body wrench
         used, factor = now.measure.utilisation, now.point.factor
         whole = now if factor == 1.0 else whole
         low = 0.0 if best is None else best.point.factor
@@ -189,14 +189,14 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
                 break
             now = better
             continue
-        # relative, where Newton's method does not end
+        # bracketed to 0.2 %, where Newton's method does not end
         if high < math.inf and high - low <= 2e-3 * high:
             sure = overloaded
             break
         assert now.outcome.balance_dual is not None
         slope = -float(now.outcome.balance_dual[:6] @ hands.wrench[:6])
         aim = math.inf if used < 1.0 else 0.0
-        if slope > 1e-3:  # the plan gets harder with the load
+        if slope > 1e-3:  # it gets harder with the load
             aim = factor + (1.0 - used) / slope
         if aim < least and factor <= SETTINGS.small_factors[0]:
             # what overloads the hands is not the body wrench

@@ -164,7 +164,7 @@ class LeastUse(Goal):
                 hard[binding],
             ]
         )
-        # for one unit of z away from the point
+        # the last is the weight of staying near the point, for one unit of z
         return bent_root(
             scipy.linalg.block_diag(*hands.curvature(point, within, weights)), rows, 0.002
         )

@@ -58,7 +58,7 @@ def starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Palms]:
     best = min(common, key=rank)
     for i in engaged:
         best = min([best, *(_with(best, i, mode) for mode in PALM_MODES.values())], key=rank)
-    # so many are tried, if the first ones give none
+    # more choices than these are not tried
     yield from sorted(dict.fromkeys([best, *common]), key=rank)[:5]
 
 

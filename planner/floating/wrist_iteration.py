@@ -121,7 +121,7 @@ def solve_wrists(
         if outcome.solved:
             if goal.exact(now.measure, hands):
                 here = replace(now, found="least", outcome=outcome, rounds=rounds)
-                if _gap(goal, now, outcome) <= 4e-6:  # of a point to the best of its sets
+                if _gap(goal, now, outcome) <= 4e-6:  # nothing in the sets is better
                     return here
                 passed = replace(here, found="unproven")
             penalty = max(penalty, 2.0 * goal.dearest(outcome))
@@ -211,7 +211,8 @@ def _made_exact(
         budget.spend()
         if goal.exact(now.measure, hands) and outcome.solved:
             value = goal.value(start.measure)
-            if goal.value(now.measure) - value <= 1e-3 * max(1.0, value):  # what repairs may cost
+            # repairs may cost a thousandth
+            if goal.value(now.measure) - value <= 1e-3 * max(1.0, value):
                 return replace(now, found="unproven", outcome=outcome, rounds=rounds)
             break
         before, now, rounds = now, _repaired(hands, goal, now, SETTINGS.first_range), rounds + 1

@@ -85,7 +85,7 @@ class ExactMeasure(NamedTuple):
     def exact(self, hands: HandSets) -> bool:
         """Return whether the body wrench is balanced and no hard row is broken."""
         size = max(1.0, float(np.linalg.norm(hands.wrench)))
-        # relative, in `WRENCH_UNIT`; and in `LOAD_UNIT`
+        # what is missing is relative, in `WRENCH_UNIT`; hard rows are in `LOAD_UNIT`
         return self.missing <= 2e-8 * size and self.broken <= 1e-8
 
 
@@ -252,7 +252,7 @@ class HandSets:
         ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by differences of slopes; zero for fixed wrists. Weights ε
         of the rows of effort are none by default.
         """
-        difference = 1e-3  # in `TWIST_UNIT`
+        difference = 1e-3  # of slopes, in `TWIST_UNIT`
         balance, aside = duals.balance_dual, difference * np.diag(TWIST_UNIT)
         assert balance is not None
         bent = []

@@ -73,7 +73,7 @@ def posture(question: Question) -> Posture | None:
         return posture_at(question, given)
     angles = _solved(question, asked)
     off = _off(stance, angles, asked)
-    # [m, rad]: nearer they are at the pose
+    # [m, rad] joints that were found put a hand at its pose up to here
     far = {limb: each for limb, each in off.items() if max(each) > 5e-6}
     return replace(posture_at(question, given | angles), off=far)
 

@@ -190,7 +190,7 @@ class Station(Generic[Input, Output]):
         dead : bool, optional
             Whether it has ended by itself, as its pipes show a moment earlier than the system.
         """
-        self.process.join(1.0 if dead else 0.0)  # [s]
+        self.process.join(1.0 if dead else 0.0)  # [s] its pipes end a moment earlier
         status = self.process.exitcode
         self.process.kill()
         self.process.join()

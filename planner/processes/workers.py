@@ -82,7 +82,7 @@ class Workers(Generic[Input, Output]):
         self.hands: dict[Lane[Input, Output], dict[int, _Task[Input]]] = {}
         self.failed_starts = 0
         self._queue: deque[_Task[Input]] = deque()
-        self._knows: LRUCache[Hashable, Lane[Input, Output]] = LRUCache(256)  # of so many things
+        self._knows: LRUCache[Hashable, Lane[Input, Output]] = LRUCache(256)
         self._unborn = ""
         """Reason of the last failed start."""
 
@@ -133,7 +133,7 @@ class Workers(Generic[Input, Output]):
     def _exchange(self) -> list[tuple[int, Output | Lost]]:
         """Give processes what they have room for, and return what comes next."""
         for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
-            # one beside that in work, there before it is done
+            # one item beside that in work is there before that is done
             while self._queue and lane.ready and len(self.hands[lane]) <= 1:
                 task = self._chosen(lane)
                 self.hands[lane][task.number] = task

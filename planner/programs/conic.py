@@ -295,7 +295,7 @@ class Solvers:
         return None
 
 
-WAITING_SOLVERS: Final = Solvers(64)  # so many wait
+WAITING_SOLVERS: Final = Solvers(64)
 """Those of this process."""
 
 

@@ -144,7 +144,7 @@ def tie_break(data: StanceData, cap: float) -> Outcome:
 def least_tensions(data: StanceData, utilisation: float) -> Outcome:
     """Solve `tie_break` at a utilisation that has all its digits, or where needed near it."""
     outcome = Outcome(False, OUT_OF_TIME, 0, math.nan)
-    for slack in (1e-9, CAP_SLACK):  # where the least one has all its digits
+    for slack in (1e-9, CAP_SLACK):  # where the least has all its digits, or else near it
         outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
         if outcome.solved or deadline.expired():
             break

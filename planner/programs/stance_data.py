@@ -143,7 +143,7 @@ class _Roles(NamedTuple):
     efforts: slice | Indices
 
 
-@lru_cache(maxsize=256)  # lists of names
+@lru_cache(maxsize=256)  # lists of names, some 5 kB each
 def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Roles:
     """Return the roles of names; ``count`` of the rows are limits."""
     limits = rows[:count]
@@ -160,14 +160,14 @@ def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Role
     # hard rows are in newtons, but for those of a wrist's range
     ranges = np.array([row.limit == WRIST_RANGE for row in rows[count:]])
     efforts = np.flatnonzero([is_effort(row) for row in limits])
-    # loads that are not tensions: enough to make them unique
+    # enough to make loads unique that are not tensions
     weight = np.where(tensions, 1.0, 1e-4)
     measured = np.array(list(measures), dtype=np.intp)
     roles = _Roles(
         unit=TWIST_UNIT if floats else np.full(len(columns), LOAD_UNIT),
         scale=TWIST_UNIT if floats else LOAD_UNIT,
         weight=weight,
-        other=np.where(tensions, 0.0, 0.1),  # where the effort itself is least
+        other=np.where(tensions, 0.0, 0.1),  # of that weight
         measured=measured,
         measures=np.array(list(measures.values()), dtype=np.intp),
         forces=np.sqrt(weight[measured]) * LOAD_UNIT,

@@ -50,7 +50,7 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
 
 def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
-    most = 1e12  # [N, N·m]
+    most = 1e12  # [N, N·m] larger, the unit is wrong
     if not np.abs(wrench).max() <= most:
         raise InvalidInputError(f"asks for more than {most:g} N or N·m", field=field)
     return wrench
@@ -71,7 +71,7 @@ def _possible(pose: Pose, field: str) -> None:
         return
     axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").reshape(3, 3)
     off = np.append(axes.T @ axes - np.eye(3), np.linalg.det(axes) - 1.0)
-    if not np.abs(off).max() <= 1e-6:  # of the products of axes
+    if not np.abs(off).max() <= 1e-6:  # rounding of the axes' products
         raise InvalidInputError(
             "orthonormal right-handed axes are needed", field=f"{field}.orientation"
         )
@@ -268,7 +268,7 @@ class Stance:
                 )
             seen.add(hand.limb)
             away = math.dist(hand.pose.position.tolist(), origin)
-            if away > 10.0 * reach:  # its reaches: beyond, units are wrong
+            if away > 10.0 * reach:  # farther, the unit is wrong
                 raise InvalidInputError(
                     f"the hand is {away:.3g} m from the body; its limb reaches about "
                     f"{reach:.2g} m (positions are in metres)",

@@ -167,7 +167,7 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
 
     there = [k for k, factor in enumerate(factors) if factor is not None]
     found = np.array([factors[k] for k in there], dtype=float)
-    # of fewer a correlation says nothing
+    # of fewer than three a correlation says nothing
     if len(found) < 3 or np.ptp(found) <= SPREAD_SETTINGS.least_variation * np.abs(found).max():
         return []
     b = _centred_ranks(found, SPREAD_SETTINGS.least_variation * np.abs(found).max())

@@ -267,7 +267,7 @@ def _torque_limits(mount: Mount, coupled: JointCoupling) -> Array:
             f"missing, and the URDF has no effort up to {TOLERANCES.joint_torque:g} of "
             f"{shorten(', '.join(unknown), 100, placeholder=' …')} (0 is none); {advice}"
         )
-    if efforts.min() == efforts.max() >= 1e3:  # [N·m, N] of all joints, or more
+    if efforts.min() == efforts.max() >= 1e3:  # [N·m, N] a placeholder
         raise InvalidInputError(
             f"missing, and the URDF has an effort of {efforts[0]:g} of every joint, which "
             f"exporters write where nothing is known; {advice}"

@@ -149,13 +149,13 @@ def lower_torques(batch: LimbBatch, angles: Array) -> Array:
     """
     now = _measured(batch, angles.copy())
     movable = np.abs(now.errors).max(axis=1) <= TOLERANCES.pose_error
-    movable &= np.array(batch.joints) > 6  # joints that a pose takes up
+    movable &= np.array(batch.joints) > 6  # a pose takes up six joints
     if not movable.any():
         return angles
-    # over the sum of the curvatures; it falls with steps kept and grows with others
+    # damping over the sum of the curvatures falls with steps kept and grows with others
     first, damping, going = now.cost.copy(), np.full(len(angles), 1e-3), movable
     longest = 0.35  # [rad] that a joint turns in a step of lowering
-    for _ in range(6):  # taken back or not
+    for _ in range(6):  # steps, kept or not
         deadline.check("the joint angles were found")
         back = damped_step(batch, now.angles, now.errors, now.jacobians) - now.angles
         along = _along(_idle(now.jacobians), now.efforts, now.slopes, damping)
@@ -163,7 +163,7 @@ def lower_torques(batch: LimbBatch, angles: Array) -> Array:
         along *= _room(batch, now.angles, along)[:, None]
         tried = np.minimum(np.maximum(now.angles + along + back, batch.lower), batch.upper)
         new = _measured(batch, np.where(going[:, None], tried, now.angles))
-        # as `LimbBatch.errors`: the next step takes it back
+        # in the terms of `LimbBatch.errors`: the next step takes that back
         kept = going & (new.cost < now.cost) & (np.abs(new.errors).max(axis=1) <= 0.1)
         for before, after in zip(now, new, strict=True):
             before[kept] = after[kept]
@@ -171,7 +171,7 @@ def lower_torques(batch: LimbBatch, angles: Array) -> Array:
         going = going & (np.abs(along).max(axis=1) > 1e-3)  # [rad] of a step; less lowers no more
         if not going.any():
             break
-    for _ in range(6):  # back onto the pose
+    for _ in range(6):  # steps back onto the pose
         if np.abs(now.errors[movable]).max() <= TOLERANCES.pose_error:
             break
         moved = damped_step(batch, now.angles, now.errors, now.jacobians)

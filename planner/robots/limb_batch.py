@@ -66,7 +66,7 @@ class LimbBatch:
         self.levers = np.array([np.linalg.norm(mounts[limb].pose.position) for limb in poses])
         stretches = robot.stretches(Pose.identity(), self.limbs, list(poses.values()))
         beyond = (np.array(stretches) - 1.0) * self.reach
-        # of the reach of a stretched limb: rounding
+        # a stretched limb's end may be beyond its reach by rounding
         self.beyond = np.where(beyond > 1e-9 * self.reach, beyond, 0.0)
         self._neutral = robot.configuration({})
         targets = [robot.root @ pose for pose in poses.values()]

@@ -51,7 +51,7 @@ def starts_beside(batch: LimbBatch, i: int, best: Array) -> tuple[LimbBatch, Seq
     """
     limb = batch.part(np.array([i]))
     angles = postures_near(batch, i, 128)[:, None]
-    for _ in range(8):  # steps nearer
+    for _ in range(8):  # steps nearer to the pose
         deadline.check("it was known how near a hand comes to its pose")
         angles = damped_step(limb, angles, *limb.errors(angles))
     errors = (limb.errors(angles)[0] ** 2).sum(axis=(1, 2))
@@ -121,7 +121,7 @@ def lacking(limb: LimbBatch, starts: Sequence[Array]) -> tuple[float, float | No
         for weights in (np.array([first**2, 1.0]), np.array([1.0, first**2]))
     )
     # without a posture that is turned as asked, the distance of the place is returned
-    missing = near if askew <= 2e-3 else way  # [rad]: as good as asked for
+    missing = near if askew <= 2e-3 else way  # [rad]: it counts as turned as asked
     beyond = float(limb.beyond[0])
     if beyond > 0.0 and missing <= beyond + TOLERANCES.place_error:
         missing = beyond
@@ -175,7 +175,7 @@ def _followed(
 
 def _bounded(limb: LimbBatch, end: _Approach, most: Array) -> _Approach:
     """Return where distance and angle are within their tolerances, and the measure least."""
-    largest = (most * (1.0 - 1e-6)) ** 2  # kept free for rounding
+    largest = (most * (1.0 - 1e-6)) ** 2  # room for rounding
     limits = scipy.optimize.NonlinearConstraint(
         lambda angles: _squares(limb, angles)[0] / largest,
         -np.inf,

@@ -35,7 +35,7 @@ def find_angles(batch: LimbBatch) -> Array:
         If the time is over before.
     """
     best, least = np.zeros(batch.shape), np.full(len(batch.limbs), np.inf)
-    for k in range(8):  # of starts, for a pose that may be within reach
+    for k in range(8):  # rounds of starts for a pose that may be within reach
         # what is beyond the stretched limb is tried once, for the angles that come nearest
         left = np.flatnonzero(
             (least > TOLERANCES.pose_error) & ((batch.beyond <= 0.0) | np.isinf(least))
@@ -55,7 +55,7 @@ def _follow(batch: LimbBatch, angles: Array) -> tuple[Array, Array]:
     size = np.full(angles.shape[:2], np.inf)
     slow = np.zeros(angles.shape[:2], dtype=bool)
     steps = 15  # from every start
-    # more while each at least halves the error, as they do where a limb is stretched
+    # 25 more while each at least halves the error, as they do where a limb is stretched
     for k in range(steps + 25):
         deadline.check("the joint angles were found")
         errors, jacobians = batch.errors(angles)
@@ -63,7 +63,7 @@ def _follow(batch: LimbBatch, angles: Array) -> tuple[Array, Array]:
         done = size <= TOLERANCES.pose_error
         if k >= steps:
             slow |= size > 0.5 * last
-        # of which the one of the least torques is taken
+        # of two solutions that of the least torques is taken
         over = done | slow | (done.sum(axis=0) >= 2)
         if over.all():
             break
@@ -89,7 +89,7 @@ def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array
     stuck = (angles <= batch.lower) & (slope < 0.0) | (angles >= batch.upper) & (slope > 0.0)
     J = jacobians * ~stuck[..., None, :]
     transposed = J.swapaxes(-1, -2)
-    # where there is no error, a stretched limb's matrix is singular
+    # a little is left where there is no error: a stretched limb's matrix is singular
     damping = 0.1 * (errors * errors).sum(axis=-1) + 1e-12
     inner = np.linalg.solve(
         J @ transposed + damping[..., None, None] * POSE_IDENTITY, errors[..., None]
@@ -121,7 +121,7 @@ def postures_near(batch: LimbBatch, i: int, count: int) -> Array:
 def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
     """Return random angles of every limb, and a tree of where they put its hand."""
     rng = np.random.default_rng(0)
-    count = 4096  # of each limb, among which starts are looked up
+    count = 4096  # random postures of each limb to look starts up in
     samples = {
         limb: rng.uniform(
             np.maximum(chain.lower, -np.pi),
@@ -140,5 +140,5 @@ def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
 
 def _place(pose: Pose, reach: float) -> Array:
     """Return nine numbers, near each other for poses that are."""
-    # weight of the hand's axes, in reaches
+    # axes count 0.35 reaches beside the place
     return np.concatenate([pose.position / reach, 0.35 * pose.rotation[:, :2].ravel()])

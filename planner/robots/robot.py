@@ -214,7 +214,7 @@ class Robot:
             chain = self.chains[limb]
             found[limb] = finite_vector(given, len(chain.joints), limb)
             beyond = np.maximum(chain.lower - found[limb], found[limb] - chain.upper)
-            for i in np.flatnonzero(beyond > 1e-6).tolist():  # [rad, or m]: seven digits
+            for i in np.flatnonzero(beyond > 1e-6).tolist():  # [rad, or m] rounding of seven digits
                 unit = "m" if chain.sliding[i] else "rad"
                 raise InvalidInputError(
                     f"{chain.joints[i]} goes from {chain.lower[i]:.6g} to {chain.upper[i]:.6g} "

@@ -205,7 +205,7 @@ def _string(value: Any, field: str) -> str:
 
 
 def _named(name: str, field: str) -> None:
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,63}", name):  # it is part of keys
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,63}", name):  # names are part of keys
         raise InvalidInputError(
             "a name must begin with a letter and go on with at most 63 letters, digits, _ or -, "
             f"got {shorten(repr(name), LONGEST_QUOTE, placeholder=' …')}",
@@ -268,7 +268,7 @@ def _capsules(entries: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
     names = _mapping(entries, "capsules")
     table = section_table(names, "capsules", dict.fromkeys(names, "m"))
     found = {}
-    size = 7  # both ends of its segment, and its radius
+    size = 7  # numbers: both ends of its segment, and its radius
     for _, name, _ in table:
         values = table.vector("capsules", name)
         rows = tuple(values[i : i + size] for i in range(0, len(values), size))

@@ -304,7 +304,7 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         axis = axis / length
     lower, upper, effort = -math.inf, math.inf, 0.0
     limit = element.find("limit")
-    # one motor can move it
+    # one motor can move these
     if (
         limit is not None
         and kind in ("revolute", "continuous", "prismatic")
@@ -370,7 +370,7 @@ def _link(element: ElementTree.Element) -> Link:
     )
     own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     principal = np.linalg.eigvalsh(own)
-    # for rounding, relative or of a link that is a thread of 1 µm
+    # rounding, relative to the largest moment or to a radius of gyration of 1 µm
     if principal[0] < -max(1e-9 * principal[-1], 1e-6**2 * mass):
         raise InvalidInputError(
             f"{owner}: its inertia must have no negative principal moment, got {principal[0]:g}"

@@ -50,7 +50,7 @@ Mask = npt.NDArray[np.bool_]
 class SolvingTolerances:
     """Of a plan's optimum."""
 
-    row: float = 1e-9  # that just holds, scaled
+    row: float = 1e-9  # scaled, of one that holds
     multiplier: float = 1e-14
     """Below zero at a weight of 1; those of the limits add up to one."""
     stationarity: float = 1e-13  # of Q z + Cᵀ λ = 0 at a weight of 1
@@ -124,7 +124,7 @@ class Face:
         diagonal = S.diagonal()
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         S = scale[:, None] * S * scale
-        S.flat[:: len(S) + 1] += 1e-13  # of a diagonal of ones
+        S.flat[:: len(S) + 1] += 1e-13  # soft, beside a diagonal of ones
         try:
             # S⁻¹ = rootᵀ root
             self.root = np.linalg.inv(np.linalg.cholesky(S)) * scale
@@ -155,7 +155,7 @@ class Face:
         z, u, multipliers = start.z, start.u, start.multipliers[self.active]
         met = 1e-10  # of the equations of rows, scaled
         sum_met = 1e-9  # of dᵀ λ = 1
-        for taken in range(6):  # Newton's, at most
+        for taken in range(6):  # Newton's steps
             r1, r2 = -Q * z - multipliers @ C, b + d * u - C @ z
             r3 = 0.0 if fixed else 1.0 - float(d @ multipliers)
             still = (

@@ -103,7 +103,7 @@ def _dual_bound(
         return -math.inf
     signed = np.concatenate([*outcome.limit_duals, *outcome.hard_duals])
     scale = max(1.0, abs(outcome.value))
-    tolerance = 1e-5  # of multipliers that count, from stationary, and below zero
+    tolerance = 1e-5  # of multipliers from stationary, and below zero
     if signed.min(initial=0.0) < -tolerance * scale:
         return -math.inf
     stationary = np.append(nu, signed) @ rows.whole

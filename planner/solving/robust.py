@@ -167,7 +167,7 @@ def _interval(factors: Array, taken: Indices, percent: float) -> list[float]:
         own_share = 1.0 / SETTINGS.rounds
         between += max(float(means.var(ddof=1)) - whole / SETTINGS.rounds, 0.0) / (1.0 - own_share)
     between = min(between, whole)
-    # standard deviations to either side hold it in 95 %
+    # 1.96 standard deviations to either side hold it in 95 %
     off = 1.96 * math.sqrt(between / PLACES + (whole - between) / samples)
     ends = np.clip([share - off, share + off], 0.0, 1.0)
     found: list[float] = np.quantile(factors, ends).tolist()

@@ -133,7 +133,7 @@ def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
         return False
     most = max(np.abs(loads).max(initial=0.0) for loads in found.solution.least.loads)
     needed = float(np.linalg.norm(prepared.wrench[:3]))
-    # beyond, hands do little but squeeze each other
+    # with a thousand times the need, hands do little but squeeze each other
     return bool(most > max(LOAD_BOX * LOAD_UNIT, 1e3 * needed))
 
 
@@ -154,7 +154,7 @@ def _second_look(
         deadline.check("a plan was found")
     data = solution.sets.data
     nearest = programs.nearest(data)
-    # relative: nearer, rounding alone is to blame
+    # relative distance for which rounding alone is to blame
     far = 1e-7 * max(1.0, float(np.linalg.norm(data.wrench)))
     if nearest.solved and nearest.value <= far:
         if prepared.hands.floating or not isinstance(found, Failed):

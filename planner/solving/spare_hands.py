@@ -61,7 +61,7 @@ def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[
     trade : TensionTrade
     """
     room = trade.most - exact.value
-    # some wrench of a hand is given: nothing is taken away
+    # with more than the body's six rows of balance, a hand's wrench is given
     if room <= 0.0 or len(data.hands) < 2 or len(data.wrench) > 6:
         return ()
     if exact.balance_dual is None:  # the solver gave no multipliers

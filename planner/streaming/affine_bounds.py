@@ -66,7 +66,7 @@ def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
     multipliers = np.concatenate([signed, outcome.balance_dual])
     for _ in range(3):  # each takes nearly all of what is left
         error = goal - rows @ multipliers
-        # of the utilisation: a price that needs no further step
+        # so little of the utilisation needs no further step
         if LOAD_BOX * float(np.abs(error).sum()) <= 1e-9:
             break
         # each changes in proportion to its size, so that none of the signed ones turns over
@@ -80,7 +80,7 @@ def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
     multipliers /= multipliers[: len(limit)].sum()
     left = (rows @ multipliers)[:-1]
     price = LOAD_BOX * float(np.abs(left).sum())
-    if not price <= 1e-6:  # of the utilisation; dearer there is no bound
+    if not price <= 1e-6:  # of the utilisation: for more there is no bound
         return None
     nu = multipliers[len(signed) :]
     g = np.sum([hand.g for hand in data.hands], axis=0)

@@ -111,15 +111,15 @@ class Prefetch:
         """Let the next interpolation be solved if the wrench is far from the newest centre."""
         if self.coming is not None or self._thread is None:
             return
-        # of the radius, after which it is looked for again
+        # what was not found is looked for again a quarter of a radius away
         if self._missed is not None and self._way(self._missed, wrench) < 0.25:
             return
         centres = [wrench]
         if self.newest is not None:
-            if distance < 0.5 or (self._fading < 1.0 and distance < 1.0):  # of its radius
+            if distance < 0.5 or (self._fading < 1.0 and distance < 1.0):  # half-way out
                 return
             if distance < 1.0:
-                # of the way from the last centre
+                # ahead by half of the way from the last centre
                 centres.insert(0, wrench + 0.5 * (wrench - self.newest.centre))
         self._missed = wrench
         self.coming = self._thread.submit(self._found, centres)
@@ -170,4 +170,4 @@ class Prefetch:
 
 def _weight(distance: float) -> float:
     """Return the weight φ of an interpolation at a distance Σ |t| from its centre."""
-    return min(max((1.0 - distance) / 0.2, 0.0), 1.0)  # outermost part, in which it falls
+    return min(max((1.0 - distance) / 0.2, 0.0), 1.0)  # it falls in the outermost fifth

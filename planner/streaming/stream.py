@@ -153,7 +153,7 @@ class WrenchStream:
         share, loads, bound, _ = mixture
         if share > 0.0:
             read = self._stance.read(loads)
-            # below the cap plans are solved one by one
+            # up to 0.01 below the cap plans are solved one by one
             share *= min(max((self._stance.cap - read.utilisation) / 0.01, 0.0), 1.0)
             if share >= 1.0:
                 points = self._told(wrench, loads, read, bound, "interpolated")

@@ -246,7 +246,7 @@ class Check:
         """Yield by how much hands' wrenches (H, 6) do not balance the body, if they do not."""
         error = self.carry @ wrenches.ravel() - body_wrench
         off, size = math.sqrt(error.dot(error)), math.sqrt(body_wrench.dot(body_wrench))
-        if not off <= 1e-6 * max(size, 1.0):  # moments over a metre
+        if not off <= 1e-6 * max(size, 1.0):  # moments count over a metre
             yield f"balance is off by {off:.3g} of {size:.3g}"
 
     def _wrists(self, arrays: PlanArrays) -> Iterator[str]:

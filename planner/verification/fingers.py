@@ -62,7 +62,7 @@ class DriveLimits(Limits):
         aside = lateral * known.engagement * known.touch.touches
         aside = np.add.reduceat(aside, index.first_of_finger)
         # fingers without rock have no reaction
-        # to either side
+        # signs of a lateral reaction to either side
         self._aside = np.array([[1.0], [-1.0]]) / np.where(aside > 0.0, aside, np.inf)
         drive, nail = body.drive, body.nail
         self._winch = drive.winch_radius

@@ -116,7 +116,7 @@ def _move(
         face = Face.of(contact, model, float(depths[j]))
         arm = point - joint
         rise = way[0] * arm[1] - way[1] * arm[0]
-        if not abs(rise - face.height) <= 1e-9:  # [m]
+        if not abs(rise - face.height) <= 1e-9:  # [m] rounding
             found.append(f"{name}: {PHALANGES[j]} contact is {rise:.6g} m above its joint")
         dragged = complex(way[0], way[1]) * cmath.rect(1.0, -contact.tilt)
         angles.append(cmath.phase(dragged))
@@ -126,7 +126,7 @@ def _move(
             before = np.array(contact.point(model.tile_height))
             slip, off = slip_of(section, face, (before, point), (float(arm @ way), way))
             exact &= slip is not None
-            if not abs(off) <= 1e-7:  # [m] along it
+            if not abs(off) <= 1e-7:  # [m] along the phalanx
                 found.append(
                     f"{name}: {PHALANGES[j]} contact is {off:.3g} m from where its tile bears"
                 )

@@ -151,7 +151,7 @@ class JointBalance(Limits):
             self._bears = touch.contacts[places.phalanges] != CONTACT_CODES["none"]
             alone = ~self._bears.any(axis=1, keepdims=True)
             self.held = (known.stops > 0) | alone
-            # of a joint's torque on the limit at which it stands
+            # signs of a joint's torque on the limit at which it stands
             signs = [{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in STOPS]
             sides = np.array(signs)[known.stops] * ~alone
             self.stop_fingers, self.stop_joints = sides.nonzero()
@@ -213,7 +213,7 @@ class JointBalance(Limits):
         if len(self.stop_fingers):
             stops, text = self.stops(again.left), " would leave its stop"
             own, name = hands[self.stop_fingers], names.of_fingers("a joint", self.stop_fingers)
-            # [N·m]: rounding of a pull
+            # [N·m] by rounding a stop may seem to pull
             residuals.append(Residual("least", stops, own, name, text, error=1e-6))
         return residuals
 

@@ -138,10 +138,10 @@ def _needed(question: Question, own: LimbTorques) -> Array:
 def _check_places(found: list[str], question: Question, where: Posture, own: LimbTorques) -> None:
     """Check that joints put the hands where the stance has them, within the joints' limits."""
     stance = question.stance
-    most_off, most_turned = 0.01, 0.05  # [m], [rad]
+    most_off, most_turned = 0.01, 0.05  # [m], [rad]: up to here a posture is taken for the hand's
     solved, given_angles = stance.solved_limbs, stance.given_joints
     body = stance.body.inverse()
-    error = 1e-5  # [m, rad] of joints that were found
+    error = 1e-5  # [m, rad] of what is reported of joints that were found
     for place in stance.hands:
         pose, there = body @ place.pose, own.hands[place.limb]
         off = float(np.linalg.norm(pose.position - there.position))
@@ -161,7 +161,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
     for limb, angles in where.angles.items():
         chain = stance.robot.chains[limb]
         beyond = np.maximum(chain.lower - angles, angles - chain.upper)
-        if not float(beyond.max()) <= 1e-6:  # [rad, or m]
+        if not float(beyond.max()) <= 1e-6:  # [rad, or m] rounding of seven digits
             found.append(f"{limb}: a joint is {beyond.max():.3g} rad beyond its limit")
         if limb not in solved:
             given = given_angles.get(limb, np.clip(0.0, chain.lower, chain.upper))

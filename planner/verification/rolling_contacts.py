@@ -79,7 +79,7 @@ def slip_of(
     radius = _radius(section, before)
     if radius is None:
         return None, 0.0
-    # [m]: beyond, the model slides it as on a flat
+    # from a radius of 10 m on the model lets faces slide as on a flat
     rolls, touches = face.lies and radius < 10.0, [face.along, along]
     if rolls:
         touches[0] += _beside(section, radius, before, face.way)
@@ -112,7 +112,7 @@ def _arc(section: Section, before: Array, after: Array, u: Array, lies: Array | 
     turn = math.atan2(first[0] * last[1] - first[1] * last[0], float(first @ last))
     middle = first + last
     tangent = np.array([-middle[1], middle[0]]) / float(np.linalg.norm(middle))
-    straight = 1e-12  # [rad] of the normal: the rock is flat
+    straight = 1e-12  # [rad] turn of the normal of flat rock
     if lies is not None and abs(turn) < straight:
         tangent = lies
     sign = math.copysign(1.0, float(tangent @ u))
@@ -140,7 +140,7 @@ def _radius(section: Section, point: Array) -> float | None:
     if away < 0.0:
         return None
     radius, expected = math.inf, 0.0
-    rounding = 1e-11  # [m] from a circle or a line
+    rounding = 1e-11  # [m] off a circle or a line
     if away > rounding:
         radius = (beside**2 - away**2) / (2.0 * away)
         expected = math.hypot(radius, 2.0 * beside) - radius

@@ -71,7 +71,7 @@ class LimitCurves:
         ratio = np.minimum(np.arctan2(pull, along) * self._per_radian, 1.0)
         straight = self._flat[0] - self._loss[0] * ratio**self._exponent
         aside = self._flat[1] - self._loss[1] * ratio
-        # [N] in place of zero
+        # [N] where there is no load
         strength = straight * (1.0 - aside * ((along - shear) / (size + 1e-300)))
         return np.asarray(size - self._gain * (normal - pull) - (1.0 + relative) * strength)
 
@@ -156,7 +156,7 @@ class TileLimits(Limits):
         """
         inside = -self._curves.excess(loads[:, 0], loads[:, 1], loads[:, 2], TOLERANCES.utilisation)
         if not np.minimum.reduce(inside) >= -TOLERANCES.load:
-            sides = loads[:, 2:] / self._lateral * [1.0, -1.0]  # to either side
+            sides = loads[:, 2:] / self._lateral * [1.0, -1.0]  # lateral loads to either side
             planes = self._used(arrays.half_planes, loads)
             used = np.hstack([planes, sides]) * self._per_share
             inside[(used.max(axis=1) > 1.0) | self._known.touch.away] = 0.0
