@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
-"""The path of a hand of a question, or of one of its fields."""
+"""The path of a hand of a question, or of one of its fields: groups are its number and that."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -146,7 +146,7 @@ class CombinationSearch:
             for start in {as_it_is, seen[-1], *self.anywhere()}:
                 deadline.check(SETTINGS.late)
                 choices.add(self._climbed(start, smallest))
-            new = [each for each in choices if each[1] not in seen]
+            new = [(worth, choice) for worth, choice in choices if choice not in seen]
             if not new:
                 return None
             _, choice = max(new)

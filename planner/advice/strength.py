@@ -33,7 +33,7 @@ def _enough(trials: Trials, which: Sequence[int]) -> bool:
     if not most or not trials.holds(most[0].utilisation):
         return False
     cap = trials.question.limits.utilisation
-    # over 1 / k the utilisation is nearly straight
+    # pairs of 1 / k and utilisation, over which that is nearly straight
     low, high = (1.0, trials.base.utilisation), (1.0 / SETTINGS.strongest, most[0].utilisation)
     for _ in range(SETTINGS.strength_plans - 1):
         share = 0.5 if math.isinf(low[1]) else (cap - high[1]) / (low[1] - high[1])

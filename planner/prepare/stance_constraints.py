@@ -47,7 +47,7 @@ PASSIVE_JOINT: Final = "passive_joint"
 
 FORCE_DIRECTIONS: Final = np.vstack([HELD, HELD[8:] * [1.0, 1.0, -1.0]])
 """Directions (26, 3) whose largest product with a force is at least its size: `HELD` and, toward
-the rock, its mirror image."""
+the rock, its mirror image: that of those after the first eight, which lie in the palm's plane."""
 
 CHANGE_ROWS: Final = tuple(
     Row(finger, None, TENSION_CHANGE, "hard", f"{finger}/{TENSION_CHANGE}/{way}")

@@ -286,6 +286,7 @@ def hands_data(
         G = carried @ rows.generators
         # a solver is set up for the places of zeros, which must not depend on rounding
         G[np.abs(G) < 1e-14] = 0.0
+        # beside the generators and the origin, all is the same wherever the hand is
         found.append(HandData(G, carried @ rows.origin, *rows[2:]))
     return tuple(found)
 

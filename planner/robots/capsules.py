@@ -113,9 +113,9 @@ def _given(
         limb, step = places[frame.parentJoint]
         for pattern, rows in described.capsules.items():
             if fnmatchcase(frame.name, pattern):
-                for row in rows:
-                    ends = pose_of(frame.placement).apply(np.reshape(row[:6], (2, 3)))
-                    yield _Capsule(frame.name, limb, step, frame.parentJoint, ends, row[6])
+                for *places_of_ends, radius in rows:
+                    ends = pose_of(frame.placement).apply(np.reshape(places_of_ends, (2, 3)))
+                    yield _Capsule(frame.name, limb, step, frame.parentJoint, ends, radius)
 
 
 def scene_number(section: str, name: str) -> float:

@@ -271,7 +271,7 @@ class Robot:
         rates = self.root_acceleration(gravity, acceleration)
         torque = pin.rnea(model, data, self.configuration(angles), np.zeros(model.nv), rates)
         return Statics(
-            self._to_body @ torque[:6],
+            self._to_body @ torque[:6],  # of the joint that lets the root link move freely
             {limb: chain.coupling.T @ torque[chain.columns] for limb, chain in self.chains.items()},
         )
 
