@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from planner.prepare import Sets
 from planner.programs import (
-    SLACK,
+    CAP_SLACK,
     HandData,
     StanceData,
     program,
@@ -127,7 +127,7 @@ def unique(data: Data) -> Conic:
 def tie(data: Data, utilisation: float) -> Conic:
     """Return the tie-break among plans of a least utilisation."""
     r = data.rows
-    cap = utilisation + SLACK * max(1.0, abs(utilisation))
+    cap = utilisation + CAP_SLACK * max(1.0, abs(utilisation))
     return Conic(
         p=2.0 * data.v**2,
         q=np.zeros(r.B.shape[1]),

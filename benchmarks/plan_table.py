@@ -78,13 +78,12 @@ class Rivals:
         own = [scaled(each.sets) for each in stances]
         plain = [si(each.question, each.sets) for each in stances]
         used = [each.utilisation for each in stances]
-        settings = program.SHARP
+        settings = program.SHARP_SETTINGS
         self.unique = Clarabel([unique(data) for data in own], settings)
         self.whole = whole_blocks([each.sets.data for each in stances])
-        self.least = Clarabel([least(data) for data in own], stance_program.SETTINGS)
-        self.tie = Clarabel(
-            [tie(data, u) for data, u in zip(own, used, strict=True)], stance_program.SETTINGS
-        )
+        usual = stance_program.CLARABEL_SETTINGS
+        self.least = Clarabel([least(data) for data in own], usual)
+        self.tie = Clarabel([tie(data, u) for data, u in zip(own, used, strict=True)], usual)
         self.si = Clarabel([unique(data) for data in plain], {})
         self.qoco = Qoco([unique(data) for data in own])
         self.plain = [least(data) for data in plain]
@@ -197,7 +196,7 @@ def _seldom(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> list[Lin
         return replace(question, stance=replace(question.stance, hands=hands))
 
     def first(number: int) -> None:
-        conic.SOLVERS.clear()
+        conic.WAITING_SOLVERS.clear()
         plan(late[number])
 
     def heavy(number: int, twin: int, **more: Any) -> Question:

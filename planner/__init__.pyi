@@ -40,7 +40,7 @@ from .processes import (
     starting_children as starting_children,
 )
 from .question import (
-    EARTH as EARTH,
+    EARTH_GRAVITY as EARTH_GRAVITY,
     BodyRange as BodyRange,
     ForceCap as ForceCap,
     HandOnHold as HandOnHold,

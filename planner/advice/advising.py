@@ -2,51 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from planner.advice.body import BodySearch, can_move
-from planner.advice.changes import Change
+from planner.advice.changes import SETTINGS, Change
 from planner.advice.combinations import CombinationSearch
-from planner.advice.hands import TURNS, WAYS, closings, grasps, lettings, placed
+from planner.advice.hands import closings, grasps, lettings, placed, turn_motions, way_motions
 from planner.advice.new_holds import try_new_holds
 from planner.advice.strength import lighter, stronger
-from planner.advice.trials import PLANS, Attempt, Trial, Trials, Tried
+from planner.advice.trials import Attempt, Trial, Trials, Tried
 from planner.deadline import DeadlineError
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import Question
 from planner.result import Advice
 
 __all__ = ["advise"]
 
-MOST: Final = 10
-"""Largest number of advices that are returned."""
-
-WORTH: Final = 0.01
-"""Least relative decrease of the utilisation by an advice."""
-
-STRENGTH: Final = 14
-"""Plans for stronger holds, at most."""
-
-SPARE: Final = 5
-"""Plans for stronger holds where combinations are tried, too, at most."""
-
-MASS: Final = 5
-"""Plans for a lighter body, at most."""
-
-MANY: Final = ("pair", "combination")
-"""Kinds of several changes together."""
-
-WORST: Final = 5.0
-"""Utilisation below which a change is returned that does not make the stance hold."""
-
-NEAR: Final = 2.5
-"""Utilisation up to which small changes of every hand are tried."""
-
 
 def advise(
-    question: Question, attempt: Attempt, plans: int = PLANS
+    question: Question, attempt: Attempt, plans: int = SETTINGS.plans
 ) -> tuple[tuple[Advice, ...], bool]:
     """Return what would make a question's stance hold, or hold more.
 
@@ -68,8 +42,9 @@ def advise(
     # changes that are returned are planned again for least effort, where that is the objective
     plain = question.bare()
     again = question.objective != plain.objective
+    most = 10  # advices that are returned
     try:
-        trials = Trials(plain, attempt, plans - MOST - 1 if again else plans)
+        trials = Trials(plain, attempt, plans - most - 1 if again else plans)
     except DeadlineError:
         return (), False
     whole, advices = True, []
@@ -79,7 +54,7 @@ def advise(
         whole = False
     try:
         known = trials.again(trials.question, question.objective) if again else trials.base
-        for tried in _ranked(trials)[:MOST]:
+        for tried in _ranked(trials)[:most]:
             trial = trials.again(tried.question, question.objective) if again else tried.trial
             # what costs least effort may use more than it has to, or have no plan that passes
             if trial.utilisation < known.utilisation:
@@ -93,7 +68,7 @@ def _try_all(trials: Trials) -> None:
     """Try single changes; a lighter body and stronger holds; then combinations if none holds."""
     base, prepared = trials.base, trials.base.prepared
     order = _order(trials)
-    near = base.utilisation <= NEAR
+    near = base.utilisation <= 2.5  # small changes of every hand may do
     trials.of(lettings(prepared.question))
     if can_move(prepared):
         body = BodySearch(trials)
@@ -103,12 +78,13 @@ def _try_all(trials: Trials) -> None:
     trials.of(grasps(prepared, order if near else order[:2]))
     trials.of(closings(prepared))
     for i in order[: 2 if near else 1]:
-        trials.of(placed(prepared, i, (*TURNS, *WAYS)))
+        trials.of(placed(prepared, i, (*turn_motions(), *way_motions())))
     try_new_holds(trials)
     if trials.holds(base.utilisation):
         return
-    lighter(trials, base.load_factor().factor, min(MASS, trials.left))
-    stronger(trials, order, min(STRENGTH if trials.helped else SPARE, trials.left))
+    lighter(trials, base.load_factor().factor, min(5, trials.left))
+    # fewer plans where combinations are tried, too
+    stronger(trials, order, min(14 if trials.helped else 5, trials.left))
     if not trials.helped:
         CombinationSearch(trials).run()
 
@@ -126,15 +102,17 @@ def _ranked(trials: Trials) -> list[Tried]:
     holds = trials.holds(base)
 
     def rank(tried: Tried) -> tuple[bool, float]:
-        gain = 1.0 / max(tried.utilisation, SLACK) - 1.0 / max(base, SLACK)
+        gain = 1.0 / max(tried.utilisation, CAP_SLACK) - 1.0 / max(base, CAP_SLACK)
         does = not holds and trials.holds(tried.utilisation)
-        return not does, tried.change.size if does else -gain / max(tried.change.size, SLACK)
+        return not does, tried.change.size if does else -gain / max(tried.change.size, CAP_SLACK)
 
     def worthwhile(tried: Tried) -> bool:
         # on its way to one that holds the search tries others
         found = not trials.helped or trials.holds(tried.utilisation)
-        enough = tried.utilisation < min((1.0 - WORTH) * base, WORST)
-        return enough and (found or tried.change.kind not in MANY)
+        # a decrease by 1 % at least; beyond 5 what does not make it hold is no help
+        enough = tried.utilisation < min((1.0 - 0.01) * base, 5.0)
+        # kinds of several changes together
+        return enough and (found or tried.change.kind not in ("pair", "combination"))
 
     found, seen = [], set()
     for tried in sorted(filter(worthwhile, trials.found), key=rank):

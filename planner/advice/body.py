@@ -25,43 +25,14 @@ import scipy
 
 from hand_models.base import Array, Pose, turns_about
 from planner import programs
-from planner.advice.changes import Change, pose_message
-from planner.advice.trials import WORSE, Trial, Trials, direction
+from planner.advice.changes import SETTINGS, Change, pose_message
+from planner.advice.trials import Trial, Trials, direction
 from planner.prepare import PreparedStance
 from planner.programs import WRENCH_UNIT
 from planner.result import Distance
 from planner.scene import body_clearance, scene_of
 
-__all__ = ["SHIFT_UNIT", "BodySearch", "can_move", "slope"]
-
-ROUNDS: Final = 14
-"""Plans of a search for the best shift, at most."""
-
-CLOSE: Final = 2e-3
-"""Relative gap of the best utilisation found to its lower bound at which the search ends."""
-
-LEAST: Final = 1e-3
-"""Shift that counts as one [m]."""
-
-CLEAR: Final = 0.15
-"""Least distance of B's origin from the plane of a palm, where it is not nearer already [m]."""
-
-REACHED: Final = 1e-6
-"""Tolerance of a limb's reach, relative."""
-
-TANGENTS: Final = 30
-"""Planes that stand for the limbs' reaches in one step, at most."""
-
-SHIFT_UNIT: Final = 0.1
-"""Shift of size 1 [m]."""
-
-TILT_UNIT: Final = 0.2
-"""Tilt of size 1 [rad]."""
-
-AXES: Final = "xyz"
-
-STEPS: Final = 7
-"""Steps of a grid of shifts, along each axis."""
+__all__ = ["BodySearch", "can_move", "slope"]
 
 
 def can_move(prepared: PreparedStance) -> bool:
@@ -96,7 +67,7 @@ class _Tilt(NamedTuple):
         return turns_about(self.angle * np.eye(3)[self.axis])
 
 
-LEVEL: Final = _Tilt()
+LEVEL_TILT: Final = _Tilt()
 
 
 class BodySearch:
@@ -114,19 +85,19 @@ class BodySearch:
         self._cuts: list[_Cut] = []
         self._known: list[tuple[Array, float]] = []
         self._rock: dict[_Tilt, list[tuple[Array, float]]] = {}
-        now = self._nearest(np.zeros(3), LEVEL)
+        now = self._nearest(np.zeros(3), LEVEL_TILT)
         # what is in rock today may stay so
         self._allowed = -math.inf if now is None else min(now.distance, 0.0)
 
     def run(self) -> None:
         """Look for the best shift."""
         self._keep(np.zeros(3), self.trials.base)
-        for _ in range(ROUNDS):
-            shift, bound = self._next(LEVEL)
+        for _ in range(14):  # plans
+            shift, bound = self._next(LEVEL_TILT)
             best = self._best
             if shift is None or self.trials.left <= 0:
                 return
-            if self._known and best - bound <= CLOSE * max(best, CLOSE):
+            if self._known and best - bound <= SETTINGS.shift_gap * max(best, SETTINGS.shift_gap):
                 return
             self._look(shift)
 
@@ -135,15 +106,15 @@ class BodySearch:
         best = self._best
         if not math.isfinite(best):
             return []
-        wanted = [(1.0 + CLOSE) * best]
+        wanted = [(1.0 + SETTINGS.shift_gap) * best]
         cap = self.trials.question.limits.utilisation
         if best < cap and not self.trials.holds(self.trials.base.utilisation):
             wanted.insert(0, cap)
         shifts = [least for level in wanted if (least := self._least(level)) is not None]
         found = [self.change(shift) for shift in shifts]
-        if len(found) > 1 and found[0].size > (1.0 - CLOSE) * found[1].size:
+        if len(found) > 1 and found[0].size > (1.0 - SETTINGS.shift_gap) * found[1].size:
             found.pop()
-        return [each for each in found if each.size > LEAST / SHIFT_UNIT]
+        return [each for each in found if each.size > SETTINGS.least_shift / SETTINGS.shift_unit]
 
     def tilts(self) -> list[Change]:
         """Return the best shift with tilts: all if joints count, else the one that reaches most."""
@@ -166,18 +137,22 @@ class BodySearch:
         if not there:
             return []
         bound, _, shift, tilt = min(there, key=lambda each: each[:2])
-        return [self.change(shift, tilt)] if bound < (1.0 - 5.0 * CLOSE) * self._best else []
+        return (
+            [self.change(shift, tilt)]
+            if bound < (1.0 - 5.0 * SETTINGS.shift_gap) * self._best
+            else []
+        )
 
     def grid(self) -> Array:
         """Return shifts in reach, the body clear of the palms, shape (s, 3); none comes first."""
-        steps = np.linspace(-self.range.shift, self.range.shift, STEPS)
+        steps = np.linspace(-self.range.shift, self.range.shift, 7)  # along each axis
         shifts = np.array([(x, y, z) for x in steps for y in steps for z in steps])
-        centres, radii = self._reaches(LEVEL)
+        centres, radii = self._reaches(LEVEL_TILT)
         far = np.linalg.norm(shifts[:, None] - centres, axis=2)
         clear = np.array(list(self._clearances(0)))
         fine = (far <= radii).all(axis=1) & (shifts @ clear[:, :3].T <= clear[:, 3]).all(axis=1)
         there = shifts[fine & shifts.any(axis=1)]
-        free = [each for each in there if self._rock_plane(each, LEVEL) is None]
+        free = [each for each in there if self._rock_plane(each, LEVEL_TILT) is None]
         return np.vstack([np.zeros(3), *free])
 
     @property
@@ -220,7 +195,7 @@ class BodySearch:
         ]
         for axis in np.eye(3):
             rows += [(*axis, *-axis, 0.0), (*-axis, *-axis, 0.0)]
-        found = self._solve(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]), rows, LEVEL)
+        found = self._solve(np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]), rows, LEVEL_TILT)
         return None if found is None else found[:3]
 
     def _solve(self, cost: Array, rows: Sequence[Sequence[float]], tilt: _Tilt) -> Array | None:
@@ -230,7 +205,7 @@ class BodySearch:
         nothing = np.zeros(len(cost) - 3)
         rows += [(*normal, *nothing, bound) for normal, bound in self._rock.get(tilt, [])]
         bounds = [(-most, most)] * 3 + [(0.0, None)] * (len(cost) - 3)
-        for _ in range(TANGENTS):
+        for _ in range(30):  # planes that stand for the reaches
             table = np.array(rows).reshape(-1, len(cost) + 1)
             found = scipy.optimize.linprog(
                 cost, table[:, :-1], table[:, -1], bounds=bounds, method="highs"
@@ -239,7 +214,8 @@ class BodySearch:
                 return None
             away = found.x[:3] - centres
             far = np.sqrt(np.einsum("nx,nx->n", away, away))
-            beyond = far > (1.0 + REACHED) * radii
+            # the linear program keeps to the reaches by so much only
+            beyond = far > (1.0 + 1e-6) * radii
             if not beyond.any():
                 cut = self._rock_plane(found.x[:3], tilt)
                 if cut is None:
@@ -259,12 +235,13 @@ class BodySearch:
             into = hand.pose.rotation[:, 2]
             off = float(into @ (hand.pose.position - stance.body.position))
             # what is nearer today may stay so
-            yield (*(into @ stance.body.rotation), *np.zeros(further), off - min(off, CLEAR))
+            # [m] from B's origin to the plane of a palm, at least
+            yield (*(into @ stance.body.rotation), *np.zeros(further), off - min(off, 0.15))
 
     def _rock_plane(self, shift: Array, tilt: _Tilt) -> tuple[Array, float] | None:
         """Return n, c of n · d ≤ c that takes the body out of rock; None where it is not in any."""
         nearest = self._nearest(shift, tilt)
-        if nearest is None or nearest.distance >= self._allowed - WORSE:
+        if nearest is None or nearest.distance >= self._allowed - SETTINGS.worse_tolerance:
             return None
         one, other = np.array(nearest.points)
         # points lie the other way round where one is in the other
@@ -297,16 +274,19 @@ class BodySearch:
             return np.array(question.load.com)
         return question.stance.robot.com if where is None else where.weights.com
 
-    def change(self, shift: Array, tilt: _Tilt = LEVEL) -> Change:
+    def change(self, shift: Array, tilt: _Tilt = LEVEL_TILT) -> Change:
         """Return a shift of the body, in its axes, with a tilt."""
         stance = self.stance
-        if np.linalg.norm(shift) < LEAST:
+        if np.linalg.norm(shift) < SETTINGS.least_shift:
             shift = np.zeros(3)
         body = self._body(shift, tilt)
         changes: dict[str, Any] = {"stance.body": pose_message(body)}
         if stance.joints is not None:
             changes["stance.joints"] = "solve"
-        size = float(np.linalg.norm(shift)) / SHIFT_UNIT + abs(tilt.angle) / TILT_UNIT
+        size = (
+            float(np.linalg.norm(shift)) / SETTINGS.shift_unit
+            + abs(tilt.angle) / SETTINGS.tilt_unit
+        )
         return Change("body", (), ", and ".join(self._words(shift, tilt)), changes, size)
 
     def _words(self, shift: Array, tilt: _Tilt) -> Iterator[str]:
@@ -317,6 +297,6 @@ class BodySearch:
         if tilt.angle:
             whom = "it" if shift.any() else "the body"
             yield (
-                f"tilt {whom} by {math.degrees(tilt.angle):.1f}° about its {AXES[tilt.axis]} axis "
+                f"tilt {whom} by {math.degrees(tilt.angle):.1f}° about its {'xyz'[tilt.axis]} axis "
                 "through its centre of mass"
             )

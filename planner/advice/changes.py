@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -15,13 +16,56 @@ from hand_models.tile import Surface
 from planner.question import HandOnHold, Question
 from planner.result import AdviceKind
 
-__all__ = ["HAND_PATH", "Change", "changed", "combined", "hand_path", "pose_message"]
+__all__ = [
+    "HAND_PATH",
+    "SETTINGS",
+    "AdviceSettings",
+    "Change",
+    "changed",
+    "combined",
+    "hand_path",
+    "pose_message",
+]
 
 HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
-"""The path of a hand of a question, or of one of its fields."""
+"""The path of a hand of a question, or of one of its fields: groups are its number and that."""
 
-BY_LIMB: Final = re.compile(r"(present|limits\.per_hand)\.(.+)")
-"""Fields of a question about hands outside its stance."""
+
+@dataclass(frozen=True, slots=True)
+class AdviceSettings:
+    """What is tried for advice, and how large a change is that counts as one of size 1."""
+
+    plans: int = 100  # for the advice about a question, at most
+    worse_tolerance: float = 1e-3  # [m], or without a unit: by how much what is odd may grow
+    kinds_of_other_task: tuple[str, ...] = ("mass", "strength")  # no help, nor part of a pair
+    outer_turns: tuple[float, ...] = (0.0, math.pi / 2.0, math.pi)  # [rad] of the outer fingers
+    palm_turns: tuple[float, ...] = (30.0, -30.0, 60.0, -60.0)  # [deg] of a hand about z
+    palm_ways: tuple[tuple[float, float], ...] = (  # [m] of a hand along x and y of its palm
+        (0.02, 0.0),
+        (-0.02, 0.0),
+        (0.0, 0.02),
+        (0.0, -0.02),
+    )
+    shift_gap: float = 2e-3  # of the best utilisation to its lower bound, relative
+    least_shift: float = 1e-3  # [m] of the body that counts as one
+    most_given: float = 1e3  # in parts of what is needed: more than any direction needs
+    hands_apart: float = 0.25  # [m] of a new hold from other hands, at least
+    quarter_turns: tuple[float, ...] = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
+    """First turns of a new hand from the one that it is like [rad]."""
+    strongest: float = 4.0  # times a hold's strength, at most
+    share_step: float = 0.01  # [1] resolution of the factors of strength and mass
+    strength_plans: int = 4  # to find a factor of strength, at most
+    late: str = "all changes were tried"  # what a deadline leaves unfinished
+    shift_unit: float = 0.1  # [m] of the body
+    tilt_unit: float = 0.2  # [rad] of the body
+    way_unit: float = 0.02  # [m] of a hand
+    turn_unit: float = 0.5  # [rad] of a hand
+    outer_turn_unit: float = math.pi / 2.0  # [rad] of the outer fingers
+    hand_size: float = 2.0  # of a hand more or less
+    strength_unit: float = math.log(1.1)  # of the logarithm of strength or mass
+
+
+SETTINGS: Final = AdviceSettings()
 
 
 class Change(NamedTuple):
@@ -101,7 +145,9 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
     stance: dict[str, Any] = {}
     whole: dict[str, Any] = {}
     for path, value in changes.items():
-        hand, named = HAND_PATH.fullmatch(path), BY_LIMB.fullmatch(path)
+        hand = HAND_PATH.fullmatch(path)
+        # said of a limb outside the stance
+        named = re.fullmatch(r"(present|limits\.per_hand)\.(.+)", path)
         if hand is not None:
             hands.setdefault(int(hand[1]), {})[hand[2]] = value
         elif path == "stance.body":
@@ -160,9 +206,9 @@ def _field(hand: HandOnHold, updates: Mapping[str, Any], field: str, value: Any)
     if field.startswith("grasp."):
         grasp = updates.get("grasp", hand.grasp)
         return "grasp", structs.replace(grasp, **{field.removeprefix("grasp."): value})
-    if field not in FIELDS:
+    if field not in HAND_FIELD_READERS:
         raise InvalidInputError("advice does not change this", field=f"stance.hands.{field}")
-    name, read = FIELDS[field]
+    name, read = HAND_FIELD_READERS[field]
     if value is None:
         return name, "rest" if name == "seat" else None
     return name, read(value)
@@ -172,7 +218,7 @@ def _pose(message: Mapping[str, Any]) -> Pose:
     return Pose.from_quaternion(message["position"], message["orientation"])
 
 
-FIELDS: Final[Mapping[str, tuple[str, Callable[[Any], Any]]]] = {
+HAND_FIELD_READERS: Final[Mapping[str, tuple[str, Callable[[Any], Any]]]] = {
     "limb": ("limb", str),
     "pose": ("pose", _pose),
     "place": ("at", _pose),

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,11 +25,11 @@ from hand_models.base import Array, Indices, Pose, wrench_transport
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import SettledHand
 from planner import deadline
-from planner.advice.body import SHIFT_UNIT, BodySearch, can_move
-from planner.advice.changes import Change, changed, combined
+from planner.advice.body import BodySearch, can_move
+from planner.advice.changes import SETTINGS, Change, changed, combined
 from planner.advice.hands import lettings, variants
-from planner.advice.new_holds import APART, every_hold
-from planner.advice.trials import TRIED, Trial, Trials, direction
+from planner.advice.new_holds import every_hold
+from planner.advice.trials import Trial, Trials, direction
 from planner.prepare import settle_each
 from planner.programs import Support
 from planner.question import HandOnHold
@@ -37,40 +37,6 @@ from planner.question import HandOnHold
 __all__ = ["Choice", "CombinationSearch"]
 
 Mask = npt.NDArray[np.bool_]
-
-DIGITS: Final = 6
-"""Digits of the worth of choices: rounding errors decide nothing."""
-
-ENOUGH: Final = 1.5
-"""Part of what is needed beyond which a choice is no better."""
-
-SIZE: Final = 0.02
-"""Part of what is needed that is worth a change of size 1."""
-
-FAR: Final = 1e3
-"""Stands for more than any direction needs, in parts of that."""
-
-HOPELESS: Final = 0.97
-"""Part of what is needed below which no choice is planned with."""
-
-NEW: Final = ("free_hand", "new_hold")
-"""Kinds with a hand elsewhere."""
-
-FORBIDDEN: Final = 200
-"""Choices that cannot be, after which a search ends."""
-
-SMALLER: Final = 12
-"""Plans for smaller changes, once some hold."""
-
-
-FEW: Final = 48
-"""Variants of a limb that are put together with those of another."""
-
-STARTS: Final = 8
-"""Choices that are begun at besides what is near."""
-
-SEED: Final = 0
-"""Seed of these random choices."""
 
 
 class _Variant(NamedTuple):
@@ -99,7 +65,10 @@ class _Variant(NamedTuple):
         """Return the most of direction · w, of body wrenches w that it gives."""
         if self.support is None:
             return 0.0
-        return min(max(self.support(-(direction @ self.transport)), -FAR), FAR)
+        return min(
+            max(self.support(-(direction @ self.transport)), -SETTINGS.most_given),
+            SETTINGS.most_given,
+        )
 
 
 class Choice(NamedTuple):
@@ -142,18 +111,19 @@ class CombinationSearch:
         self.slots = [np.flatnonzero(limbs == limb) for limb in dict.fromkeys(limbs.tolist())]
         self._body = BodySearch(trials) if can_move(prepared) else None
         self._shifts = np.zeros((1, 3)) if self._body is None else self._body.grid()
-        self.shift_sizes = np.linalg.norm(self._shifts, axis=1) / SHIFT_UNIT
+        self.shift_sizes = np.linalg.norm(self._shifts, axis=1) / SETTINGS.shift_unit
         self.reached = _reached(trials, self._variants, self._shifts)
         self.together = _together(self._variants)
         self._needed = prepared.wrench
-        self._random = np.random.default_rng(SEED)
+        self._random = np.random.default_rng(0)
         self.gives, self.needs = np.zeros((0, len(limbs))), np.zeros((0, len(self._shifts)))
         self.learn(trials.base, 0)
 
     def run(self) -> None:
         """Look for changes that hold, then for smaller ones, with the plans that are left."""
         if self.find(0, smallest=False) is not None:
-            self.find(max(self.trials.left - SMALLER, 0), smallest=True)
+            # plans for smaller changes, once some hold
+            self.find(max(self.trials.left - 12, 0), smallest=True)
 
     def find(self, last: int, *, smallest: bool) -> Choice | None:
         """Plan for one choice after the other, until one holds or so many plans are left.
@@ -174,18 +144,19 @@ class CombinationSearch:
         while len(self.gives) and self.trials.left > last:
             choices = set()
             for start in {as_it_is, seen[-1], *self.anywhere()}:
-                deadline.check(TRIED)
+                deadline.check(SETTINGS.late)
                 choices.add(self._climbed(start, smallest))
-            new = [each for each in choices if each[1] not in seen]
+            new = [(worth, choice) for worth, choice in choices if choice not in seen]
             if not new:
                 return None
             _, choice = max(new)
-            if self.part(choice) < HOPELESS:
+            if self.part(choice) < 0.97:  # of what is needed: with less no plan is made
                 return None
             seen.append(choice)
             change = self.change(choice)
             trial = None if change is None else self.trials.one(change)
-            if trial is None and forbidden < FORBIDDEN:
+            # choices that cannot be, after which the search ends
+            if trial is None and forbidden < 200:
                 forbidden += 1
                 self._forbid(choice)
             elif trial is None:
@@ -198,7 +169,7 @@ class CombinationSearch:
 
     def anywhere(self) -> Iterator[Choice]:
         """Yield choices to begin at."""
-        for _ in range(STARTS):
+        for _ in range(8):  # random choices to begin at
             hands = tuple(int(self._random.choice(slot)) for slot in self.slots)
             yield Choice(hands, int(self._random.integers(len(self._shifts))))
 
@@ -240,11 +211,12 @@ class CombinationSearch:
                 return best, Choice(tuple(hands), shift)
 
     def _best(self, slot: Indices, given: Array, smallest: bool) -> Indices:
-        """Return the variants of a limb that are worth most by themselves, `FEW` at most."""
-        if len(slot) <= FEW:
+        """Return the variants of a limb that are worth most by themselves, 48 at most."""
+        few = 48  # that are put together with those of another limb
+        if len(slot) <= few:
             return slot
         worth = _worth(given[:, None] + self.gives[:, slot], self.sizes[slot], smallest)
-        return slot[np.argsort(-worth, kind="stable")[:FEW]]
+        return slot[np.argsort(-worth, kind="stable")[:few]]
 
     def learn(self, trial: Trial, shift: int) -> None:
         """Keep the direction in which most is missing by a plan's multipliers, if there is one."""
@@ -297,9 +269,12 @@ def _worth(given: Array, sizes: Array, smallest: bool) -> Array:
     ``smallest``: whether the smallest that gives enough is wanted, not the one that gives most.
     """
     part = given.min(axis=0)
+    digits = 6  # of the worth of choices: rounding errors decide nothing
+    price = 0.02  # of a change of size 1, in parts of what is needed
     if smallest:
-        return np.where(part >= 1.0, -SIZE * sizes, part - FAR).round(DIGITS)
-    return np.asarray(np.minimum(part, ENOUGH) - SIZE * sizes).round(DIGITS)
+        return np.where(part >= 1.0, -price * sizes, part - SETTINGS.most_given).round(digits)
+    # half as much again as is needed is enough: more is no better
+    return np.asarray(np.minimum(part, 1.5) - price * sizes).round(digits)
 
 
 def _variants(trials: Trials) -> Iterator[_Variant]:
@@ -322,7 +297,7 @@ def _variants(trials: Trials) -> Iterator[_Variant]:
     closed = [each for each in settled if isinstance(each, SettledHand)]
     for one, space in zip(closed, wrench_spaces(closed, limits.tendon_tension), strict=True):
         if one not in supports:
-            deadline.check(TRIED)
+            deadline.check(SETTINGS.late)
             supports[one] = Support(space, limits.utilisation)
     body = stance.body.inverse()
     for (limb, said, hand), each in zip(wanted, settled, strict=True):
@@ -357,8 +332,11 @@ def _together(variants: Sequence[_Variant]) -> Mask:
     nowhere = np.full(3, np.inf)
     places = np.array([nowhere if v.pose is None else v.pose.position for v in variants])
     with np.errstate(invalid="ignore"):
-        near = np.linalg.norm(places[:, None] - places, axis=2) < APART
-    new = np.array([v.change is not None and v.change.kind in NEW for v in variants])
+        near = np.linalg.norm(places[:, None] - places, axis=2) < SETTINGS.hands_apart
+    # with a hand elsewhere
+    new = np.array(
+        [v.change is not None and v.change.kind in ("free_hand", "new_hold") for v in variants]
+    )
     return np.asarray(~(near & (new | new[:, None])))
 
 

@@ -5,69 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from msgspec import structs
 
 from hand_models.base import InvalidInputError, Pose, turns_about
 from hand_models.hand import Grasp
-from planner.advice.changes import Change, combined, hand_path, pose_message
+from planner.advice.changes import SETTINGS, Change, combined, hand_path, pose_message
 from planner.prepare import PreparedStance, settle_each
 from planner.question import HandOnHold, Question
 
 __all__ = [
-    "GRASPS",
-    "HAND",
-    "TURNS",
-    "WAYS",
     "closings",
     "fingers",
     "grasps",
     "lettings",
     "placed",
+    "turn_motions",
     "unseated",
     "variants",
+    "way_motions",
 ]
 
-GRASPS: Final = (0.0, math.pi / 2.0, math.pi)
-"""Turns of outer fingers that are tried [rad]."""
-
-CLOSINGS: Final = (20.0, 50.0)
-"""Closing tensions that are tried of all hands [N]."""
-
-CLOSING_UNIT: Final = 10.0
-"""Change of a closing tension of size 1 [N]."""
-
-ALIKE: Final = 0.05
-"""Turns of outer fingers that are the same grasp [rad]."""
-
-TURNS: Final = tuple((0.0, 0.0, math.radians(turn)) for turn in (30.0, -30.0, 60.0, -60.0))
-"""Turns of a hand about z of its palm [m, m, rad]."""
-
-AROUND: Final = tuple(
-    (0.0, 0.0, math.radians(turn))
-    for turn in (30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180)
-)
-"""Turns of a hand all around."""
-
-WAYS: Final = ((0.02, 0.0, 0.0), (-0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, -0.02, 0.0))
-"""Displacements of a hand along x and y of its palm [m, m, rad]."""
-
-WAY_UNIT: Final = 0.02
-"""Way of a hand of size 1 [m]."""
-
-TURN_UNIT: Final = 0.5
-"""Turn of a hand of size 1 [rad]."""
-
-GRASP_UNIT: Final = math.pi / 2.0
-"""Turn of outer fingers of size 1 [rad]."""
-
-HAND: Final = 2.0
-"""Size of a hand more or less."""
-
-MOVED: Final = 1e-3
-"""Least displacement of a hand that is reported [m]."""
+_Motion = tuple[float, float, float]
 
 
 def lettings(question: Question) -> Iterator[Change]:
@@ -79,13 +40,13 @@ def lettings(question: Question) -> Iterator[Change]:
             changes[f"present.{hand.limb}"] = None
         if hand.limb in question.limits.per_hand:
             changes[f"limits.per_hand.{hand.limb}"] = None
-        yield Change("let_go", (hand.limb,), f"let {hand.limb} go", changes, HAND)
+        yield Change("let_go", (hand.limb,), f"let {hand.limb} go", changes, SETTINGS.hand_size)
 
 
 def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
     """Yield other grasps of one hand, and of all; one that is seated goes where they seat it."""
     hands = prepared.question.stance.hands
-    found: dict[float, list[Change]] = {turn: [] for turn in GRASPS}
+    found: dict[float, list[Change]] = {turn: [] for turn in SETTINGS.outer_turns}
     for i in order:
         for turn in _other_grasps(hands[i]):
             found[turn] += _grasped(prepared, i, turn)
@@ -101,15 +62,18 @@ def _other_grasps(hand: HandOnHold) -> list[float]:
     """Return turns of the outer fingers that are not the hand's; a fingernail has none [rad]."""
     if hand.grasp.fingernail:
         return []
-    return [turn for turn in GRASPS if abs(hand.grasp.outer_rotation - turn) > ALIKE]
+    # within 0.05 rad it is the same grasp
+    return [turn for turn in SETTINGS.outer_turns if abs(hand.grasp.outer_rotation - turn) > 0.05]
 
 
 def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
     """Yield one hand moved, turned all around and with other grasps, its rock staying."""
     hand = prepared.question.stance.hands[index]
     yield from grasps(prepared, [index])
-    yield from placed(prepared, index, WAYS)
-    for turned in placed(prepared, index, AROUND):
+    yield from placed(prepared, index, way_motions())
+    for turned in placed(
+        prepared, index, turn_motions((30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180))
+    ):
         yield turned
         for turn in _other_grasps(hand):
             yield Change(
@@ -117,7 +81,7 @@ def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
                 turned.limbs,
                 f"{turned.words} and take it with {fingers(turn)}",
                 {**turned.changes, hand_path(index, "grasp.outer_rotation"): turn},
-                turned.size + abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT,
+                turned.size + abs(turn - hand.grasp.outer_rotation) / SETTINGS.outer_turn_unit,
             )
 
 
@@ -125,9 +89,9 @@ def closings(prepared: PreparedStance) -> Iterator[Change]:
     """Yield all hands closed with another tension."""
     stance = prepared.question.stance
     known = [hand.closing_tension for hand in prepared.batch.hands]
-    for tension in CLOSINGS:
+    for tension in (20.0, 50.0):  # [N] of all hands
         changes = {hand_path(i, "grasp.closing_tension"): tension for i in range(len(known))}
-        size = sum(abs(tension - each) for each in known) / CLOSING_UNIT
+        size = sum(abs(tension - each) for each in known) / 10.0  # 10 N are of size 1
         limbs = tuple(hand.limb for hand in stance.hands)
         yield Change("grasp", limbs, f"close all hands with {tension:g} N", changes, size)
 
@@ -142,7 +106,7 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
     stance = prepared.question.stance
     hand, rock = stance.hands[index], rock_pose(prepared, index)
     grasp: Grasp = structs.replace(hand.grasp, outer_rotation=turn)
-    size = abs(turn - hand.grasp.outer_rotation) / GRASP_UNIT
+    size = abs(turn - hand.grasp.outer_rotation) / SETTINGS.outer_turn_unit
     changes: dict[str, Any] = {hand_path(index, "grasp.outer_rotation"): turn}
     words = f"take the hold of {hand.limb} with {fingers(turn)}"
     if hand.placed_hold() is None:
@@ -151,9 +115,9 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
             return []
         pose = rock @ there.seating.pose.inverse()
         way = float(np.linalg.norm(pose.position - hand.pose.position))
-        if way > MOVED:
+        if way > 1e-3:  # [m]; less is not worth a word
             words += f", {1e3 * way:.0f} mm from where it is"
-        size += way / WAY_UNIT
+        size += way / SETTINGS.way_unit
         moved = _moved(prepared, index, pose, seated=hand.at is None)
         if moved is None:
             return []
@@ -161,9 +125,7 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
     return [Change("grasp", (hand.limb,), words, changes, size)]
 
 
-def placed(
-    prepared: PreparedStance, index: int, motions: Sequence[tuple[float, float, float]]
-) -> Iterator[Change]:
+def placed(prepared: PreparedStance, index: int, motions: Sequence[_Motion]) -> Iterator[Change]:
     """Yield one hand moved along x and y of its palm [m], and turned about z [rad]."""
     hand = prepared.question.stance.hands[index]
     for x, y, turn in motions:
@@ -179,7 +141,7 @@ def placed(
         if turn:
             whom = "it" if words else hand.limb
             words.append(f"turn {whom} by {math.degrees(turn):.0f}° about z of its H")
-        size = math.hypot(x, y) / WAY_UNIT + abs(turn) / TURN_UNIT
+        size = math.hypot(x, y) / SETTINGS.way_unit + abs(turn) / SETTINGS.turn_unit
         yield Change("place", (hand.limb,), " and ".join(words), changes, size)
 
 
@@ -207,6 +169,16 @@ def _moved(
     if stance.joints is not None:
         changes["stance.joints"] = "solve"
     return changes
+
+
+def way_motions() -> list[_Motion]:
+    """Return small motions of a hand along its palm, for `placed`."""
+    return [(x, y, 0.0) for x, y in SETTINGS.palm_ways]
+
+
+def turn_motions(turns: Sequence[float] = SETTINGS.palm_turns) -> list[_Motion]:
+    """Return turns of a hand about z of its palm [deg], for `placed`."""
+    return [(0.0, 0.0, math.radians(turn)) for turn in turns]
 
 
 def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:

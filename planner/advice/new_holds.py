@@ -10,42 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import permutations
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Pose, turns_about
-from planner.advice.changes import Change, hand_path, pose_message
-from planner.advice.hands import GRASPS, HAND, fingers, rock_pose, unseated
+from planner.advice.changes import SETTINGS, Change, hand_path, pose_message
+from planner.advice.hands import fingers, rock_pose, unseated
 from planner.advice.trials import Trials, Tried
 from planner.prepare import PreparedStance
 
-__all__ = ["APART", "NewHold", "every_hold", "try_new_holds"]
-
-NORMAL: Final = 0.3
-"""Least length of the mean of palms' axes for hands to have a plane."""
-
-IN_REACH: Final = 0.95
-"""Share of a limb's reach that a new hold may ask for."""
-
-APART: Final = 0.25
-"""Least distance of a new hold from other hands [m]."""
-
-GRID: Final = (0.0, -0.6, 0.6)
-"""Places along either axis, in shares of what the limb reaches on the plane."""
-
-QUARTERS: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
-"""First turns of a new hand from the one that it is like [rad]."""
-
-AROUND: Final = tuple(math.radians(turn) for turn in range(-135, 181, 45))
-"""All around [rad]."""
-
-BETWEEN: Final = math.pi / 4.0
-"""Further turn, tried after that [rad]."""
-
-
-SAME: Final = 1e-6
-"""Difference of two rocks' places [m], or axes, up to which they are one: rounding of poses."""
+__all__ = ["NewHold", "every_hold", "try_new_holds"]
 
 
 class _Hold(NamedTuple):
@@ -103,13 +78,13 @@ class NewHold:
         """Try the best so far turned, with other grasps, then elsewhere."""
         if self.best is None:
             return
-        quarters = QUARTERS[1:] if self.best[1].turn == 0.0 else ()
-        for steps in (quarters, (BETWEEN, -BETWEEN)):
+        quarters = SETTINGS.quarter_turns[1:] if self.best[1].turn == 0.0 else ()
+        for steps in (quarters, (math.pi / 4.0, -(math.pi / 4.0))):
             now = self.best[1]
             self._try([now._replace(turn=now.turn + step) for step in steps])
         now = self.best[1]
         if self.prepared.question.stance.hands[now.like].placed_hold() is None:
-            self._try([now._replace(grasp=grasp) for grasp in GRASPS])
+            self._try([now._replace(grasp=grasp) for grasp in SETTINGS.outer_turns])
         now = self.best[1]
         self._try([now._replace(place=place) for place in self.places])
 
@@ -155,7 +130,7 @@ class NewHold:
             limbs=(self.limb,),
             words=self._words(hand.limb, hold),
             changes=changes,
-            size=HAND,
+            size=SETTINGS.hand_size,
         )
 
     def _words(self, like: str, hold: _Hold) -> str:
@@ -173,9 +148,10 @@ class NewHold:
 def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
     """Yield a limb at all places, like each other hand, turned all around from it."""
     search = NewHold(trials, limb)
+    turns = [math.radians(turn) for turn in range(-135, 181, 45)]  # [rad] all around
     for place in search.places:
         for like in search.likes:
-            for turn in AROUND:
+            for turn in turns:
                 yield search.change(_Hold(like, place, turn))
 
 
@@ -192,7 +168,7 @@ def try_new_holds(trials: Trials, most: int = 1) -> None:
     searches = []
     for limb in trials.question.stance.robot.limbs:
         search = NewHold(trials, limb)
-        search.probe(QUARTERS[:1] if limb in limbs else QUARTERS)
+        search.probe(SETTINGS.quarter_turns[:1] if limb in limbs else SETTINGS.quarter_turns)
         searches += [] if search.best is None else [search]
     searches.sort(key=lambda search: search.best[0].utilisation if search.best else math.inf)
     for search in searches[:most]:
@@ -203,12 +179,13 @@ def _sharing(prepared: PreparedStance) -> set[int]:
     """Return the hands whose rock, where it stands in W, is that of another hand."""
     hands = prepared.question.stance.hands
     poses = [rock_pose(prepared, i) for i in range(len(hands))]
+    rounding = 1e-6  # [m], and of axes: that of poses of one rock
     return {
         i
         for i, j in permutations(range(len(hands)), 2)
         if hands[i].hold == hands[j].hold
-        and np.allclose(poses[i].position, poses[j].position, rtol=0.0, atol=SAME)
-        and np.allclose(poses[i].rotation, poses[j].rotation, rtol=0.0, atol=SAME)
+        and np.allclose(poses[i].position, poses[j].position, rtol=0.0, atol=rounding)
+        and np.allclose(poses[i].rotation, poses[j].rotation, rtol=0.0, atol=rounding)
     }
 
 
@@ -219,20 +196,22 @@ def _places(prepared: PreparedStance, limb: str) -> Iterator[Array]:
     yield from (hand.pose.position for hand in stance.hands if hand.limb == limb)
     normal = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
     length = float(np.linalg.norm(normal))
-    if length < NORMAL:
+    if length < 0.3:  # palms that look all ways have no plane in common
         return
     normal /= length
     chain = stance.robot.chains[limb]
     shoulder = stance.body.apply(chain.shoulder)
     off = float(np.mean([normal @ hand.pose.position for hand in stance.hands]) - normal @ shoulder)
-    if abs(off) >= IN_REACH * chain.reach:
+    reach = 0.95 * chain.reach  # share of a limb's reach that a new hold may ask for
+    if abs(off) >= reach:
         return
-    wide = math.sqrt((IN_REACH * chain.reach) ** 2 - off**2)
+    wide = math.sqrt(reach**2 - off**2)
     x, y = _plane_axes(stance.body.rotation, normal)
-    for a in GRID:
-        for b in GRID:
+    shares = (0.0, -0.6, 0.6)  # of what the limb reaches on the plane, the middle first
+    for a in shares:
+        for b in shares:
             place = shoulder + off * normal + wide * (a * x + b * y)
-            if all(np.linalg.norm(place - other) >= APART for other in others):
+            if all(np.linalg.norm(place - other) >= SETTINGS.hands_apart for other in others):
                 yield place
 
 

@@ -5,31 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Any
 
-from planner.advice.changes import Change, hand_path
+from planner.advice.changes import SETTINGS, Change, hand_path
 from planner.advice.trials import Trials, Tried
 from planner.question import HandOnHold
 
 __all__ = ["lighter", "stronger"]
-
-STRONGEST: Final = 4.0
-"""Largest factor of a hold's strength."""
-
-STEP: Final = 0.01
-"""Resolution of the factor by which holds are stronger."""
-
-ROUNDS: Final = 4
-"""Plans with which it is found, at most."""
-
-UNIT: Final = math.log(1.1)
-"""Logarithm of size 1."""
-
-LIGHTEST: Final = 1e-2
-"""Least share of the mass that is reported."""
-
-WITHIN: Final = 1e-4
-"""Relative difference of the reported mass from the largest, which it stays below."""
 
 
 def stronger(trials: Trials, order: Sequence[int], most: int) -> None:
@@ -37,7 +19,7 @@ def stronger(trials: Trials, order: Sequence[int], most: int) -> None:
     hands, last = trials.question.stance.hands, trials.left - most
     single = [(i,) for i in order] if len(hands) > 1 else []
     for which in [tuple(range(len(hands))), *single]:
-        if trials.left - last < ROUNDS:
+        if trials.left - last < SETTINGS.strength_plans:
             return
         enough = _enough(trials, which)
         if not enough and len(which) == len(hands):
@@ -46,17 +28,17 @@ def stronger(trials: Trials, order: Sequence[int], most: int) -> None:
 
 
 def _enough(trials: Trials, which: Sequence[int]) -> bool:
-    """Find how much stronger some holds have to be, if that is enough, to `STEP` if it can be."""
-    most = trials.of([_strengthened(trials, which, STRONGEST)])
+    """Find how much stronger some holds have to be, if that is enough, to 0.01 if it can be."""
+    most = trials.of([_strengthened(trials, which, SETTINGS.strongest)])
     if not most or not trials.holds(most[0].utilisation):
         return False
     cap = trials.question.limits.utilisation
-    # over 1 / k the utilisation is nearly straight
-    low, high = (1.0, trials.base.utilisation), (1.0 / STRONGEST, most[0].utilisation)
-    for _ in range(ROUNDS - 1):
+    # pairs of 1 / k and utilisation, over which that is nearly straight
+    low, high = (1.0, trials.base.utilisation), (1.0 / SETTINGS.strongest, most[0].utilisation)
+    for _ in range(SETTINGS.strength_plans - 1):
         share = 0.5 if math.isinf(low[1]) else (cap - high[1]) / (low[1] - high[1])
         inverse = high[0] + min(max(share, 0.02), 0.98) * (low[0] - high[0])
-        factor = math.ceil((1.0 / inverse) / STEP) * STEP
+        factor = math.ceil((1.0 / inverse) / SETTINGS.share_step) * SETTINGS.share_step
         if not 1.0 / low[0] < factor < 1.0 / high[0]:
             break
         found = trials.of([_strengthened(trials, which, factor)])
@@ -78,7 +60,9 @@ def _strengthened(trials: Trials, which: Sequence[int], factor: float) -> Change
     limbs = tuple(hand.limb for hand in hands)
     whose = "all hands" if len(which) == len(trials.question.stance.hands) else limbs[0]
     words = f"have rock {factor:.2f} times as strong under {whose}"
-    return Change("strength", limbs, words, changes, len(which) * math.log(factor) / UNIT)
+    return Change(
+        "strength", limbs, words, changes, len(which) * math.log(factor) / SETTINGS.strength_unit
+    )
 
 
 def _surface(hand: HandOnHold, factor: float) -> dict[str, Any]:
@@ -104,19 +88,19 @@ def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
     mass = question.stance.robot.mass if load.mass is None else load.mass
     found: list[Tried] = []
     low, high = 0.0, min(factor, 1.0)
-    share = high * (1.0 - WITHIN)
+    share = high * (1.0 - 1e-4)  # a little less than the largest mass
     for _ in range(most):
-        if share < LIGHTEST:
+        if share < 1e-2:  # less of the mass is not reported
             break
         changes: dict[str, Any] = {"load.mass": share * mass}
         words = f"let the body weigh {share * mass:.1f} kg, not {mass:.1f} kg"
-        size = -math.log(share) / UNIT
+        size = -math.log(share) / SETTINGS.strength_unit
         tried = trials.of([Change("mass", (), words, changes, size)])
         if tried and trials.holds(tried[0].utilisation):
             low, found = share, tried
         else:
             high = share
-        if low >= (1.0 - STEP) * high:
+        if low >= (1.0 - SETTINGS.share_step) * high:
             break
         share = 0.5 * (low + high)
     return found

@@ -6,43 +6,27 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
 from planner import deadline, programs
-from planner.advice.changes import Change, changed
+from planner.advice.changes import SETTINGS, Change, changed
 from planner.explanation import LimitUse, scene_findings
 from planner.prepare import PreparedStance, prepare_stance, settle_each
-from planner.programs import SLACK, WRENCH_UNIT, Outcome, StanceData
+from planner.programs import CAP_SLACK, WRENCH_UNIT, Outcome, StanceData
 from planner.question import Objective, OwnObjective, Question
 from planner.result import LoadFactor
 from planner.scene import body_clearance, scene_of
 
 __all__ = [
-    "PLANS",
-    "TRIED",
-    "WITHOUT",
-    "WORSE",
     "Attempt",
     "Trial",
     "Trials",
     "Tried",
     "direction",
 ]
-
-PLANS: Final = 100
-"""Plans that are made for the advice about a question, at most."""
-
-WITHOUT: Final = ("mass", "strength")
-"""Kinds that do not count as help, nor as part of a pair: the task becomes another."""
-
-WORSE: Final = 1e-3
-"""By how much what is odd may grow: metres, or without a unit."""
-
-TRIED: Final = "all changes were tried"
-"""Words for the work that a deadline leaves unfinished."""
 
 
 class Trial(NamedTuple):
@@ -121,7 +105,7 @@ class Trials:
         By all that plans, if the time is over.
     """
 
-    def __init__(self, question: Question, attempt: Attempt, plans: int = PLANS) -> None:
+    def __init__(self, question: Question, attempt: Attempt, plans: int = SETTINGS.plans) -> None:
         self.left = plans
         self.found: list[Tried] = []
         self.question, self._attempt = question, attempt
@@ -130,13 +114,15 @@ class Trials:
 
     def holds(self, utilisation: float) -> bool:
         """Return whether a utilisation is within the question's cap."""
-        return utilisation <= self.question.limits.utilisation + SLACK
+        return utilisation <= self.question.limits.utilisation + CAP_SLACK
 
     @property
     def helped(self) -> bool:
         """True if some change makes it hold, not counting lighter bodies and stronger holds."""
         return any(
-            self.holds(each.utilisation) for each in self.found if each.change.kind not in WITHOUT
+            self.holds(each.utilisation)
+            for each in self.found
+            if each.change.kind not in SETTINGS.kinds_of_other_task
         )
 
     def of(self, candidates: Iterable[Change]) -> list[Tried]:
@@ -177,7 +163,8 @@ class Trials:
         except InvalidInputError:
             return None
         worse = any(
-            size > self._odd.get(kind, 0.0) + WORSE for kind, size in _odd(prepared).items()
+            size > self._odd.get(kind, 0.0) + SETTINGS.worse_tolerance
+            for kind, size in _odd(prepared).items()
         )
         return None if worse else prepared
 
@@ -203,10 +190,10 @@ class Trials:
             settle_each(self.question.stance.robot.hand, hands)
 
     def _try(self, prepared: PreparedStance) -> Trial:
-        deadline.check(TRIED)
+        deadline.check(SETTINGS.late)
         self.left -= 1
         trial = self._attempt(prepared)
-        deadline.check(TRIED)
+        deadline.check(SETTINGS.late)
         return trial
 
 

@@ -16,7 +16,7 @@ from msgspec import structs
 
 from hand_models.base import Array, CruxError, InvalidInputError, SolverError, UnsupportedError
 from planner import deadline, programs
-from planner.explanation import ALIKE, BINDING, joint_name, limit_name
+from planner.explanation import TOLERANCES, joint_name, limit_name
 from planner.floating import disagreements
 from planner.prepare import (
     HandSets,
@@ -26,7 +26,7 @@ from planner.prepare import (
     posture_at,
     widest_at_rest,
 )
-from planner.programs import SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
+from planner.programs import CAP_SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
 from planner.question import Question
 from planner.result import LimitName, Plan
 from planner.solving import plan
@@ -141,12 +141,12 @@ class BodyPrograms:
         """Return the utilisation to go up to, where a balance can be had within it."""
         outcome = programs.margin(data)
         if not outcome.solved:
-            if outcome.status not in programs.PROVEN:
+            if outcome.status not in programs.INFEASIBLE_STATUSES:
                 raise _unsolved(outcome)
             return None
         # where the least utilisation is the cap itself, rounding must not empty the set
-        within = outcome.value <= self.cap + SLACK
-        return max(self.cap, outcome.value + SLACK) if within else None
+        within = outcome.value <= self.cap + CAP_SLACK
+        return max(self.cap, outcome.value + CAP_SLACK) if within else None
 
     def reached(
         self, goal: Array, columns: Array, start: Array, cap: float | None = None
@@ -187,8 +187,10 @@ class BodyPrograms:
         for names, duals in zip(self._names, outcome.limit_duals, strict=True):
             for name, multiplier in zip(names, duals, strict=True):
                 worth[name] = worth.get(name, 0.0) + float(multiplier)
-        most = max(worth, key=lambda name: round(worth[name], ALIKE), default=None)
-        return most if most is not None and worth[most] > BINDING else None
+        most = max(
+            worth, key=lambda name: round(worth[name], TOLERANCES.ranking_digits), default=None
+        )
+        return most if most is not None and worth[most] > TOLERANCES.binding_multiplier else None
 
     def linearisation_error(self, ends: Sequence[End]) -> float:
         """Return how far floating hands' sets are off at most at some ends [N].
@@ -221,10 +223,10 @@ def _solved(
     K = None if K is None else [torque / unit for torque in K]
     found = programs.reach(data, goal / size_of(goal), B, cap, K)
     if not found.outcome.solved:
-        if found.outcome.status not in programs.PROVEN:
+        if found.outcome.status not in programs.INFEASIBLE_STATUSES:
             raise _unsolved(found.outcome)
         return None
-    if _error(data, found, B, cap, K) > SLACK * max(1.0, float(np.abs(found.t).max())):
+    if _error(data, found, B, cap, K) > CAP_SLACK * max(1.0, float(np.abs(found.t).max())):
         raise SolverError("body space: the solver's answer does not pass the checks")
     return found._replace(t=found.t / unit)
 
@@ -308,7 +310,7 @@ def _error(
 
 def _unsolved(outcome: Outcome) -> CruxError:
     deadline.check(MISSING_RESULT)
-    if outcome.status in programs.UNBOUNDED:
+    if outcome.status in ("unbounded", "unbounded_inaccurate"):
         return UnsupportedError(
             "what the hands hold has no bound some way: sets of floating wrists, taken about this "
             "body wrench, do not hold them everywhere; ask about one that can nearly be held"

@@ -34,7 +34,7 @@ from hand_models.parameters import (
 )
 from hand_models.tile import Surface
 from planner.question import Question
-from planner.result import VARIES
+from planner.result import SPREAD_SETTINGS
 from planner.robots import robosimian
 from planner.solving import plan
 
@@ -228,7 +228,7 @@ def _ranked(
         there = np.isfinite(each)
         # what all draws agree on no measurement narrows
         varies = there.sum() > 1 and np.ptp(np.percentile(each[there], [5.0, 95.0]))
-        if varies > VARIES * np.abs(each[there]).max():
+        if varies > SPREAD_SETTINGS.least_variation * np.abs(each[there]).max():
             found[stance] = widths(given[there], each[there], accuracy)
     width, chance = np.mean(list(found.values()), axis=0).tolist() if found else (1.0, 1.0)
     return {

@@ -1,6 +1,5 @@
 from .active_limits import (
-    ALIKE as ALIKE,
-    BINDING as BINDING,
+    TOLERANCES as TOLERANCES,
     ActiveLimits as ActiveLimits,
     LimitUse as LimitUse,
     joint_name as joint_name,
@@ -12,14 +11,10 @@ from .certificate import (
     certify_idle as certify_idle,
 )
 from .path_safety import (
-    UNKNOWN as UNKNOWN,
     tension_path as tension_path,
     unsafe_sentence as unsafe_sentence,
 )
 from .sentences import (
-    LEAST_FACTOR as LEAST_FACTOR,
-    NO_FACTOR as NO_FACTOR,
-    UNPROVEN as UNPROVEN,
     constraint_words as constraint_words,
     limit_sentence as limit_sentence,
     overload_sentence as overload_sentence,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -12,11 +13,13 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.prepare import KEPT_NAMES
-from planner.programs import JOINT_FORCE, JOINT_TORQUE, SLACK
+from planner.programs import CAP_SLACK, JOINT_FORCE, JOINT_TORQUE
 from planner.result import LimitName, Price
 
 __all__ = [
+    "TOLERANCES",
     "ActiveLimits",
+    "ExplanationTolerances",
     "LimitUse",
     "close_to",
     "joint_name",
@@ -24,22 +27,31 @@ __all__ = [
     "unit_of",
 ]
 
-BINDING: Final = 1e-6
-"""Multipliers below this do not count as binding."""
 
-ALIKE: Final = 5
-"""Decimals of multipliers by which limits are ranked; where these are alike, rows' order counts."""
+@dataclass(frozen=True, slots=True)
+class ExplanationTolerances:
+    """From where on numbers of a plan, or of a proof that there is none, mean something."""
 
-NO_WORTH: Final = (-math.inf, 0)
-"""Rank of limits that do not bind: below any that binds, and a place."""
+    binding_multiplier: float = 1e-6  # of a limit that binds, at least
+    ranking_digits: int = 5  # decimals of multipliers; where alike, rows' order counts
+    weighing_multiplier: float = 1e-6  # in a proof, of which all add up to about one
+    broken: float = 1e-7  # rows that must be broken by more have no loads, in scaled units
+    kept: float = 2e-9  # rows that need not be broken by more have loads: the solver's rounding
+    tension_change: float = 1e-3
+    """What hard rows give on the way, and no change of tension [N]: no present tension is known
+    better, and a tendon at rest where it would stick is not slack by a rounding."""
+    com_offset: float = 0.05
+    """From where the centre of mass is taken, without a warning [m]: on a vertical wall 0.12 m
+    changed the load factor of four hands by a sixth."""
 
-UNITS: Final = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
-"""Units of limits that are not in newtons."""
+
+TOLERANCES: Final = ExplanationTolerances()
 
 
 def unit_of(limit: str) -> str:
     """Return the unit of a limit's capacity."""
-    return UNITS.get(limit, "N")
+    units = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
+    return units.get(limit, "N")
 
 
 def limit_name(limb: str, row: Row) -> LimitName:
@@ -67,7 +79,7 @@ class LimitUse(NamedTuple):
 
 def close_to(utilisation: float) -> float:
     """Return the utilisation from which on a limit ties with the most used ones."""
-    return utilisation - 2.0 * SLACK * max(1.0, utilisation)
+    return utilisation - 2.0 * CAP_SLACK * max(1.0, utilisation)
 
 
 class ActiveLimits:
@@ -93,16 +105,16 @@ class ActiveLimits:
         self._capacities = np.concatenate([space.s for space in spaces])
         self._names, self._of_row = _named(tuple([space.rows for space in spaces]), tuple(limbs))
         duals = np.concatenate(multipliers)
-        self._weights = duals * (duals > BINDING)
+        self._weights = duals * (duals > TOLERANCES.binding_multiplier)
         self._worth = np.bincount(self._of_row, self._weights, len(self._names))
 
     def _rank(self, limit: int) -> tuple[float, int]:
         """Return what a limit is worth, and for those alike how early its first row that binds."""
         worth = float(self._worth[limit])
         if worth == 0.0:
-            return NO_WORTH
+            return (-math.inf, 0)  # below any that binds, and a place
         first = ((self._of_row == limit) & (self._weights > 0.0)).argmax()
-        return round(worth, ALIKE), -int(first)
+        return round(worth, TOLERANCES.ranking_digits), -int(first)
 
     def prices(self, utilisation: float) -> tuple[Price, ...]:
         """Return the price of each limit that binds.
@@ -143,7 +155,11 @@ class ActiveLimits:
             return most
         limits, shares = self._of_row.take(rows), used.take(rows)
         worth = self._worth.take(limits)
-        dear = (worth >= np.maximum.reduce(worth) - 10.0**-ALIKE).nonzero()[0].tolist()
+        dear = (
+            (worth >= np.maximum.reduce(worth) - 10.0**-TOLERANCES.ranking_digits)
+            .nonzero()[0]
+            .tolist()
+        )
         tied = set(limits.take(dear).tolist())
         if len(tied) > 1:
             first = max(map(self._rank, tied))

@@ -17,9 +17,9 @@ from hand_models.base import Array
 from hand_models.fixed_wrist import TENDON_TENSION
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs
-from planner.explanation.active_limits import LimitUse, limit_name
+from planner.explanation.active_limits import TOLERANCES, LimitUse, limit_name
 from planner.explanation.infeasibility import (
-    BODY,
+    BODY_ROWS,
     HELD_WRENCH,
     HardRowSystem,
     ranked,
@@ -44,20 +44,8 @@ from planner.result import Certificate, LimitName
 
 __all__ = ["certify", "certify_idle"]
 
-BLOCKING: Final = 1e-6
+LEAST_DIRECTION: Final = 1e-6
 """A direction shorter than this, in the body's six components, is none."""
-
-CLOSE: Final = 0.1
-"""What a certificate's direction must gain, relative to what is missing, to turn by a unit."""
-
-CONTRADICTS: Final = 1e-7
-"""Rows of a hand that must be broken by more than this contradict each other."""
-
-FINEST: Final = 1e-3
-"""Least unit of what is gained: in smaller ones the box costs more than solvers have digits for."""
-
-DISTANT: Final = 1e-9
-"""Distance to the nearest body wrench below which there is nothing to prove."""
 
 
 def certify(
@@ -103,7 +91,7 @@ def certify(
     missing: Array | None = None
     if nearest.solved:
         missing = data.wrench - programs.body_wrench(data, nearest.loads)
-        missing[BODY:] = 0.0
+        missing[BODY_ROWS:] = 0.0
         found: tuple[Array, Array] | None = _polished(system, missing)
     else:
         found = _contradiction(system, limbs)
@@ -124,16 +112,16 @@ def certify(
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
         utilisation=cap,
-        direction=direction[:BODY] / WRENCH_UNIT,
+        direction=direction[:BODY_ROWS] / WRENCH_UNIT,
         held={
-            limb: mine.T @ direction[BODY:] / WRENCH_UNIT
+            limb: mine.T @ direction[BODY_ROWS:] / WRENCH_UNIT
             for limb, mine in zip(limbs, held, strict=True)
             if mine.any()
         },
         supremum=system.bound(direction, multipliers),
         needed=float(direction @ data.wrench),
-        shortfall=None if missing is None else missing[:BODY] * WRENCH_UNIT,
-        nearest=None if missing is None else (data.wrench - missing)[:BODY] * WRENCH_UNIT,
+        shortfall=None if missing is None else missing[:BODY_ROWS] * WRENCH_UNIT,
+        nearest=None if missing is None else (data.wrench - missing)[:BODY_ROWS] * WRENCH_UNIT,
         blocking=_in_order(
             (name for name in ranked(weights) if name.limit != HELD_WRENCH), limits, spaces
         ),
@@ -234,7 +222,7 @@ def _contradiction(system: HardRowSystem, limbs: Sequence[str]) -> tuple[Array, 
     for limb in limbs:
         mine = [name for name in system.constraints if name.limb == limb]
         found = system.least_violation(mine, balance=False)
-        if found is not None and found.gain > CONTRADICTS:
+        if found is not None and found.gain > TOLERANCES.broken:
             return found.direction, found.multipliers
     return None
 
@@ -255,7 +243,7 @@ def _multipliers(
     ]
     direction, multipliers = -outcome.balance_dual, np.maximum(np.concatenate(parts), 0.0)
     length, weight = float(np.linalg.norm(direction[:6])), float(multipliers.sum())
-    if length > BLOCKING * weight:
+    if length > LEAST_DIRECTION * weight:
         return direction / length, multipliers / length
     direction[:6] = 0.0
     return (direction / weight, multipliers / weight) if weight > 0.0 else None
@@ -264,15 +252,19 @@ def _multipliers(
 def _polished(system: HardRowSystem, missing: Array) -> tuple[Array, Array]:
     """Return a unit d near that of ``missing``, and λ ≥ 0, that prove the most.
 
-    A vertex of max d·(W − g) − λ·h − X Σ|Gᵀd − Hᵀλ|, less `CLOSE` for turning d away: the error
-    of an interior-point solution would be magnified by a box as large as X. The parts of d for
-    given wrenches are free.
+    A vertex of max d·(W − g) − λ·h − X Σ|Gᵀd − Hᵀλ|, less a tenth of what is missing for turning d
+    away: the error of an interior-point solution would be magnified by a box as large as X. The
+    parts of d for given wrenches are free.
     """
     length = float(np.linalg.norm(missing))
-    if length > DISTANT:
-        found = system.program.near(missing[:BODY] / length, CLOSE * length, max(length, FINEST))
+    turning = 0.1  # part of what is missing that a turn by a unit must gain
+    if length > 1e-9:  # nearer there is nothing to prove
+        # in smaller units of the gain the box costs more than solvers have digits for
+        found = system.program.near(
+            missing[:BODY_ROWS] / length, turning * length, max(length, 1e-3)
+        )
         if found is not None:
-            size = float(np.linalg.norm(found.direction[:BODY]))
-            if size >= BLOCKING:
+            size = float(np.linalg.norm(found.direction[:BODY_ROWS]))
+            if size >= LEAST_DIRECTION:
                 return found.direction / size, found.multipliers / size
     return np.zeros(len(missing)), np.zeros(len(system.h))

@@ -5,7 +5,7 @@ constraint. Whether some of them leave loads that balance the body is a linear p
 
     min t  with  |W − Σ g − G z| ≤ t,  H z − h ≤ t,  |z| ≤ X,
 
-whose multipliers d, λ are a proof (Farkas) where t is above zero. The box X of `UNLIMITED`, far
+whose multipliers d, λ are a proof (Farkas) where t is above zero. The box X of `LOAD_BOX`, far
 beyond any strength, always counts.
 
 These multipliers are a linear program of as many equations as loads, however many rows, and it is
@@ -29,14 +29,13 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array
 from planner import deadline
-from planner.explanation.active_limits import ALIKE
-from planner.programs import UNLIMITED, SilentHighs
+from planner.explanation.active_limits import TOLERANCES
+from planner.programs import LOAD_BOX, SilentHighs
 from planner.result import LimitName
 
 __all__ = [
-    "BODY",
+    "BODY_ROWS",
     "HELD_WRENCH",
-    "WEIGHS",
     "Chosen",
     "FarkasProgram",
     "HardRowSystem",
@@ -50,24 +49,8 @@ Chosen = NDArray[np.bool_]
 HELD_WRENCH: Final = "held_wrench"
 """Name of the constraint that a given wrench of a hand is."""
 
-BODY: Final = 6
+BODY_ROWS: Final = 6
 """Rows of the balance that are the body's."""
-
-WEIGHS: Final = 1e-6
-"""Multipliers below this, of which all add up to about one, do not count."""
-
-EXACT: Final = 1e-10
-"""Tolerance of the linear programs."""
-
-OPTIONS: Final[dict[str, float | str]] = {
-    "presolve": "off",
-    "parallel": "off",
-    "solver": "simplex",
-    "simplex_scale_strategy": 0,
-    "primal_feasibility_tolerance": EXACT,
-    "dual_feasibility_tolerance": EXACT,
-}
-"""Options of HiGHS. Presolving would lose the basis; the rows have their physical scaling."""
 
 
 class Multipliers(NamedTuple):
@@ -156,7 +139,7 @@ class FarkasProgram:
 
     def _priced(self, more: Array, less: Array) -> Array:
         """Return the columns' costs; what d⁺ and d⁻ gain is given."""
-        box = np.full(2 * self.G.shape[1], UNLIMITED)
+        box = np.full(2 * self.G.shape[1], LOAD_BOX)
         return np.concatenate([-more, -less, self.h, box])
 
     def _solved(self, costs: Array, most: Array, start: Array, total: float) -> Multipliers | None:
@@ -195,7 +178,15 @@ class FarkasProgram:
 
 def _solver_of(A: Array) -> SilentHighs:
     """Return a solver of programs with rows A, all of whose columns are above zero."""
-    solver, zeros = SilentHighs(OPTIONS), np.zeros(max(A.shape))
+    options: dict[str, float | str] = {
+        "presolve": "off",  # would lose the basis
+        "parallel": "off",
+        "solver": "simplex",
+        "simplex_scale_strategy": 0,  # rows have their physical scaling
+        "primal_feasibility_tolerance": 1e-10,
+        "dual_feasibility_tolerance": 1e-10,
+    }
+    solver, zeros = SilentHighs(options), np.zeros(max(A.shape))
     rows, columns = zeros[: len(A)], zeros[: A.shape[1]]
     solver.load(A, (columns, np.full(A.shape[1], np.inf)), (rows, rows))
     return solver
@@ -257,16 +248,16 @@ class HardRowSystem:
         chosen = np.zeros(len(self._places), dtype=bool)
         chosen[[self._places[name] for name in constraints if name in self._places]] = True
         rows = chosen[self.owners]
-        return np.append(np.full(BODY, balance), rows[len(self.h) :]), rows[: len(self.h)]
+        return np.append(np.full(BODY_ROWS, balance), rows[len(self.h) :]), rows[: len(self.h)]
 
     def bound(self, direction: Array, multipliers: Array) -> float:
-        """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `UNLIMITED`.
+        """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `LOAD_BOX`.
 
         By hand: with H z ≤ h and λ ≥ 0
 
             d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h.
         """
-        leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * UNLIMITED
+        leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * LOAD_BOX
         return float(direction @ self.g + multipliers @ self.h + leak)
 
     def proves(self, direction: Array, multipliers: Array) -> bool:
@@ -285,10 +276,10 @@ class HardRowSystem:
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
         """Return the weights of constraints by their multipliers, those that count alone."""
-        shares = np.append(multipliers, np.abs(direction[BODY:]))
+        shares = np.append(multipliers, np.abs(direction[BODY_ROWS:]))
         weights = np.bincount(self.owners, shares, len(self.constraints)).tolist()
         pairs = zip(self.constraints, weights, strict=True)
-        return {name: weight for name, weight in pairs if weight > WEIGHS}
+        return {name: weight for name, weight in pairs if weight > TOLERANCES.weighing_multiplier}
 
     def least_violation(
         self, constraints: Iterable[LimitName], *, balance: bool = True
@@ -327,4 +318,4 @@ def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitNa
 
 def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
     """Return constraints, the weightiest first."""
-    return sorted(weights, key=lambda name: -round(weights[name], ALIKE))
+    return sorted(weights, key=lambda name: -round(weights[name], TOLERANCES.ranking_digits))

@@ -11,42 +11,24 @@ all the others have loads is in every one of them.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices
-from planner.explanation.infeasibility import (
-    BODY,
-    WEIGHS,
-    Chosen,
-    HardRowSystem,
-    Multipliers,
-    ranked,
-)
-from planner.programs import UNLIMITED
+from planner.explanation.active_limits import TOLERANCES
+from planner.explanation.infeasibility import BODY_ROWS, Chosen, HardRowSystem, Multipliers, ranked
+from planner.programs import LOAD_BOX
 from planner.result import LimitName
 
 __all__ = ["balance_alone", "blocks_up_to", "irreducible_set", "sufficient_alone"]
-
-BROKEN: Final = 1e-7
-"""Rows that must be broken by more than this have no loads, in the program's units."""
-
-KEPT: Final = 2e-9
-"""Rows that need not be broken by more than this have loads: what the solver's rounding leaves."""
-
-MOST: Final = 24
-"""Constraints of a set that are left out one by one; larger sets are not tried."""
-
-RANK: Final = 1e-4
-"""Relative size below which singular values of rows are none: loads would be beyond the box."""
 
 
 def balance_alone(system: HardRowSystem) -> bool:
     """Return whether the balance alone has no loads, so that the irreducible set is empty."""
     found = system.least_violation(())
-    return found is not None and found.gain > BROKEN and _prove_alone(system, found, ())
+    return found is not None and found.gain > TOLERANCES.broken and _prove_alone(system, found, ())
 
 
 def irreducible_set(
@@ -70,7 +52,7 @@ def irreducible_set(
         first = system.least_violation(start)
         if first is None:
             return None
-        if first.gain > BROKEN:
+        if first.gain > TOLERANCES.broken:
             return _filtered(system, first)
     return None
 
@@ -78,7 +60,7 @@ def irreducible_set(
 def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...] | None:
     """Leave out one constraint after the other, for good where the rest still has no loads."""
     kept = system.weights(proof.direction, proof.multipliers)
-    needed = _needed(system, kept, proof.multipliers > WEIGHS, kept)
+    needed = _needed(system, kept, proof.multipliers > TOLERANCES.weighing_multiplier, kept)
     for name in reversed(ranked(kept)):
         if name not in kept or name in needed:
             continue
@@ -86,10 +68,12 @@ def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...
         trial = system.least_violation(others)
         if trial is None:
             return None
-        if trial.gain > BROKEN:
+        if trial.gain > TOLERANCES.broken:
             proof = trial
             kept = system.weights(proof.direction, proof.multipliers)
-        elif trial.gain > KEPT and not _needed(system, kept, np.ones_like(system.h, bool), [name]):
+        elif trial.gain > TOLERANCES.kept and not _needed(
+            system, kept, np.ones_like(system.h, bool), [name]
+        ):
             return None
     return tuple(ranked(kept)) if _prove_alone(system, proof, kept) else None
 
@@ -97,13 +81,13 @@ def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...
 def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
     """Return the size of loads |z| up to which constraints without any are proven to have none.
 
-    At least `UNLIMITED`, the box in which they were found to; infinite where no box is needed.
+    At least `LOAD_BOX`, the box in which they were found to; infinite where no box is needed.
     """
     proof = system.least_violation(names)
     if proof is None:
-        return UNLIMITED
+        return LOAD_BOX
     tied, rows = system.rows_of(names)
-    return max(system.proven_up_to(proof.direction * tied, proof.multipliers * rows), UNLIMITED)
+    return max(system.proven_up_to(proof.direction * tied, proof.multipliers * rows), LOAD_BOX)
 
 
 def sufficient_alone(
@@ -123,7 +107,7 @@ def sufficient_alone(
     -------
     tuple of LimitName or None
         In the order of the set. None without a set, or if rounding leaves undecided whether some
-        constraints have loads, or if a set of more than `MOST` would have to be tried one by one.
+        constraints have loads, or if a set of more than 24 would have to be tried one by one.
     """
     if not irreducible:
         return irreducible
@@ -136,18 +120,18 @@ def sufficient_alone(
         trial = system.least_violation_without(group)
         if trial is None:
             return None
-        if trial.gain > BROKEN:
+        if trial.gain > TOLERANCES.broken:
             # what is left is in the way even without all of them
             left.difference_update(group)
             weighed = system.weights(trial.direction, trial.multipliers)
             if _prove_alone(system, trial, weighed):
                 left.intersection_update(weighed)
-        elif len(group) > MOST:
+        elif len(group) > 24:  # of a larger set they are not left out one by one
             return None
         elif len(group) > 1:
             half = len(group) // 2
             groups += [tuple(group[half:]), tuple(group[:half])]
-        elif trial.gain > KEPT:
+        elif trial.gain > TOLERANCES.kept:
             return None
         else:
             found.update(group)
@@ -176,7 +160,7 @@ def _needed(
 
 
 class _Rows(NamedTuple):
-    """Rows M z ≤ r, the first `BODY` of them equations, and which constraint each is.
+    """Rows M z ≤ r, the first `BODY_ROWS` of them equations, and which constraint each is.
 
     A given wrench's rows are there twice, with either sign.
     """
@@ -191,20 +175,20 @@ class _Rows(NamedTuple):
         tied, _ = system.rows_of(kept)
         G, goal = system.G[tied], system.goal[tied]
         limits, given = np.split(system.owners, [len(system.h)])
-        held = given[tied[BODY:]]
+        held = given[tied[BODY_ROWS:]]
         return cls(
-            np.vstack([G, -G[BODY:], system.H[rows]]),
-            np.concatenate([goal, -goal[BODY:], system.h[rows]]),
-            np.concatenate([np.full(BODY, -1), held, held, limits[rows]]),
+            np.vstack([G, -G[BODY_ROWS:], system.H[rows]]),
+            np.concatenate([goal, -goal[BODY_ROWS:], system.h[rows]]),
+            np.concatenate([np.full(BODY_ROWS, -1), held, held, limits[rows]]),
         )
 
     def hold(self, loads: Array, but: int) -> bool:
         """Return whether loads are in the box, and keep to all rows but those of one constraint."""
         over = self.M @ loads - self.right
-        over[:BODY] = np.abs(over[:BODY])
+        over[:BODY_ROWS] = np.abs(over[:BODY_ROWS])
         over[self.whose == but] = 0.0
-        small = np.abs(loads).max(initial=0.0) <= UNLIMITED
-        return bool(small and over.max() <= KEPT)
+        small = np.abs(loads).max(initial=0.0) <= LOAD_BOX
+        return bool(small and over.max() <= TOLERANCES.kept)
 
     def loads_without(self, places: Iterable[int]) -> Iterator[tuple[int, Array]]:
         """Yield loads of all rows but those of one constraint after the other, if there are any.
@@ -215,9 +199,10 @@ class _Rows(NamedTuple):
         the smallest.
         """
         left, sizes, across = np.linalg.svd(self.M)
-        rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+        least = 1e-4  # relative: loads of smaller singular values would be beyond the box
+        rank = int((sizes > least * sizes.max(initial=0.0)).sum())
         N, inverse = left[:, rank:].T, (across[:rank].T / sizes[:rank]) @ left[:, :rank].T
-        missing, above = N @ self.right, N[:, BODY:]
+        missing, above = N @ self.right, N[:, BODY_ROWS:]
         if not len(N):  # on no equations SciPy's nnls may end the process
             loads = inverse @ self.right
             yield from ((place, loads) for place in places)
@@ -230,6 +215,6 @@ class _Rows(NamedTuple):
                 continue
             if not np.isfinite(shares).all():
                 continue
-            slack = np.append(np.zeros(BODY), shares[: above.shape[1]])
+            slack = np.append(np.zeros(BODY_ROWS), shares[: above.shape[1]])
             slack[freed] -= shares[above.shape[1] :]
             yield place, inverse @ (self.right - slack)

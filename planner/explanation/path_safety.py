@@ -26,27 +26,17 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs
-from planner.explanation.active_limits import LimitUse, close_to, limit_name
+from planner.explanation.active_limits import TOLERANCES, LimitUse, close_to, limit_name
 from planner.explanation.infeasibility import ranked, summed
 from planner.explanation.sentences import blocking_sentence
 from planner.prepare import PreparedStance, Sets
-from planner.programs import LOAD_UNIT, SLACK, Outcome, StanceData
+from planner.programs import CAP_SLACK, LOAD_UNIT, Outcome, StanceData
 from planner.result import LimitName, TensionPath
 
-__all__ = ["UNKNOWN", "tension_path", "unsafe_sentence"]
+__all__ = ["tension_path", "unsafe_sentence"]
 
-TENSIONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
+TENSION_COLUMNS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
 """Columns of a hand with a fixed wrist."""
-
-UNKNOWN: Final = "whether the straight way from the present tensions is safe was not found out"
-"""Warning for a way for which the solver gave no answer that passes the check."""
-
-ENDS: Final = 1e-3
-"""Multipliers below this part of the largest do not count as an end of the way."""
-
-GIVE: Final = 1e-3
-"""How much hard rows give on the way, and how small a change of tension is none [N]: no present
-tension is known better, and a tendon at rest where it would stick is not slack by a rounding."""
 
 
 def tension_path(
@@ -77,7 +67,7 @@ def tension_path(
     z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
     rows = [hand.L @ part + hand.l0 for hand, part in zip(data.hands, z, strict=True)]
     used = [float(row.max(initial=0.0)) for row in rows]
-    fixed = [i for i, space in enumerate(spaces) if TENSIONS[0] in space.columns]
+    fixed = [i for i, space in enumerate(spaces) if TENSION_COLUMNS[0] in space.columns]
     changes = {
         i: present[limbs[i]] / LOAD_UNIT - z[i][_columns(spaces[i])]
         for i in fixed
@@ -94,8 +84,12 @@ def tension_path(
     size = float(np.abs(way).max(initial=0.0))
     change = LOAD_UNIT * size
     here = max(still, *used)
-    at_present = here if change <= GIVE else _least(start.turned(start.wrench + way), still)
-    if here > cap + SLACK:
+    at_present = (
+        here
+        if change <= TOLERANCES.tension_change
+        else _least(start.turned(start.wrench + way), still)
+    )
+    if here > cap + CAP_SLACK:
         close = close_to(here)
         names = [
             limit_name(limb, space.rows[i])
@@ -104,20 +98,20 @@ def tension_path(
         ]
         names += [each.name for each in idle if each.utilisation >= close]
         return TensionPath(False, 0.0, at_present, change, list(dict.fromkeys(names)))
-    if change <= GIVE:
+    if change <= TOLERANCES.tension_change:
         return TensionPath(True, 1.0, at_present, change)
     # rounding must not leave the plan itself outside
     most = max(cap, *used)
-    reached = programs.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * SLACK)
+    reached = programs.reach(start, np.ones(1), (way / size)[:, None], cap=most + 0.5 * CAP_SLACK)
     if not reached.outcome.solved:
         return None
     part = float(reached.t[0]) / size
     if not programs.holds(
-        start.turned(start.wrench + part * way), reached.outcome.loads, most + SLACK
+        start.turned(start.wrench + part * way), reached.outcome.loads, most + CAP_SLACK
     ):
         return None
     part = min(max(part, 0.0), 1.0)
-    if part >= 1.0 - SLACK:
+    if part >= 1.0 - CAP_SLACK:
         return TensionPath(True, part, at_present, change)
     ends = _ends([limbs[i] for i in fixed], [spaces[i] for i in fixed], reached.outcome)
     return TensionPath(False, part, at_present, change, ends)
@@ -140,12 +134,13 @@ def _ends(limbs: Sequence[str], spaces: Sequence[WrenchSpace], outcome: Outcome)
     ]
     duals = zip(outcome.limit_duals, outcome.hard_duals, strict=True)
     weights = summed(names, np.concatenate([part for pair in duals for part in pair]).tolist())
-    least = ENDS * max(weights.values(), default=0.0)
+    # multipliers below a thousandth of the largest end nothing
+    least = 1e-3 * max(weights.values(), default=0.0)
     return [name for name in ranked(weights) if weights[name] > least]
 
 
 def _columns(space: WrenchSpace) -> list[int]:
-    return [space.columns.index(name) for name in TENSIONS]
+    return [space.columns.index(name) for name in TENSION_COLUMNS]
 
 
 def _pinned(
@@ -177,7 +172,7 @@ def _pinned(
         data.hands[i]._replace(
             G=np.vstack([data.hands[i].G, mine]),
             g=np.concatenate([data.hands[i].g, np.zeros(len(places))]),
-            h=data.hands[i].h + GIVE / LOAD_UNIT,
+            h=data.hands[i].h + TOLERANCES.tension_change / LOAD_UNIT,
         )
         for i, mine in zip(fixed, picked, strict=True)
     ]
@@ -189,6 +184,6 @@ def _pinned(
 def _least(data: StanceData, still: float) -> float | None:
     """Return the least utilisation; ``still`` is what hands use that are left out."""
     outcome = programs.margin(data)
-    if not (outcome.solved and programs.holds(data, outcome.loads, outcome.value + SLACK)):
+    if not (outcome.solved and programs.holds(data, outcome.loads, outcome.value + CAP_SLACK)):
         return None
     return max(outcome.value, still)

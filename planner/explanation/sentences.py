@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from planner.programs import JOINT_FORCE, JOINT_TORQUE, WRENCH_UNIT
 from planner.result import Certificate, HandPlan, LimitName
 
 __all__ = [
-    "LEAST_FACTOR",
-    "NO_FACTOR",
-    "UNPROVEN",
     "blocking_sentence",
     "constraint_words",
     "limit_sentence",
@@ -28,93 +25,61 @@ __all__ = [
     "shortfall_sentence",
 ]
 
-NOTABLE: Final = 0.3
-"""Least component of a missing wrench that is named, relative to the largest."""
 
-FOREMOST: Final = 2
-"""Number of constraints in the way that are named; the rest are counted."""
+class _Words(NamedTuple):
+    """What is said of a limit, or of a hard row, a cap or a given wrench.
 
-MANNERS: Final = {
-    "shear": " in shear",
-    "pull_off": " toward pull-off",
-    "palm_shear": " in shear",
-    "palm_pressing": " in pressing",
-    "finger_shear": " in shear together",
-    "finger_lateral": " sideways together",
-    "nail_shear": " along its finger",
-    "fingertip_force": " in pressing",
-    FORCE_CAP: " allowed",
+    Attributes
+    ----------
+    bearer : str
+        Part of a finger, a hand or its limb that it is about; by default its tendon or palm.
+    does, would_do : str
+    manner : str
+        How the load of a limit acts.
+    barrier : str
+        What it forbids or demands; by default more than a limit.
+    """
+
+    bearer: str = ""
+    does: str = "carries"
+    would_do: str = "carry"
+    manner: str = ""
+    barrier: str = ""
+
+
+LIMIT_WORDS: Final = {
+    "motor_torque": _Words("motor", "gives", "give"),
+    "motor_current": _Words("motor", "draws", "draw"),
+    "finger_shear": _Words("tiles", "carry", manner=" in shear together"),
+    "finger_lateral": _Words("tiles", "carry", manner=" sideways together"),
+    "shear": _Words(manner=" in shear"),
+    "pull_off": _Words(manner=" toward pull-off"),
+    "palm_shear": _Words(manner=" in shear"),
+    "palm_pressing": _Words(manner=" in pressing"),
+    "nail_shear": _Words(manner=" along its finger"),
+    "fingertip_force": _Words(manner=" in pressing"),
+    HAND_LOAD: _Words("the hand", "holds", "hold"),
+    FORCE_CAP: _Words("the hand", "exerts", "exert", " allowed", "may exert no more that way"),
+    HELD_WRENCH: _Words("the hand", barrier="must exert the wrench that it is given"),
+    JOINT_TORQUE: _Words("its joints", "bears", "bear"),
+    JOINT_FORCE: _Words("its joints", "bears", "bear"),
+    "wrist_range": _Words("the wrist", barrier="goes no farther"),
+    "slack_tendon": _Words(barrier="cannot push"),
+    "dragged_backwards": _Words(barrier="cannot be dragged away from the finger's base"),
+    "joint_stop": _Words(barrier="cannot leave its joint's stop"),
+    "frame_pulled": _Words(barrier="rests beside its spines, which cannot pull there"),
+    "nail_lifts": _Words(barrier="cannot pull"),
+    "nail_slips": _Words(barrier="would slip"),
+    "tendon_sticks": _Words(barrier="would stick if it were slackened"),
+    "palm_shear_reversed": _Words(barrier="cannot drag the rock along +x of the hand"),
+    "palm_pressing_reversed": _Words(barrier="cannot pull"),
+    TENSION_CHANGE: _Words(barrier="may not change that much"),
+    PASSIVE_JOINT: _Words(barrier="has no motor and bears no torque"),
 }
-"""Words for the load of a limit."""
-
-BEARERS: Final = {
-    "motor_torque": "motor",
-    "motor_current": "motor",
-    "finger_shear": "tiles",
-    "finger_lateral": "tiles",
-}
-"""Part of a finger that a limit is about; its tendon by default."""
-
-WHOLES: Final = {
-    HAND_LOAD: "the hand",
-    FORCE_CAP: "the hand",
-    HELD_WRENCH: "the hand",
-    JOINT_TORQUE: "its joints",
-    JOINT_FORCE: "its joints",
-    "wrist_range": "the wrist",
-}
-"""Part of a hand or its limb that a limit is about; its palm by default."""
-
-AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
-"""Components of a body wrench."""
-
-VERBS: Final = {
-    "motor_torque": ("gives", "give"),
-    "motor_current": ("draws", "draw"),
-    "finger_shear": ("carry", "carry"),
-    "finger_lateral": ("carry", "carry"),
-    HAND_LOAD: ("holds", "hold"),
-    FORCE_CAP: ("exerts", "exert"),
-    JOINT_TORQUE: ("bears", "bear"),
-    JOINT_FORCE: ("bears", "bear"),
-}
-"""Verbs of a limit: it does, it would do; `CARRIES` by default."""
-
-CARRIES: Final = ("carries", "carry")
-
-BARRIERS: Final = {
-    "slack_tendon": "cannot push",
-    "dragged_backwards": "cannot be dragged away from the finger's base",
-    "joint_stop": "cannot leave its joint's stop",
-    "frame_pulled": "rests beside its spines, which cannot pull there",
-    "nail_lifts": "cannot pull",
-    "nail_slips": "would slip",
-    "tendon_sticks": "would stick if it were slackened",
-    "palm_shear_reversed": "cannot drag the rock along +x of the hand",
-    "palm_pressing_reversed": "cannot pull",
-    "wrist_range": "goes no farther",
-    FORCE_CAP: "may exert no more that way",
-    TENSION_CHANGE: "may not change that much",
-    PASSIVE_JOINT: "has no motor and bears no torque",
-    HELD_WRENCH: "must exert the wrench that it is given",
-}
-"""Words for what a hard row or a cap forbids, or a given wrench demands."""
 
 
-UNPROVEN: Final = (
-    "the floating wrists are where their hands' stiffness jumps or the search ended: the loads are "
-    "exact, but that no other pose uses less is not proven"
-)
-"""Warning for a plan that its search could not prove to be the least."""
-
-
-LEAST_FACTOR: Final = (
-    "the load factor is a lower bound: beyond it no plan was found, nor proven away"
-)
-"""Warning for a load factor whose search ended for want of a plan, not at a limit."""
-
-NO_FACTOR: Final = "no load factor was found; with floating wrists that is no proof of none"
-"""Warning for a search that ends without a load factor."""
+def _words(limit: str) -> _Words:
+    return LIMIT_WORDS.get(limit, _Words())
 
 
 def _bearer(name: LimitName) -> str:
@@ -125,9 +90,7 @@ def _bearer(name: LimitName) -> str:
         return name.phalanx if name.phalanx == NAIL else "tile"
     if name.joint is not None:
         return "joint"
-    if name.finger is not None:
-        return BEARERS.get(name.limit, "tendon")
-    return WHOLES.get(name.limit, "palm")
+    return _words(name.limit).bearer or ("palm" if name.finger is None else "tendon")
 
 
 def _spoken(name: LimitName) -> str:
@@ -142,15 +105,14 @@ def _spoken(name: LimitName) -> str:
 
 def _verb(limit: str, held: bool) -> str:
     """Say what is done to a limit, or would be."""
-    does, would_do = VERBS.get(limit, CARRIES)
-    return does if held else f"would {would_do}"
+    words = _words(limit)
+    return words.does if held else f"would {words.would_do}"
 
 
 def _barrier(limit: str) -> str:
     """Say what a constraint forbids."""
-    if limit in BARRIERS:
-        return BARRIERS[limit]
-    return f"cannot {VERBS.get(limit, CARRIES)[1]} more{MANNERS.get(limit, '')}"
+    words = _words(limit)
+    return words.barrier or f"cannot {words.would_do} more{words.manner}"
 
 
 def _spoken_load(limit: str, load: float) -> str:
@@ -192,7 +154,7 @@ def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
     if carried == most and not held:
         # so near that only further digits differ
         carried = f"{_spoken_load(name.limit, capacity)} and a little more"
-    manner = MANNERS.get(name.limit, "")
+    manner = _words(name.limit).manner
     return f"{_spoken(name)} {_verb(name.limit, held)} {carried} of {most}{manner}"
 
 
@@ -274,18 +236,19 @@ def _floats(certificate: Certificate, floating: Collection[str]) -> bool:
 
 def _missing(shortfall: Array) -> str:
     """Name the components of what is missing that matter, the largest first."""
-    units = ("N",) * 3 + ("N·m",) * 3
+    axes, units = ("fx", "fy", "fz", "mx", "my", "mz"), ("N",) * 3 + ("N·m",) * 3
     size = np.abs(shortfall / WRENCH_UNIT)
-    order = [int(i) for i in np.argsort(-size) if size[i] >= NOTABLE * size.max()]
+    # components of less than 0.3 of the largest are not named
+    order = [int(i) for i in np.argsort(-size) if size[i] >= 0.3 * size.max()]
     # three digits, and no exponents
     values = [f"{x:+.0f}" if abs(x) >= 1000.0 else f"{x:+.3g}" for x in shortfall.tolist()]
-    return ", ".join(f"{AXES[i]} {values[i]} {units[i]}" for i in order)
+    return ", ".join(f"{axes[i]} {values[i]} {units[i]}" for i in order)
 
 
 def blocking_sentence(names: Sequence[LimitName]) -> str:
     """Say what is in the way, the foremost first; a limb's name once in a row."""
     words: list[str] = []
-    for i, name in enumerate(names[:FOREMOST]):
+    for i, name in enumerate(names[:2]):  # the rest are counted
         sentence = f"{_spoken(name)} {_barrier(name.limit)}"
         again = i > 0 and names[i - 1].limb == name.limb
         words.append(sentence.removeprefix(f"{name.limb}: ") if again else sentence)

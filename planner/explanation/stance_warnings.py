@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
 
 import numpy as np
 
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.rock import Hold
+from planner.explanation.active_limits import TOLERANCES
 from planner.prepare import HandBatch, Posture, PreparedStance
 from planner.question import Question, Stance
 from planner.result import Finding, HandPlan
@@ -22,27 +22,6 @@ __all__ = [
     "strained_preloads",
     "warnings",
 ]
-
-SWINGS: Final = 1e-3
-"""Torque from which on a joint without a motor is said to move [N·m]: a smaller one is nothing but
-the rounding of angles."""
-
-OFF_CENTRE: Final = 0.05
-"""Distance of the centre of mass from where it is taken, from which on that is a warning [m]: on a
-vertical wall 0.12 m changed the load factor of four hands by a sixth."""
-
-
-FAR: Final = 5e-3
-"""Largest displacement of a wrist from rest without a warning [m]."""
-
-TURNED: Final = 50e-3
-"""Largest turn of a wrist from rest without a warning [rad]."""
-
-BACKWARDS: Final = 1e-3
-"""Shear away from the finger's base that counts [N]."""
-
-LIMIT: Final = 1.0 + 1e-6
-"""Utilisation beyond which a hand is overloaded at rest."""
 
 
 def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
@@ -127,7 +106,7 @@ def _load_findings(question: Question, where: Posture | None) -> tuple[Finding, 
     if load.com is not None:
         com = where.weights.com
         away = float(np.linalg.norm(np.asarray(load.com) - com))
-        if away > OFF_CENTRE:
+        if away > TOLERANCES.com_offset:
             place = ", ".join(f"{value:z.3f}" for value in com)
             message = (
                 f"load.com: it is {away:.2g} m from the posture's centre of mass, ({place}) in B: "
@@ -169,7 +148,7 @@ def _joint_sentences(question: Question, where: Posture | None) -> tuple[str, ..
     for limb, loads in where.idle(question.stance).items():
         passive = loads.passive
         for name, torque in zip(passive.names, passive.gravity.tolist(), strict=True):
-            if abs(torque) > SWINGS:
+            if abs(torque) > 1e-3:  # [N·m]; a smaller torque is nothing but the rounding of angles
                 found.append(
                     f"{limb}: joint {name} has no motor and does not stay where it is, its limb's "
                     f"weight turns it with {abs(torque):.2g} N·m"
@@ -184,7 +163,7 @@ def _com_sentences(question: Question) -> tuple[str, ...]:
     body, robot = stance.body.inverse(), stance.robot
     hands = {hand.limb: body.apply(hand.pose.position) for hand in stance.hands}
     away = float(np.linalg.norm(robot.com_reaching(hands) - robot.com))
-    if away <= OFF_CENTRE:
+    if away <= TOLERANCES.com_offset:
         return ()
     return (
         f"the joints are not known: the centre of mass is taken where the robot's file has it, and "
@@ -232,7 +211,7 @@ def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
             at_zero, per_newton = (float(value) for value in drag)
             at_zero += float(hand.drag_allowances[t])
             shear = at_zero + per_newton * float(wrist.hand.preload[finger])
-            if shear < -BACKWARDS and per_newton > 0.0:
+            if shear < -1e-3 and per_newton > 0.0:  # [N] less does not count
                 needs.append((-at_zero / per_newton, finger, hand.tiles[t].phalanx))
         if needs:
             need, finger, phalanx = max(needs)
@@ -259,7 +238,7 @@ def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
             continue
         verdict = wrist.evaluate(np.zeros((1, 6)))
         used, row = float(verdict.utilisation[0]), wrist.limits[int(verdict.limiting[0])]
-        if used > LIMIT:
+        if used > 1.0 + 1e-6:
             where = " of ".join(part for part in (row.phalanx, row.finger) if part is not None)
             yield (
                 f"{limb}: tendon_preload alone takes the hand to utilisation {used:.3g} at rest "
@@ -274,7 +253,7 @@ def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
             continue
         moved = float(np.linalg.norm(hand.wrist.twist[:3]))
         turned = float(np.linalg.norm(hand.wrist.twist[3:]))
-        if moved > FAR or turned > TURNED:
+        if moved > 5e-3 or turned > 50e-3:  # [m] and [rad]: so far one step from rest is right
             yield (
                 f"{hand.limb}: the wrist moves {1e3 * moved:.0f} mm and turns "
                 f"{1e3 * turned:.0f} mrad: loads are of one step from rest, contacts may have "

@@ -1,5 +1,4 @@
 from .continuation import (
-    PROGRAMS as PROGRAMS,
     LargestFactor as LargestFactor,
     least_use as least_use,
     most_load as most_load,
@@ -9,5 +8,5 @@ from .effort import (
     best_within as best_within,
     with_room as with_room,
 )
-from .goals import Goal as Goal
+from .goals import SETTINGS as SETTINGS, Goal as Goal
 from .wrist_iteration import WristSolution as WristSolution, disagreements as disagreements

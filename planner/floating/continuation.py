@@ -11,52 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner import deadline
 from planner.deadline import Budget
-from planner.floating.palm_modes import NEARBY, exchanged, first_plan, starts
+from planner.floating.goals import SETTINGS
+from planner.floating.palm_modes import exchanged, first_plan, starts
 from planner.floating.wrist_iteration import WristSolution, solve_wrists
-from planner.prepare import NO_WRENCH, HandSets
-from planner.programs import SLACK
+from planner.prepare import TOLERANCES, HandSets
+from planner.programs import CAP_SLACK
 
-__all__ = ["PROGRAMS", "LargestFactor", "least_use", "most_load"]
-
-PROGRAMS: Final = 320
-"""Most programs for a question, so that four floating hands take some ten seconds at most. Then the
-best found so far is the answer."""
-
-FIRST: Final = 70
-"""Most programs for a search for a first plan."""
-
-ALONG: Final = 190
-"""Most programs for searches along the factor."""
-
-LAST: Final = 50
-"""Most programs for trying the palms of a plan the other way."""
-
-FACTORS: Final = 10
-"""Most factors of the body wrench that are tried on one way."""
-
-HALVINGS: Final = 8
-"""Most steps from a part of the body wrench to the whole."""
-
-FRACTIONS: Final = (0.5, 0.1)
-"""Factors from which the largest is sought where the whole body wrench has no plan."""
-
-BRACKET: Final = 2e-3
-"""Relative width to which the largest factor is bracketed where Newton's method does not end."""
-
-ALIKE: Final = 1e-3
-"""Largest relative difference of the utilisations of two plans that count as the same."""
-
-LEAST: Final = 0.02
-"""Least factor that is tried."""
-
-SLOPE: Final = 1e-3
-"""Utilisation per factor below which a plan does not get harder with the load."""
+__all__ = ["LargestFactor", "least_use", "most_load"]
 
 
 class LargestFactor(NamedTuple):
@@ -106,14 +73,15 @@ def least_use(
         Of the body wrench, as far as it has been sought: None for a plan within its limits.
     """
     choices = starts(hands, 1.0, budget)
-    plan = None if near is None else solve_wrists(hands, near.point, budget.part(FIRST))
+    first = SETTINGS.first_programs
+    plan = None if near is None else solve_wrists(hands, near.point, budget.part(first))
     if plan is None or not plan.exact:
-        near, plan = None, first_plan(hands, 1.0, choices, budget.part(FIRST))
+        near, plan = None, first_plan(hands, 1.0, choices, budget.part(first))
     if deadline.expired():
         return plan, None
     most: LargestFactor | None = None
-    if not _held(plan) and np.abs(hands.wrench[:6]).max() > NO_WRENCH:
-        along = budget.part(ALONG)
+    if not _held(plan) and np.abs(hands.wrench[:6]).max() > TOLERANCES.body_wrench:
+        along = budget.part(190)  # programs
         for way in _ways(hands, plan, along, up=near is None):
             if most is None or way.most.factor > most.factor:
                 most = way.most
@@ -123,9 +91,9 @@ def least_use(
             if same or _held(plan):
                 break
     if not plan.exact and not budget.ended:
-        plan = _better(plan, first_plan(hands, 1.0, choices, budget.part(FIRST)))
+        plan = _better(plan, first_plan(hands, 1.0, choices, budget.part(first)))
     if plan.exact:
-        plan = exchanged(hands, plan, budget.part(LAST))
+        plan = exchanged(hands, plan, budget.part(50))  # for trying its palms the other way
     if _held(plan) and most is not None and most.factor < 1.0:
         most = None
     return plan, most
@@ -156,7 +124,7 @@ def most_load(
 
 def _held(found: WristSolution) -> bool:
     """Return whether a solution is a plan within its limits."""
-    return found.exact and found.measure.utilisation <= 1.0 + SLACK
+    return found.exact and found.measure.utilisation <= 1.0 + CAP_SLACK
 
 
 def _better(plan: WristSolution, other: WristSolution | None) -> WristSolution:
@@ -170,17 +138,17 @@ def _better(plan: WristSolution, other: WristSolution | None) -> WristSolution:
 
 def _as_good(found: WristSolution, plan: WristSolution) -> bool:
     """Return whether a plan uses no more than another, to the accuracy of such searches."""
-    return not plan.exact or found.measure.utilisation <= plan.measure.utilisation * (1.0 + ALIKE)
+    return not plan.exact or found.measure.utilisation <= plan.measure.utilisation * (1.0 + 1e-3)
 
 
 def _ways(
     hands: HandSets, plan: WristSolution, budget: Budget, *, up: bool = True
 ) -> Iterator[_Way]:
     """Yield searches along the factor: up from a small one, if so, and down from a plan."""
-    for fraction in FRACTIONS if up else ():
+    for fraction in SETTINGS.small_factors if up else ():
         if deadline.expired():
             return
-        part = budget.part(FIRST)
+        part = budget.part(SETTINGS.first_programs)
         start = first_plan(hands, fraction, starts(hands, fraction, part), part)
         if start.exact:
             way = _way(hands, start, budget)
@@ -202,33 +170,35 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
     """
     now, best, whole = start, None, None
     high, sure, overloaded = math.inf, False, False
-    for _ in range(FACTORS):
+    least = 0.02  # of the factors that are tried
+    for _ in range(10):  # factors of the body wrench
         used, factor = now.measure.utilisation, now.point.factor
         whole = now if factor == 1.0 else whole
         low = 0.0 if best is None else best.point.factor
-        if used <= 1.0 + SLACK:
+        if used <= 1.0 + CAP_SLACK:
             if factor >= low:
                 best, low = now, factor
         elif factor < high:
             high, overloaded = factor, True
         if budget.ended:
             break
-        if abs(used - 1.0) <= SLACK:
+        if abs(used - 1.0) <= CAP_SLACK:
             better = exchanged(hands, now, budget)
             if better is now:
                 sure = True
                 break
             now = better
             continue
-        if high < math.inf and high - low <= BRACKET * high:
+        # bracketed to 0.2 %, where Newton's method does not end
+        if high < math.inf and high - low <= 2e-3 * high:
             sure = overloaded
             break
         assert now.outcome.balance_dual is not None
         slope = -float(now.outcome.balance_dual[:6] @ hands.wrench[:6])
         aim = math.inf if used < 1.0 else 0.0
-        if slope > SLOPE:
+        if slope > 1e-3:  # it gets harder with the load
             aim = factor + (1.0 - used) / slope
-        if aim < LEAST and factor <= FRACTIONS[0]:
+        if aim < least and factor <= SETTINGS.small_factors[0]:
             # what overloads the hands is not the body wrench
             break
         aim = min(max(aim, 0.3 * factor), 2.0 * factor)
@@ -236,9 +206,9 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
             aim = 0.5 * (low + high) if high < math.inf else 2.0 * low
         if low < 1.0 < min(aim, high):
             aim = 1.0
-        if aim < LEAST:
+        if aim < least:
             break
-        there = solve_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        there = solve_wrists(hands, replace(now.point, factor=aim), budget, SETTINGS.rounds_nearby)
         if there.exact:
             now = there
         elif aim > factor or best is not None:
@@ -253,10 +223,10 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
 def _carried_on(hands: HandSets, at: WristSolution, budget: Budget) -> WristSolution | None:
     """Return a plan for the whole body wrench that follows from one for a part of it."""
     now, aim = at, 1.0
-    for _ in range(HALVINGS):
+    for _ in range(8):  # halvings of what is left
         if budget.ended:
             break
-        there = solve_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        there = solve_wrists(hands, replace(now.point, factor=aim), budget, SETTINGS.rounds_nearby)
         if there.exact and aim == 1.0:
             return there
         now, aim = (there, 1.0) if there.exact else (now, 0.5 * (now.point.factor + aim))

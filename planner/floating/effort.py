@@ -8,7 +8,7 @@ Lagrangian,
     Σ 2 (E z + e₀) ∂²E/∂z² + λ ∂²L/∂z² + μ ∂²H/∂z² + ν ∂²G/∂z²,
 
 as further rows of E (Gauss–Newton is the rest). It starts from a plan within the cap and ends at
-one with no more effort: exact, and by no more than `planner.floating.CLOSE` above the least effort
+one with no more effort: exact, and by no more than 4e-6 above the least effort
 of the sets about it, or else unproven.
 """
 
@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 import scipy
@@ -24,27 +23,13 @@ import scipy
 from hand_models.base import Array
 from planner import programs
 from planner.deadline import Budget
-from planner.floating.goals import BINDING, Goal, bent_root
+from planner.floating.goals import SETTINGS, Goal, bent_root
 from planner.floating.palm_modes import exchanged
 from planner.floating.wrist_iteration import WristSolution, solve_wrists
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
-from planner.programs import SLACK, TWIST_UNIT, Outcome, StanceData
+from planner.programs import CAP_SLACK, TWIST_UNIT, Outcome, StanceData
 
 __all__ = ["LeastEffort", "best_within", "with_room"]
-
-NEAR: Final = 2e-4
-"""Weight with which rounds stay near the point, for one unit of z: what an effort may be below
-which is not worth a way of several units."""
-
-PROGRAMS: Final = 110
-"""Most programs for the search."""
-
-FARTHEST: Final = 4.0
-"""Largest distance from rest at which effort is sought, in `TWIST_UNIT`: farther, where loads of
-one step from rest are no longer sure, less of it would be no gain."""
-
-OVER: Final = 0.25 * SLACK
-"""Largest excess of the utilisation of a plan over the cap."""
 
 
 class LeastEffort(Goal):
@@ -64,7 +49,7 @@ class LeastEffort(Goal):
         return max(measure.utilisation - self.cap, 0.0)
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
-        return measure.exact(hands) and self.excess(measure) <= OVER
+        return measure.exact(hands) and self.excess(measure) <= SETTINGS.cap_excess
 
     def constraints(self, data: StanceData) -> StanceData:
         return data.capped(self.cap)
@@ -79,7 +64,7 @@ class LeastEffort(Goal):
         return max(rows, float(np.abs(outcome.balance_dual).max()))
 
     def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
-        root = NEAR * np.eye(sum(len(y) for y in near))
+        root = SETTINGS.effort_nearness * np.eye(sum(len(y) for y in near))
         return self.later_step(data, root, near)
 
     def root(
@@ -100,8 +85,9 @@ class LeastEffort(Goal):
             sets.data.hands, bent, weights.limit_duals, weights.hard_duals, strict=True
         ):
             # each binds a hand by itself: the balance alone couples hands
-            rows = np.vstack([hand.L[limit > BINDING], hand.H[hard > BINDING]])
-            roots.append(bent_root(0.5 * part, rows, NEAR))
+            least = SETTINGS.binding_multiplier
+            rows = np.vstack([hand.L[limit > least], hand.H[hard > least]])
+            roots.append(bent_root(0.5 * part, rows, SETTINGS.effort_nearness))
         return scipy.linalg.block_diag(*roots)
 
     def later_step(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
@@ -124,7 +110,7 @@ class LeastEffort(Goal):
 
 def with_room(cap: float, used: float) -> float:
     """Return a cap at which a plan that uses just as much leaves room for rounding."""
-    return max(cap, min(used + 0.5 * SLACK, cap + SLACK - OVER))
+    return max(cap, min(used + 0.5 * CAP_SLACK, cap + CAP_SLACK - SETTINGS.cap_excess))
 
 
 def best_within(
@@ -136,7 +122,7 @@ def best_within(
 ) -> WristSolution:
     """Return the best plan for a goal that is found down from a plan within a cap.
 
-    Wrists stay within `FARTHEST` of rest, or where the plan has them. If nothing is better, the
+    Wrists stay within 4 `TWIST_UNIT` of rest, or where the plan has them. If nothing is better, the
     plan itself is returned, without proof.
 
     Parameters
@@ -150,12 +136,14 @@ def best_within(
         Returns the goal at a cap, with how far from rest each wrist may be.
     budget : Budget
     """
+    # in `TWIST_UNIT`: farther, where loads of one step from rest are no longer sure, less
+    # would be no gain
     away = [
-        np.maximum(FARTHEST * TWIST_UNIT, np.abs(y)) if wrist is not None else y
+        np.maximum(4.0 * TWIST_UNIT, np.abs(y)) if wrist is not None else y
         for wrist, y in zip(hands.wrists, plan.point.loads, strict=True)
     ]
     least = goal(cap, away)
-    budget = budget.part(PROGRAMS)
+    budget = budget.part(SETTINGS.effort_programs)
     found = solve_wrists(hands, plan.point, budget, goal=least)
     if not found.exact or least.value(found.measure) > least.value(plan.measure):
         sets = hands.sets(plan.point, 1.0, least.farthest)

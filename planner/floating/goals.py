@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -17,18 +18,34 @@ import scipy
 from hand_models.base import Array
 from planner import programs
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
-from planner.programs import SLACK, Outcome, StanceData
+from planner.programs import CAP_SLACK, Outcome, StanceData
 
-__all__ = ["BINDING", "LEAST_USE", "RANK", "Goal", "LeastUse", "bent_root"]
+__all__ = ["LEAST_USE", "SETTINGS", "FloatingSettings", "Goal", "LeastUse", "bent_root"]
 
-NEAR: Final = 0.002
-"""Weight with which later rounds of `LeastUse` stay near the point, for one unit of z."""
 
-BINDING: Final = 1e-6
-"""Multipliers above this bind."""
+@dataclass(frozen=True, slots=True)
+class FloatingSettings:
+    """How far searches for the wrists of floating hands go."""
 
-RANK: Final = 1e-8
-"""Relative size below which binding rows count as dependent."""
+    programs: int = 320
+    """For a question, at most, so that four floating hands take some ten seconds. Then the best
+    found so far is the answer."""
+    first_programs: int = 70  # for a search for a first plan, at most
+    effort_programs: int = 110  # for the search for least effort, at most
+    rounds: int = 40  # for one choice of palm modes, at most
+    rounds_nearby: int = 16  # from a plan, or where another search has failed, at most
+    first_range: float = 4.0  # about a point, in `TWIST_UNIT`
+    small_factors: tuple[float, ...] = (0.5, 0.1)
+    """Of the body wrench, from which the largest is sought where the whole has no plan."""
+    binding_multiplier: float = 1e-6  # above this it binds
+    dependent_rows: float = 1e-8  # relative size of binding rows that count as dependent
+    effort_nearness: float = 2e-4
+    """Weight with which rounds stay near the point, for one unit of z: what an effort may be below
+    which is not worth a way of several units."""
+    cap_excess: float = 0.25 * CAP_SLACK  # of a plan's utilisation over the cap, at most
+
+
+SETTINGS: Final = FloatingSettings()
 
 
 class Goal(ABC):
@@ -123,7 +140,7 @@ class LeastUse(Goal):
         return float(np.abs(outcome.balance_dual).max())
 
     def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
-        cap = outcome.value + SLACK * max(1.0, abs(outcome.value))
+        cap = outcome.value + CAP_SLACK * max(1.0, abs(outcome.value))
         return programs.tie_break(data, cap)
 
     def root(
@@ -138,16 +155,18 @@ class LeastUse(Goal):
         limits = scipy.linalg.block_diag(*(hand.L for hand in parts))
         shares = np.concatenate(weights.limit_duals)
         hard = scipy.linalg.block_diag(*(hand.H for hand in parts))
-        binding = np.concatenate(weights.hard_duals) > BINDING
+        least = SETTINGS.binding_multiplier
+        binding = np.concatenate(weights.hard_duals) > least
         rows = np.vstack(
             [
                 np.hstack([hand.G for hand in parts]),
-                limits[shares > BINDING] - shares @ limits / max(float(shares.sum()), BINDING),
+                limits[shares > least] - shares @ limits / max(float(shares.sum()), least),
                 hard[binding],
             ]
         )
+        # the last is the weight of staying near the point, for one unit of z
         return bent_root(
-            scipy.linalg.block_diag(*hands.curvature(point, within, weights)), rows, NEAR
+            scipy.linalg.block_diag(*hands.curvature(point, within, weights)), rows, 0.002
         )
 
     def later_step(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
@@ -167,7 +186,7 @@ def bent_root(curvature: Array, rows: Array, near: float) -> Array:
     solution, and need not be convex), and ``near``² everywhere.
     """
     _, sizes, axes = np.linalg.svd(rows)
-    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+    rank = int((sizes > SETTINGS.dependent_rows * sizes.max(initial=0.0)).sum())
     across, along = axes[:rank], axes[rank:]
     values, turns = np.linalg.eigh(along @ curvature @ along.T)
     roots = np.sqrt(np.maximum(values, 0.0) + near**2)

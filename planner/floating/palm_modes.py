@@ -11,33 +11,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
-from typing import Final
 
 from hand_models.compliance import PALM_MODES, PalmMode
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from planner import deadline, programs
 from planner.deadline import Budget
-from planner.floating.goals import LEAST_USE, Goal
-from planner.floating.wrist_iteration import ROUNDS, WristSolution, solve_wrists
+from planner.floating.goals import LEAST_USE, SETTINGS, Goal
+from planner.floating.wrist_iteration import WristSolution, solve_wrists
 from planner.prepare import HandSets
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 
-__all__ = ["NEARBY", "exchanged", "first_plan", "starts"]
-
-STARTS: Final = 5
-"""Choices of modes from which a point is sought, if the first ones give none."""
-
-NEARBY: Final = 16
-"""Most rounds of a search that starts from a plan, or where another search has failed."""
-
-EXCHANGES: Final = 6
-"""Most trials of a palm the other way."""
-
-HELD_BACK: Final = 1e-6
-"""Multiplier above which a palm's mode holds it back, of the goal per `stance_data.LOAD_UNIT`."""
-
-UNBALANCED: Final = 1e6
-"""Rank of a choice without balance at rest, beside what is missing."""
+__all__ = ["exchanged", "first_plan", "starts"]
 
 Palms = tuple[PalmMode | None, ...]
 
@@ -48,7 +32,7 @@ def first_plan(
     """Return the first plan that a choice of modes gives, or what comes nearest to one."""
     failed: list[WristSolution] = []
     for palms in choices:
-        most = NEARBY if failed else ROUNDS
+        most = SETTINGS.rounds_nearby if failed else SETTINGS.rounds
         start = replace(hands.at_rest(palms), factor=factor)
         found = solve_wrists(hands, start, budget, most)
         if found.exact:
@@ -74,7 +58,8 @@ def starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Palms]:
     best = min(common, key=rank)
     for i in engaged:
         best = min([best, *(_with(best, i, mode) for mode in PALM_MODES.values())], key=rank)
-    yield from sorted(dict.fromkeys([best, *common]), key=rank)[:STARTS]
+    # more choices than these are not tried
+    yield from sorted(dict.fromkeys([best, *common]), key=rank)[:5]
 
 
 def _rank(hands: HandSets, factor: float, budget: Budget, palms: Palms) -> float:
@@ -88,7 +73,7 @@ def _rank(hands: HandSets, factor: float, budget: Budget, palms: Palms) -> float
         return outcome.value
     budget.spend()
     nearest = programs.nearest(data)
-    return UNBALANCED * (1.0 + nearest.value) if nearest.solved else float("inf")
+    return 1e6 * (1.0 + nearest.value) if nearest.solved else float("inf")  # beside what is missing
 
 
 def _with(palms: Palms, i: int, mode: PalmMode) -> Palms:
@@ -100,14 +85,15 @@ def exchanged(
 ) -> WristSolution:
     """Return a better point that is had by turning palms that their mode holds back."""
     tried: set[Palms] = {found.point.palms}
-    for _ in range(EXCHANGES):
+    for _ in range(6):
         new = next((p for p in _turned(found) if p not in tried), None)
         if new is None or budget.ended:
             break
         tried.add(new)
-        there = solve_wrists(hands, replace(found.point, palms=new), budget, NEARBY, goal)
+        turned = replace(found.point, palms=new)
+        there = solve_wrists(hands, turned, budget, SETTINGS.rounds_nearby, goal)
         value = goal.value(found.measure)
-        lower = value - SLACK * max(1.0, value)
+        lower = value - CAP_SLACK * max(1.0, value)
         if there.exact and goal.value(there.measure) < lower:
             found = there
     return found
@@ -116,13 +102,14 @@ def exchanged(
 def _turned(found: WristSolution) -> Iterator[Palms]:
     """Yield choices in which one palm that its mode holds back goes the other way."""
     palms = found.point.palms
+    holding = 1e-6  # multiplier of the goal, per `LOAD_UNIT`
     for i, (space, mode) in enumerate(zip(found.sets.spaces, palms, strict=True)):
         if mode is None:
             continue
         drags, presses = next(key for key, value in PALM_MODES.items() if value == mode)
         rows = space.rows[len(space.s) :]
         for row, multiplier in zip(rows, found.outcome.hard_duals[i], strict=True):
-            if multiplier > HELD_BACK and row.limit == f"{PALM_SHEAR}_reversed":
+            if multiplier > holding and row.limit == f"{PALM_SHEAR}_reversed":
                 yield _with(palms, i, PALM_MODES[not drags, presses])
-            elif multiplier > HELD_BACK and row.limit == f"{PALM_PRESSING}_reversed":
+            elif multiplier > holding and row.limit == f"{PALM_PRESSING}_reversed":
                 yield _with(palms, i, PALM_MODES[drags, not presses])

@@ -31,63 +31,14 @@ from hand_models.base import Array
 from hand_models.wrench_spaces import WRENCH_SCALE, WrenchSpace
 from planner import deadline, programs
 from planner.deadline import Budget
-from planner.floating.goals import LEAST_USE, RANK, Goal
+from planner.floating.goals import LEAST_USE, SETTINGS, Goal
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import Outcome
 
 __all__ = ["WristSolution", "disagreements", "solve_wrists"]
 
-ROUNDS: Final = 40
-"""Most rounds for one choice of palm modes."""
-
-
-EARLY: Final = 5
-"""Rounds that go where the sets are best; later ones stay near the point and mind their curvature.
-"""
-
-
-START: Final = 4.0
-"""First range about a point, in `TWIST_UNIT`."""
-
-
-WIDEST: Final = 30.0
-"""Widest range, in `TWIST_UNIT`."""
-
-
-WIDEN: Final = 2.5
-"""Factor by which a range widens where a step reaches its end."""
-
-
-SHRINK: Final = 0.3
-"""Factor by which a range narrows where steps do not lower the merit."""
-
-
-KINK: Final = 1e-3
-"""Range in which only a kink spoils steps, in `TWIST_UNIT`."""
-
-
-REPAIRS: Final = 12
-"""Most steps to make a point exact."""
-
-
-BESIDE: Final = 1e-5
-"""Room of hard rows that just hold, in `stance_data.LOAD_UNIT`."""
-
-
-GIVEN: Final = 1e-3
-"""Largest increase of the goal's value that repairs may cost, relative."""
-
-
-CLOSE: Final = 4e-6
-"""Largest relative gap of a point to the best of the sets about it."""
-
-
-UNSOLVED: Final = Outcome(False, "none", 0, math.nan)
+NOT_SOLVED: Final = Outcome(False, "none", 0, math.nan)
 """Before anything is solved."""
-
-
-STALLED: Final = 4
-"""Rounds that hardly lower what is missing, after which none of the sets has a balance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,14 +94,14 @@ def _searching(
     sets = hands.sets(point, within, goal.farthest)
     if before is not None:
         error = max(disagreements(hands, before.spaces, sets.spaces, point.loads))
-    return WristSolution("nothing", point, sets, UNSOLVED, 0, error)
+    return WristSolution("nothing", point, sets, NOT_SOLVED, 0, error)
 
 
 def solve_wrists(
     hands: HandSets,
     start: LinearisationPoint,
     budget: Budget,
-    most: int = ROUNDS,
+    most: int = SETTINGS.rounds,
     goal: Goal = LEAST_USE,
 ) -> WristSolution:
     """Find the best point for a goal, from a start and with the start's palm modes.
@@ -158,10 +109,10 @@ def solve_wrists(
     Where the search ends without proof, or its budget does, the point is made exact there. At a
     deadline the best exact point on the way is what was found.
     """
-    now = _searching(hands, goal, start, START)
+    now = _searching(hands, goal, start, SETTINGS.first_range)
     passed: WristSolution | None = None
-    within, penalty, stalled = START, goal.least_penalty, 0
-    weights, root, rounds = UNSOLVED, None, 0
+    within, penalty, stalled = SETTINGS.first_range, goal.least_penalty, 0
+    weights, root, rounds = NOT_SOLVED, None, 0
     for rounds in range(1, most + 1):
         if budget.ended:
             break
@@ -170,12 +121,12 @@ def solve_wrists(
         if outcome.solved:
             if goal.exact(now.measure, hands):
                 here = replace(now, found="least", outcome=outcome, rounds=rounds)
-                if _gap(goal, now, outcome) <= CLOSE:
+                if _gap(goal, now, outcome) <= 4e-6:  # nothing in the sets is better
                     return here
                 passed = replace(here, found="unproven")
             penalty = max(penalty, 2.0 * goal.dearest(outcome))
             step, stalled = outcome, 0
-            if rounds <= EARLY:
+            if rounds <= 5:  # later ones stay near the point and mind their curvature
                 chosen = goal.first_step(now.sets.data, outcome, now.point.loads)
             else:
                 if root is None:
@@ -187,7 +138,8 @@ def solve_wrists(
         else:
             # no balance in this range: come as near as it lets
             step = goal.restore(now.sets.data)
-            if not step.solved or stalled > STALLED:
+            # rounds that hardly lower what is missing: none of the sets has a balance
+            if not step.solved or stalled > 4:
                 break
         size = hands.step(now.point, step.loads)
         there = _searching(hands, goal, replace(now.point, loads=step.loads), within, now.sets)
@@ -202,12 +154,12 @@ def solve_wrists(
             if not direct and outcome.solved and goal.promised is not None:
                 direct = before - after >= goal.promised * (before - outcome.value)
             if direct and size > 0.8 * within:
-                within = min(WIDEN * within, WIDEST)
+                within = min(2.5 * within, 30.0)  # in `TWIST_UNIT`, where a step reaches its end
                 there = _searching(hands, goal, there.point, within, error=there.error)
             now, root = there, None
         else:
-            within = SHRINK * min(within, size)
-            if within < KINK:
+            within = 0.3 * min(within, size)  # where steps do not lower the merit
+            if within < 1e-3:  # in `TWIST_UNIT`: only a kink spoils such steps
                 break
             now = _searching(hands, goal, now.point, within, error=now.error)
     if passed is not None and deadline.expired():
@@ -227,7 +179,7 @@ def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) 
         return state
     z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
     room = np.concatenate([hand.h - hand.H @ x for hand, x in zip(data.hands, z, strict=True)])
-    those = room < BESIDE
+    those = room < 1e-5  # in `LOAD_UNIT`: they just hold
     rows = np.vstack(
         [
             np.hstack([hand.G for hand in data.hands]),
@@ -236,7 +188,7 @@ def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) 
     )
     missing = data.wrench - programs.body_wrench(data, loads)
     aims = np.concatenate([missing, np.minimum(room[those], 0.0)])
-    step = np.linalg.lstsq(rows, aims, rcond=RANK)[0]
+    step = np.linalg.lstsq(rows, aims, rcond=SETTINGS.dependent_rows)[0]
     parts = np.split(step, np.cumsum([len(x) for x in z])[:-1])
     moved = tuple(
         y + hand.unit * part for hand, y, part in zip(data.hands, loads, parts, strict=True)
@@ -251,18 +203,19 @@ def _made_exact(
     hands: HandSets, goal: Goal, start: WristSolution, rounds: int, budget: Budget
 ) -> WristSolution:
     """Make the point exact at which a search ended without proof."""
-    now = start = _searching(hands, goal, start.point, START, error=start.error)
-    for _ in range(REPAIRS):
+    now = start = _searching(hands, goal, start.point, SETTINGS.first_range, error=start.error)
+    for _ in range(12):
         if deadline.expired():
             break
         outcome = goal.solve(now.sets.data)
         budget.spend()
         if goal.exact(now.measure, hands) and outcome.solved:
             value = goal.value(start.measure)
-            if goal.value(now.measure) - value <= GIVEN * max(1.0, value):
+            # repairs may cost a thousandth
+            if goal.value(now.measure) - value <= 1e-3 * max(1.0, value):
                 return replace(now, found="unproven", outcome=outcome, rounds=rounds)
             break
-        before, now, rounds = now, _repaired(hands, goal, now, START), rounds + 1
+        before, now, rounds = now, _repaired(hands, goal, now, SETTINGS.first_range), rounds + 1
         lost, left = (goal.wrong(state.measure) for state in (before, now))
         if not now.sets.finite or not left < 0.5 * lost:
             break

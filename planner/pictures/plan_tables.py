@@ -14,7 +14,7 @@ from hand_models.hand import NAIL
 from planner.explanation import constraint_words
 from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM
 from planner.question import Question
-from planner.result import MANY, Certificate, LimitName, Plan, Spread
+from planner.result import SPREAD_SETTINGS, Certificate, LimitName, Plan, Spread
 
 __all__ = ["draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
 
@@ -191,7 +191,8 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
         return
     low, high = spread.load_factor.low, spread.load_factor.high
     ends = np.array([*factors, 1.0, *([] if nominal is None else [nominal])])
-    axes.axvspan(low, high, color="0.88", label="5 to 95 %" if len(factors) >= MANY else "all")
+    many = len(factors) >= SPREAD_SETTINGS.many_draws
+    axes.axvspan(low, high, color="0.88", label="5 to 95 %" if many else "all")
     axes.hist(factors, np.linspace(ends.min(), ends.max(), 15 + 1), color="tab:blue")
     axes.axvline(1.0, color="tab:red", linestyle="--", label="needed")
     if nominal is not None:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from msgspec.structs import asdict
 
 from hand_models.base import Array, whole_file
-from planner.result import MANY, LimitName, Plan
+from planner.result import SPREAD_SETTINGS, LimitName, Plan
 from planner.route import OutOfReach, RouteResult, RouteStage
 
 __all__ = ["draw_route", "summary", "write_report"]
@@ -247,7 +247,8 @@ def _band(plans: Sequence[Plan | OutOfReach], name: str) -> Array:
 def _of_draws(plans: Sequence[Plan | OutOfReach]) -> str:
     """Return in words what the bands of the spread contain."""
     draws = max((plan.spread.draws for plan in plans if plan.spread is not None), default=0)
-    return f"5 to 95 % of {draws} draws" if draws >= MANY else f"all of {draws} draws"
+    part = "5 to 95 %" if draws >= SPREAD_SETTINGS.many_draws else "all"
+    return f"{part} of {draws} draws"
 
 
 def _draw_band(axes: Any, band: Array, label: str) -> None:

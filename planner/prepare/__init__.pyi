@@ -1,9 +1,6 @@
 from .hand_batch import (
-    CONTACTS as CONTACTS,
+    CONTACT_CODES as CONTACT_CODES,
     KEPT_NAMES as KEPT_NAMES,
-    NONE as NONE,
-    NOTHING as NOTHING,
-    TOUCHING as TOUCHING,
     HandBatch as HandBatch,
     TileIndex as TileIndex,
     concatenated as concatenated,
@@ -24,7 +21,6 @@ from .joint_posture import (
     torque_limits as torque_limits,
 )
 from .prepared_stance import (
-    NO_WRENCH as NO_WRENCH,
     PreparedStance as PreparedStance,
     assemble as assemble,
     checked_question as checked_question,
@@ -38,8 +34,9 @@ from .settled_stance import (
     settle_hand as settle_hand,
 )
 from .stance_constraints import (
-    BALL as BALL,
     FORCE_CAP as FORCE_CAP,
+    FORCE_DIRECTIONS as FORCE_DIRECTIONS,
     PASSIVE_JOINT as PASSIVE_JOINT,
     TENSION_CHANGE as TENSION_CHANGE,
+    TOLERANCES as TOLERANCES,
 )

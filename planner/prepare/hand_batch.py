@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -18,11 +19,8 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
 
 __all__ = [
-    "CONTACTS",
+    "CONTACT_CODES",
     "KEPT_NAMES",
-    "NONE",
-    "NOTHING",
-    "TOUCHING",
     "ContactPattern",
     "HandBatch",
     "TileIndex",
@@ -34,21 +32,17 @@ __all__ = [
 KEPT_NAMES: Final = 256
 """Lists of names (of tiles, columns, rows) of which something is kept: some 5 kB each."""
 
-BASE, NAIL_PART = 0, len(PHALANGES) + 1
-"""Parts of a finger with tiles: its rotating base, phalanges outward, and its nail."""
-
 Number = TypeVar("Number", bound=np.generic)
 
-NOTHING, TOUCHING = 0, 1
-
-CONTACTS: Final = {"none": NOTHING, "face": TOUCHING, "edge": TOUCHING, "frame": 2, NAIL: 3}
+CONTACT_CODES: Final = {"none": 0, "face": 1, "edge": 1, "frame": 2, NAIL: 3}
 """Codes of the contact states of a tile: its face and its edge hold alike."""
 
-NONE: Final = np.zeros(0, dtype=np.intp)
-"""No rows."""
 
-UNLIMITED: Final = (math.inf, math.inf)
-"""Limits of a palm that touches nothing: no part of them is used."""
+class _Part(IntEnum):
+    """Parts of a finger with tiles, but for its phalanges, which come between."""
+
+    BASE = 0
+    NAIL = len(PHALANGES) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,29 +79,31 @@ class TileIndex:
 
 
 def _parts_of_hand(*, nails: bool) -> Indices:
-    """Return finger and part of each tile of a hand, shape (n, 2); parts by `BASE` and beyond."""
-    last = NAIL_PART if nails else NAIL_PART - 1
+    """Return finger and part of each tile of a hand, shape (n, 2); parts by `_Part`."""
+    last = _Part.NAIL if nails else _Part.NAIL - 1
     return np.array(
         [
             (i, part)
             for i, name in enumerate(FINGERS)
-            for part in range(BASE if name.startswith("outer") else BASE + 1, last + 1)
+            for part in range(_Part.BASE if name.startswith("outer") else _Part.BASE + 1, last + 1)
         ],
         dtype=np.intp,
     )
 
 
-PARTS: Final = {nails: _parts_of_hand(nails=nails) for nails in (False, True)}
+TILE_PARTS: Final = {nails: _parts_of_hand(nails=nails) for nails in (False, True)}
 """Fingers and parts of the tiles of a hand, by whether it clings with its nails."""
 
 
 def tile_index_of(counts: Sequence[int]) -> TileIndex:
     """Return the places of hands that have so many tiles each."""
     hand = np.arange(len(counts)).repeat(counts)
-    of_each = np.concatenate([PARTS[count > len(PARTS[False])] for count in counts])
+    of_each = np.concatenate([TILE_PARTS[count > len(TILE_PARTS[False])] for count in counts])
     finger, part = len(FINGERS) * hand + of_each[:, 0], of_each[:, 1]
-    phalanges = np.flatnonzero((part != BASE) & (part != NAIL_PART)).reshape(-1, len(PHALANGES))
-    bases = np.flatnonzero(part == BASE)
+    phalanges = np.flatnonzero((part != _Part.BASE) & (part != _Part.NAIL)).reshape(
+        -1, len(PHALANGES)
+    )
+    bases = np.flatnonzero(part == _Part.BASE)
     return TileIndex(
         hand=hand,
         finger=finger,
@@ -117,7 +113,7 @@ def tile_index_of(counts: Sequence[int]) -> TileIndex:
         tips=phalanges[:, -1].copy(),
         bases=bases,
         base_fingers=finger[bases],
-        nails=np.flatnonzero(part == NAIL_PART),
+        nails=np.flatnonzero(part == _Part.NAIL),
     )
 
 
@@ -127,7 +123,7 @@ class ContactPattern(NamedTuple):
     Attributes
     ----------
     contacts : ndarray of int, shape (T,)
-        Codes of `CONTACTS`.
+        Codes of `CONTACT_CODES`.
     touches, framed : ndarray, shape (T,)
         One for tiles on rock, zero for others; the same of those whose frame rests beside them.
     away : ndarray of bool, shape (T,)
@@ -150,17 +146,17 @@ class ContactPattern(NamedTuple):
 def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
     """Return the contact states of hands with these tiles."""
     places = tile_index_of(tuple(map(len, hands)))
-    contacts = np.array([CONTACTS[tile.contact] for hand in hands for tile in hand])
-    away = contacts != TOUCHING
+    contacts = np.array([CONTACT_CODES[tile.contact] for hand in hands for tile in hand])
+    away = contacts != CONTACT_CODES["face"]
     touches = 1.0 - away
-    holds = touches + (contacts == CONTACTS[NAIL])
+    holds = touches + (contacts == CONTACT_CODES[NAIL])
     return ContactPattern(
         contacts=contacts,
         touches=touches,
-        framed=1.0 * (contacts == CONTACTS["frame"]),
+        framed=1.0 * (contacts == CONTACT_CODES["frame"]),
         away=away,
         touching=np.flatnonzero(touches),
-        idle=np.flatnonzero(contacts == NOTHING),
+        idle=np.flatnonzero(contacts == CONTACT_CODES["none"]),
         holding=tuple(np.add.reduceat(holds, places.first_of_finger).astype(int).tolist()),
     )
 
@@ -204,8 +200,11 @@ class HandBatch:
         tiles = tuple([hand.tiles for hand in hands])
         positions = [hand.positions for hand in hands]
         angles = concatenated([hand.postures.angles for hand in hands])
+        # what touches nothing uses nothing
         limits = [
-            (hand.palm.shear_limit, hand.palm.pressing_limit) if hand.palm.engaged else UNLIMITED
+            (hand.palm.shear_limit, hand.palm.pressing_limit)
+            if hand.palm.engaged
+            else (math.inf, math.inf)
             for hand in hands
         ]
         points = np.concatenate([*positions, [hand.palm.centre for hand in hands]])

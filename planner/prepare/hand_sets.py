@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -40,18 +40,6 @@ __all__ = [
     "wrist_at",
     "wrists_at",
 ]
-
-DIFFERENCE: Final = 1e-3
-"""Step of the differences of slopes, in `TWIST_UNIT`."""
-
-FARTHEST: Final = 50.0
-"""Farthest that a wrist may go from rest, in `TWIST_UNIT`: beyond, no twist is small."""
-
-BALANCED: Final = 2e-8
-"""Largest missing body wrench of a point that is exact, relative, per `WRENCH_UNIT`."""
-
-UNBROKEN: Final = 1e-8
-"""Tolerance of the hard rows of an exact point, in `stance_data.LOAD_UNIT`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +85,8 @@ class ExactMeasure(NamedTuple):
     def exact(self, hands: HandSets) -> bool:
         """Return whether the body wrench is balanced and no hard row is broken."""
         size = max(1.0, float(np.linalg.norm(hands.wrench)))
-        return self.missing <= BALANCED * size and self.broken <= UNBROKEN
+        # what is missing is relative, in `WRENCH_UNIT`; hard rows are in `LOAD_UNIT`
+        return self.missing <= 2e-8 * size and self.broken <= 1e-8
 
 
 class Sets(NamedTuple):
@@ -263,7 +252,8 @@ class HandSets:
         ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by differences of slopes; zero for fixed wrists. Weights ε
         of the rows of effort are none by default.
         """
-        balance, aside = duals.balance_dual, DIFFERENCE * np.diag(TWIST_UNIT)
+        difference = 1e-3  # of slopes, in `TWIST_UNIT`
+        balance, aside = duals.balance_dual, difference * np.diag(TWIST_UNIT)
         assert balance is not None
         bent = []
         for i, (wrist, y) in enumerate(zip(self.wrists, point.loads, strict=True)):
@@ -277,12 +267,13 @@ class HandSets:
                     slopes[j] = hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance
                     if efforts is not None:
                         slopes[j] += hand.E.T @ efforts[i]
-            bent.append((slopes[1:] - slopes[0]) / DIFFERENCE)
+            bent.append((slopes[1:] - slopes[0]) / difference)
         return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
 
     def near_rest(self, point: LinearisationPoint) -> bool:
         """Return whether no wrist is farther from rest than a small twist."""
-        return self.step(self.at_rest(point.palms), point.loads) <= FARTHEST
+        # in `TWIST_UNIT`: beyond, no twist is small
+        return self.step(self.at_rest(point.palms), point.loads) <= 50.0
 
     def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:
         """Return how far the wrists move from a point to loads, in `TWIST_UNIT`."""

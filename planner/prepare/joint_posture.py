@@ -10,26 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 import numpy as np
 import scipy
 
 from hand_models.base import Array, InvalidInputError, Pose, within, wrench_transport
-from planner.prepare.stance_constraints import JointLoads
+from planner.prepare.stance_constraints import TOLERANCES, JointLoads
 from planner.question import Question, Stance, Weights
 from planner.robots import UnreachableError, carriers, held_up, solve_limbs
 
 __all__ = ["Posture", "posture"]
-
-OFF: Final = 0.01
-"""Largest distance of a hand's pose from where its joints put it [m]."""
-
-TURNED: Final = 0.05
-"""Largest angle of a hand's axes from those that its joints give [rad]."""
-
-EXACT: Final = 5e-6
-"""Up to so far [m], and so much turned [rad], joints that were found put a hand at its pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +73,8 @@ def posture(question: Question) -> Posture | None:
         return posture_at(question, given)
     angles = _solved(question, asked)
     off = _off(stance, angles, asked)
-    far = {limb: each for limb, each in off.items() if max(each) > EXACT}
+    # [m, rad] joints that were found put a hand at its pose up to here
+    far = {limb: each for limb, each in off.items() if max(each) > 5e-6}
     return replace(posture_at(question, given | angles), off=far)
 
 
@@ -166,10 +157,10 @@ def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     index = {hand.limb: i for i, hand in enumerate(stance.hands)}
     known = {limb: pose for limb, pose in poses.items() if limb not in solved}
     for limb, (off, turned) in _off(stance, joints, known).items():
-        if off > OFF or turned > TURNED:
+        if off > TOLERANCES.hand_offset or turned > TOLERANCES.hand_turn:
             raise InvalidInputError(
                 f"{limb} is {off:.3g} m and {turned:.3g} rad from where its joints put it; "
-                f"up to {OFF:g} m and {TURNED:g} rad are valid",
+                f"up to {TOLERANCES.hand_offset:g} m and {TOLERANCES.hand_turn:g} rad are valid",
                 field=f"stance.hands[{index[limb]}].pose",
             )
     return joints
@@ -202,7 +193,9 @@ def _solved(question: Question, poses: Mapping[str, Pose]) -> dict[str, Array]:
         limb: np.concatenate([pose.rotation.T @ force, np.zeros(3)]) for limb, pose in poses.items()
     }
     try:
-        return solve_limbs(robot, poses, shares, gravity, (OFF, TURNED))
+        return solve_limbs(
+            robot, poses, shares, gravity, (TOLERANCES.hand_offset, TOLERANCES.hand_turn)
+        )
     except UnreachableError as error:
         index = [hand.limb for hand in hands].index(next(iter(error.missing)))
         error.field = f"stance.hands[{index}].pose"

@@ -18,23 +18,13 @@ from planner.prepare.hand_batch import HandBatch
 from planner.prepare.hand_sets import HandSets, Sets, wrists_at
 from planner.prepare.joint_posture import Posture, posture
 from planner.prepare.settled_stance import settle_stance
-from planner.prepare.stance_constraints import NOTHING, StanceConstraints
+from planner.prepare.stance_constraints import NO_CONSTRAINTS, TOLERANCES, StanceConstraints
 from planner.programs import WRENCH_UNIT, ScaledRows
 from planner.question import Question
 
-__all__ = ["NO_WRENCH", "PreparedStance", "assemble", "checked_question", "prepare_stance"]
+__all__ = ["PreparedStance", "assemble", "checked_question", "prepare_stance"]
 
-FREE: Final = np.zeros((0, 6))
-"""Given components of a hand's wrench where none are given."""
-
-NO_WRENCH: Final = 1e-9
-"""Body wrench that is none, in `WRENCH_UNIT`: every multiple of it is the same."""
-
-NO_AIMS: Final = np.zeros(0)
-"""The values of that."""
-
-
-KNOWN: Final[
+KNOWN_HANDS: Final[
     BoundedStore[Hashable, tuple[HandBatch, list[WrenchSpace], tuple[ScaledRows, ...]]]
 ] = BoundedStore("hands in arrays", 64)
 """Hands of stances in arrays, their sets, and these as programs need them, by the hands and the cap
@@ -80,7 +70,7 @@ class PreparedStance:
     @property
     def needs_hands(self) -> bool:
         """True if the hands have a body wrench to give."""
-        return bool(np.abs(self.hands.wrench[:6]).max() > NO_WRENCH)
+        return bool(np.abs(self.hands.wrench[:6]).max() > TOLERANCES.body_wrench)
 
     @property
     def at_rest(self) -> Sets:
@@ -161,8 +151,10 @@ def assemble(
         return HandBatch.of(settled), spaces, tuple(map(ScaledRows.of, spaces))
 
     # sets are of this stance alone where a wrist floats, or the stance adds rows
-    own = any(each is not None for each in wrists) or any(each is not NOTHING for each in added)
-    batch, spaces, scaled = made() if own else KNOWN.get((settled, cap), made)
+    own = any(each is not None for each in wrists) or any(
+        each is not NO_CONSTRAINTS for each in added
+    )
+    batch, spaces, scaled = made() if own else KNOWN_HANDS.get((settled, cap), made)
     held, aims = _held(question)
     transports = wrench_transports(stance.body, [hand.pose for hand in stance.hands])
     needed = np.concatenate([wrench / WRENCH_UNIT, aims]) if len(aims) else wrench / WRENCH_UNIT
@@ -180,7 +172,7 @@ def _spaces_of(
     of_fixed = iter(wrench_spaces(fixed, cap))
     plain = [next(of_fixed) if wrist is None else wrist.linearised() for wrist in wrists]
     pairs = zip(plain, added, strict=True)
-    return [each if rows is NOTHING else rows.on(each) for each, rows in pairs]
+    return [each if rows is NO_CONSTRAINTS else rows.on(each) for each, rows in pairs]
 
 
 def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstraints, ...]:
@@ -191,7 +183,7 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
     for hand in stance.hands:
         cap, frame = limits.per_hand.get(hand.limb), None
         if where is None and cap is None and change is None:
-            found.append(NOTHING)
+            found.append(NO_CONSTRAINTS)
             continue
         if cap is not None:
             axes = {
@@ -214,9 +206,9 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
 
 def _held(question: Question) -> tuple[tuple[Array, ...], Array]:
     """Return what of each hand's wrench is given, (k, 6) each, and its scaled values (k,)."""
-    hands = question.stance.hands
+    hands, free = question.stance.hands, np.zeros((0, 6))
     if not any(hand.wrench for hand in hands):
-        return (FREE,) * len(hands), NO_AIMS
+        return (free,) * len(hands), np.zeros(0)
     given = [
         (i, j, value)
         for i, hand in enumerate(hands)
@@ -224,7 +216,7 @@ def _held(question: Question) -> tuple[tuple[Array, ...], Array]:
         if value is not None
     ]
     if not given:
-        return (FREE,) * len(hands), NO_AIMS
+        return (free,) * len(hands), np.zeros(0)
     held = [np.zeros((len(given), 6)) for _ in hands]
     for row, (i, j, _) in enumerate(given):
         held[i][row, j] = 1.0

@@ -27,10 +27,12 @@ from planner.programs import JOINT_FORCE, JOINT_TORQUE
 
 __all__ = [
     "FORCE_CAP",
-    "NOTHING",
+    "NO_CONSTRAINTS",
     "PASSIVE_JOINT",
     "TENSION_CHANGE",
+    "TOLERANCES",
     "JointLoads",
+    "PrepareTolerances",
     "StanceConstraints",
 ]
 
@@ -43,14 +45,10 @@ TENSION_CHANGE: Final = "tension_change"
 PASSIVE_JOINT: Final = "passive_joint"
 """Name of the hard rows of a joint without a motor."""
 
-AXES: Final = ("fx+", "fx-", "fy+", "fy-", "fz+", "fz-")
-"""Both ways along the axes of a cap's frame."""
-
-BALL: Final = np.vstack([HELD_DIRECTIONS, HELD_DIRECTIONS[8:] * [1.0, 1.0, -1.0]])
+FORCE_DIRECTIONS: Final = np.vstack([HELD_DIRECTIONS, HELD_DIRECTIONS[8:] * [1.0, 1.0, -1.0]])
 """Directions (26, 3) whose largest product with a force is at least its size: `HELD_DIRECTIONS`
-and, toward the rock, its mirror image."""
-
-BALL_NAMES: Final = tuple(str(k + 1) for k in range(len(BALL)))
+and, toward the rock, its mirror image: that of those after the first eight, which lie in the palm's
+plane."""
 
 CHANGE_ROWS: Final = tuple(
     Row(finger, None, TENSION_CHANGE, "hard", f"{finger}/{TENSION_CHANGE}/{way}")
@@ -58,6 +56,19 @@ CHANGE_ROWS: Final = tuple(
     for way in ("up", "down")
 )
 """Names of the hard rows of a change of tensions."""
+
+
+@dataclass(frozen=True, slots=True)
+class PrepareTolerances:
+    """From where on a number of a stance means something."""
+
+    hand_offset: float = 0.01  # [m] of a hand's pose from where its joints put it
+    hand_turn: float = 0.05  # [rad] of its axes from those that its joints give
+    body_wrench: float = 1e-9
+    """In `WRENCH_UNIT`; a smaller one is none, every multiple of it is the same."""
+
+
+TOLERANCES: Final = PrepareTolerances()
 
 
 class JointLoads(NamedTuple):
@@ -193,10 +204,13 @@ class StanceConstraints:
     def _cap(self) -> tuple[tuple[str, ...], Array, Array]:
         """Return names, directions (n, 3) and sizes (n,) of what caps the hand's force."""
         if not isinstance(self.cap, tuple):
-            return BALL_NAMES, BALL, np.full(len(BALL), self.cap)
+            count = len(FORCE_DIRECTIONS)
+            ways = tuple(map(str, range(1, count + 1)))
+            return ways, FORCE_DIRECTIONS, np.full(count, self.cap)
         assert self.frame is not None
         axes = np.stack([self.frame.T, -self.frame.T], axis=1).reshape(-1, 3)
-        return AXES, axes, np.array([most for low, high in self.cap for most in (high, -low)])
+        ways = ("fx+", "fx-", "fy+", "fy-", "fz+", "fz-")
+        return ways, axes, np.array([most for low, high in self.cap for most in (high, -low)])
 
 
 def _joint_rows(kind: Literal["limit", "hard"], names: Sequence[tuple[str, str]]) -> list[Row]:
@@ -213,5 +227,5 @@ def _force_rows(kind: Literal["limit", "hard"], ways: Iterable[str]) -> list[Row
     return [Row(None, None, FORCE_CAP, kind, f"{FORCE_CAP}/{way}") for way in ways]
 
 
-NOTHING: Final = StanceConstraints()
+NO_CONSTRAINTS: Final = StanceConstraints()
 """No rows."""

@@ -16,48 +16,49 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from types import FrameType
 from typing import Any, Final, Generic, TypeVar
 
-__all__ = ["Make", "PriorityLane", "WorkerHandle", "resident", "starting_children"]
+__all__ = [
+    "SETTINGS",
+    "Make",
+    "PriorityLane",
+    "ProcessSettings",
+    "WorkerHandle",
+    "resident",
+    "starting_children",
+]
 
-T = TypeVar("T")
-R = TypeVar("R")
+Input = TypeVar("Input")
+Output = TypeVar("Output")
 
-SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
-
-ORPHANED: Final = 1.0
-"""Longest time that a process may go on without the one that started it [s]."""
-
-THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Variables that keep a library of linear algebra to one thread, set before it is loaded."""
-
-SWITCH: Final = 5e-4
-"""Time for which a lane keeps the interpreter from the others of its process [s]. Python's own is
-ten times as long: a short question would wait that long for a long one at each of its steps."""
-
-ROOM: Final = 2**14
-"""Bytes that a pipe has room for, wherever."""
-
-PART: Final = 2**13
-"""Bytes of an answer that are sent at once: so few that no process can be stopped within them."""
-
-PATIENCE: Final = 1.0
-"""Longest time between the end of a process's pipes and its own [s]."""
-
-UNREADY: Final = 70
-"""Exit status of a process that cannot be made ready to answer."""
-
-OUT_OF_MEMORY: Final = 77
-"""Exit status of a process that may not have the memory that a question needs."""
-
-Make = Callable[[], Callable[[T], R]]
+Make = Callable[[], Callable[[Input], Output]]
 """Called once in a process: returns what answers there."""
 
 
-class PriorityLane(Generic[T, R]):
+@dataclass(frozen=True, slots=True)
+class ProcessSettings:
+    """What processes and those that start them agree on."""
+
+    signals: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM)
+    thread_variables: tuple[str, ...] = (
+        "OPENBLAS_NUM_THREADS",
+        "OMP_NUM_THREADS",
+        "MKL_NUM_THREADS",
+    )
+    """Which keep a library of linear algebra to one thread, set before it is loaded."""
+    part_bytes: int = 2**13  # of an answer, sent at once: no process can be stopped within them
+    out_of_memory: int = 77  # exit status of one that may not have the memory it needs
+    starts: int = 2  # in a row that may fail, or die before they are ready; then no more are tried
+
+
+SETTINGS: Final = ProcessSettings()
+
+
+class PriorityLane(Generic[Input, Output]):
     """One of a process's lanes, which answers one question after another.
 
     Attributes
@@ -71,7 +72,7 @@ class PriorityLane(Generic[T, R]):
         Whether it has said that it can work.
     """
 
-    def __init__(self, handle: WorkerHandle[T, R], number: int, pipe: Connection) -> None:
+    def __init__(self, handle: WorkerHandle[Input, Output], number: int, pipe: Connection) -> None:
         self.handle = handle
         self.number = number
         self.pipe = pipe
@@ -79,14 +80,15 @@ class PriorityLane(Generic[T, R]):
         self._parts: list[bytes] = []
         self._sender: threading.Thread | None = None
 
-    def give(self, question: T) -> None:
+    def give(self, question: Input) -> None:
         """Send a question; if the process has died, `take` raises.
 
         One that the pipe may have no room for is sent in the background: its process may be at work
         on another, or stand still, and take nothing.
         """
         data, before = pickle.dumps(question, protocol=pickle.HIGHEST_PROTOCOL), self._sender
-        if len(data) < ROOM and (before is None or not before.is_alive()):
+        # [bytes]: every pipe has room for them
+        if len(data) < 2**14 and (before is None or not before.is_alive()):
             self._send(data)
             return
         self._sender = threading.Thread(target=self._send, args=(data, before), daemon=True)
@@ -105,7 +107,7 @@ class PriorityLane(Generic[T, R]):
             self._sender.join()
         self.pipe.close()
 
-    def take(self) -> R | None:
+    def take(self) -> Output | None:
         """Return what has come; None for the word that the lane is ready, or a part of an answer.
 
         To be called where something has come; it waits for nothing more, though a process may
@@ -118,19 +120,19 @@ class PriorityLane(Generic[T, R]):
         """
         try:
             self._parts.append(self.pipe.recv_bytes())
-            while len(self._parts[-1]) == PART:
+            while len(self._parts[-1]) == SETTINGS.part_bytes:
                 if not self.pipe.poll():
                     return None
                 self._parts.append(self.pipe.recv_bytes())
         except OSError:
             raise EOFError from None
         whole, self._parts = b"".join(self._parts), []
-        found: R | None = pickle.loads(whole)
+        found: Output | None = pickle.loads(whole)
         self.ready = True
         return found
 
 
-class WorkerHandle(Generic[T, R]):
+class WorkerHandle(Generic[Input, Output]):
     """A process that answers.
 
     Parameters
@@ -153,7 +155,7 @@ class WorkerHandle(Generic[T, R]):
 
     def __init__(
         self,
-        make: Make[T, R],
+        make: Make[Input, Output],
         lanes: int = 1,
         memory: int | None = None,
         *,
@@ -188,7 +190,7 @@ class WorkerHandle(Generic[T, R]):
         dead : bool, optional
             Whether it has ended by itself, as its pipes show a moment earlier than the system.
         """
-        self.process.join(PATIENCE if dead else 0.0)
+        self.process.join(1.0 if dead else 0.0)  # [s] its pipes end a moment earlier
         status = self.process.exitcode
         self.process.kill()
         self.process.join()
@@ -196,7 +198,7 @@ class WorkerHandle(Generic[T, R]):
             lane.close()
         if status is None:
             return "was stopped"
-        if status == OUT_OF_MEMORY:
+        if status == SETTINGS.out_of_memory:
             return "had not enough memory"
         return f"was killed by signal {-status}" if status < 0 else f"ended with status {status}"
 
@@ -213,7 +215,9 @@ def resident(pid: int | None) -> int | None:
 def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> None:
     """Answer what comes through pipes until their other ends are gone: a process's whole run."""
     _begin_child(stays=stays)
-    sys.setswitchinterval(SWITCH)
+    # [s], a tenth of Python's own: a short question would wait that long for a long one at
+    # each of its steps
+    sys.setswitchinterval(5e-4)
     try:
         make = pipes[0].recv()
     except (EOFError, OSError):
@@ -222,7 +226,7 @@ def _answer_each(pipes: list[Connection], memory: int | None, stays: bool) -> No
         answer = make()
     except BaseException:
         traceback.print_exc()
-        sys.exit(UNREADY)
+        sys.exit(70)  # exit status of what cannot be made ready
     _keep_to(memory)
     for pipe in pipes[1:]:
         threading.Thread(target=_lane, args=(answer, pipe), daemon=True).start()
@@ -241,15 +245,15 @@ def _lane(answer: Callable[[Any], Any], pipe: Connection) -> None:
                 _send_parts(pipe, result)
             except MemoryError:
                 # nothing here can be trusted to go on
-                os._exit(OUT_OF_MEMORY)
+                os._exit(SETTINGS.out_of_memory)
             del question, result
 
 
 def _send_parts(pipe: Connection, result: object) -> None:
     """Send a result in parts that are there whole or not at all; the last is a shorter one."""
     whole = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
-    for at in range(0, len(whole) + 1, PART):
-        pipe.send_bytes(whole[at : at + PART])
+    for at in range(0, len(whole) + 1, SETTINGS.part_bytes):
+        pipe.send_bytes(whole[at : at + SETTINGS.part_bytes])
 
 
 def _keep_to(memory: int | None) -> None:
@@ -272,7 +276,7 @@ def _begin_child(*, stays: bool = False) -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN if stays else signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SETTINGS.signals)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -280,7 +284,7 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])
-        time.sleep(ORPHANED)
+        time.sleep(1.0)  # [s] for what it is about to end by itself
         os._exit(1)
 
 
@@ -296,7 +300,7 @@ def starting_children(*signals: signal.Signals) -> Iterator[None]:
     *signals : Signals
         By default SIGINT and SIGTERM.
     """
-    signals = signals or SIGNALS
+    signals = signals or SETTINGS.signals
     # or else it is started with the first process, and lets signals in again
     resource_tracker.ensure_running()
     arrived: list[int] = []
@@ -325,8 +329,8 @@ def starting_children(*signals: signal.Signals) -> Iterator[None]:
 @contextmanager
 def _one_thread() -> Iterator[None]:
     """Let processes that are started here do their linear algebra on one thread."""
-    before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    before = {name: os.environ.get(name) for name in SETTINGS.thread_variables}
+    os.environ.update(dict.fromkeys(SETTINGS.thread_variables, "1"))
     try:
         yield
     finally:

@@ -12,35 +12,19 @@ import os
 from collections import deque
 from collections.abc import Hashable
 from multiprocessing.connection import Connection, wait
-from typing import Final, Generic, NamedTuple, Self, TypeVar, cast
+from typing import Generic, NamedTuple, Self, TypeVar, cast
 
 from cachetools import LRUCache
 
 from hand_models.base import CruxError
-from planner.processes.worker_handles import Make, PriorityLane, WorkerHandle
+from planner.processes.worker_handles import SETTINGS, Make, PriorityLane, WorkerHandle
 
 __all__ = ["Lost", "Workers", "cores"]
 
 log = logging.getLogger(__name__)
 
-T = TypeVar("T")
-R = TypeVar("R")
-
-AHEAD: Final = 1
-"""Items that a process has beside the one in work: they are there before it is done."""
-
-KNOWN: Final = 256
-"""Things that items are about of which it is kept which process had them last."""
-
-STARTS: Final = 2
-"""Processes in a row that may not start, or die before they are ready; then no more are started."""
-
-NO_GUARD: Final = (
-    " while it started; a program that starts processes needs its 'if __name__ == \"__main__\":'"
-)
-
-UNCAUGHT: Final = 1
-"""Status of a process whose program ends with an error."""
+Input = TypeVar("Input")
+Output = TypeVar("Output")
 
 
 class Lost:
@@ -55,11 +39,11 @@ class Lost:
         self.reason = reason
 
 
-class _Task(NamedTuple, Generic[T]):
+class _Task(NamedTuple, Generic[Input]):
     """An item with its number, what it is about, and whether a process has died of it."""
 
     number: int
-    item: T
+    item: Input
     about: Hashable = None
     tried: bool = False
 
@@ -71,7 +55,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class Workers(Generic[T, R]):
+class Workers(Generic[Input, Output]):
     """Processes that turn items into results, while it is entered. For one caller at a time.
 
     Parameters
@@ -93,12 +77,12 @@ class Workers(Generic[T, R]):
         Processes in a row that could not be started, or have died before they were ready.
     """
 
-    def __init__(self, make: Make[T, R], count: int) -> None:
+    def __init__(self, make: Make[Input, Output], count: int) -> None:
         self._make, self.width = make, count
-        self.hands: dict[PriorityLane[T, R], dict[int, _Task[T]]] = {}
+        self.hands: dict[PriorityLane[Input, Output], dict[int, _Task[Input]]] = {}
         self.failed_starts = 0
-        self._queue: deque[_Task[T]] = deque()
-        self._knows: LRUCache[Hashable, PriorityLane[T, R]] = LRUCache(KNOWN)
+        self._queue: deque[_Task[Input]] = deque()
+        self._knows: LRUCache[Hashable, PriorityLane[Input, Output]] = LRUCache(256)
         self._unborn = ""
         """Reason of the last failed start."""
 
@@ -116,7 +100,7 @@ class Workers(Generic[T, R]):
         for lane in [lane for lane in self.hands if not lane.ready]:
             self._take(lane)
 
-    def put(self, number: int, item: T, about: Hashable = None) -> None:
+    def put(self, number: int, item: Input, about: Hashable = None) -> None:
         """Let an item be worked on; `collect` returns its result.
 
         Parameters
@@ -130,7 +114,7 @@ class Workers(Generic[T, R]):
         """
         self._queue.append(_Task(number, item, about))
 
-    def collect(self) -> list[tuple[int, R | Lost]]:
+    def collect(self) -> list[tuple[int, Output | Lost]]:
         """Wait until something that was put has its result, and return all that have.
 
         Raises
@@ -138,7 +122,7 @@ class Workers(Generic[T, R]):
         CruxError
             If processes do not start.
         """
-        found: list[tuple[int, R | Lost]] = []
+        found: list[tuple[int, Output | Lost]] = []
         while not found and (self._queue or any(self.hands.values())):
             self._start()
             if not self.hands:
@@ -146,10 +130,11 @@ class Workers(Generic[T, R]):
             found = self._exchange()
         return found
 
-    def _exchange(self) -> list[tuple[int, R | Lost]]:
+    def _exchange(self) -> list[tuple[int, Output | Lost]]:
         """Give processes what they have room for, and return what comes next."""
         for lane in sorted(self.hands, key=lambda lane: len(self.hands[lane])):
-            while self._queue and lane.ready and len(self.hands[lane]) <= AHEAD:
+            # one item beside that in work is there before that is done
+            while self._queue and lane.ready and len(self.hands[lane]) <= 1:
                 task = self._chosen(lane)
                 self.hands[lane][task.number] = task
                 lane.give(task.item)
@@ -157,7 +142,7 @@ class Workers(Generic[T, R]):
         ready = wait(list(lanes))
         return [each for pipe in ready for each in self._take(lanes[cast(Connection, pipe)])]
 
-    def _take(self, lane: PriorityLane[T, R]) -> list[tuple[int, R | Lost]]:
+    def _take(self, lane: PriorityLane[Input, Output]) -> list[tuple[int, Output | Lost]]:
         """Return what a process has done, if anything; of one that has died, what is lost.
 
         What it had in work goes first in the queue again, once, and all else that it had.
@@ -179,7 +164,7 @@ class Workers(Generic[T, R]):
         del self.hands[lane][number]
         return [(number, done)]
 
-    def _chosen(self, lane: PriorityLane[T, R]) -> _Task[T]:
+    def _chosen(self, lane: PriorityLane[Input, Output]) -> _Task[Input]:
         """Take what a process gets next: what it knows, or else nobody, or else what is first."""
         knows = [self._knows.get(task.about) for task in self._queue] if self._knows else []
         i = next((knows.index(one) for one in (lane, None) if one in knows), 0)
@@ -191,7 +176,7 @@ class Workers(Generic[T, R]):
 
     def _start(self) -> None:
         """Start processes in place of those that have died."""
-        while len(self.hands) < self.width and self.failed_starts < STARTS:
+        while len(self.hands) < self.width and self.failed_starts < SETTINGS.starts:
             try:
                 handle = WorkerHandle(self._make)
             except OSError as error:
@@ -203,19 +188,24 @@ class Workers(Generic[T, R]):
         """Count a process that could not be started, or died before it was ready."""
         self.failed_starts += 1
         self._unborn = why
-        if self.failed_starts == STARTS:
+        if self.failed_starts == SETTINGS.starts:
             log.warning(why)
 
-    def _remove_dead(self, lane: PriorityLane[T, R]) -> str:
+    def _remove_dead(self, lane: PriorityLane[Input, Output]) -> str:
         """Remove a process that has died, and return how it died."""
         how = f"a worker {self._remove(lane, dead=True)}"
         if not lane.ready:
             # before a process is ready, only the program's own start-up runs in it
-            hint = NO_GUARD if lane.handle.process.exitcode == UNCAUGHT else ""
+            hint = ""
+            if lane.handle.process.exitcode == 1:  # the program has ended with an error
+                hint = (
+                    " while it started; a program that starts processes needs its "
+                    "'if __name__ == \"__main__\":'"
+                )
             self._miss(f"processes do not start: {how}{hint}")
         return how
 
-    def _remove(self, lane: PriorityLane[T, R], *, dead: bool = False) -> str:
+    def _remove(self, lane: PriorityLane[Input, Output], *, dead: bool = False) -> str:
         del self.hands[lane]
         for about in [about for about, one in self._knows.items() if one is lane]:
             del self._knows[about]

@@ -1,7 +1,11 @@
-from .conic import PROVEN as PROVEN, UNBOUNDED as UNBOUNDED, Outcome as Outcome, Reached as Reached
-from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
+from .conic import (
+    INFEASIBLE_STATUSES as INFEASIBLE_STATUSES,
+    Outcome as Outcome,
+    Reached as Reached,
+)
+from .program import LOAD_BOX as LOAD_BOX, TIE_WEIGHT as TIE_WEIGHT, tie_weight as tie_weight
 from .solvers import (
-    SLACK as SLACK,
+    CAP_SLACK as CAP_SLACK,
     TensionTrade as TensionTrade,
     beyond as beyond,
     body_wrench as body_wrench,
@@ -36,5 +40,4 @@ from .stance_data import (
     is_effort as is_effort,
     parted as parted,
 )
-from .stance_program import SOLVER as SOLVER
 from .supports import SilentHighs as SilentHighs, Support as Support

@@ -11,7 +11,6 @@ before.
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,14 +23,11 @@ from hand_models.base import Array, Indices, StoreInfo, enlist
 from planner import deadline
 
 __all__ = [
-    "ENDS",
-    "FAILED",
-    "LATE",
+    "INFEASIBLE_STATUSES",
     "OUT_OF_TIME",
-    "PRESENT",
-    "PROVEN",
-    "SOLVERS",
-    "UNBOUNDED",
+    "SOLVED_STATUSES",
+    "SOLVER_ERROR",
+    "WAITING_SOLVERS",
     "Columns",
     "ConicProgram",
     "Outcome",
@@ -41,13 +37,10 @@ __all__ = [
     "Solvers",
 ]
 
-KEPT: Final = 64
-"""Solvers that wait for programs."""
-
 OUT_OF_TIME: Final = "out of time"
 """Status of a solver that the deadline has ended."""
 
-STATUS: Final = {
+CLARABEL_STATUSES: Final = {
     "Solved": "optimal",
     "AlmostSolved": "optimal_inaccurate",
     "PrimalInfeasible": "infeasible",
@@ -58,20 +51,15 @@ STATUS: Final = {
     "MaxTime": "user_limit",
     "CallbackTerminated": OUT_OF_TIME,
 }
-"""CVXPY's word for each of Clarabel's; for all others it is `FAILED`."""
+"""CVXPY's word for each of Clarabel's; for all others it is `SOLVER_ERROR`."""
 
-FAILED: Final = "solver_error"
+SOLVER_ERROR: Final = "solver_error"
 
-PRESENT: Final = ("optimal", "optimal_inaccurate")
+SOLVED_STATUSES: Final = ("optimal", "optimal_inaccurate")
 """Statuses with a solution."""
 
-PROVEN: Final = ("infeasible", "infeasible_inaccurate")
+INFEASIBLE_STATUSES: Final = ("infeasible", "infeasible_inaccurate")
 """Statuses with multipliers that prove that there is no solution."""
-
-UNBOUNDED: Final = ("unbounded", "unbounded_inaccurate")
-
-ENDS: Final = ("optimal", "infeasible", "unbounded", OUT_OF_TIME)
-"""After which nothing else is tried."""
 
 
 class Columns(NamedTuple):
@@ -290,7 +278,7 @@ class Solvers:
             solver.update(program)
         solution = solver.solve()
         # one that has met what is no number, or was interrupted, may not forget it
-        if solution.status != FAILED:
+        if solution.status != SOLVER_ERROR:
             with self._lock:
                 self._idle.append(solver)
                 del self._idle[: -self._most]
@@ -307,7 +295,7 @@ class Solvers:
         return None
 
 
-SOLVERS: Final = Solvers(KEPT)
+WAITING_SOLVERS: Final = Solvers(64)
 """Those of this process."""
 
 
@@ -349,10 +337,10 @@ def _numbers(program: ConicProgram) -> dict[str, Array]:
 
 
 def _read(raw: Any) -> Solution:
-    status = STATUS.get(str(raw.status), FAILED)
-    if status in PRESENT:
+    status = CLARABEL_STATUSES.get(str(raw.status), SOLVER_ERROR)
+    if status in SOLVED_STATUSES:
         return Solution(status, raw.iterations, raw.obj_val, np.array(raw.x), np.array(raw.z))
-    proof = np.array(raw.z) if status in PROVEN else None
+    proof = np.array(raw.z) if status in INFEASIBLE_STATUSES else None
     return Solution(status, raw.iterations, multipliers=proof)
 
 
@@ -386,10 +374,6 @@ class Outcome:
     limit_duals: tuple[Array, ...] = ()
     hard_duals: tuple[Array, ...] = ()
     balance_dual: Array | None = None
-
-
-LATE: Final = Outcome(False, OUT_OF_TIME, 0, math.nan)
-"""Outcome of a program that there was no time for."""
 
 
 class Reached(NamedTuple):

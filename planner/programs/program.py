@@ -13,14 +13,14 @@ body wrenches go; and `Nearest`, of how near. With what is least they have names
 
 ==============  =============================================================================
 `margin`        min u                              least utilisation; its duals are the prices
-`unique`        min u + `TIE` · mean (tension / maximum)²       least utilisation, made unique
+`unique`        min u + `TIE_WEIGHT` · mean (tension / maximum)²   least use, made unique
 `less_tension`  min u + w Σ (tension / maximum)²  the plan that is meant: see `tension_trade`
 `curved`        min u + ½ ‖R (z − z₀)‖²            with the curvature of floating hands
 `tie_break`     min Σ (tension / maximum)²         among plans of least utilisation
 `effort`        min Σ ‖E z + e₀‖²                  relative tensions and torques, under a cap
 `reach`         max c·t with W + B t for W         how far body wrenches go, under a cap
 `load_factor`   max s with s W in place of W       at utilisation 1
-`nearest`       min ‖S (W − Σ …)‖                  hard rows alone, loads up to `UNLIMITED`
+`nearest`       min ‖S (W − Σ …)‖                  hard rows alone, loads up to `LOAD_BOX`
 ==============  =============================================================================
 
 Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
@@ -39,14 +39,19 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner.programs.conic import Columns, ConicProgram, Outcome, Reached
 from planner.programs.stance_data import StanceData
-from planner.programs.stance_program import REFINED, SHARP, VERTEX, Definition, StanceProgram
+from planner.programs.stance_program import (
+    REFINED_SETTINGS,
+    SHARP_SETTINGS,
+    Definition,
+    StanceProgram,
+)
 
-__all__ = ["TIE", "UNLIMITED", "Best", "Nearest", "Reach", "tie_weight"]
+__all__ = ["LOAD_BOX", "TIE_WEIGHT", "Best", "Nearest", "Reach", "tie_weight"]
 
-UNLIMITED: Final = 1e4
+LOAD_BOX: Final = 1e4
 """Box, in `LOAD_UNIT`, on loads at no matter what utilisation: far beyond any strength."""
 
-TIE: Final = 8e-6
+TIE_WEIGHT: Final = 8e-6
 """Weight of the mean square of relative tensions beside the utilisation."""
 
 
@@ -87,7 +92,7 @@ class Best(StanceProgram):
         self.cap, self.weights, self.residuals, self.most = cap, weights, residuals, most
         if cap is None and weights is not None:
             # beside u the second term is small
-            self.settings, self.wanted = (SHARP, REFINED), 1
+            self.settings, self.wanted = (SHARP_SETTINGS, REFINED_SETTINGS), 1
 
     def define(self) -> Definition:
         import cvxpy as cp
@@ -135,12 +140,17 @@ class Best(StanceProgram):
         Of linear programs alone. An interior point has as many digits of all loads as of the
         largest; here each row has its own.
         """
-        return self.by_definition(VERTEX)[0]
+        options = {
+            "method": "highs-ds",
+            "primal_feasibility_tolerance": 1e-10,
+            "dual_feasibility_tolerance": 1e-10,
+        }
+        return self.by_definition({"solver": "SCIPY", "scipy_options": options})[0]
 
 
 def tie_weight(hands: int) -> float:
-    """Return what `unique` weighs the sum of squares with: `TIE` over the number of tendons."""
-    return TIE / (len(FINGERS) * hands)
+    """Return what `unique` weighs the sum of squares with: `TIE_WEIGHT` over all tendons."""
+    return TIE_WEIGHT / (len(FINGERS) * hands)
 
 
 class Reach(StanceProgram):
@@ -224,7 +234,7 @@ class Reach(StanceProgram):
 
 
 class Nearest(StanceProgram):
-    """min ‖W − w‖ over all body wrenches w that loads up to `UNLIMITED` can give.
+    """min ‖W − w‖ over all body wrenches w that loads up to `LOAD_BOX` can give.
 
     ``value`` is the distance, in `WRENCH_UNIT`.
 
@@ -247,7 +257,7 @@ class Nearest(StanceProgram):
         missing, z = cp.Variable(len(self.G)), self.loads()
         balance = self.G @ z + missing == self.data.offset
         _, limits, hard = self.rows(z, 0.0)
-        box = [z <= UNLIMITED, -z <= UNLIMITED]
+        box = [z <= LOAD_BOX, -z <= LOAD_BOX]
         kept = [missing[len(self.G) - self.kept :] == 0.0] if self.kept else []
         problem = cp.Problem(cp.Minimize(cp.norm(missing)), [balance, *kept, hard, *box])
         return Definition(problem, (z,), (balance, limits, hard))
@@ -264,7 +274,7 @@ class Nearest(StanceProgram):
         A[box:cone, 1 + count :] = np.vstack([np.eye(size), -np.eye(size)])
         A[cone:, : 1 + count] = -np.eye(1 + count)
         b = np.zeros(len(A))
-        b[:count], b[zero:box], b[box:cone] = self.data.offset, self.h, UNLIMITED
+        b[:count], b[zero:box], b[box:cone] = self.data.offset, self.h, LOAD_BOX
         P, q = np.zeros((2, A.shape[1]))
         q[0] = 1.0
         return ConicProgram(P, q, (Columns.of(A),), b, zero, second_order=1 + count)

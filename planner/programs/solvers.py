@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import cache
 from importlib import resources
 from typing import Final, NamedTuple
 
@@ -12,12 +14,12 @@ import scipy
 from hand_models.base import Array
 from hand_models.parameters import ParameterTable
 from planner import deadline
-from planner.programs.conic import LATE, Outcome, Reached
+from planner.programs.conic import OUT_OF_TIME, Outcome, Reached
 from planner.programs.program import Best, Nearest, Reach, Residuals, tie_weight
 from planner.programs.stance_data import StanceData
 
 __all__ = [
-    "SLACK",
+    "CAP_SLACK",
     "TensionTrade",
     "beyond",
     "body_wrench",
@@ -39,21 +41,8 @@ __all__ = [
     "vertex",
 ]
 
-SLACK: Final = 1e-6
+CAP_SLACK: Final = 1e-6
 """Utilisation that the tie-break may give away above the least; also its tolerance at a cap."""
-
-SHARP_SLACK: Final = 1e-9
-"""Utilisation that it may give away where the least one has all its digits."""
-
-
-_PLANS = resources.files("planner.parameters").joinpath("plans.toml")
-_TABLE = ParameterTable.read(_PLANS.read_text("utf-8"), _PLANS.name)
-
-GIVEN_AWAY: Final = _TABLE.positive("tension", "given_away")
-"""Part of the least utilisation that a plan gives away at most."""
-
-WEIGHT: Final = _TABLE.positive("tension", "weight")
-"""w"""
 
 
 class TensionTrade(NamedTuple):
@@ -94,8 +83,17 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
     cap : float
         On the utilisation, that the question asks for.
     """
-    whole = GIVEN_AWAY * abs(least)
-    return TensionTrade(WEIGHT, least + max(min(whole, cap - least), 0.0), whole)
+    given_away, weight = _tension_numbers()
+    whole = given_away * abs(least)
+    return TensionTrade(weight, least + max(min(whole, cap - least), 0.0), whole)
+
+
+@cache
+def _tension_numbers() -> tuple[float, float]:
+    """Return the part of the least utilisation that is given away at most, and w."""
+    path = resources.files("planner.parameters").joinpath("plans.toml")
+    table = ParameterTable.read(path.read_text("utf-8"), path.name)
+    return table.positive("tension", "given_away"), table.positive("tension", "weight")
 
 
 def margin(data: StanceData) -> Outcome:
@@ -111,7 +109,7 @@ def vertex(data: StanceData) -> Outcome:
 def unique(data: StanceData, share: float = 1.0) -> Outcome:
     """Solve for the least utilisation, made unique in one solve; ``value`` is that utilisation.
 
-    A tension is at most u times its maximum, so the least u is exceeded by less than TIE u².
+    A tension is at most u times its maximum, so the least u is exceeded by less than TIE_WEIGHT u².
     ``share``: how much of its weight the second term is given.
     """
     return Best(data, weights=tie_weight(len(data.hands)) * share * data.rows.tie).solve()
@@ -145,8 +143,8 @@ def tie_break(data: StanceData, cap: float) -> Outcome:
 
 def least_tensions(data: StanceData, utilisation: float) -> Outcome:
     """Solve `tie_break` at a utilisation that has all its digits, or where needed near it."""
-    outcome = LATE
-    for slack in (SHARP_SLACK, SLACK):
+    outcome = Outcome(False, OUT_OF_TIME, 0, math.nan)
+    for slack in (1e-9, CAP_SLACK):  # where the least has all its digits, or else near it
         outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
         if outcome.solved or deadline.expired():
             break
@@ -187,10 +185,10 @@ def nearest_body(data: StanceData) -> Outcome:
 
 
 def holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
-    """Return whether loads y balance, and keep hard rows and limits at a cap, within `SLACK`."""
+    """Return whether loads y balance, and keep hard rows and limits at a cap, by `CAP_SLACK`."""
     error = np.abs(body_wrench(data, loads) - data.wrench).max()
-    balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))
-    return balances and beyond(data, loads, cap) <= SLACK
+    balances = bool(error <= CAP_SLACK * max(1.0, float(np.abs(data.wrench).max())))
+    return balances and beyond(data, loads, cap) <= CAP_SLACK
 
 
 def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:

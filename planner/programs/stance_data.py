@@ -54,15 +54,6 @@ JOINT_TORQUE: Final = "joint_torque"
 JOINT_FORCE: Final = "joint_force"
 """Name of the limit rows of a limb's joints that slide."""
 
-SECONDARY: Final = 1e-4
-"""Weight in the tie-break of loads that are not tensions: enough to make them unique."""
-
-LIGHT: Final = 0.1
-"""How much less of that weight they have where the effort itself is least."""
-
-KEPT: Final = 256
-"""Lists of names that are kept."""
-
 
 class ScaledRows(NamedTuple):
     """Scaled rows of a hand's set, the same wherever the hand is. Arrays are read-only.
@@ -130,7 +121,7 @@ class _Roles(NamedTuple):
     weight : ndarray, shape (m,)
         Weights in the tie-break, of loads that no capacity measures.
     other : ndarray, shape (m,)
-        Zero for tensions, `LIGHT` for the others.
+        Zero for tensions, a tenth for the others.
     measured, measures : ndarray of int
         Columns with a capacity of their own (tendons, the palm), and the limit rows that have it.
     forces : ndarray
@@ -152,7 +143,7 @@ class _Roles(NamedTuple):
     efforts: slice | Indices
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=256)  # lists of names, some 5 kB each
 def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Roles:
     """Return the roles of names; ``count`` of the rows are limits."""
     limits = rows[:count]
@@ -169,13 +160,14 @@ def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Role
     # hard rows are in newtons, but for those of a wrist's range
     ranges = np.array([row.limit == WRIST_RANGE for row in rows[count:]])
     efforts = np.flatnonzero([is_effort(row) for row in limits])
-    weight = np.where(tensions, 1.0, SECONDARY)
+    # enough to make loads unique that are not tensions
+    weight = np.where(tensions, 1.0, 1e-4)
     measured = np.array(list(measures), dtype=np.intp)
     roles = _Roles(
         unit=TWIST_UNIT if floats else np.full(len(columns), LOAD_UNIT),
         scale=TWIST_UNIT if floats else LOAD_UNIT,
         weight=weight,
-        other=np.where(tensions, 0.0, LIGHT),
+        other=np.where(tensions, 0.0, 0.1),  # of that weight
         measured=measured,
         measures=np.array(list(measures.values()), dtype=np.intp),
         forces=np.sqrt(weight[measured]) * LOAD_UNIT,
@@ -197,10 +189,6 @@ def is_effort(row: Row) -> bool:
 
 WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 """Scale of a body wrench [N, N·m]."""
-
-ROUNDING: Final = 1e-14
-"""Scaled entry that counts as zero, left where others cancel. A solver is set up for the places of
-zeros, which must not depend on rounding."""
 
 
 class HandData(NamedTuple):
@@ -296,7 +284,9 @@ def hands_data(
         if len(given):
             carried = np.vstack([carried, given / WRENCH_UNIT])
         G = carried @ rows.generators
-        G[np.abs(G) < ROUNDING] = 0.0
+        # a solver is set up for the places of zeros, which must not depend on rounding
+        G[np.abs(G) < 1e-14] = 0.0
+        # beside the generators and the origin, all is the same wherever the hand is
         found.append(HandData(G, carried @ rows.origin, *rows[2:]))
     return tuple(found)
 

@@ -19,12 +19,11 @@ import numpy as np
 from hand_models.base import Array
 from planner import deadline
 from planner.programs.conic import (
-    ENDS,
-    FAILED,
+    INFEASIBLE_STATUSES,
     OUT_OF_TIME,
-    PRESENT,
-    PROVEN,
-    SOLVERS,
+    SOLVED_STATUSES,
+    SOLVER_ERROR,
+    WAITING_SOLVERS,
     Columns,
     ConicProgram,
     Outcome,
@@ -35,11 +34,9 @@ from planner.programs.stance_data import StanceData, parted
 if TYPE_CHECKING:
     import cvxpy as cp
 
-__all__ = ["REFINED", "SETTINGS", "SHARP", "SOLVER", "VERTEX", "Definition", "StanceProgram"]
+__all__ = ["CLARABEL_SETTINGS", "REFINED_SETTINGS", "SHARP_SETTINGS", "Definition", "StanceProgram"]
 
-SOLVER: Final = "CLARABEL"
-
-SETTINGS: Final[dict[str, Any]] = {
+CLARABEL_SETTINGS: Final[dict[str, Any]] = {
     "equilibrate_enable": False,
     "iterative_refinement_enable": False,
     "presolve_enable": False,
@@ -51,24 +48,15 @@ SETTINGS: Final[dict[str, Any]] = {
 }
 """One physical scaling instead of equilibration, and no refinement of solutions that are good."""
 
-SHARP: Final[dict[str, Any]] = {**SETTINGS, "tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11}
+SHARP_SETTINGS: Final[dict[str, Any]] = {
+    **CLARABEL_SETTINGS,
+    "tol_gap_abs": 1e-11,
+    "tol_gap_rel": 1e-11,
+}
 """Settings for programs where a small term of the objective decides."""
 
-REFINED: Final[dict[str, Any]] = {**SETTINGS, "iterative_refinement_enable": True}
+REFINED_SETTINGS: Final[dict[str, Any]] = {**CLARABEL_SETTINGS, "iterative_refinement_enable": True}
 """For a second try."""
-
-CAREFUL: Final[dict[str, Any]] = {"solver": "CLARABEL", "max_threads": 1}
-"""The solver's own defaults, for a third."""
-
-VERTEX: Final[dict[str, Any]] = {
-    "solver": "SCIPY",
-    "scipy_options": {
-        "method": "highs-ds",
-        "primal_feasibility_tolerance": 1e-10,
-        "dual_feasibility_tolerance": 1e-10,
-    },
-}
-"""Settings for linear programs whose rows all need their digits: the dual simplex method."""
 
 _cvxpy = threading.Lock()
 """CVXPY counts its variables for all threads, and loses count where two define at a time."""
@@ -110,7 +98,7 @@ class StanceProgram(ABC):
         M.
     """
 
-    settings: Sequence[Mapping[str, Any]] = (SETTINGS, REFINED)
+    settings: Sequence[Mapping[str, Any]] = (CLARABEL_SETTINGS, REFINED_SETTINGS)
     wanted: int = 0
     """How many of the variables before the loads are wanted."""
 
@@ -197,12 +185,14 @@ class StanceProgram(ABC):
             What is wanted beside the loads; None where there is no solution.
         """
         program = self.conic()
-        found = SOLVERS.solve(program, self.settings[0])
+        found = WAITING_SOLVERS.solve(program, self.settings[0])
+        # after which nothing else is tried
+        ends = ("optimal", "infeasible", "unbounded", OUT_OF_TIME)
         for settings in self.settings[1:]:
-            if found.status in ENDS or deadline.expired():
+            if found.status in ends or deadline.expired():
                 break
             found = Solver(program, settings).solve()
-        ended = found.status in ENDS or deadline.expired()
+        ended = found.status in ends or deadline.expired()
         if not ended and all(
             np.isfinite(part).all()
             for part in (program.P, program.q, program.b, self.data.rows.whole)
@@ -214,13 +204,13 @@ class StanceProgram(ABC):
             duals = np.concatenate([balance, duals[program.zero :]])
         return self._read(found.status, found.iterations, found.value, found.x, duals)
 
-    def by_definition(self, careful: Mapping[str, Any] = CAREFUL) -> tuple[Outcome, Array | None]:
-        """Let CVXPY solve it, with these options."""
+    def by_definition(self, own: Mapping[str, Any] | None = None) -> tuple[Outcome, Array | None]:
+        """Let CVXPY solve it, with these options; by default those of Clarabel itself."""
         import cvxpy as cp
 
         left = deadline.left()
-        options = dict(careful)
-        if left is not None and careful is CAREFUL:
+        options = dict(own or {"solver": "CLARABEL", "max_threads": 1})
+        if left is not None and own is None:
             options["time_limit"] = left
         with _cvxpy, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
@@ -230,13 +220,14 @@ class StanceProgram(ABC):
             try:
                 problem.solve(**options)
             except cp.SolverError:
-                return self._read(FAILED, 0, math.nan, None, None)
+                return self._read(SOLVER_ERROR, 0, math.nan, None, None)
         status, stats = problem.status, problem.solver_stats
         x = duals = None
-        if status in PRESENT:
+        if status in SOLVED_STATUSES:
             x = np.concatenate([np.atleast_1d(variable.value) for variable in variables])
         values = [row.dual_value for row in rows if row.size]
-        if status in (*PRESENT, *PROVEN) and all(each is not None for each in values):
+        told = status in (*SOLVED_STATUSES, *INFEASIBLE_STATUSES)
+        if told and all(each is not None for each in values):
             duals = np.concatenate(values)
         if status == cp.USER_LIMIT and left is not None:
             status = OUT_OF_TIME

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any
 
 import highspy
 import numpy as np
@@ -13,13 +13,6 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.programs.stance_data import ScaledRows
 
 __all__ = ["SilentHighs", "Support"]
-
-OPTIONS: Final[dict[str, Any]] = {
-    "presolve": "off",
-    "parallel": "off",
-    "solver": "simplex",
-}
-"""Options of HiGHS. Presolving would lose the basis of the program before."""
 
 
 class SilentHighs(highspy.Highs):
@@ -82,7 +75,8 @@ class Support:
         self._generators, self._origin = rows.generators, rows.origin
         A, most = np.vstack([rows.L, rows.H]), np.concatenate([cap - rows.l0, rows.h])
         free = np.full(A.shape[1], np.inf)
-        self._solver = SilentHighs(OPTIONS)
+        # presolving would lose the basis of the program before
+        self._solver = SilentHighs({"presolve": "off", "parallel": "off", "solver": "simplex"})
         self._solver.load(A, (-free, free), (np.full(len(A), -np.inf), most))
         self._columns = np.arange(A.shape[1], dtype=np.int32)
 

@@ -17,8 +17,7 @@ from .question import (
     Question as Question,
 )
 from .stance import (
-    EARTH as EARTH,
-    SOLVE as SOLVE,
+    EARTH_GRAVITY as EARTH_GRAVITY,
     HandOnHold as HandOnHold,
     Stance as Stance,
     checked_body_wrench as checked_body_wrench,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from hand_models.parameters import (
 from hand_models.tile import Surface, surface_names
 
 __all__ = ["DrawnHand", "drawn_hands", "drawn_quantities"]
-
-KEPT: Final = 8
-"""Choices of draws whose hands are kept, those used last."""
 
 
 class DrawnHand(NamedTuple):
@@ -51,7 +48,7 @@ class DrawnHand(NamedTuple):
         return replace(Surface.named(usual.name, self.surfaces), half_planes=planes)
 
 
-@stored("hands of draws", KEPT)
+@stored("hands of draws", 8)  # those used last
 def drawn_hands(hand: HandModel, draws: tuple[Draw, ...] | None = None) -> tuple[DrawnHand, ...]:
     """Return what draws make of a hand.
 

@@ -15,8 +15,6 @@ from msgspec.structs import force_setattr
 from hand_models.base import Force, InvalidFieldError, Name, Strict, Tension, check_positive
 
 __all__ = [
-    "OBJECTIVES",
-    "WANTS",
     "BodyRange",
     "ForceCap",
     "Limits",
@@ -27,20 +25,11 @@ __all__ = [
 
 Objective = Literal["max_margin", "min_effort"]
 
-OBJECTIVES: Final = get_args(Objective)
-"""Names of objectives of a plan."""
-
 Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance", "advice"]
-
-WANTS: Final = get_args(Want)
-"""Names of the extras beside a plan."""
 
 Frame = Literal["hand", "body", "world"]
 
-FRAMES: Final = get_args(Frame)
-"""Frames in which a force may be capped."""
-
-LEAST: Final = 1e-3
+LEAST_LIMIT: Final = 1e-3
 """Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""
 
 Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
@@ -85,15 +74,16 @@ class ForceCap(Strict, frozen=True):
     frame: Frame = "hand"
 
     def __post_init__(self) -> None:
-        if self.frame not in FRAMES:
+        frames = get_args(Frame)  # in which a force may be capped
+        if self.frame not in frames:
             raise InvalidFieldError(
-                f"unknown frame {self.frame!r}; known are {', '.join(FRAMES)}", field="frame"
+                f"unknown frame {self.frame!r}; known are {', '.join(frames)}", field="frame"
             )
         most = self.most
         if isinstance(most, float):
-            if not (math.isfinite(most) and most >= LEAST):
+            if not (math.isfinite(most) and most >= LEAST_LIMIT):
                 raise InvalidFieldError(
-                    f"must be at least {LEAST:g} N, got {most:g}", field="largest_force"
+                    f"must be at least {LEAST_LIMIT:g} N, got {most:g}", field="largest_force"
                 )
             return
         if len(most) != 3:
@@ -105,9 +95,9 @@ class ForceCap(Strict, frozen=True):
                     f"got {low:g} to {high:g} N",
                     field=f"largest_force[{i}]",
                 )
-            if any(0.0 < abs(end) < LEAST for end in (low, high)):
+            if any(0.0 < abs(end) < LEAST_LIMIT for end in (low, high)):
                 raise InvalidFieldError(
-                    f"an end is zero or at least {LEAST:g} N, got {low:g} to {high:g} N",
+                    f"an end is zero or at least {LEAST_LIMIT:g} N, got {low:g} to {high:g} N",
                     field=f"largest_force[{i}]",
                 )
 
@@ -178,8 +168,8 @@ class Limits(Strict, frozen=True):
         by_limb = torque if isinstance(torque, Mapping) else {"": torque}
         for limb, given in by_limb.items():
             each = given if isinstance(given, tuple) else (given,)
-            idle = 0.0 if isinstance(given, tuple) else LEAST
-            wrong = [most for most in each if not (most == idle or LEAST <= most < math.inf)]
+            idle = 0.0 if isinstance(given, tuple) else LEAST_LIMIT
+            wrong = [most for most in each if not (most == idle or LEAST_LIMIT <= most < math.inf)]
             if wrong:
                 raise no_torque(wrong, "joint_torque" + (f".{limb}" if limb else ""))
 
@@ -187,7 +177,7 @@ class Limits(Strict, frozen=True):
 def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
     """Return the error about the most that joints may bear."""
     return InvalidFieldError(
-        f"must be at least {LEAST:g} N·m, or in a list 0 for a joint without a motor "
+        f"must be at least {LEAST_LIMIT:g} N·m, or in a list 0 for a joint without a motor "
         f"(not all of a limb), got {', '.join(f'{most:g}' for most in given)}",
         field=field,
     )

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Final, Protocol
+from typing import ClassVar, Final, Protocol, get_args
 
 from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
 from hand_models.hand import FINGERS
 from hand_models.parameters import Draw
 from planner.question.draws import drawn_hands
 from planner.question.limits import (
-    OBJECTIVES,
-    WANTS,
     BodyRange,
     Limits,
     Objective,
@@ -84,11 +82,12 @@ class Question:
             checked_body_wrench(wrench, "body_wrench")
             object.__setattr__(self, "body_wrench", wrench)
         if isinstance(self.objective, str) or not hasattr(self.objective, "name"):
-            known_choice(str(self.objective), OBJECTIVES, "objective")
-        unknown = sorted(set(self.want) - set(WANTS))
+            known_choice(str(self.objective), get_args(Objective), "objective")
+        wants = get_args(Want)
+        unknown = sorted(set(self.want) - set(wants))
         if isinstance(self.want, str) or unknown:
             raise InvalidInputError(
-                f"a set of extras is needed, got {self.want!r}; known are {', '.join(WANTS)}",
+                f"a set of extras is needed, got {self.want!r}; known are {', '.join(wants)}",
                 field="want",
             )
         object.__setattr__(self, "want", frozenset(self.want))

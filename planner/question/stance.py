@@ -17,8 +17,7 @@ from hand_models.tile import Surface
 from planner.robots import Robot, robosimian
 
 __all__ = [
-    "EARTH",
-    "SOLVE",
+    "EARTH_GRAVITY",
     "HandOnHold",
     "Stance",
     "checked_body_wrench",
@@ -28,26 +27,8 @@ __all__ = [
 
 WristMode = Literal["fixed", "floating"]
 
-WRISTS: Final = get_args(WristMode)
-"""Modes of a wrist."""
-
-SOLVE: Final = "solve"
-"""Value of ``joints`` that finds them from the hands' poses."""
-
-EARTH: Final = (0.0, 0.0, -9.81)
+EARTH_GRAVITY: Final = (0.0, 0.0, -9.81)
 """Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
-
-FARTHEST: Final = 1e9
-"""Largest distance of a frame from its parent's origin [m]; farther, its digits are all lost."""
-
-HEAVIEST: Final = 1e12
-"""Largest component of a body wrench that is taken for one [N, N·m]."""
-
-TOO_FAR: Final = 10.0
-"""Largest distance of a hand from the body, over its limb's reach: beyond, units are wrong."""
-
-ORTHONORMAL: Final = 1e-6
-"""Tolerance of the products of a pose's axes, which are orthonormal."""
 
 
 def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
@@ -69,8 +50,9 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
 
 def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
-    if not np.abs(wrench).max() <= HEAVIEST:
-        raise InvalidInputError(f"asks for more than {HEAVIEST:g} N or N·m", field=field)
+    most = 1e12  # [N, N·m] larger, the unit is wrong
+    if not np.abs(wrench).max() <= most:
+        raise InvalidInputError(f"asks for more than {most:g} N or N·m", field=field)
     return wrench
 
 
@@ -80,15 +62,16 @@ def _possible(pose: Pose, field: str) -> None:
     if not pose.proper:
         place = finite_vector(place, 3, f"{field}.position")
     position = place.tolist()
-    if max(map(abs, position)) > FARTHEST:
+    farthest = 1e9  # [m]; farther its digits are all lost
+    if max(map(abs, position)) > farthest:
         raise InvalidInputError(
-            f"must be within {FARTHEST:g} m, got {position}", field=f"{field}.position"
+            f"must be within {farthest:g} m, got {position}", field=f"{field}.position"
         )
     if pose.proper:
         return
     axes = finite_vector(np.ravel(pose.rotation), 9, f"{field}.orientation").reshape(3, 3)
     off = np.append(axes.T @ axes - np.eye(3), np.linalg.det(axes) - 1.0)
-    if not np.abs(off).max() <= ORTHONORMAL:
+    if not np.abs(off).max() <= 1e-6:  # rounding of the axes' products
         raise InvalidInputError(
             "orthonormal right-handed axes are needed", field=f"{field}.orientation"
         )
@@ -143,7 +126,7 @@ class HandOnHold:
     at: Pose | None = None
 
     def __post_init__(self) -> None:
-        known_choice(self.wrist, WRISTS, "wrist")
+        known_choice(self.wrist, get_args(WristMode), "wrist")
         if self.tendon_preload is not None:
             if self.wrist == "fixed":
                 raise InvalidInputError(
@@ -222,16 +205,16 @@ class Stance:
 
     hands: tuple[HandOnHold, ...]
     body: Pose
-    gravity: Array = field(default_factory=lambda: np.array(EARTH))
+    gravity: Array = field(default_factory=lambda: np.array(EARTH_GRAVITY))
     robot: Robot = field(default_factory=robosimian)
     joints: Mapping[str, Array | Literal["solve"]] | Literal["solve"] | None = None
 
     def __post_init__(self) -> None:
         self._check_hands()
         if isinstance(self.joints, str):
-            if self.joints != SOLVE:
+            if self.joints != "solve":
                 raise InvalidInputError(
-                    f"valid are angles of each limb, or {SOLVE!r}; got {self.joints!r}",
+                    f"valid are angles of each limb, or 'solve'; got {self.joints!r}",
                     field="joints",
                 )
         elif self.joints is not None:
@@ -243,11 +226,11 @@ class Stance:
                 if not isinstance(angles, str):
                     count = len(chains[limb].joints)
                     joints[limb] = finite_vector(angles, count, f"joints.{limb}")
-                elif angles == SOLVE and limb in holding:
-                    joints[limb] = SOLVE
+                elif angles == "solve" and limb in holding:
+                    joints[limb] = "solve"
                 else:
                     raise InvalidInputError(
-                        f"valid are angles or, of a limb that holds on, {SOLVE!r}; got {angles!r}",
+                        f"valid are angles or, of a limb that holds on, 'solve'; got {angles!r}",
                         field=f"joints.{limb}",
                     )
             object.__setattr__(self, "joints", joints)
@@ -285,7 +268,7 @@ class Stance:
                 )
             seen.add(hand.limb)
             away = math.dist(hand.pose.position.tolist(), origin)
-            if away > TOO_FAR * reach:
+            if away > 10.0 * reach:  # farther, the unit is wrong
                 raise InvalidInputError(
                     f"the hand is {away:.3g} m from the body; its limb reaches about "
                     f"{reach:.2g} m (positions are in metres)",

@@ -29,8 +29,7 @@ from .plan import (
     Status as Status,
 )
 from .spread import (
-    MANY as MANY,
-    VARIES as VARIES,
+    SPREAD_SETTINGS as SPREAD_SETTINGS,
     DrawnPlan as DrawnPlan,
     Influence as Influence,
     Quantiles as Quantiles,

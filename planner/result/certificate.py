@@ -10,14 +10,14 @@ from typing import Generic, TypeVar
 
 from msgspec import UNSET, Struct, UnsetType
 
-from planner.result.plain_parts import LimitName, V
+from planner.result.plain_parts import AnyVector, LimitName
 
 __all__ = ["CertificateOf"]
 
-S = TypeVar("S")
+SetOfWrenches = TypeVar("SetOfWrenches")
 
 
-class CertificateOf(Struct, Generic[V, S], frozen=True, kw_only=True, eq=False):
+class CertificateOf(Struct, Generic[AnyVector, SetOfWrenches], frozen=True, kw_only=True, eq=False):
     """Why no plan balances the body, or none within a cap on the utilisation.
 
     Checked without the solver: for every body wrench w that the hands can give, and the wrenches v
@@ -71,14 +71,14 @@ class CertificateOf(Struct, Generic[V, S], frozen=True, kw_only=True, eq=False):
     """
 
     utilisation: float | None = None
-    direction: V
-    held: Mapping[str, V] = {}
+    direction: AnyVector
+    held: Mapping[str, AnyVector] = {}
     supremum: float
     needed: float
-    shortfall: V | None
-    nearest: V | None
+    shortfall: AnyVector | None
+    nearest: AnyVector | None
     blocking: Sequence[LimitName]
     irreducible: Sequence[LimitName] | None = None
     irreducible_up_to: float | None = None
     sufficient: Sequence[LimitName] | None = None
-    wrench_spaces: Mapping[str, S] | UnsetType = UNSET
+    wrench_spaces: Mapping[str, SetOfWrenches] | UnsetType = UNSET

@@ -20,9 +20,8 @@ from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.prepare import (
-    CONTACTS,
+    CONTACT_CODES,
     KEPT_NAMES,
-    TOUCHING,
     HandBatch,
     concatenated,
     contact_pattern_of,
@@ -37,22 +36,10 @@ __all__ = ["LoadRecovery", "recover_floating_hand"]
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Signs of a palm's shear along x and its pressing along z."""
 
-COUNT: Final = len(FINGERS)
-
-OWN: Final = (
-    *(f"{finger}/{kind}" for kind in ("tension", "lateral", NAIL) for finger in FINGERS),
-    PALM_SHEAR,
-    PALM_PRESSING,
-)
-"""Every column that a hand with a fixed wrist may have."""
-
-WRENCH: Final = 6
+WRENCH_ROWS: Final = 6
 """Rows of a wrench."""
 
-SIGNED: Final = ("/lateral", f"/{NAIL}")
-"""Loads that may be negative."""
-
-ZERO: Final = np.zeros(1)
+NO_LOAD: Final = np.zeros(1)
 """A load that a hand does not have, before all others."""
 
 
@@ -124,33 +111,43 @@ def _layout_of(
     places, touch = tile_index_of(tuple(map(len, tiles))), contact_pattern_of(tiles)
     named = [(h, name) for h, own in enumerate(columns) for name in own]
     place = {name: i for i, name in enumerate(named, start=1)}
-    found = np.array([[place.get((h, name), 0) for name in OWN] for h in range(len(limits))])
+    # every column that a hand with a fixed wrist may have
+    every = (
+        *(f"{finger}/{kind}" for kind in ("tension", "lateral", NAIL) for finger in FINGERS),
+        PALM_SHEAR,
+        PALM_PRESSING,
+    )
+    found = np.array([[place.get((h, name), 0) for name in every] for h in range(len(limits))])
     loads = np.zeros((len(limits), max(map(len, columns))), dtype=np.intp)
     for h, own in enumerate(columns):
         loads[h, : len(own)] = [place[h, name] for name in own]
+    count = len(FINGERS)
     tensions, laterals, axials = (
-        found[:, i : i + COUNT].ravel() for i in range(0, 3 * COUNT, COUNT)
+        found[:, i : i + count].ravel() for i in range(0, 3 * count, count)
     )
     of_tile = np.empty((len(places.hand), 3), dtype=np.intp)
     of_tile[:, :2] = tensions[places.finger, None]
     of_tile[:, 2] = laterals[places.finger]
-    hooked = np.flatnonzero(touch.contacts == CONTACTS[NAIL])
+    hooked = np.flatnonzero(touch.contacts == CONTACT_CODES[NAIL])
     of_tile[hooked, 0] = axials[places.finger[hooked]]
     rows = [(h, row) for h, own in enumerate(names) for row in own if row.kind == "limit"]
     of_row = np.array([h for h, _ in rows], dtype=np.intp)
     counts = np.bincount(of_row, minlength=len(limits))
-    first_row, most = np.cumsum(counts) - counts, WRENCH + int(counts.max())
-    touching = [sum(CONTACTS[tile.contact] == TOUCHING for tile in own) for own in tiles]
+    first_row, most = np.cumsum(counts) - counts, WRENCH_ROWS + int(counts.max())
+    touching = [
+        sum(CONTACT_CODES[tile.contact] == CONTACT_CODES["face"] for tile in own) for own in tiles
+    ]
     of_rock = zip(first_row, limits, touching, strict=True)
     kept = np.zeros(len(places.hand), dtype=np.intp)
     kept[touch.touching] = places.hand[touch.touching] + np.arange(len(touch.touching))
+    signed = ("/lateral", f"/{NAIL}")  # may be negative
     return _LoadLayout(
         columns=loads,
         shape=(len(limits), most),
-        limits=most * of_row + WRENCH + np.arange(len(rows)) - first_row[of_row],
-        least=np.array([0.0, *(-np.inf if name.endswith(SIGNED) else 0.0 for _, name in named)]),
+        limits=most * of_row + WRENCH_ROWS + np.arange(len(rows)) - first_row[of_row],
+        least=np.array([0.0, *(-np.inf if name.endswith(signed) else 0.0 for _, name in named)]),
         tensions=tensions,
-        palms=found[:, 3 * COUNT :],
+        palms=found[:, 3 * count :],
         of_tile=of_tile,
         first_row=first_row,
         begins=np.concatenate([at + each * np.arange(n + 1) for at, each, n in of_rock]),
@@ -210,9 +207,9 @@ class LoadRecovery:
         self.at_rest = np.zeros(layout.shape)
         of_sets = [ScaledRows.of(space) for space in spaces] if scaled is None else scaled
         for mine, rest, own in zip(self.rows, self.at_rest, of_sets, strict=True):
-            end, columns = WRENCH + len(own.L), own.L.shape[1]
-            mine[:WRENCH, :columns], mine[WRENCH:end, :columns] = own.generators, own.L
-            rest[:WRENCH], rest[WRENCH:end] = own.origin, own.l0
+            end, columns = WRENCH_ROWS + len(own.L), own.L.shape[1]
+            mine[:WRENCH_ROWS, :columns], mine[WRENCH_ROWS:end, :columns] = own.generators, own.L
+            rest[:WRENCH_ROWS], rest[WRENCH_ROWS:end] = own.origin, own.l0
         self._drawn = _drawn_tendons(known)
         self._fixed = (
             tiles,
@@ -235,13 +232,13 @@ class LoadRecovery:
             Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques.
         """
         known, layout = self._known, self._layout
-        y = np.concatenate([ZERO, *loads])
+        y = np.concatenate([NO_LOAD, *loads])
         np.maximum(y, layout.least, out=y)
         scaled = y.take(layout.columns)
         scaled /= LOAD_UNIT
         rows = (self.rows @ scaled[:, :, None])[:, :, 0]
         rows += self.at_rest
-        wrenches, used = rows[:, :WRENCH], rows.take(layout.limits)
+        wrenches, used = rows[:, :WRENCH_ROWS], rows.take(layout.limits)
         efforts = used.take(layout.efforts)
 
         tensions, palms = y.take(layout.tensions), y.take(layout.palms)

@@ -30,7 +30,7 @@ __all__ = [
 
 Vector = list[float]
 
-V = TypeVar("V")
+AnyVector = TypeVar("AnyVector")
 """Kind of a part's vectors: arrays in the planner, lists in a reply."""
 
 
@@ -289,7 +289,7 @@ class RobustLoadFactor(Struct, frozen=True):
     reasons: dict[str, str] = {}
 
 
-class Palm(Struct, Generic[V], frozen=True, kw_only=True, eq=False):
+class Palm(Struct, Generic[AnyVector], frozen=True, kw_only=True, eq=False):
     """The palm: where it acts, its force on the rock there, and its moment about that point, in H.
 
     Attributes
@@ -301,9 +301,9 @@ class Palm(Struct, Generic[V], frozen=True, kw_only=True, eq=False):
     utilisation : float
     """
 
-    position: V
-    force: V
-    moment: V
+    position: AnyVector
+    force: AnyVector
+    moment: AnyVector
     engaged: Sequence[int]
     utilisation: float
 

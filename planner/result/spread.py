@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from msgspec import Struct
@@ -10,22 +11,18 @@ from msgspec import Struct
 if TYPE_CHECKING:
     from hand_models.base import Array
 
-__all__ = ["MANY", "VARIES", "DrawnPlan", "Influence", "Quantiles", "Spread"]
+__all__ = ["SPREAD_SETTINGS", "DrawnPlan", "Influence", "Quantiles", "Spread", "SpreadSettings"]
 
-PERCENTS: Final = (5.0, 50.0, 95.0)
-"""Quantiles of a number over the samples that are reported [%]."""
 
-MANY: Final = 20
-"""Samples from which on 5 % are one or more; of fewer the extremes and the median are reported."""
+@dataclass(frozen=True, slots=True)
+class SpreadSettings:
+    """From where on draws say something."""
 
-VARIES: Final = 1e-4
-"""Least difference of numbers that counts, over the largest: less is the solver's error."""
+    many_draws: int = 20  # of which 5 % are one; of fewer the extremes are reported
+    least_variation: float = 1e-4  # of numbers, over the largest: less is the solver's error
 
-FEWEST: Final = 3
-"""Load factors of which a correlation says anything."""
 
-REPORTED_INFLUENCES: Final = 3
-"""Number of influences that are reported, the largest ones."""
+SPREAD_SETTINGS: Final = SpreadSettings()
 
 
 class DrawnPlan(Struct, frozen=True):
@@ -59,7 +56,9 @@ class Quantiles(Struct, frozen=True):
         import numpy as np
 
         there = [value for value in values if value is not None]
-        percents = PERCENTS if len(there) >= MANY else (0.0, 50.0, 100.0)
+        percents = (
+            (5.0, 50.0, 95.0) if len(there) >= SPREAD_SETTINGS.many_draws else (0.0, 50.0, 100.0)
+        )
         return cls(*np.percentile(there, percents).tolist()) if there else None
 
 
@@ -168,9 +167,10 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
 
     there = [k for k, factor in enumerate(factors) if factor is not None]
     found = np.array([factors[k] for k in there], dtype=float)
-    if len(found) < FEWEST or np.ptp(found) <= VARIES * np.abs(found).max():
+    # of fewer than three a correlation says nothing
+    if len(found) < 3 or np.ptp(found) <= SPREAD_SETTINGS.least_variation * np.abs(found).max():
         return []
-    b = _centred_ranks(found, VARIES * np.abs(found).max())
+    b = _centred_ranks(found, SPREAD_SETTINGS.least_variation * np.abs(found).max())
     shares: dict[bytes, Influence] = {}
     for name, values in drawn.items():
         a = _centred_ranks(values[there])
@@ -178,7 +178,7 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
             # a quantity that is ordered as one before says the same
             share = float((a @ b) ** 2 / ((a @ a) * (b @ b)))
             shares.setdefault(a.tobytes(), Influence(name, share))
-    return sorted(shares.values(), key=lambda each: -each.share)[:REPORTED_INFLUENCES]
+    return sorted(shares.values(), key=lambda each: -each.share)[:3]  # the largest
 
 
 def _centred_ranks(values: Array, least: float = 0.0) -> Array:

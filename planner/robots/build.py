@@ -14,23 +14,14 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, within
 from planner.robots.limb_joints import JointCoupling, coupling_of, limb_joints, locked_joints
-from planner.robots.robot_file import STRONGEST, Mount, RobotDescription
+from planner.robots.robot_file import Mount, RobotDescription
+from planner.robots.tolerances import TOLERANCES
 from planner.robots.urdf import JointElement, Urdf
 
 __all__ = ["Chain", "build_model", "pose_of"]
 
 ROOT_JOINT: Final = 1
 """Index of the joint that lets the whole robot move freely, in Pinocchio's model."""
-
-ROOT_NAME: Final = "free body\x01"
-"""Its name, which no joint of a URDF can have: XML does not allow its last character."""
-
-PLACEHOLDER: Final = 1e3
-"""An effort from which on, where all joints of a limb have the same, it is taken for none
-[N·m, N]."""
-
-ON_AXIS: Final = 1e-9
-"""Distance from a joint's axis up to which the next joint counts as on it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +146,8 @@ def build_model(
     locked = locked_joints(tree, described)
     joints = limb_joints(tree, described, locked)
     try:
-        whole = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), ROOT_NAME)
+        # which no joint of a URDF can have: XML allows no such character
+        whole = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), "free body\x01")
     except (ValueError, RuntimeError) as error:
         raise InvalidInputError(
             f"Pinocchio cannot read it: {' '.join(str(error).split())}", field="urdf"
@@ -216,9 +208,9 @@ def _mounted(
     with within(f"limbs.{limb}.link"):
         coupled = coupling_of(elements)
     shoulder, reach = _bound(model, elements, ids, columns.start, pose_of(link.placement))
-    if reach <= ON_AXIS:
+    if reach <= TOLERANCES.axis_distance:
         reach = float(np.linalg.norm(mount.pose.position))
-    if reach <= ON_AXIS:
+    if reach <= TOLERANCES.axis_distance:
         raise InvalidInputError(
             "the limb's joints only turn the hand in its place; it must be away from them",
             field=f"limbs.{limb}.position",
@@ -269,13 +261,13 @@ def _torque_limits(mount: Mount, coupled: JointCoupling) -> Array:
         return np.broadcast_to(np.array(given), len(joints)).copy()
     efforts = np.array([joint.effort for joint in joints])
     advice = "give torque_limit; 0 in its list is a joint without a motor"
-    unknown = [joint.name for joint in joints if not 0.0 < joint.effort <= STRONGEST]
+    unknown = [joint.name for joint in joints if not 0.0 < joint.effort <= TOLERANCES.joint_torque]
     if unknown:
         raise InvalidInputError(
-            f"missing, and the URDF has no effort up to {STRONGEST:g} of "
+            f"missing, and the URDF has no effort up to {TOLERANCES.joint_torque:g} of "
             f"{shorten(', '.join(unknown), 100, placeholder=' …')} (0 is none); {advice}"
         )
-    if efforts.min() == efforts.max() >= PLACEHOLDER:
+    if efforts.min() == efforts.max() >= 1e3:  # [N·m, N] a placeholder
         raise InvalidInputError(
             f"missing, and the URDF has an effort of {efforts[0]:g} of every joint, which "
             f"exporters write where nothing is known; {advice}"
@@ -297,7 +289,7 @@ def _bound(
     places.append(joints[-1].apply(link.position))
     if len(joints) > 1 and not elements[0].slides:
         axis = np.array(data.J[3:, first])
-        if np.linalg.norm(np.cross(axis, places[1] - places[0])) <= ON_AXIS:
+        if np.linalg.norm(np.cross(axis, places[1] - places[0])) <= TOLERANCES.axis_distance:
             places = places[1:]
     slides = sum(max(abs(each.lower), abs(each.upper)) for each in elements if each.slides)
     return places[0], sum(float(np.linalg.norm(b - a)) for a, b in pairwise(places)) + slides

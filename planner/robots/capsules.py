@@ -24,10 +24,7 @@ from planner.robots.robot_file import RobotDescription
 
 __all__ = ["Capsules", "capsules_of", "scene_number"]
 
-BODY: Final = 0
-"""Step of what no joint moves."""
-
-SCENE: Final = ParameterTable.read(
+SCENE_NUMBERS: Final = ParameterTable.read(
     resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8"), "scene.toml"
 )
 """Numbers of what is in the way, and of what is usual."""
@@ -75,7 +72,7 @@ class _Capsule(NamedTuple):
 
 def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Chain]) -> Capsules:
     """Return the capsules about a robot's links."""
-    places = {ROOT_JOINT: (None, BODY)} | {
+    places = {ROOT_JOINT: (None, 0)} | {  # moved by no joint
         joint: (limb, step)
         for limb, chain in chains.items()
         for step, joint in enumerate(chain.ids, start=1)
@@ -116,11 +113,11 @@ def _given(
         limb, step = places[frame.parentJoint]
         for pattern, rows in described.capsules.items():
             if fnmatchcase(frame.name, pattern):
-                for row in rows:
-                    ends = pose_of(frame.placement).apply(np.reshape(row[:6], (2, 3)))
-                    yield _Capsule(frame.name, limb, step, frame.parentJoint, ends, row[6])
+                for *places_of_ends, radius in rows:
+                    ends = pose_of(frame.placement).apply(np.reshape(places_of_ends, (2, 3)))
+                    yield _Capsule(frame.name, limb, step, frame.parentJoint, ends, radius)
 
 
 def scene_number(section: str, name: str) -> float:
     """Return a number of ``parameters/scene.toml``, in SI units."""
-    return SCENE.positive(section, name)
+    return SCENE_NUMBERS.positive(section, name)

@@ -7,7 +7,7 @@ move without moving its hand, with each step's error of the pose taken back in t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,38 +15,12 @@ from numpy.typing import NDArray
 from hand_models.base import Array, InvalidInputError, Pose
 from planner import deadline
 from planner.robots.limb_batch import LimbBatch
-from planner.robots.nearest_pose import PLACED, angles_near, lacking, starts_beside
-from planner.robots.pose_search import TOLERANCE, damped_step, find_angles
+from planner.robots.nearest_pose import angles_near, lacking, starts_beside
+from planner.robots.pose_search import damped_step, find_angles
 from planner.robots.robot import Robot
+from planner.robots.tolerances import TOLERANCES
 
 __all__ = ["UnreachableError", "lower_torques", "solve_limbs"]
-
-STEPS: Final = 6
-"""Steps of lowering, taken back or not."""
-
-LONGEST_STEP: Final = 0.35
-"""Most that a joint turns in one of them [rad]."""
-
-LOWERED: Final = 1e-3
-"""Step after which the torques count as lowered [rad]."""
-
-ASTRAY: Final = 0.1
-"""Largest error of the pose that a step may leave, in the terms of `LimbBatch.errors`."""
-
-CORRECTIONS: Final = 6
-"""Steps back onto the pose at the end."""
-
-DAMPING: Final = 1e-3
-"""First damping, over the sum of the curvatures; it falls with steps kept and grows with others."""
-
-FLAT: Final = 1e-12
-"""Curvature that is always added: joints that bear nothing have none."""
-
-SINGULAR: Final = 1e-8
-"""Added to J Jᵀ, which is singular where a limb is stretched."""
-
-POSE: Final = 6
-"""Joints that a pose takes up."""
 
 
 class UnreachableError(InvalidInputError):
@@ -73,7 +47,7 @@ class UnreachableError(InvalidInputError):
     ) -> None:
         said = []
         for limb, distance in missing.items():
-            if limb in turned and distance <= PLACED:
+            if limb in turned and distance <= TOLERANCES.place_error:
                 said.append(f"{limb} cannot be turned as asked, by {turned[limb]:.2g} rad")
                 continue
             near = f" (turned by {turned[limb]:.2g} rad it is there)" if limb in turned else ""
@@ -138,7 +112,7 @@ def solve_limbs(
 def _solved(batch: LimbBatch) -> tuple[Array, NDArray[np.bool_]]:
     """Return angles (L, m) with low torques, and which limbs' poses they solve, shape (L,)."""
     angles = lower_torques(batch, find_angles(batch))
-    return angles, np.abs(batch.errors(angles[None])[0][0]).max(axis=1) <= TOLERANCE
+    return angles, np.abs(batch.errors(angles[None])[0][0]).max(axis=1) <= TOLERANCES.pose_error
 
 
 def _lowered(batch: LimbBatch, angles: Mapping[str, Array]) -> dict[str, Array]:
@@ -174,32 +148,35 @@ def lower_torques(batch: LimbBatch, angles: Array) -> Array:
         If the time is over before.
     """
     now = _measured(batch, angles.copy())
-    movable = np.abs(now.errors).max(axis=1) <= TOLERANCE
-    movable &= np.array(batch.joints) > POSE
+    movable = np.abs(now.errors).max(axis=1) <= TOLERANCES.pose_error
+    movable &= np.array(batch.joints) > 6  # a pose takes up six joints
     if not movable.any():
         return angles
-    first, damping, going = now.cost.copy(), np.full(len(angles), DAMPING), movable
-    for _ in range(STEPS):
+    # damping over the sum of the curvatures falls with steps kept and grows with others
+    first, damping, going = now.cost.copy(), np.full(len(angles), 1e-3), movable
+    longest = 0.35  # [rad] that a joint turns in a step of lowering
+    for _ in range(6):  # steps, kept or not
         deadline.check("the joint angles were found")
         back = damped_step(batch, now.angles, now.errors, now.jacobians) - now.angles
         along = _along(_idle(now.jacobians), now.efforts, now.slopes, damping)
-        along *= (LONGEST_STEP / np.maximum(np.abs(along).max(axis=1), LONGEST_STEP))[:, None]
+        along *= (longest / np.maximum(np.abs(along).max(axis=1), longest))[:, None]
         along *= _room(batch, now.angles, along)[:, None]
         tried = np.minimum(np.maximum(now.angles + along + back, batch.lower), batch.upper)
         new = _measured(batch, np.where(going[:, None], tried, now.angles))
-        kept = going & (new.cost < now.cost) & (np.abs(new.errors).max(axis=1) <= ASTRAY)
+        # in the terms of `LimbBatch.errors`: the next step takes that back
+        kept = going & (new.cost < now.cost) & (np.abs(new.errors).max(axis=1) <= 0.1)
         for before, after in zip(now, new, strict=True):
             before[kept] = after[kept]
         damping = np.where(kept, damping / 10.0, damping * 10.0)
-        going = going & (np.abs(along).max(axis=1) > LOWERED)
+        going = going & (np.abs(along).max(axis=1) > 1e-3)  # [rad] of a step; less lowers no more
         if not going.any():
             break
-    for _ in range(CORRECTIONS):
-        if np.abs(now.errors[movable]).max() <= TOLERANCE:
+    for _ in range(6):  # steps back onto the pose
+        if np.abs(now.errors[movable]).max() <= TOLERANCES.pose_error:
             break
         moved = damped_step(batch, now.angles, now.errors, now.jacobians)
         now = _measured(batch, np.where(movable[:, None], moved, now.angles))
-    good = movable & (np.abs(now.errors).max(axis=1) <= TOLERANCE) & (now.cost <= first)
+    good = movable & (np.abs(now.errors).max(axis=1) <= TOLERANCES.pose_error) & (now.cost <= first)
     return np.where(good[:, None], now.angles, angles)
 
 
@@ -223,7 +200,8 @@ def _measured(batch: LimbBatch, angles: Array) -> _Posture:
 def _idle(jacobians: Array) -> Array:
     """Return projectors (L, m, m) onto the motions that leave the hands alone."""
     transposed = jacobians.transpose(0, 2, 1)
-    inner = jacobians @ transposed + SINGULAR * np.eye(POSE)
+    # J Jᵀ is singular where a limb is stretched
+    inner = jacobians @ transposed + 1e-8 * np.eye(jacobians.shape[1])
     return np.eye(jacobians.shape[2]) - transposed @ np.linalg.solve(inner, jacobians)
 
 
@@ -232,7 +210,8 @@ def _along(idle: Array, effort: Array, slopes: Array, damping: Array) -> Array:
     S = slopes @ idle
     transposed = S.transpose(0, 2, 1)
     curvature = transposed @ S
-    added = damping * np.einsum("lkk->l", curvature) + FLAT
+    # joints that bear nothing have no curvature
+    added = damping * np.einsum("lkk->l", curvature) + 1e-12
     uphill = transposed @ effort[:, :, None]
     x = np.linalg.solve(curvature + added[:, None, None] * np.eye(idle.shape[1]), -uphill)
     return np.asarray((idle @ x)[:, :, 0])

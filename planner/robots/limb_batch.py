@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
 
 import numpy as np
 import pinocchio as pin
@@ -12,9 +11,6 @@ from hand_models.base import Array, Indices, Pose
 from planner.robots.robot import Robot
 
 __all__ = ["LimbBatch"]
-
-ROUNDING: Final = 1e-9
-"""Part of its reach that a stretched limb's end may be beyond it by rounding."""
 
 
 class LimbBatch:
@@ -70,7 +66,8 @@ class LimbBatch:
         self.levers = np.array([np.linalg.norm(mounts[limb].pose.position) for limb in poses])
         stretches = robot.stretches(Pose.identity(), self.limbs, list(poses.values()))
         beyond = (np.array(stretches) - 1.0) * self.reach
-        self.beyond = np.where(beyond > ROUNDING * self.reach, beyond, 0.0)
+        # a stretched limb's end may be beyond its reach by rounding
+        self.beyond = np.where(beyond > 1e-9 * self.reach, beyond, 0.0)
         self._neutral = robot.configuration({})
         targets = [robot.root @ pose for pose in poses.values()]
         self._targets = [pin.SE3(target.rotation, target.position) for target in targets]

@@ -21,20 +21,8 @@ from planner.robots.urdf import JointElement, Urdf
 
 __all__ = ["JointCoupling", "coupling_of", "limb_joints", "locked_joints"]
 
-MOVING: Final = ("revolute", "continuous", "prismatic")
-"""Types of joint that a limb may have."""
-
 LOCKED_UNITS: Final = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
 """Types of joint that can be locked, with the units of where."""
-
-MOST_JOINTS: Final = 64
-"""More joints of a limb than this no request names."""
-
-FARTHEST: Final = 100.0
-"""Farthest from zero that a joint without limits may be locked [rad, or m]."""
-
-BARE_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
-"""Names that TOML takes as keys without quotes."""
 
 
 def locked_joints(tree: Urdf, described: RobotDescription) -> dict[str, float]:
@@ -48,12 +36,13 @@ def locked_joints(tree: Urdf, described: RobotDescription) -> dict[str, float]:
     joints = {joint.name: joint for joint in tree.joints.values()}
     units = {n: LOCKED_UNITS[j.type] for n, j in joints.items() if j.type in LOCKED_UNITS}
     found = {name: joint.lower for name, joint in joints.items() if _stuck(joint)}
+    farthest = 100.0  # [rad, or m]: joints without limits may be locked up to here
     for section, name, quantity in section_table(described.locked, "locked", units):
         field = f"{section}.{name}"
         if isinstance(quantity.value, list):
             raise InvalidInputError("one number is needed, not a list", field=field)
         value, joint = float(quantity.value), joints[name]
-        low, high = max(joint.lower, -FARTHEST), min(joint.upper, FARTHEST)
+        low, high = max(joint.lower, -farthest), min(joint.upper, farthest)
         if not low <= value <= high:
             raise InvalidInputError(
                 f"must be from {low:.6g} to {high:.6g} {quantity.unit}, got {value:.6g}",
@@ -79,6 +68,7 @@ def limb_joints(
         slide, or follow a joint that is none of the limb's; the message says how to lock these.
     """
     body, chains = described.body, {}
+    most = 64  # no request names more
     for limb, mount in described.mounts.items():
         field = f"limbs.{limb}.link"
         with within(field):
@@ -90,9 +80,9 @@ def limb_joints(
                 f"no joint moves between {body!r} and {mount.link!r}{why}; a limb has at least one",
                 field=field,
             )
-        if len(chains[limb]) > MOST_JOINTS:
+        if len(chains[limb]) > most:
             raise InvalidInputError(
-                f"a limb has at most {MOST_JOINTS} joints, got {len(chains[limb])}", field=field
+                f"a limb has at most {most} joints, got {len(chains[limb])}", field=field
             )
     _require_own(chains, described.locked)
     for limb, chain in chains.items():
@@ -124,7 +114,8 @@ def _require_own(chains: Mapping[str, tuple[JointElement, ...]], already: Collec
 
 def _require_moved(chain: tuple[JointElement, ...], between: str, already: Collection[str]) -> None:
     """Refuse joints of a limb that no motor of it moves; say how to lock them."""
-    free = [joint for joint in chain if joint.type not in MOVING]
+    moving = ("revolute", "continuous", "prismatic")  # types of joint that a limb may have
+    free = [joint for joint in chain if joint.type not in moving]
     known = _drivers(chain)
     wrong = free or [joint for joint in chain if joint.name not in known]
     if not wrong:
@@ -133,7 +124,7 @@ def _require_moved(chain: tuple[JointElement, ...], between: str, already: Colle
     if free:
         raise InvalidInputError(
             f"joint {last.name!r} {between} is {last.type}; a limb's joints must be "
-            f"{', '.join(MOVING)}, or fixed{advice}"
+            f"{', '.join(moving)}, or fixed{advice}"
         )
     follows = "" if last.mimic is None else last.mimic.joint
     raise InvalidInputError(
@@ -152,7 +143,7 @@ def _advice(joints: Iterable[JointElement], already: Collection[str]) -> str:
         if joint.type not in LOCKED_UNITS:
             return ""
         key = joint.name
-        if not BARE_KEY.fullmatch(key):
+        if not re.fullmatch(r"[A-Za-z0-9_-]+", key):  # TOML wants quotes
             key = json.dumps(key, ensure_ascii=False)
         entries.append(f"{key} = {min(max(0.0, joint.lower), joint.upper)}")
     line = ", ".join(entries)

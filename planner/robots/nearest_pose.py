@@ -8,7 +8,7 @@ programming) instead of the slopes alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -17,38 +17,9 @@ from hand_models.base import Array
 from planner import deadline
 from planner.robots.limb_batch import LimbBatch
 from planner.robots.pose_search import damped_step, postures_near
+from planner.robots.tolerances import TOLERANCES
 
-__all__ = ["PLACED", "angles_near", "lacking", "starts_beside"]
-
-POSTURES: Final = 128
-"""Postures near a pose that are brought nearer."""
-
-DAMPED: Final = 8
-"""Steps that bring them nearer."""
-
-STARTS: Final = 8
-"""Number of these postures, the nearest, that are followed to the end."""
-
-FEW_STARTS: Final = 4
-"""Number of starts from which a missing distance is sought, which is only reported."""
-
-STEPS: Final = 150
-"""Most steps from a start."""
-
-CONVERGED: Final = 1e-10
-"""Change of what is least, after which a start has been followed to its end."""
-
-FIRST: Final = 300.0
-"""Weight of the quantity that is least first, over that of the second."""
-
-PLACED: Final = 1e-3
-"""Distance up to which a hand counts as in its place [m]."""
-
-TURNED: Final = 2e-3
-"""Angle up to which it counts as turned as asked [rad]."""
-
-INSIDE: Final = 1e-6
-"""Part of a tolerance that is kept free for rounding."""
+__all__ = ["angles_near", "lacking", "starts_beside"]
 
 
 class _Approach(NamedTuple):
@@ -79,12 +50,13 @@ def starts_beside(batch: LimbBatch, i: int, best: Array) -> tuple[LimbBatch, Seq
         The angles that came nearest so far; the first of those returned.
     """
     limb = batch.part(np.array([i]))
-    angles = postures_near(batch, i, POSTURES)[:, None]
-    for _ in range(DAMPED):
+    angles = postures_near(batch, i, 128)[:, None]
+    for _ in range(8):  # steps nearer to the pose
         deadline.check("it was known how near a hand comes to its pose")
         angles = damped_step(limb, angles, *limb.errors(angles))
     errors = (limb.errors(angles)[0] ** 2).sum(axis=(1, 2))
-    return limb, [best, *angles[np.argsort(errors, kind="stable")[:STARTS], 0]]
+    # the nearest are followed to the end
+    return limb, [best, *angles[np.argsort(errors, kind="stable")[:8], 0]]
 
 
 def angles_near(
@@ -142,16 +114,18 @@ def lacking(limb: LimbBatch, starts: Sequence[Array]) -> tuple[float, float | No
         Where the place is within reach, but not with these axes: the angle that is missing there
         [rad].
     """
+    first = 300.0  # weight of the quantity that is least first, over that of the second
+    # what is missing is only reported: a few starts will do
     (way, turn), (near, askew) = (
-        min(_ends(limb, starts[:FEW_STARTS], weights), key=lambda end: end.measure).off.tolist()
-        for weights in (np.array([FIRST**2, 1.0]), np.array([1.0, FIRST**2]))
+        min(_ends(limb, starts[:4], weights), key=lambda end: end.measure).off.tolist()
+        for weights in (np.array([first**2, 1.0]), np.array([1.0, first**2]))
     )
     # without a posture that is turned as asked, the distance of the place is returned
-    missing = near if askew <= TURNED else way
+    missing = near if askew <= 2e-3 else way  # [rad]: it counts as turned as asked
     beyond = float(limb.beyond[0])
-    if beyond > 0.0 and missing <= beyond + PLACED:
+    if beyond > 0.0 and missing <= beyond + TOLERANCES.place_error:
         missing = beyond
-    return missing, turn if way <= PLACED else None
+    return missing, turn if way <= TOLERANCES.place_error else None
 
 
 def _squares(limb: LimbBatch, angles: Array) -> tuple[Array, Array]:
@@ -192,7 +166,7 @@ def _followed(
         method="SLSQP",
         bounds=scipy.optimize.Bounds(low, high),
         constraints=limits,
-        options={"maxiter": STEPS, "ftol": CONVERGED},
+        options={"maxiter": 150, "ftol": 1e-10},
     )
     angles = np.clip(end.x, low, high)
     squares, _ = _squares(limb, angles)
@@ -201,7 +175,7 @@ def _followed(
 
 def _bounded(limb: LimbBatch, end: _Approach, most: Array) -> _Approach:
     """Return where distance and angle are within their tolerances, and the measure least."""
-    largest = (most * (1.0 - INSIDE)) ** 2
+    largest = (most * (1.0 - 1e-6)) ** 2  # room for rounding
     limits = scipy.optimize.NonlinearConstraint(
         lambda angles: _squares(limb, angles)[0] / largest,
         -np.inf,

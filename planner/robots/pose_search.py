@@ -17,43 +17,11 @@ from hand_models.base import Array, Pose, stored
 from planner import deadline
 from planner.robots.limb_batch import LimbBatch
 from planner.robots.robot import Robot
+from planner.robots.tolerances import TOLERANCES
 
-__all__ = ["TOLERANCE", "damped_step", "find_angles", "postures_near"]
+__all__ = ["damped_step", "find_angles", "postures_near"]
 
-EYE: Final = np.eye(6)
-
-TOLERANCE: Final = 1e-9
-"""Largest component of a solved pose's error: a part of the limb's reach, or an angle [rad]."""
-
-STEPS: Final = 15
-"""Steps from every start."""
-
-MORE_STEPS: Final = 25
-"""Steps after those while each at least halves the error, as they do where a limb is stretched."""
-
-ABREAST: Final = 4
-"""Starts that are followed together."""
-
-ROUNDS: Final = 8
-"""Rounds of starts for a pose that may be within reach, at most."""
-
-CHOICE: Final = 2
-"""Solutions among which the one of the least torques is taken."""
-
-LONGEST_STEP: Final = 1.0
-"""Most that a joint turns in a step [rad]."""
-
-DAMPING: Final = 0.1
-"""Damping over the square of the error."""
-
-LEAST_DAMPING: Final = 1e-12
-"""Damping that is left where there is no error: a stretched limb's matrix is singular."""
-
-SAMPLES: Final = 4096
-"""Random postures of each limb among which starts are looked up."""
-
-TURN_WEIGHT: Final = 0.35
-"""Weight of a hand's axes, in reaches, when postures near a pose are looked up."""
+POSE_IDENTITY: Final = np.eye(6)
 
 
 def find_angles(batch: LimbBatch) -> Array:
@@ -67,9 +35,11 @@ def find_angles(batch: LimbBatch) -> Array:
         If the time is over before.
     """
     best, least = np.zeros(batch.shape), np.full(len(batch.limbs), np.inf)
-    for k in range(ROUNDS):
+    for k in range(8):  # rounds of starts for a pose that may be within reach
         # what is beyond the stretched limb is tried once, for the angles that come nearest
-        left = np.flatnonzero((least > TOLERANCE) & ((batch.beyond <= 0.0) | np.isinf(least)))
+        left = np.flatnonzero(
+            (least > TOLERANCES.pose_error) & ((batch.beyond <= 0.0) | np.isinf(least))
+        )
         if not len(left):
             break
         starts = np.stack([_starts_near(batch, int(i), k) for i in left], axis=1)
@@ -84,20 +54,23 @@ def _follow(batch: LimbBatch, angles: Array) -> tuple[Array, Array]:
     """Return where starts (S, L, m) lead, the best for each limb, and the size of its error."""
     size = np.full(angles.shape[:2], np.inf)
     slow = np.zeros(angles.shape[:2], dtype=bool)
-    for k in range(STEPS + MORE_STEPS):
+    steps = 15  # from every start
+    # 25 more while each at least halves the error, as they do where a limb is stretched
+    for k in range(steps + 25):
         deadline.check("the joint angles were found")
         errors, jacobians = batch.errors(angles)
         last, size = size, np.abs(errors).max(axis=2)
-        done = size <= TOLERANCE
-        if k >= STEPS:
+        done = size <= TOLERANCES.pose_error
+        if k >= steps:
             slow |= size > 0.5 * last
-        over = done | slow | (done.sum(axis=0) >= CHOICE)
+        # of two solutions that of the least torques is taken
+        over = done | slow | (done.sum(axis=0) >= 2)
         if over.all():
             break
         angles = np.where(over[:, :, None], angles, damped_step(batch, angles, errors, jacobians))
     size = np.abs(batch.errors(angles)[0]).max(axis=2)
     # solutions by torque, then all others by error
-    rank = np.where(size <= TOLERANCE, -1.0 / (1.0 + batch.cost(angles)), size)
+    rank = np.where(size <= TOLERANCES.pose_error, -1.0 / (1.0 + batch.cost(angles)), size)
     pick = rank.argmin(axis=0), np.arange(len(batch.limbs))
     return angles[pick], size[pick]
 
@@ -116,18 +89,23 @@ def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array
     stuck = (angles <= batch.lower) & (slope < 0.0) | (angles >= batch.upper) & (slope > 0.0)
     J = jacobians * ~stuck[..., None, :]
     transposed = J.swapaxes(-1, -2)
-    damping = DAMPING * (errors * errors).sum(axis=-1) + LEAST_DAMPING
-    inner = np.linalg.solve(J @ transposed + damping[..., None, None] * EYE, errors[..., None])
+    # a little is left where there is no error: a stretched limb's matrix is singular
+    damping = 0.1 * (errors * errors).sum(axis=-1) + 1e-12
+    inner = np.linalg.solve(
+        J @ transposed + damping[..., None, None] * POSE_IDENTITY, errors[..., None]
+    )
     step = (transposed @ inner)[..., 0]
-    longest = np.maximum(np.abs(step).max(axis=-1), LONGEST_STEP)
-    moved = angles + step * (LONGEST_STEP / longest)[..., None]
+    most = 1.0  # [rad] that a joint turns
+    longest = np.maximum(np.abs(step).max(axis=-1), most)
+    moved = angles + step * (most / longest)[..., None]
     return np.asarray(np.minimum(np.maximum(moved, batch.lower), batch.upper))
 
 
 def _starts_near(batch: LimbBatch, i: int, k: int) -> Array:
     """Return a limb's angles to start from in round k, shape (S, m), the most promising first."""
-    starts = np.zeros((ABREAST, batch.shape[1]))
-    starts[:, : batch.joints[i]] = postures_near(batch, i, ABREAST * (k + 1))[-ABREAST:]
+    abreast = 4  # starts that are followed together
+    starts = np.zeros((abreast, batch.shape[1]))
+    starts[:, : batch.joints[i]] = postures_near(batch, i, abreast * (k + 1))[-abreast:]
     return starts
 
 
@@ -143,16 +121,17 @@ def postures_near(batch: LimbBatch, i: int, count: int) -> Array:
 def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
     """Return random angles of every limb, and a tree of where they put its hand."""
     rng = np.random.default_rng(0)
+    count = 4096  # random postures of each limb to look starts up in
     samples = {
         limb: rng.uniform(
             np.maximum(chain.lower, -np.pi),
             np.minimum(chain.upper, np.pi),
-            (SAMPLES, len(chain.joints)),
+            (count, len(chain.joints)),
         )
         for limb, chain in robot.chains.items()
     }
-    places = {limb: np.empty((SAMPLES, 9)) for limb in robot.limbs}
-    for k in range(SAMPLES):
+    places = {limb: np.empty((count, 9)) for limb in robot.limbs}
+    for k in range(count):
         found = robot.kinematics({limb: angles[k] for limb, angles in samples.items()})
         for limb, (pose, _) in found.items():
             places[limb][k] = _place(pose, robot.chains[limb].reach)
@@ -161,4 +140,5 @@ def _postures(robot: Robot) -> dict[str, tuple[Array, Any]]:
 
 def _place(pose: Pose, reach: float) -> Array:
     """Return nine numbers, near each other for poses that are."""
-    return np.concatenate([pose.position / reach, TURN_WEIGHT * pose.rotation[:, :2].ravel()])
+    # axes count 0.35 reaches beside the place
+    return np.concatenate([pose.position / reach, 0.35 * pose.rotation[:, :2].ravel()])

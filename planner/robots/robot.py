@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -36,9 +36,6 @@ __all__ = ["Robot", "Statics", "robosimian", "robot_of"]
 
 Angles = Mapping[str, Array] | Mapping[str, Sequence[float]]
 """Angles of limbs' joints, by limb [rad]."""
-
-BEYOND: Final = 1e-6
-"""Tolerance of an angle beyond its joint's limit [rad, or m]: the rounding of seven digits."""
 
 
 class Statics(NamedTuple):
@@ -217,7 +214,7 @@ class Robot:
             chain = self.chains[limb]
             found[limb] = finite_vector(given, len(chain.joints), limb)
             beyond = np.maximum(chain.lower - found[limb], found[limb] - chain.upper)
-            for i in np.flatnonzero(beyond > BEYOND).tolist():
+            for i in np.flatnonzero(beyond > 1e-6).tolist():  # [rad, or m] rounding of seven digits
                 unit = "m" if chain.sliding[i] else "rad"
                 raise InvalidInputError(
                     f"{chain.joints[i]} goes from {chain.lower[i]:.6g} to {chain.upper[i]:.6g} "
@@ -274,7 +271,7 @@ class Robot:
         rates = self.root_acceleration(gravity, acceleration)
         torque = pin.rnea(model, data, self.configuration(angles), np.zeros(model.nv), rates)
         return Statics(
-            self._to_body @ torque[:6],
+            self._to_body @ torque[:6],  # of the joint that lets the root link move freely
             {limb: chain.coupling.T @ torque[chain.columns] for limb, chain in self.chains.items()},
         )
 

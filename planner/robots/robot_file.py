@@ -18,52 +18,13 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 from textwrap import shorten
-from typing import Any, Final
+from typing import Any
 
 from hand_models.base import InvalidInputError, Pose, in_file, within
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
+from planner.robots.tolerances import TOLERANCES
 
-__all__ = ["STRONGEST", "Mount", "RobotDescription", "RobotFile", "section_table"]
-
-NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
-"""Pattern of the names of a robot and of its limbs: they are part of keys."""
-
-TEXTS: Final = ("name", "urdf", "body")
-"""Entries of the file that are plain text."""
-
-SECTIONS: Final = ("robot", "locked", "every_limb", "limbs", "capsules")
-"""Its sections."""
-
-ROBOT_UNITS: Final = {"com": "m", "back": "1"}
-"""Entries of the whole robot, by name, with their units."""
-
-LIMB_UNITS: Final = {
-    "position": "m",
-    "orientation": "1",
-    "hand_com": "m",
-    "torque_limit": "N·m",
-    "radius": "m",
-}
-"""Entries of a limb, by name, with their units."""
-
-MOST_LIMBS: Final = 16
-"""More limbs than this no program was tried with."""
-
-FARTHEST: Final = 10.0
-"""Largest coordinate of a hand in its link, or of a centre of mass [m]; larger, it is in other
-units."""
-
-WEAKEST: Final = 1e-3
-"""Smallest torque limit that is taken for one [N·m]."""
-
-THICKEST: Final = 1.0
-"""Largest radius of a link that is taken for one [m]."""
-
-CAPSULE: Final = 7
-"""Numbers of a capsule: both ends of its segment, and its radius."""
-
-STRONGEST: Final = 1e6
-"""Largest torque limit that is taken for one [N·m]."""
+__all__ = ["Mount", "RobotDescription", "RobotFile", "section_table"]
 
 
 @dataclass(frozen=True)
@@ -186,20 +147,30 @@ class RobotDescription:
             raw = tomllib.loads(toml)
         except tomllib.TOMLDecodeError as error:
             raise InvalidInputError(str(error)) from None
-        called, urdf, body = (_string(raw.get(name), name) for name in TEXTS)
+        texts = ("name", "urdf", "body")  # entries that are plain text
+        called, urdf, body = (_string(raw.get(name), name) for name in texts)
         _named(called, "name")
         for name in raw:
-            if name not in (*TEXTS, *SECTIONS):
-                known = ", ".join((*TEXTS, *SECTIONS))
-                raise InvalidInputError(f"unknown; known are {known}", field=name)
-        whole = section_table(raw.get("robot", {}), "robot", ROBOT_UNITS)
+            known = (*texts, "robot", "locked", "every_limb", "limbs", "capsules")
+            if name not in known:
+                raise InvalidInputError(f"unknown; known are {', '.join(known)}", field=name)
+        whole = section_table(raw.get("robot", {}), "robot", {"com": "m", "back": "1"})
         locked = _mapping(raw.get("locked", {}), "locked")
         every = _mapping(raw.get("every_limb", {}), "every_limb")
-        section_table(every, "every_limb", LIMB_UNITS)
+        # entries of a limb, by name, with their units
+        limb_units = {
+            "position": "m",
+            "orientation": "1",
+            "hand_com": "m",
+            "torque_limit": "N·m",
+            "radius": "m",
+        }
+        section_table(every, "every_limb", limb_units)
         limbs = _mapping(raw.get("limbs", {}), "limbs")
-        if not 1 <= len(limbs) <= MOST_LIMBS:
+        most = 16  # no program was tried with more
+        if not 1 <= len(limbs) <= most:
             raise InvalidInputError(
-                f"from 1 to {MOST_LIMBS} limbs are needed, as [limbs.NAME], got {len(limbs)}",
+                f"from 1 to {most} limbs are needed, as [limbs.NAME], got {len(limbs)}",
                 field="limbs",
             )
         mounts: dict[str, Mount] = {}
@@ -209,7 +180,7 @@ class RobotDescription:
             entries = dict(_mapping(entries, section))
             link = _string(entries.pop("link", None), f"{section}.link")
             both = {**every, **entries}
-            mounts[limb] = _mount(link, section_table(both, section, LIMB_UNITS), section)
+            mounts[limb] = _mount(link, section_table(both, section, limb_units), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
         capsules = _capsules(raw.get("capsules", {}))
         back = _direction(whole, "robot", "back")
@@ -234,7 +205,7 @@ def _string(value: Any, field: str) -> str:
 
 
 def _named(name: str, field: str) -> None:
-    if not NAME.fullmatch(name):
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,63}", name):  # names are part of keys
         raise InvalidInputError(
             "a name must begin with a letter and go on with at most 63 letters, digits, _ or -, "
             f"got {shorten(repr(name), LONGEST_QUOTE, placeholder=' …')}",
@@ -284,9 +255,9 @@ def section_table(entries: Any, section: str, units: Mapping[str, str]) -> Param
 def _triple(table: ParameterTable, section: str, name: str) -> tuple[float, ...]:
     """Return a place, three coordinates of a possible size."""
     values = table.vector(section, name)
-    if len(values) != 3 or not all(abs(value) <= FARTHEST for value in values):
+    if len(values) != 3 or not all(abs(value) <= TOLERANCES.mount_distance for value in values):
         raise InvalidInputError(
-            f"must be 3 numbers within ±{FARTHEST:g} m, got {_quoted(values)}",
+            f"must be 3 numbers within ±{TOLERANCES.mount_distance:g} m, got {_quoted(values)}",
             field=f"{section}.{name}",
         )
     return values
@@ -297,19 +268,21 @@ def _capsules(entries: Any) -> dict[str, tuple[tuple[float, ...], ...]]:
     names = _mapping(entries, "capsules")
     table = section_table(names, "capsules", dict.fromkeys(names, "m"))
     found = {}
+    size = 7  # numbers: both ends of its segment, and its radius
     for _, name, _ in table:
         values = table.vector("capsules", name)
-        rows = tuple(values[i : i + CAPSULE] for i in range(0, len(values), CAPSULE))
+        rows = tuple(values[i : i + size] for i in range(0, len(values), size))
         sound = [
-            len(row) == CAPSULE
-            and all(abs(value) <= FARTHEST for value in row)
-            and 0.0 < row[-1] <= THICKEST
+            len(row) == size
+            and all(abs(value) <= TOLERANCES.mount_distance for value in row)
+            and 0.0 < row[-1] <= TOLERANCES.link_radius
             for row in rows
         ]
         if not (rows and all(sound)):
             raise InvalidInputError(
-                f"must be {CAPSULE} numbers a capsule, the ends of its segment within ±{FARTHEST:g}"
-                f" m and a radius up to {THICKEST:g} m, got {_quoted(values)}",
+                f"must be {size} numbers a capsule, the ends of its segment within "
+                f"±{TOLERANCES.mount_distance:g} m and a radius up to "
+                f"{TOLERANCES.link_radius:g} m, got {_quoted(values)}",
                 field=f"capsules.{name}",
             )
         found[name] = rows
@@ -338,9 +311,10 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
     hand_com = _triple(table, section, "hand_com") if given else (0.0, 0.0, 0.0)
     limits = _torque_limits(table, section)
     radius = table.positive(section, "radius") if "radius" in table.sections[section] else None
-    if radius is not None and radius > THICKEST:
+    if radius is not None and radius > TOLERANCES.link_radius:
         raise InvalidInputError(
-            f"must be at most {THICKEST:g} m, got {radius:g}", field=f"{section}.radius"
+            f"must be at most {TOLERANCES.link_radius:g} m, got {radius:g}",
+            field=f"{section}.radius",
         )
     return Mount(link, pose, hand_com, limits, radius)
 
@@ -351,11 +325,12 @@ def _torque_limits(table: ParameterTable, section: str) -> tuple[float, ...] | N
         return None
     value = table.quantity(section, "torque_limit").value
     limits = tuple(map(float, value)) if isinstance(value, list) else (float(value),)
-    sound = [limit == 0.0 or WEAKEST <= limit <= STRONGEST for limit in limits]
+    weakest = 1e-3  # [N·m]: less is no rating
+    sound = [limit == 0.0 or weakest <= limit <= TOLERANCES.joint_torque for limit in limits]
     if not any(limits) or not all(sound):
         raise InvalidInputError(
-            f"must be {WEAKEST:g} to {STRONGEST:g} N·m, or in a list 0 for a joint without a motor "
-            f"(not all of a limb), got {_quoted(limits)}",
+            f"must be {weakest:g} to {TOLERANCES.joint_torque:g} N·m, or in a list 0 for a joint "
+            f"without a motor (not all of a limb), got {_quoted(limits)}",
             field=f"{section}.torque_limit",
         )
     return limits

@@ -14,50 +14,12 @@ from xml.etree import ElementTree
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose
+from planner.robots.tolerances import TOLERANCES
 
 __all__ = ["JointElement", "Link", "Mimic", "Urdf", "parse_urdf"]
 
-TYPES: Final = ("revolute", "continuous", "fixed", "prismatic", "floating", "planar")
-"""Types of joint that URDF knows."""
-
-DRIVEN: Final = ("revolute", "continuous", "prismatic")
-"""Types that one motor can move."""
-
-LONGEST: Final = 100.0
-"""Farthest that a frame may be from its parent's [m]; farther, the units are wrong."""
-
-HEAVIEST: Final = 1e5
-"""Largest mass of a link that is taken for one [kg]."""
-
-LARGEST_INERTIA: Final = HEAVIEST * LONGEST**2
-"""Largest moment of inertia of a link that is taken for one [kg·m²]."""
-
-WIDEST: Final = 100.0
-"""Largest angle that is taken for one [rad]."""
-
-NEGATIVE: Final = 1e-9
-"""Tolerance of a principal moment below zero, over the largest, for rounding."""
-
-NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+NUMBER_PATTERN: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 """A number of XML: what Pinocchio reads otherwise, as `1_0`, would be a link without mass there."""
-
-STEEPEST: Final = 1e3
-"""Largest multiplier of a coupled joint that is taken for one."""
-
-UNITS: Final = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "value"): "kg"}
-"""Units of attributes of elements."""
-
-XACRO: Final = "/xacro"
-"""End of the namespace of xacro."""
-
-EXPAND: Final = (
-    "this is a xacro, which is not expanded; expand it: xacro ROBOT.urdf.xacro > ROBOT.urdf "
-    "(from ROS, or from pip install xacro)"
-)
-"""Error message for a file that still has instructions for xacro in it."""
-
-THIN: Final = 1e-6
-"""Radius of gyration that is none for a link [m]: so far below zero its mass may put a moment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +169,7 @@ def parse_urdf(text: str) -> Urdf:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
         if "xacro:" in text:
-            raise InvalidInputError(f"must be a URDF; {EXPAND}") from None
+            raise _unexpanded() from None
         raise InvalidInputError(f"must be a URDF, which is XML: {error}") from None
     if root.tag != "robot":
         raise InvalidInputError(f"must be a URDF, whose root is <robot>, got <{root.tag}>")
@@ -236,15 +198,22 @@ def parse_urdf(text: str) -> Urdf:
     return replace(tree, links={link.name: link for link in map(_link, root.findall("link"))})
 
 
+def _unexpanded() -> InvalidInputError:
+    return InvalidInputError(
+        "must be a URDF; this is a xacro, which is not expanded; expand it: "
+        "xacro ROBOT.urdf.xacro > ROBOT.urdf (from ROS, or from pip install xacro)"
+    )
+
+
 def _require_expanded(root: ElementTree.Element, text: str) -> None:
     """Refuse a file with elements of xacro, or with values that xacro is to put in."""
     if "<xacro:" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
-        raise InvalidInputError(f"must be a URDF; {EXPAND}")
+        raise _unexpanded()
     for element in root.iter():
         space = element.tag.rpartition("}")[0] if isinstance(element.tag, str) else ""
         values = [value for name, value in element.items() if name != "filename"]
-        if space.endswith(XACRO) or any("${" in value or "$(" in value for value in values):
-            raise InvalidInputError(f"must be a URDF; {EXPAND}")
+        if space.endswith("/xacro") or any("${" in value or "$(" in value for value in values):
+            raise _unexpanded()
 
 
 def _name(element: ElementTree.Element) -> str:
@@ -279,12 +248,13 @@ def _numbers(
             raise InvalidInputError(f"{place} is missing")
         return [default] * count
     words = raw.split()
-    numbers = [float(word) for word in words] if all(map(NUMBER.fullmatch, words)) else []
+    numbers = [float(word) for word in words] if all(map(NUMBER_PATTERN.fullmatch, words)) else []
     # written so that what is not a number fails
     if len(numbers) != count or not all(abs(number) <= largest for number in numbers):
         wanted = "a number" if count == 1 else f"{count} numbers"
         got = shorten(raw, 100, placeholder=" …")
-        within = f"±{largest:g} {UNITS.get((element.tag, attribute), '')}".rstrip()
+        units = {("origin", "xyz"): "m", ("origin", "rpy"): "rad", ("mass", "value"): "kg"}
+        within = f"±{largest:g} {units.get((element.tag, attribute), '')}".rstrip()
         raise InvalidInputError(f"{place} must be {wanted} within {within}, got {got!r}")
     return numbers
 
@@ -294,8 +264,8 @@ def _origin(owner: str, element: ElementTree.Element) -> Pose:
     origin = element.find("origin")
     if origin is None:
         return Pose.identity()
-    position = _numbers(owner, origin, "xyz", 3, LONGEST, default=0.0)
-    angles = _numbers(owner, origin, "rpy", 3, WIDEST, default=0.0)
+    position = _numbers(owner, origin, "xyz", 3, TOLERANCES.frame_distance, default=0.0)
+    angles = _numbers(owner, origin, "rpy", 3, TOLERANCES.angle, default=0.0)
     # turned about the fixed axes x, y, z, one after the other
     (cx, sx), (cy, sy), (cz, sz) = ((math.cos(a), math.sin(a)) for a in angles)
     rotation = np.array(
@@ -319,20 +289,27 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
             raise InvalidInputError(f"{owner}: its {end} must be a link of the file, got {link!r}")
         ends[end] = str(link)
     kind = element.get("type", "")
-    if kind not in TYPES:
-        raise InvalidInputError(f"{owner}: type must be one of {', '.join(TYPES)}, got {kind!r}")
+    # types of joint that URDF knows
+    types = ("revolute", "continuous", "fixed", "prismatic", "floating", "planar")
+    if kind not in types:
+        raise InvalidInputError(f"{owner}: type must be one of {', '.join(types)}, got {kind!r}")
     place = _origin(owner, element)
     given = element.find("axis")
     axis = np.array([1.0, 0.0, 0.0])
     if given is not None and kind not in ("fixed", "floating"):
-        axis = np.array(_numbers(owner, given, "xyz", 3, LONGEST))
+        axis = np.array(_numbers(owner, given, "xyz", 3, TOLERANCES.frame_distance))
         length = np.linalg.norm(axis)
         if not length > 0.0:
             raise InvalidInputError(f"{owner}: its axis must not be zero")
         axis = axis / length
     lower, upper, effort = -math.inf, math.inf, 0.0
     limit = element.find("limit")
-    if limit is not None and kind in DRIVEN and "effort" in limit.attrib:
+    # one motor can move these
+    if (
+        limit is not None
+        and kind in ("revolute", "continuous", "prismatic")
+        and "effort" in limit.attrib
+    ):
         (effort,) = _numbers(owner, limit, "effort", 1, sys.float_info.max)
         if effort < 0.0:
             raise InvalidInputError(f"{owner}: effort must not be negative, got {effort:g}")
@@ -342,8 +319,8 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         for rating in ("effort", "velocity"):
             _numbers(owner, limit, rating, 1, sys.float_info.max)
         # URDF takes a limit that is left out for zero
-        (lower,) = _numbers(owner, limit, "lower", 1, WIDEST, default=0.0)
-        (upper,) = _numbers(owner, limit, "upper", 1, WIDEST, default=0.0)
+        (lower,) = _numbers(owner, limit, "lower", 1, TOLERANCES.angle, default=0.0)
+        (upper,) = _numbers(owner, limit, "upper", 1, TOLERANCES.angle, default=0.0)
         if lower > upper:
             unit = "m" if kind == "prismatic" else "rad"
             raise InvalidInputError(
@@ -368,8 +345,8 @@ def _mimic(owner: str, element: ElementTree.Element) -> Mimic | None:
     mimic = element.find("mimic")
     if mimic is None:
         return None
-    (multiplier,) = _numbers(owner, mimic, "multiplier", 1, STEEPEST, default=1.0)
-    (offset,) = _numbers(owner, mimic, "offset", 1, WIDEST, default=0.0)
+    (multiplier,) = _numbers(owner, mimic, "multiplier", 1, 1e3, default=1.0)
+    (offset,) = _numbers(owner, mimic, "offset", 1, TOLERANCES.angle, default=0.0)
     return Mimic(mimic.get("joint", ""), multiplier, offset)
 
 
@@ -384,16 +361,17 @@ def _link(element: ElementTree.Element) -> Link:
     weight, tensor = inertial.find("mass"), inertial.find("inertia")
     if weight is None or tensor is None:
         raise InvalidInputError(f"{owner}: <inertial> needs <mass> and <inertia>")
-    (mass,) = _numbers(owner, weight, "value", 1, HEAVIEST)
+    (mass,) = _numbers(owner, weight, "value", 1, TOLERANCES.link_mass)
     if mass < 0.0:
         raise InvalidInputError(f"{owner}: mass must not be negative, got {mass:g} kg")
     xx, xy, xz, yy, yz, zz = (
-        _numbers(owner, tensor, name, 1, LARGEST_INERTIA)[0]
+        _numbers(owner, tensor, name, 1, TOLERANCES.link_inertia)[0]
         for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     principal = np.linalg.eigvalsh(own)
-    if principal[0] < -max(NEGATIVE * principal[-1], THIN**2 * mass):
+    # rounding, relative to the largest moment or to a radius of gyration of 1 µm
+    if principal[0] < -max(1e-9 * principal[-1], 1e-6**2 * mass):
         raise InvalidInputError(
             f"{owner}: its inertia must have no negative principal moment, got {principal[0]:g}"
         )

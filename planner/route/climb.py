@@ -18,7 +18,6 @@ from msgspec import structs
 from hand_models.base import Array, InvalidInputError, Pose
 from hand_models.parameters import Draw
 from planner.question import (
-    SOLVE,
     HandOnHold,
     Limits,
     Load,
@@ -56,7 +55,7 @@ class Move:
 
     hand: HandOnHold
     body: Pose | None = None
-    joints: Mapping[str, JointAngles] | Literal["solve"] = SOLVE
+    joints: Mapping[str, JointAngles] | Literal["solve"] = "solve"
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +272,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
         joint_fields |= {each: f"moves[{number - 1}].joints.{each}" for each in given}
         if joints is not None:
             if move.body is not None:
-                joints |= dict.fromkeys(hands, SOLVE)
+                joints |= dict.fromkeys(hands, "solve")
             joints |= {each: angles for each, angles in given.items() if each != limb}
         if move.body is not None:
             body, body_field = move.body, f"moves[{number - 1}].body"
@@ -283,7 +282,7 @@ def stages(route: Route) -> Iterator[RouteStage]:
         yield stage(number, "lift", limb, [hand for hand in hands.values() if hand.limb != limb])
         hands[limb], fields[limb] = move.hand, f"moves[{number - 1}]"
         if joints is not None:
-            joints[limb] = given.get(limb, SOLVE)
+            joints[limb] = given.get(limb, "solve")
         index += 1
         yield stage(number, "place", limb, list(hands.values()))
 
@@ -292,7 +291,7 @@ def _joints_of(start: Stance) -> dict[str, JointAngles] | None:
     """Return the joints of a start stance limb by limb; None where nothing is said of them."""
     if start.joints is None:
         return None
-    found: dict[str, JointAngles] = dict.fromkeys(start.solved_limbs, SOLVE)
+    found: dict[str, JointAngles] = dict.fromkeys(start.solved_limbs, "solve")
     return found | start.given_joints
 
 
@@ -305,7 +304,7 @@ def _on_rock(
         for limb, angles in joints.items()
         if limb in limbs or not isinstance(angles, str)
     }
-    return found if any(not isinstance(angles, str) for angles in found.values()) else SOLVE
+    return found if any(not isinstance(angles, str) for angles in found.values()) else "solve"
 
 
 def in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInputError:

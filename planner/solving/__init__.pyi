@@ -1,6 +1,6 @@
 from .dual_bounds import is_least as is_least, least_bound as least_bound
 from .objectives import (
-    OBJECTIVES as OBJECTIVES,
+    NAMED_OBJECTIVES as NAMED_OBJECTIVES,
     CappedObjective as CappedObjective,
     MaxMargin as MaxMargin,
     Objective as Objective,

@@ -22,6 +22,7 @@ On the way there the first row that would break becomes active; at its end the o
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -30,33 +31,33 @@ import numpy.typing as npt
 from hand_models.base import Array
 from planner.programs import StanceData
 
-__all__ = ["ApartError", "Face", "Mask", "Optimum", "Point", "Rows", "optimum"]
+__all__ = [
+    "TOLERANCES",
+    "ApartError",
+    "Face",
+    "Mask",
+    "Optimum",
+    "Point",
+    "Rows",
+    "SolvingTolerances",
+    "optimum",
+]
 
 Mask = npt.NDArray[np.bool_]
 
-MANY: Final = 96
-"""Rows that may break on the way to where active ones meet; with more, it is sooner solved anew."""
 
-HOLDS: Final = 1e-9
-"""Tolerance of a row, scaled."""
+@dataclass(frozen=True, slots=True)
+class SolvingTolerances:
+    """Of a plan's optimum."""
 
-PUSHES: Final = 1e-14
-"""Tolerance of a multiplier below zero at a weight of 1; those of the limits add up to one."""
+    row: float = 1e-9  # scaled, of one that holds
+    multiplier: float = 1e-14
+    """Below zero at a weight of 1; those of the limits add up to one."""
+    stationarity: float = 1e-13  # of Q z + Cᵀ λ = 0 at a weight of 1
+    optimality: float = 1e-5  # relative gap of the utilisation to its proven lower bound
 
-SOFT: Final = 1e-13
-"""Softness of S, whose diagonal is scaled to ones."""
 
-STEPS: Final = 6
-"""Newton's steps for a set of active rows, at most."""
-
-MET: Final = 1e-10
-"""Tolerance of the equations of rows, scaled."""
-
-STILL: Final = 1e-13
-"""Tolerance of Q z + Cᵀ λ = 0 at a weight of 1."""
-
-WHOLE: Final = 1e-9
-"""Tolerance of dᵀ λ = 1."""
+TOLERANCES: Final = SolvingTolerances()
 
 
 class Point(NamedTuple):
@@ -90,7 +91,7 @@ class Rows(NamedTuple):
 
     def tight(self, z: Array, u: float) -> Mask:
         """Return which rows are active at a point that keeps to all."""
-        active = self.room(z, u) <= HOLDS
+        active = self.room(z, u) <= TOLERANCES.row
         active[: self.equations] = True
         return active
 
@@ -123,7 +124,7 @@ class Face:
         diagonal = S.diagonal()
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         S = scale[:, None] * S * scale
-        S.flat[:: len(S) + 1] += SOFT
+        S.flat[:: len(S) + 1] += 1e-13  # soft, beside a diagonal of ones
         try:
             # S⁻¹ = rootᵀ root
             self.root = np.linalg.inv(np.linalg.cholesky(S)) * scale
@@ -152,10 +153,16 @@ class Face:
             raise ApartError
         C, d, b, root, Q = self.C, self.d, self.b, self.root, weight * self.Q
         z, u, multipliers = start.z, start.u, start.multipliers[self.active]
-        for taken in range(STEPS):
+        met = 1e-10  # of the equations of rows, scaled
+        sum_met = 1e-9  # of dᵀ λ = 1
+        for taken in range(6):  # Newton's steps
             r1, r2 = -Q * z - multipliers @ C, b + d * u - C @ z
             r3 = 0.0 if fixed else 1.0 - float(d @ multipliers)
-            still = _size(r1) <= STILL * weight and _size(r2) <= MET and abs(r3) <= WHOLE
+            still = (
+                _size(r1) <= TOLERANCES.stationarity * weight
+                and _size(r2) <= met
+                and abs(r3) <= sum_met
+            )
             if taken and still:
                 whole = np.zeros(len(self.active))
                 whole[self.active] = multipliers
@@ -176,10 +183,12 @@ class Face:
         r1 = -weight * self.Q * least.z - least.multipliers[self.active] @ self.C
         step = (self.root @ (self.flexible @ r1)) @ self.root
         step -= float(self.d @ step) / self.stiffness * self.across
-        if _size(r1 - step @ self.C) > STILL * weight:
+        if _size(r1 - step @ self.C) > TOLERANCES.stationarity * weight:
             return False
         multipliers = least.multipliers[self.active] + step
-        return bool(multipliers[self.equations :].min(initial=0.0) >= -PUSHES * weight)
+        return bool(
+            multipliers[self.equations :].min(initial=0.0) >= -TOLERANCES.multiplier * weight
+        )
 
 
 class Optimum(NamedTuple):
@@ -230,9 +239,9 @@ def optimum(
         found = face.least(Point(z, u, multipliers), weight, fixed=fixed)
         after = rows.room(found.z, found.u)
         after[active] = 0.0
-        if after.min() < -HOLDS:
-            broken = np.flatnonzero(after < -HOLDS)
-            if len(broken) > MANY:
+        if after.min() < -TOLERANCES.row:
+            broken = np.flatnonzero(after < -TOLERANCES.row)
+            if len(broken) > 96:  # with more it is sooner solved anew
                 return None
             room = np.maximum(rows.room(z, u)[broken], 0.0)
             way = room / (room - after[broken])
@@ -243,7 +252,7 @@ def optimum(
             continue
         z, u, multipliers = found
         signed = multipliers[rows.equations :]
-        pulls = np.flatnonzero(signed < -PUSHES * weight)
+        pulls = np.flatnonzero(signed < -TOLERANCES.multiplier * weight)
         if not len(pulls):
             return Optimum(found, face)
         # those of a larger weight are many at first

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs import TIE, Outcome, StanceData, tie_weight
+from planner.programs import TIE_WEIGHT, Outcome, StanceData, tie_weight
+from planner.solving.active_set import TOLERANCES
 
 __all__ = [
-    "OPTIMAL",
     "convex_bound",
     "is_least",
     "least_bound",
@@ -19,19 +18,10 @@ __all__ = [
     "unproven_sentences",
 ]
 
-OPTIMAL: Final = 1e-5
-"""Largest relative gap of the utilisation to its proven lower bound."""
-
-ROUNDED: Final = 1e-9
-"""Relative rounding error of a bound."""
-
-STATIONARY: Final = 1e-5
-"""Tolerance of multipliers from stationary, and below zero, to count as a bound."""
-
 
 def is_least(value: float, bound: float) -> bool:
-    """Return whether a utilisation, or an effort, is as low as its bound, within `OPTIMAL`."""
-    return value - bound <= OPTIMAL * max(1.0, value)
+    """Return whether a utilisation, or an effort, is as low as its bound, within 1e-5."""
+    return value - bound <= TOLERANCES.optimality * max(1.0, value)
 
 
 def unproven_sentences(words: str, value: float, bound: float) -> tuple[str, ...]:
@@ -61,13 +51,14 @@ def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> floa
         u ≥ [least of u + ∇f(z₁)·z] + f(z₁) − ∇f(z₁)·z₁ − f(z),
 
     the first as in `least_bound`. Of a plan with at most the utilisation u₁ of z₁, f(z) is at most
-    `TIE` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to none).
+    `TIE_WEIGHT` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to
+    none).
     ``share``: how much of its weight the second term had.
     """
     rows = data.rows
     z = np.concatenate(outcome.loads) / rows.unit
     small = share * tie_weight(len(data.hands)) * rows.tie * z
-    value = -float(small @ z) - share * TIE * outcome.value**2
+    value = -float(small @ z) - share * TIE_WEIGHT * outcome.value**2
     slopes = 2.0 * small
     return _dual_bound(data, outcome, slopes, 0.0, _missing(outcome)) + value
 
@@ -112,12 +103,13 @@ def _dual_bound(
         return -math.inf
     signed = np.concatenate([*outcome.limit_duals, *outcome.hard_duals])
     scale = max(1.0, abs(outcome.value))
-    if signed.min(initial=0.0) < -STATIONARY * scale:
+    tolerance = 1e-5  # of multipliers from stationary, and below zero
+    if signed.min(initial=0.0) < -tolerance * scale:
         return -math.inf
     stationary = np.append(nu, signed) @ rows.whole
     if slopes is not None:
         stationary += slopes
-    if leak + float(np.abs(stationary).sum()) > STATIONARY * scale:
+    if leak + float(np.abs(stationary).sum()) > tolerance * scale:
         return -math.inf
-    below = float(signed @ rows.rest + nu @ data.offset) + ROUNDED * scale
+    below = float(signed @ rows.rest + nu @ data.offset) + 1e-9 * scale  # rounding, relative
     return -below - cap * float(signed[: rows.limits].sum())

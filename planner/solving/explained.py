@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -15,10 +15,6 @@ from planner import deadline
 from planner.advice import Attempt
 from planner.deadline import Unfinished, late, late_sentence
 from planner.explanation import (
-    LEAST_FACTOR,
-    NO_FACTOR,
-    UNKNOWN,
-    UNPROVEN,
     ActiveLimits,
     LimitUse,
     certify,
@@ -34,7 +30,7 @@ from planner.explanation import (
     unsafe_sentence,
 )
 from planner.prepare import PreparedStance
-from planner.programs import SLACK, SOLVER
+from planner.programs import CAP_SLACK
 from planner.result import (
     Certificate,
     Clearance,
@@ -55,9 +51,6 @@ from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
 
 __all__ = ["explained_plan", "unexplained"]
-
-LEFT: Final = 0.5
-"""Distance from the closing tension up to which a tension stays [N]: finer than motors hold."""
 
 
 def explained_plan(
@@ -120,7 +113,7 @@ def explained_plan(
         load_factor_status=factor.status if "load_factor" in question.want else "not_asked",
         findings=(*checks.findings, *odd),
         warnings=warnings,
-        solver=Solver(SOLVER, solution.least.status, solution.least.iterations),
+        solver=Solver("CLARABEL", solution.least.status, solution.least.iterations),
         time=Time(prepared_at - start, solved - prepared_at, time.perf_counter() - start),
         unfinished=unfinished,
         **parts,
@@ -166,10 +159,12 @@ def _of_plan(
         parts["path"] = path = tension_path(prepared, solution.sets, solution.loads, idle)
         unfinished += late("path") if path is None else ()
         if path is None and not unfinished:
-            warnings.append(UNKNOWN)
+            warnings.append(
+                "whether the straight way from the present tensions is safe was not found out"
+            )
         elif path is not None and not path.safe:
             warnings.append(unsafe_sentence(path))
-    if found.whole > cap + SLACK:
+    if found.whole > cap + CAP_SLACK:
         parts["status"] = "overloaded"
         if question.explain:
             proof = _overload(prepared, found, idle)
@@ -196,11 +191,11 @@ def _overload(
     """
     cap, used = prepared.question.limits.utilisation, found.utilisation
     most = max(idle, key=lambda each: each.utilisation, default=None)
-    beyond = [each for each in idle if each.utilisation > cap + SLACK]
+    beyond = [each for each in idle if each.utilisation > cap + CAP_SLACK]
     proven = found.solution.proven
     if most is not None and beyond and most.utilisation >= used:
         alone: bool | None = len(beyond) == 1
-        if used > cap + SLACK:
+        if used > cap + CAP_SLACK:
             alone = False if proven else None
         return certify_idle(most, cap, alone)
     if not proven:
@@ -221,7 +216,7 @@ def _spare_findings(prepared: PreparedStance, found: Verified) -> Iterator[Findi
             f"{without:.4g}, with it {solution.least.value:.4g}"
         )
         off = np.abs(solution.loads[i][: len(FINGERS)] - closing[i]).max()
-        if off <= LEFT:
+        if off <= 0.5:  # [N]: finer than motors hold
             message += f"; its tendons are left at their closing tension of {closing[i]:g} N"
         field = f"stance.hands[{i}]"
         yield Finding("hand_adds_nothing", field, message, without, "1")
@@ -241,16 +236,19 @@ def _wrist_warnings(prepared: PreparedStance, answer: Answer) -> Iterator[str]:
         if isinstance(answer, Verified):
             yield from far_wrists(answer.by_hand())
     if not answer.solution.proven:
-        yield UNPROVEN
+        yield (
+            "the floating wrists are where their hands' stiffness jumps or the search ended: the "
+            "loads are exact, but that no other pose uses less is not proven"
+        )
 
 
 def _factor_warnings(prepared: PreparedStance, factor: LoadFactor) -> Iterator[str]:
     """Yield what a caller should know of the load factor."""
     if "load_factor" in prepared.question.want:
         if prepared.hands.floating and factor.status == "none":
-            yield NO_FACTOR
+            yield "no load factor was found; with floating wrists that is no proof of none"
         if factor.least:
-            yield LEAST_FACTOR
+            yield ("the load factor is a lower bound: beyond it no plan was found, nor proven away")
 
 
 def _residual(prepared: PreparedStance, found: Verified) -> Array:
@@ -281,10 +279,10 @@ def _explain(
     most = binding.limiting(found.used, found.whole, idle)
     if most is None:
         return None, "nothing limits this stance"
-    held = found.whole <= 1.0 + SLACK
+    held = found.whole <= 1.0 + CAP_SLACK
     hand = next((hand for hand in hands if hand.limb == most.name.limb), None)
     sentence = limit_sentence(most, hand, held=held)
-    if held and found.whole > cap + SLACK:
+    if held and found.whole > cap + CAP_SLACK:
         sentence += f"; that is beyond the utilisation of {cap:g} that was asked for"
     return most.name, sentence
 
@@ -292,7 +290,7 @@ def _explain(
 def _prices(binding: ActiveLimits, found: Verified, idle: Sequence[LimitUse]) -> tuple[Price, ...]:
     """Return what more of each limit that binds would take off the utilisation."""
     most = max(idle, key=lambda used: used.utilisation, default=None)
-    if most is not None and most.utilisation > found.utilisation + SLACK:
+    if most is not None and most.utilisation > found.utilisation + CAP_SLACK:
         # a limb without a hand bears the most: nothing else counts
         price = most.utilisation / most.capacity
         return (Price.of(most.name, price, unit_of(most.name.limit)),)

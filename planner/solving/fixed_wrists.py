@@ -17,7 +17,7 @@ from hand_models.base import Array
 from planner import deadline, programs
 from planner.deadline import Budget, Unfinished, late
 from planner.prepare import HandSets, PreparedStance, Sets
-from planner.programs import SLACK, Outcome, StanceData, tension_trade
+from planner.programs import CAP_SLACK, Outcome, StanceData, tension_trade
 from planner.result import LoadFactor
 from planner.solving.dual_bounds import least_bound, unproven_sentences
 from planner.solving.objectives import MAX_MARGIN, CappedObjective
@@ -88,10 +88,10 @@ class FixedSolution(Solution):
         self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
     ) -> FixedSolution:
         used = self.least.value
-        if not self.loads or used > self.cap + SLACK:
+        if not self.loads or used > self.cap + CAP_SLACK:
             return self
         # where the least utilisation is the cap itself, rounding must not empty the set
-        cap, data = max(self.cap, used + 0.5 * SLACK), self.sets.data
+        cap, data = max(self.cap, used + 0.5 * CAP_SLACK), self.sets.data
         best = objective.solve(data, cap)
         if not best.solved:
             if deadline.expired():

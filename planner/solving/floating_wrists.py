@@ -18,7 +18,7 @@ from planner.floating import (
     with_room,
 )
 from planner.prepare import PreparedStance
-from planner.programs import SLACK, StanceData, tension_trade
+from planner.programs import CAP_SLACK, StanceData, tension_trade
 from planner.result import LoadFactor, WristPlan
 from planner.solving.dual_bounds import least_bound, unproven_sentences
 from planner.solving.objectives import MAX_MARGIN, CappedObjective
@@ -54,7 +54,7 @@ class FloatingSolution(Solution):
         self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
     ) -> FloatingSolution:
         used = self.search.measure.utilisation
-        if not self.loads or used > self.cap + SLACK:
+        if not self.loads or used > self.cap + CAP_SLACK:
             return self
         cap = with_room(self.cap, used)
         search = best_within(prepared.hands, self.search, cap, objective.goal, budget)

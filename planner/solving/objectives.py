@@ -2,7 +2,7 @@
 
 Every question is first answered with the plan of least utilisation, which says whether the limits
 can be kept. A `CappedObjective` then takes the best plan of its own within them. To add one is to
-write such a class, and to enter it in `OBJECTIVES`; or a question has the object itself.
+write such a class, and to enter it in `NAMED_OBJECTIVES`; or a question has the object itself.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from planner.solving.dual_bounds import convex_bound
 
 __all__ = [
     "MAX_MARGIN",
-    "OBJECTIVES",
+    "NAMED_OBJECTIVES",
     "CappedObjective",
     "MaxMargin",
     "MinEffort",
@@ -143,7 +143,7 @@ class MinEffort(CappedObjective):
 
 MAX_MARGIN: Final = MaxMargin()
 
-OBJECTIVES: Final[Mapping[str, Objective]] = {
+NAMED_OBJECTIVES: Final[Mapping[str, Objective]] = {
     objective.name: objective for objective in (MAX_MARGIN, MinEffort())
 }
 """Those that a question may name."""
@@ -158,11 +158,11 @@ def objective_of(question: Question) -> Objective:
         If it has neither a name nor an objective.
     """
     asked = question.objective
-    found = OBJECTIVES[asked] if isinstance(asked, str) else asked
+    found = NAMED_OBJECTIVES[asked] if isinstance(asked, str) else asked
     if not isinstance(found, Objective):
         raise InvalidInputError(
             f"an Objective or a name is needed, got a {type(found).__name__}; valid names are "
-            f"{', '.join(OBJECTIVES)}",
+            f"{', '.join(NAMED_OBJECTIVES)}",
             field="objective",
         )
     return found

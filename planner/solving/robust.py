@@ -12,13 +12,14 @@ left of p (1 − p), the variance of the share of all samples below is
     Σ_h σ_h² / places + (p (1 − p) − Σ_h σ_h²) / samples,
 
 as of random places, which are less even than those here. The interval has the order statistics at
-the quantiles `SURE` standard deviations off.
+the quantiles 1.96 standard deviations off.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 from zlib import crc32
 
@@ -41,18 +42,19 @@ from planner.solving.fixed_wrists import most_of_fixed
 
 __all__ = ["find_robust_load_factor"]
 
-SEED: Final = 0
-"""Seed of the places and of their combinations."""
 
-ROUNDS: Final = 16
-"""Samples that take each place: with 4 the tenth of an overhang's load factors changes by 6 % (rms)
-with the seed, with 8 by 3 %."""
+@dataclass(frozen=True, slots=True)
+class RobustSettings:
+    """Which samples are planned."""
 
-SURE: Final = 1.96
-"""Standard deviations to either side of a quantile that hold it in 95 %."""
+    seed: int = 0  # of the places and of their combinations
+    rounds: int = 16
+    """Samples that take each place: with 4 the tenth of an overhang's load factors changes by 6 %
+    (rms) with the seed, with 8 by 3 %."""
+    late: str = "all samples were planned"  # what a deadline may leave unfinished
 
-LATE: Final = "all samples were planned"
-"""Words for the work that a deadline may leave unfinished."""
+
+SETTINGS: Final = RobustSettings()
 
 Places = Sequence[WrenchSpace | None]
 """The sets of a hand at its places; None where it cannot be."""
@@ -74,11 +76,11 @@ def find_robust_load_factor(
         places = [_places(prepared, i, reasons) for i in range(len(prepared.limbs))]
         taken = np.array([_taken(limb) for limb in prepared.limbs])
         factors = _factors(prepared, places, taken, overloaded)
-        deadline.check(LATE)
+        deadline.check(SETTINGS.late)
     except DeadlineError:
         return None
     refused = {
-        limb: ROUNDS * sum(each is None for each in own)
+        limb: SETTINGS.rounds * sum(each is None for each in own)
         for limb, own in zip(prepared.limbs, places, strict=True)
         if None in own
     }
@@ -91,7 +93,7 @@ def find_robust_load_factor(
         refused=refused,
         position=position,
         angle=angle,
-        seed=SEED,
+        seed=SETTINGS.seed,
         worst=hundredth,
         tenth=tenth,
         tenth_interval=_interval(factors, taken, SCATTER_SETTINGS.tenth),
@@ -110,7 +112,7 @@ def _places(prepared: PreparedStance, i: int, reasons: dict[str, str]) -> Places
     stance, settled = prepared.question.stance, prepared.batch.hands[i]
     hand, cap = stance.robot.hand, prepared.question.limits.tendon_tension
     added, found = prepared.hands.added[i], list[WrenchSpace | None]()
-    where = scattered_places(prepared.limbs[i], SCATTER_SETTINGS.places, SEED)
+    where = scattered_places(prepared.limbs[i], SCATTER_SETTINGS.places, SETTINGS.seed)
     for outcomes in closed_about(hand, settled, where, hand.seat_scatter):
         there = [each for each in outcomes if isinstance(each, SettledHand)]
         for each in outcomes:
@@ -120,14 +122,15 @@ def _places(prepared: PreparedStance, i: int, reasons: dict[str, str]) -> Places
         found += [
             added.on(next(spaces)) if isinstance(each, SettledHand) else None for each in outcomes
         ]
-        deadline.check(LATE)
+        deadline.check(SETTINGS.late)
     return found
 
 
 def _taken(limb: str) -> Indices:
     """Return which place of a hand each sample takes, shape (samples,)."""
-    own = np.random.default_rng([SEED, crc32(limb.encode()), ROUNDS])
-    return np.concatenate([own.permutation(SCATTER_SETTINGS.places) for _ in range(ROUNDS)])
+    own = np.random.default_rng([SETTINGS.seed, crc32(limb.encode()), SETTINGS.rounds])
+    rounds = [own.permutation(SCATTER_SETTINGS.places) for _ in range(SETTINGS.rounds)]
+    return np.concatenate(rounds)
 
 
 def _factors(
@@ -142,7 +145,7 @@ def _factors(
     if overloaded:
         return factors
     for k, sample in enumerate(taken.T.tolist()):
-        deadline.check(LATE)
+        deadline.check(SETTINGS.late)
         spaces = [own[at] for own, at in zip(places, sample, strict=True)]
         there = [space for space in spaces if space is not None]
         if len(there) == len(spaces):
@@ -159,11 +162,13 @@ def _interval(factors: Array, taken: Indices, percent: float) -> list[float]:
     whole = share * (1.0 - share)
     between = 0.0
     for own in taken:
-        means = np.bincount(own, below, SCATTER_SETTINGS.places) / ROUNDS
+        means = np.bincount(own, below, SCATTER_SETTINGS.places) / SETTINGS.rounds
         # what so few samples at each place vary by themselves is taken off
-        between += max(float(means.var(ddof=1)) - whole / ROUNDS, 0.0) / (1.0 - 1.0 / ROUNDS)
+        own_share = 1.0 / SETTINGS.rounds
+        between += max(float(means.var(ddof=1)) - whole / SETTINGS.rounds, 0.0) / (1.0 - own_share)
     between = min(between, whole)
-    off = SURE * math.sqrt(between / SCATTER_SETTINGS.places + (whole - between) / samples)
+    # 1.96 standard deviations to either side hold it in 95 %
+    off = 1.96 * math.sqrt(between / SCATTER_SETTINGS.places + (whole - between) / samples)
     ends = np.clip([share - off, share + off], 0.0, 1.0)
     found: list[float] = np.quantile(factors, ends).tolist()
     return found

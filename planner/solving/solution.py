@@ -12,7 +12,7 @@ from hand_models.base import Array
 from planner import deadline
 from planner.deadline import Budget, Unfinished
 from planner.prepare import PreparedStance, Sets
-from planner.programs import SLACK, Outcome
+from planner.programs import CAP_SLACK, Outcome
 from planner.result import Certificate, HandPlan, LoadFactor, PlanArrays, WristPlan
 from planner.solving.objectives import CappedObjective, Objective
 
@@ -173,7 +173,7 @@ def load_factor_of(
     if not prepared.needs_hands:
         # any multiple of it can be held, or none
         least = answer.solution.least
-        held = least.solved and least.value <= 1.0 + SLACK
+        held = least.solved and least.value <= 1.0 + CAP_SLACK
         return LoadFactor(unbounded=held and not isinstance(answer, Infeasible))
     if deadline.expired():
         return LoadFactor(unfinished=True)

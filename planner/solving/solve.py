@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final
 
 import numpy as np
 
@@ -15,9 +14,9 @@ from planner import deadline, programs
 from planner.advice import Trial, advise
 from planner.deadline import Budget, late_sentence
 from planner.explanation import LimitUse, certify
-from planner.floating import PROGRAMS
+from planner.floating import SETTINGS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
-from planner.programs import LOAD_UNIT, UNLIMITED
+from planner.programs import LOAD_BOX, LOAD_UNIT
 from planner.question import Question, checked_body_wrench
 from planner.result import LoadFactor, Plan, Time
 from planner.solving.explained import explained_plan, unexplained
@@ -28,12 +27,6 @@ from planner.solving.solution import Answer, Failed, Infeasible, Solution, load_
 from planner.solving.verified import Checks, prepare_checks, recover, verify
 
 __all__ = ["KnownStance", "plan", "plan_on", "try_stance", "with_advice"]
-
-SQUEEZED: Final = 1e3
-"""Loads over the body's force beyond which hands do little but squeeze each other."""
-
-BALANCED: Final = 1e-7
-"""Distance to the nearest body wrench, relative, below which rounding alone is to blame."""
 
 
 def plan(question: Question) -> Plan:
@@ -83,7 +76,7 @@ def plan_on(
     DeadlineError
         If the deadline comes before anything is found that passes the checks.
     """
-    question, modelled, budget = prepared.question, time.perf_counter(), Budget(PROGRAMS)
+    question, modelled, budget = prepared.question, time.perf_counter(), Budget(SETTINGS.programs)
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
     checks = prepare_checks(prepared) if known is None else known
     answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
@@ -132,7 +125,7 @@ def _first_verified(prepared: PreparedStance, checks: Checks, found: Iterable[So
 
 
 def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
-    """Return whether loads of a plan of fixed wrists exceed `UNLIMITED`, and the need by far.
+    """Return whether loads of a plan of fixed wrists exceed `LOAD_BOX`, and the need by far.
 
     With such loads the body is balanced where the hard rows nearly contradict the balance.
     """
@@ -140,7 +133,8 @@ def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
         return False
     most = max(np.abs(loads).max(initial=0.0) for loads in found.solution.least.loads)
     needed = float(np.linalg.norm(prepared.wrench[:3]))
-    return bool(most > max(UNLIMITED * LOAD_UNIT, SQUEEZED * needed))
+    # with a thousand times the need, hands do little but squeeze each other
+    return bool(most > max(LOAD_BOX * LOAD_UNIT, 1e3 * needed))
 
 
 def _second_look(
@@ -160,7 +154,8 @@ def _second_look(
         deadline.check("a plan was found")
     data = solution.sets.data
     nearest = programs.nearest(data)
-    far = BALANCED * max(1.0, float(np.linalg.norm(data.wrench)))
+    # relative distance for which rounding alone is to blame
+    far = 1e-7 * max(1.0, float(np.linalg.norm(data.wrench)))
     if nearest.solved and nearest.value <= far:
         if prepared.hands.floating or not isinstance(found, Failed):
             return found
@@ -195,7 +190,7 @@ def try_stance(
     near : Solution, optional
         A plan of much the same stance, where solving begins.
     """
-    budget = Budget(PROGRAMS)
+    budget = Budget(SETTINGS.programs)
     checks = Checks.of(prepared, idle)
     answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
     if isinstance(answer, Failed):

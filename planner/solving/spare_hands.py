@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,17 +30,6 @@ from planner import deadline, programs
 from planner.programs import LOAD_UNIT, Outcome, StanceData, TensionTrade
 
 __all__ = ["SpareHand", "at_closing", "less_tense", "spare_hands"]
-
-STIFFEST: Final = 100.0
-"""Largest of 1 / (1 − f): a newton off closing is then as dear as ten in other hands."""
-
-BOUND: Final = 1e-6
-"""Relative excess of u* − v over the bound's least from which on no program is solved.
-
-Where a hand alone sets u*, Σ λ is one and both are zero but for rounding."""
-
-BODY: Final = 6
-"""Rows of a balance that has no given wrenches of hands, with which nothing is taken away."""
 
 
 class SpareHand(NamedTuple):
@@ -72,7 +61,8 @@ def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[
     trade : TensionTrade
     """
     room = trade.most - exact.value
-    if room <= 0.0 or len(data.hands) < 2 or len(data.wrench) > BODY:
+    # with more than the body's six rows of balance, a hand's wrench is given
+    if room <= 0.0 or len(data.hands) < 2 or len(data.wrench) > 6:
         return ()
     if exact.balance_dual is None:  # the solver gave no multipliers
         return ()
@@ -81,7 +71,8 @@ def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[
         limits, hard = exact.limit_duals[i], exact.hard_duals[i]
         share = 1.0 - float(np.add.reduce(limits))
         own = float(limits @ hand.l0 - hard @ hand.h + exact.balance_dual @ hand.g)
-        if exact.value - own > share * trade.most + BOUND * max(1.0, exact.value):
+        # where a hand alone sets u*, Σ λ is one and both are zero but for rounding
+        if exact.value - own > share * trade.most + 1e-6 * max(1.0, exact.value):
             continue
         if deadline.expired():
             break
@@ -113,7 +104,8 @@ def at_closing(
     centres = [np.zeros(len(hand.unit)) for hand in hands]
     for i, _, part in spare:
         centres[i][: len(FINGERS)] = part * closing[i] / LOAD_UNIT
-        stiffness = 1.0 / max(1.0 - part, 1.0 / STIFFEST)
+        # a newton off closing is then as dear as ten in other hands
+        stiffness = 1.0 / max(1.0 - part, 1.0 / 100.0)
         hands[i] = hands[i].about(centres[i], stiffness)
     outcome = programs.less_tension(StanceData.of(tuple(hands), data.wrench), trade)
     loads = [

@@ -20,7 +20,7 @@ from planner.advice import Attempt
 from planner.deadline import DeadlineError
 from planner.explanation import LimitUse
 from planner.prepare import PreparedStance
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import DrawnHand, drawn_hands, drawn_quantities
 from planner.result import DrawnPlan, Spread
 from planner.solving.solution import Solution
@@ -100,4 +100,4 @@ def _planned(
     used, factor = trial.utilisation, trial.load_factor().factor
     if math.isinf(used):
         return DrawnPlan(load_factor=factor)
-    return DrawnPlan(used, factor, used <= there.question.limits.utilisation + SLACK)
+    return DrawnPlan(used, factor, used <= there.question.limits.utilisation + CAP_SLACK)

@@ -16,14 +16,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
 from planner import deadline, programs
 from planner.programs import (
-    TIE,
+    TIE_WEIGHT,
     Outcome,
     StanceData,
     TensionTrade,
@@ -32,23 +32,11 @@ from planner.programs import (
     tie_weight,
 )
 from planner.solving import dual_bounds
-from planner.solving.active_set import ApartError, Optimum, Point, Rows, optimum
-from planner.solving.dual_bounds import OPTIMAL, is_least
+from planner.solving.active_set import TOLERANCES, ApartError, Optimum, Point, Rows, optimum
+from planner.solving.dual_bounds import is_least
 from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 
 __all__ = ["LeastUtilisation", "active_set_optimum", "least_utilisation"]
-
-SURE: Final = (1e-6, 1.0)
-"""Least ratios of a row's multiplier to its slack at which the row is active at first."""
-
-ROUNDS: Final = 12
-"""Sets of active rows that are tried at most."""
-
-LARGE: Final = 64
-"""Loads of a stance up to which so many systems are worth it: fewer for more, by their cube."""
-
-FREE: Final = 1e-6
-"""Excess over one of the sum of the limits' multipliers where u is not free."""
 
 
 class LeastUtilisation(NamedTuple):
@@ -87,7 +75,8 @@ def least_utilisation(
     """Return the least utilisation, and the plan that is meant.
 
     What makes the plan of `programs.unique` unique exceeds the least utilisation by up to
-    `program.TIE` times its square: far beyond the limits it is asked for again with less weight.
+    `program.TIE_WEIGHT` times its square: far beyond the limits it is asked for again with
+    less weight.
 
     Parameters
     ----------
@@ -120,7 +109,7 @@ def least_utilisation(
 
 def _far_beyond(outcome: Outcome) -> bool:
     """Return whether the term that makes a plan unique may cost more utilisation than counts."""
-    return OPTIMAL * outcome.value < TIE * outcome.value**2
+    return TOLERANCES.optimality * outcome.value < TIE_WEIGHT * outcome.value**2
 
 
 class ActiveSetOptimum(NamedTuple):
@@ -169,14 +158,16 @@ def active_set_optimum(
         return None
     # with exact multipliers the bound of `unique_bound` is the optimum but for second terms
     point = found.point
-    second = 0.5 * float(Q @ point.z**2) - share * TIE * point.u**2
+    second = 0.5 * float(Q @ point.z**2) - share * TIE_WEIGHT * point.u**2
     outcome = _outcome(data, point)
     return ActiveSetOptimum(outcome, point.u + second, found, rows, weight)
 
 
 def _rounds(size: int) -> int:
     """Return how many sets of active rows are sooner tried than a program is solved anew."""
-    return min(ROUNDS, int(ROUNDS * (LARGE / size) ** 3))
+    most = 12  # sets of active rows, at most
+    # so many systems are worth it up to 64 loads: fewer for more, by their cube
+    return min(most, int(most * (64 / size) ** 3))
 
 
 def _meant(
@@ -234,7 +225,7 @@ def _nearby(
     rows, Q, weight = exact.rows, exact.found.face.Q, trade.weight / exact.weight
     start = _point(data, near)
     # at the most that is given away the multipliers of limits add up to more
-    fixed = float(rows.d @ start.multipliers) > 1.0 + FREE
+    fixed = float(rows.d @ start.multipliers) > 1.0 + 1e-6
     if fixed:
         start = start._replace(u=trade.most)
     found = _on_active_rows(rows, Q, start, rounds, weight, fixed=fixed)
@@ -250,7 +241,7 @@ def _on_active_rows(
 ) -> Optimum | None:
     """Return the optimum from the rows that are active where a solver ended; None if too far."""
     room = rows.room(start.z, start.u)
-    for sure in SURE:
+    for sure in (1e-6, 1.0):  # ratios of multiplier to slack; more rows first
         active = start.multipliers > sure * room
         active[: rows.equations] = True
         try:

@@ -11,7 +11,7 @@ import numpy as np
 from planner import programs
 from planner.explanation import LimitUse, joint_name, oddities
 from planner.prepare import HandBatch, PreparedStance
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.result import (
     Finding,
     HandPlan,
@@ -53,7 +53,7 @@ class Checks(NamedTuple):
     @property
     def overloaded(self) -> bool:
         """True if a limb without a hand cannot bear itself, whatever the body needs."""
-        return any(used.utilisation > 1.0 + SLACK for used in self.idle)
+        return any(used.utilisation > 1.0 + CAP_SLACK for used in self.idle)
 
     @classmethod
     def of(cls, prepared: PreparedStance, idle: Sequence[LimitUse] | None = None) -> Checks:

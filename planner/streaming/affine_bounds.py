@@ -6,32 +6,20 @@ every plan z of a body wrench W has
     u ≥ λ·(L z + l0) + μ·(H z − h) + ν·(G z + g − W) = λ·l0 − μ·h + ν·(g − W) + r·z,
 
 r = Lᵀλ + Hᵀμ + Gᵀν. A solver's multipliers leave a small r; they are repaired so that it is zero
-but for rounding. The bound is lowered by what is left of it, with no load above `UNLIMITED`. So the
+but for rounding. The bound is lowered by what is left of it, with no load above `LOAD_BOX`. So the
 bound holds exactly, and for every W, not only that of the program.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs import UNLIMITED, WRENCH_UNIT, Outcome, StanceData
+from planner.programs import LOAD_BOX, WRENCH_UNIT, Outcome, StanceData
 
 __all__ = ["AffineBound", "affine_bound"]
-
-NOTHING: Final = 1e-8
-"""A multiplier below this is taken for none."""
-
-REPAIRS: Final = 3
-"""Most steps of the repair; each takes nearly all of what is left."""
-
-ENOUGH: Final = 1e-9
-"""Price of what is left, in utilisation, that needs no further step."""
-
-DEAREST: Final = 1e-6
-"""Most of the utilisation that may be paid for what is left; with more there is no bound."""
 
 
 class AffineBound(NamedTuple):
@@ -67,7 +55,7 @@ def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
     assert outcome.balance_dual is not None
     limit, hard = np.concatenate(outcome.limit_duals), np.concatenate(outcome.hard_duals)
     signed = np.concatenate([limit, hard])
-    signed[signed < NOTHING] = 0.0
+    signed[signed < 1e-8] = 0.0  # less is the solver's error
     # stationarity (M rows) and Σ λ = 1, as rows over λ, μ, ν
     whole, balance = data.rows.whole, len(outcome.balance_dual)
     rows = np.zeros((whole.shape[1] + 1, len(whole)))
@@ -76,9 +64,10 @@ def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
     goal = np.zeros(len(rows))
     goal[-1] = 1.0
     multipliers = np.concatenate([signed, outcome.balance_dual])
-    for _ in range(REPAIRS):
+    for _ in range(3):  # each takes nearly all of what is left
         error = goal - rows @ multipliers
-        if UNLIMITED * float(np.abs(error).sum()) <= ENOUGH:
+        # so little of the utilisation needs no further step
+        if LOAD_BOX * float(np.abs(error).sum()) <= 1e-9:
             break
         # each changes in proportion to its size, so that none of the signed ones turns over
         weights = multipliers.copy()
@@ -90,8 +79,8 @@ def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
         np.maximum(multipliers[: len(signed)], 0.0, out=multipliers[: len(signed)])
     multipliers /= multipliers[: len(limit)].sum()
     left = (rows @ multipliers)[:-1]
-    price = UNLIMITED * float(np.abs(left).sum())
-    if not price <= DEAREST:
+    price = LOAD_BOX * float(np.abs(left).sum())
+    if not price <= 1e-6:  # of the utilisation: for more there is no bound
         return None
     nu = multipliers[len(signed) :]
     g = np.sum([hand.g for hand in data.hands], axis=0)

@@ -14,7 +14,7 @@ import logging
 import math
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,26 +26,6 @@ from planner.streaming.stream_stance import StreamStance
 __all__ = ["Mixture", "Prefetch"]
 
 log = logging.getLogger(__name__)
-
-SMALLEST: Final = 1.0 / 16.0
-"""Least part of the radius that is tried where a wrench of the 13 has no plan, or is overloaded."""
-
-SHELL: Final = 0.2
-"""Outermost part of an interpolation, in which its weight falls."""
-
-DRIFTED: Final = 0.5
-"""Part of its radius from the centre beyond which the next interpolation is solved."""
-
-AHEAD: Final = 0.5
-"""Distance of the next centre beyond the wrench, as part of the way from the last centre."""
-
-FADE: Final = 0.1
-"""Way over which a new interpolation takes over, as part of the radius."""
-
-AGAIN: Final = 0.25
-"""Way after which an interpolation that was not found is looked for again, in the same part."""
-
-NOTHING: Final = np.zeros((0, 0))
 
 
 class Mixture(NamedTuple):
@@ -113,7 +93,7 @@ class Prefetch:
 
     def mixture(self, wrench: Array) -> Mixture:
         """Return what the interpolations say of the wrench."""
-        weight, loads, bound, distance = 0.0, NOTHING, -math.inf, math.inf
+        weight, loads, bound, distance = 0.0, np.zeros((0, 0)), -math.inf, math.inf
         if self.newest is not None:
             distance, loads = self.newest.at(wrench)
             weight = self._fading * _weight(distance)
@@ -131,14 +111,16 @@ class Prefetch:
         """Let the next interpolation be solved if the wrench is far from the newest centre."""
         if self.coming is not None or self._thread is None:
             return
-        if self._missed is not None and self._way(self._missed, wrench) < AGAIN:
+        # what was not found is looked for again a quarter of a radius away
+        if self._missed is not None and self._way(self._missed, wrench) < 0.25:
             return
         centres = [wrench]
         if self.newest is not None:
-            if distance < DRIFTED or (self._fading < 1.0 and distance < 1.0):
+            if distance < 0.5 or (self._fading < 1.0 and distance < 1.0):  # half-way out
                 return
             if distance < 1.0:
-                centres.insert(0, wrench + AHEAD * (wrench - self.newest.centre))
+                # ahead by half of the way from the last centre
+                centres.insert(0, wrench + 0.5 * (wrench - self.newest.centre))
         self._missed = wrench
         self.coming = self._thread.submit(self._found, centres)
 
@@ -158,8 +140,9 @@ class Prefetch:
             return
         self.coming = self._missed = None
         self._before, self.newest = here[0] if here else None, new
+        fade = 0.1  # of the radius: the way over which a new one takes over
         # where no other has a weight, plans are solved, and at its centre they are the same
-        self._fade = FADE if here else min(FADE, self._way(last, new.centre))
+        self._fade = fade if here else min(fade, self._way(last, new.centre))
         self._fading = 0.0 if self._fade > 0.0 else 1.0
 
     def _way(self, start: Array, end: Array) -> float:
@@ -172,7 +155,8 @@ class Prefetch:
         try:
             for centre in centres:
                 radius, found = self._radius, None
-                while radius >= SMALLEST * self._radius and not deadline.expired():
+                # smaller where a wrench of the 13 has no plan, or is overloaded
+                while radius >= self._radius / 16.0 and not deadline.expired():
                     found = Interpolation.about(self._stance, centre, radius) or found
                     if found is not None and (found.most <= cap or found.utilisation > cap):
                         break
@@ -186,4 +170,4 @@ class Prefetch:
 
 def _weight(distance: float) -> float:
     """Return the weight φ of an interpolation at a distance Σ |t| from its centre."""
-    return min(max((1.0 - distance) / SHELL, 0.0), 1.0)
+    return min(max((1.0 - distance) / 0.2, 0.0), 1.0)  # it falls in the outermost fifth

@@ -17,34 +17,20 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import wait
-from typing import Final, Self
+from typing import Self
 
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, InvalidInputError, check_positive, finite_vector
 from hand_models.hand import FINGERS
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import Question, checked_body_wrench
 from planner.result import SetPoints, SetPointSource
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.prefetch import Mixture, Prefetch
 from planner.streaming.stream_stance import LoadEffects, StreamStance, SupportBound
 
-__all__ = ["RADIUS", "WrenchStream"]
-
-RADIUS: Final = 30.0
-"""Radius of an interpolation by default [N]; of moments a tenth, per metre."""
-
-LARGEST: Final = 1e4
-"""Largest radius [N]."""
-
-NEAR: Final = 0.01
-"""Utilisation below the cap from which on plans are solved one by one."""
-
-PROOFS: Final = 8
-"""Proofs that there is no plan which are kept, those found last."""
-
-NO_PLAN: Final = "a proof that is known shows that no plan balances the body"
+__all__ = ["WrenchStream"]
 
 
 class WrenchStream:
@@ -66,8 +52,8 @@ class WrenchStream:
         (`UnsupportedError`).
     """
 
-    def __init__(self, question: Question, *, radius: float = RADIUS) -> None:
-        check_positive(radius, "N", "radius", LARGEST)
+    def __init__(self, question: Question, *, radius: float = 30.0) -> None:
+        check_positive(radius, "N", "radius", 1e4)
         self.radius = float(radius)
         self.question = question
         self._stance = StreamStance(question)
@@ -167,7 +153,8 @@ class WrenchStream:
         share, loads, bound, _ = mixture
         if share > 0.0:
             read = self._stance.read(loads)
-            share *= min(max((self._stance.cap - read.utilisation) / NEAR, 0.0), 1.0)
+            # up to 0.01 below the cap plans are solved one by one
+            share *= min(max((self._stance.cap - read.utilisation) / 0.01, 0.0), 1.0)
             if share >= 1.0:
                 points = self._told(wrench, loads, read, bound, "interpolated")
                 if points.verified:
@@ -195,7 +182,7 @@ class WrenchStream:
         tensions = loads[:, : len(FINGERS)]
         used = float(max(utilisation, check.idle))
         return SetPoints(
-            status="optimal" if used <= stance.cap + SLACK else "overloaded",
+            status="optimal" if used <= stance.cap + CAP_SLACK else "overloaded",
             body_wrench=wrench,
             utilisation=used,
             gap=float(max(used - max(bound, check.idle), 0.0)),
@@ -213,7 +200,8 @@ class WrenchStream:
         """Return what a whole plan says of a wrench that the solver has no plan for."""
         for proof in self._proofs:
             if float(proof.direction @ wrench) > proof.most:
-                return SetPoints("infeasible", wrench, verified=True, reason=NO_PLAN)
+                known = "a proof that is known shows that no plan balances the body"
+                return SetPoints("infeasible", wrench, verified=True, reason=known)
         plan = self._stance.known.plan(wrench)
         if plan.hands is not None and plan.utilisation is not None:
             # of the nearest wrench that can be had: a hair off, by rounding
@@ -224,6 +212,6 @@ class WrenchStream:
                 return points
         found = self._stance.proof(plan)
         if plan.status == "infeasible" and found is not None:
-            self._proofs = [found, *self._proofs][:PROOFS]
+            self._proofs = [found, *self._proofs][:8]  # those found last
             return SetPoints("infeasible", wrench, verified=True, reason=plan.reason)
         return SetPoints("failed", wrench, verified=False, reason=plan.reason)

@@ -31,8 +31,8 @@ from planner.verification.hands import HandLimits, check_contacts
 from planner.verification.joint_balance import JointBalance
 from planner.verification.limbs import AskedLimits, JointUse, check_limbs, recompute_joints
 from planner.verification.residuals import (
-    COUNT,
-    UTILISATION,
+    FINGER_COUNT,
+    TOLERANCES,
     Names,
     Recomputed,
     Residual,
@@ -42,13 +42,7 @@ from planner.verification.residuals import (
 )
 from planner.verification.tiles import TileLimits
 
-__all__ = ["BALANCE", "Check"]
-
-BALANCE: Final = 1e-6
-"""Largest error of the balance, relative to the body wrench (moments over a metre)."""
-
-EFFORT: Final = 1e-6
-"""Largest error of the effort that a plan says, relative."""
+__all__ = ["Check"]
 
 
 class SettledLimits:
@@ -94,13 +88,15 @@ class SettledLimits:
         # the motors of hands that float stand still where they have tightened their tendons
         wound = f.copy()
         for h, tension in self.wound.items():
-            wound[COUNT * h : COUNT * (h + 1)] = tension
+            wound[FINGER_COUNT * h : FINGER_COUNT * (h + 1)] = tension
         shear, normal, left = recompute_floating(found, self.names, balance, arrays, wound)
         loads, (drawn, _) = np.column_stack((shear, normal, lateral)), balance.loads(wound, lateral)
         return Recomputed(arrays, loads, left, wound, drawn[:, 0], nails)
 
 
-KNOWN: Final[BoundedStore[Hashable, SettledLimits]] = BoundedStore("limits of settled hands", 64)
+SETTLED_LIMITS: Final[BoundedStore[Hashable, SettledLimits]] = BoundedStore(
+    "limits of settled hands", 64
+)
 """Limits for checks, by the hands, limbs, wrists, strength and preloads: the last ones."""
 
 
@@ -111,7 +107,7 @@ def _settled_limits(
     wound = tuple([None if preload is None else preload.tobytes() for preload in preloads])
     names = tuple([(place.limb, place.wrist) for place in places])
     key = known.hands, names, wound, strength
-    return KNOWN.get(key, lambda: SettledLimits(known, places, strength))
+    return SETTLED_LIMITS.get(key, lambda: SettledLimits(known, places, strength))
 
 
 class Check:
@@ -181,14 +177,14 @@ class Check:
                     found.extend(residual.off(allowed))
                 found.extend(misplaced)
             worst = max(float(np.maximum.reduce(used)), self.idle(joints))
-            if not abs(worst - utilisation) <= UTILISATION * max(1.0, worst):
+            if not abs(worst - utilisation) <= TOLERANCES.utilisation * max(1.0, worst):
                 found.append(f"plan: utilisation is {worst:.8g}, not {utilisation:.8g}")
             found.extend(self.unbalanced(arrays.wrenches, body_wrench))
             if effort is not None:
                 relative = float(arrays.tensions.dot(arrays.tensions)) / self.strength**2
                 own = [joints[limb].shares for limb in self.limbs if limb in joints]
                 relative += sum(float(shares @ shares) for shares in own)
-                if not abs(relative - effort) <= EFFORT * max(1.0, relative):
+                if not abs(relative - effort) <= 1e-6 * max(1.0, relative):
                     found.append(f"plan: effort is {relative:.8g}, not {effort:.8g}")
         return list(dict.fromkeys(found))
 
@@ -238,7 +234,7 @@ class Check:
         used = np.zeros(len(self.limbs))
         np.maximum.at(used, np.concatenate([each.hand for each in uses]), rows)
         name, said, hand = self.settled.names.limb, arrays.utilisations, np.arange(len(used))
-        residuals.append(claim(used, said, hand, UTILISATION, name, "utilisation"))
+        residuals.append(claim(used, said, hand, TOLERANCES.utilisation, name, "utilisation"))
         return residuals, again, used
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
@@ -250,7 +246,7 @@ class Check:
         """Yield by how much hands' wrenches (H, 6) do not balance the body, if they do not."""
         error = self.carry @ wrenches.ravel() - body_wrench
         off, size = math.sqrt(error.dot(error)), math.sqrt(body_wrench.dot(body_wrench))
-        if not off <= BALANCE * max(size, 1.0):
+        if not off <= 1e-6 * max(size, 1.0):  # moments count over a metre
             yield f"balance is off by {off:.3g} of {size:.3g}"
 
     def _wrists(self, arrays: PlanArrays) -> Iterator[str]:

@@ -5,16 +5,16 @@ P across a nail follows from the balance about its pin; A along it is a load of 
 
 from __future__ import annotations
 
-from typing import Final
+from enum import IntEnum
 
 import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.hand import FINGERS, NAIL
-from planner.prepare import CONTACTS
+from planner.prepare import CONTACT_CODES
 from planner.result import PlanArrays
 from planner.verification.residuals import (
-    COUNT,
+    FINGER_COUNT,
     Limits,
     Names,
     Recomputed,
@@ -25,18 +25,19 @@ from planner.verification.residuals import (
 
 __all__ = ["DriveLimits", "NailLimits"]
 
-DRIVE: Final = 1e-9
-"""Largest error of a motor's torque, current or winch angle that a plan says, relative."""
 
-DRIVES: Final = ("motor torque", "motor current", "winch angle")
-"""Rows of `PlanArrays.drives`."""
+class _Row(IntEnum):
+    """Rows of what tensions do: motors and winches as `PlanArrays.drives`, then utilisations."""
 
-WINCH, DRIVEN, SHEAR, LATERAL, TIP = 2, 3, 6, slice(7, 9), 9
-"""Rows of what tensions do, after the motors' torque and current: winches, the first that is a
-utilisation, shears of fingers, their lateral reactions to either side, their tips."""
-
-SIDES: Final = np.array([[1.0], [-1.0]])
-"""Signs of a lateral reaction to either side."""
+    TORQUE = 0
+    CURRENT = 1
+    WINCH = 2
+    TENDON = 3
+    TORQUE_USE = 4
+    CURRENT_USE = 5
+    SHEAR = 6  # of a finger
+    LATERAL = 7  # reactions, of a row to either side
+    TIP = 9
 
 
 class DriveLimits(Limits):
@@ -61,7 +62,8 @@ class DriveLimits(Limits):
         aside = lateral * known.engagement * known.touch.touches
         aside = np.add.reduceat(aside, index.first_of_finger)
         # fingers without rock have no reaction
-        self._aside = SIDES / np.where(aside > 0.0, aside, np.inf)
+        # signs of a lateral reaction to either side
+        self._aside = np.array([[1.0], [-1.0]]) / np.where(aside > 0.0, aside, np.inf)
         drive, nail = body.drive, body.nail
         self._winch = drive.winch_radius
         # Eq. 5: a tile's spring and the rock's shear balance the tendon's two strands
@@ -69,20 +71,21 @@ class DriveLimits(Limits):
         torque = self._winch / drive.gear_ratio / drive.efficiency
         current, idle = torque / drive.torque_constant, drive.no_load_current
         driven = [torque / drive.maximum_torque, current / drive.maximum_current]
-        self._per_newton, self._at_zero = np.zeros((2, TIP + 1, COUNT * len(hands)))
+        self._per_newton, self._at_zero = np.zeros((2, _Row.TIP + 1, FINGER_COUNT * len(hands)))
         ratings = np.array([torque, current, 0.0, 1.0 / strength, *driven])
-        self._per_newton[:SHEAR] = ratings[:, None]
+        self._per_newton[: _Row.SHEAR] = ratings[:, None]
         strands = np.add.reduceat(left, index.first_of_finger)
-        self._per_newton[WINCH] = travel * drive.pulley_ratio * strands
-        self._at_zero[1], self._at_zero[SHEAR - 1] = idle, idle / drive.maximum_current
+        self._per_newton[_Row.WINCH] = travel * drive.pulley_ratio * strands
+        self._at_zero[_Row.CURRENT] = idle
+        self._at_zero[_Row.CURRENT_USE] = idle / drive.maximum_current
         bent = known.bends @ np.array(body.finger.pulley_radii)
-        self._at_zero[WINCH] = (bent + nail.pulley_radius * nail.retraction) / self._winch
+        self._at_zero[_Row.WINCH] = (bent + nail.pulley_radius * nail.retraction) / self._winch
         # shears of a finger's tiles together pull them away from the winch
-        self._per_shear = np.zeros((TIP + 1, 1))
-        self._per_shear[WINCH] = -travel
-        self._per_shear[SHEAR] = 1.0 / body.structure.finger_shear
-        self._hand = np.arange(len(hands)).repeat(COUNT)
-        self._hand_of_drive = np.tile(self._hand, len(DRIVES))
+        self._per_shear = np.zeros((_Row.TIP + 1, 1))
+        self._per_shear[_Row.WINCH] = -travel
+        self._per_shear[_Row.SHEAR] = 1.0 / body.structure.finger_shear
+        self._hand = np.arange(len(hands)).repeat(FINGER_COUNT)
+        self._hand_of_drive = np.tile(self._hand, _Row.TENDON)
 
     def recompute(self, again: Recomputed) -> list[Residual]:
         """Return what tensions use of tendons, motors and fingers, and how far drives are off."""
@@ -92,24 +95,27 @@ class DriveLimits(Limits):
         uses = self._per_newton * f
         uses += self._at_zero
         uses += self._per_shear * np.add.reduceat(shear, first)
-        uses[LATERAL] = self._aside * np.add.reduceat(lateral, first)
-        uses[TIP] = normal.take(self._places.tips) / self._body.structure.fingertip_force
+        uses[_Row.LATERAL : _Row.TIP] = self._aside * np.add.reduceat(lateral, first)
+        uses[_Row.TIP] = normal.take(self._places.tips) / self._body.structure.fingertip_force
         if again.wound is not f:
             # the motors of hands that float stand still where they have tightened their tendons
-            uses[WINCH] += self._per_newton[WINCH] * (again.wound - f)
-            uses[WINCH] += self._per_shear[WINCH] * np.add.reduceat(again.drawn - shear, first)
+            uses[_Row.WINCH] += self._per_newton[_Row.WINCH] * (again.wound - f)
+            uses[_Row.WINCH] += self._per_shear[_Row.WINCH] * np.add.reduceat(
+                again.drawn - shear, first
+            )
         if len(self._hooked):
             turned = again.nails.angles - nail.retraction
-            uses[WINCH, self._hooked] += nail.pulley_radius / self._winch * turned
-        own, said, hand = uses[:DRIVEN].ravel(), planned.drives.ravel(), self._hand_of_drive
+            uses[_Row.WINCH, self._hooked] += nail.pulley_radius / self._winch * turned
+        own, said, hand = uses[: _Row.TENDON].ravel(), planned.drives.ravel(), self._hand_of_drive
         return [
-            Residual("use", uses[DRIVEN:].T, self._hand),
-            claim(own, said, hand, DRIVE, self._name),
+            Residual("use", uses[_Row.TENDON :].T, self._hand),
+            claim(own, said, hand, 1e-9, self._name),
         ]
 
     def _name(self, i: int) -> str:
         drive, finger = divmod(i, len(self._hand))
-        return self._names.finger(DRIVES[drive], finger)
+        what = ("motor torque", "motor current", "winch angle")[drive]
+        return self._names.finger(what, finger)
 
 
 class NailLimits:
@@ -127,7 +133,7 @@ class NailLimits:
 
     def __init__(self, names: Names) -> None:
         known, self._names = names.known, names
-        self.tiles = np.flatnonzero(known.touch.contacts == CONTACTS[NAIL])
+        self.tiles = np.flatnonzero(known.touch.contacts == CONTACT_CODES[NAIL])
         self.fingers = known.places.finger[self.tiles]
         if not len(self.tiles):
             return
@@ -157,7 +163,7 @@ class NailLimits:
         if not len(self.tiles):
             return RecomputedNails([], np.zeros(0), np.zeros(0))
         nail, force = self._nail, arrays.forces[self.tiles]
-        hand, name = self.fingers // COUNT, self._names.of_fingers(NAIL, self.fingers)
+        hand, name = self.fingers // FINGER_COUNT, self._names.of_fingers(NAIL, self.fingers)
         arm = arrays.points[self.tiles] - self._joints - self._far[0] * self._along
         x, z = (arm * self._along).sum(axis=1), arm[:, 2]
         along, into = (force * self._along).sum(axis=1), force[:, 2]

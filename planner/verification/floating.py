@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from typing import Final
 
 import numpy as np
 
@@ -24,16 +23,10 @@ from hand_models.tendon import FingerTendon, TendonState, share_load
 from planner.prepare import HandBatch
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
-from planner.verification.residuals import COUNT, Names, allowed_errors
+from planner.verification.residuals import FINGER_COUNT, Names, allowed_errors
 from planner.verification.rolling_contacts import Face, slip_of
 
 __all__ = ["recompute_floating"]
-
-PLACE: Final = 1e-9
-"""Largest error of a contact's height over its phalanx [m]."""
-
-BEARS: Final = 1e-7
-"""Largest distance along it of a contact from where its tile bears [m]."""
 
 
 def moved(place: Array, wrist: WristPlan) -> Array:
@@ -75,8 +68,8 @@ def recompute_floating(
     unknown: list[int] = []
     for h, wrist in enumerate(arrays.wrists):
         if wrist is not None:
-            for i in range(COUNT):
-                finger = COUNT * h + i
+            for i in range(FINGER_COUNT):
+                finger = FINGER_COUNT * h + i
                 at = f"{names.limbs[h]}: {FINGERS[i]}"
                 if not _move(found, at, known, finger, arrays, wrist, wound, fingers, allowed[h]):
                     unknown.append(finger)
@@ -103,7 +96,7 @@ def _move(
     Of ``fingers`` its shears, torques and places become those that it has there. Its loads may be
     off by ``allowed`` [N]. Returns whether it is known how far its tiles slip.
     """
-    h, index = divmod(finger, COUNT)
+    h, index = divmod(finger, FINGER_COUNT)
     hand = known.hands[h]
     settled, model = hand.fingers[index], hand.fingers[index].model
     frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
@@ -123,7 +116,7 @@ def _move(
         face = Face.of(contact, model, float(depths[j]))
         arm = point - joint
         rise = way[0] * arm[1] - way[1] * arm[0]
-        if not abs(rise - face.height) <= PLACE:
+        if not abs(rise - face.height) <= 1e-9:  # [m] rounding
             found.append(f"{name}: {PHALANGES[j]} contact is {rise:.6g} m above its joint")
         dragged = complex(way[0], way[1]) * cmath.rect(1.0, -contact.tilt)
         angles.append(cmath.phase(dragged))
@@ -133,7 +126,7 @@ def _move(
             before = np.array(contact.point(model.tile_height))
             slip, off = slip_of(section, face, (before, point), (float(arm @ way), way))
             exact &= slip is not None
-            if not abs(off) <= BEARS:
+            if not abs(off) <= 1e-7:  # [m] along the phalanx
                 found.append(
                     f"{name}: {PHALANGES[j]} contact is {off:.3g} m from where its tile bears"
                 )

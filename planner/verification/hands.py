@@ -11,18 +11,11 @@ from hand_models.base import Array
 from hand_models.hand import HELD_DIRECTIONS
 from planner.result import PlanArrays
 from planner.verification.joint_balance import wrenches_of
-from planner.verification.residuals import (
-    UTILISATION,
-    Limits,
-    Names,
-    Recomputed,
-    Residual,
-    claim,
-)
+from planner.verification.residuals import TOLERANCES, Limits, Names, Recomputed, Residual, claim
 
 __all__ = ["HandLimits", "check_contacts"]
 
-PULLING: Final = np.array([np.inf, np.inf, 0.0])
+PULLING_BOUNDS: Final = np.array([np.inf, np.inf, 0.0])
 """Largest components of a hand's force that do not press."""
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
@@ -66,14 +59,14 @@ class HandLimits(Limits):
             Residual("zero", palms[:, 1], own, names.limb, cannot, numbers),
             Residual("least", pressing * PALM_SIGNS, own, names.limb, cannot, numbers),
             Residual("use", used, own),
-            claim(most, said, own, UTILISATION, names.limb, "palm: utilisation"),
+            claim(most, said, own, TOLERANCES.utilisation, names.limb, "palm: utilisation"),
             Residual("use", along / self._hand_load, own),
         ]
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
         """Return what rows say that hands hold, beyond what they do: across and away from rock."""
         forces = wrenches[:, :3]
-        held = np.minimum(forces, PULLING)
+        held = np.minimum(forces, PULLING_BOUNDS)
         size = np.sqrt(np.add.reduce(held * held, axis=1))
         left, limb = np.maximum.reduce(forces @ HELD_DIRECTIONS.T, axis=1) - size, self._names.limb
         text = "the hand holds {:.6g} N, more than its rows say"

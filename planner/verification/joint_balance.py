@@ -26,32 +26,21 @@ from numpy.typing import NDArray
 from hand_models.base import SKEW_MATRICES, Array
 from hand_models.finger import JOINT_STOPS, PHALANGES
 from hand_models.hand import HandModel
-from planner.prepare import NONE, NOTHING, TileIndex
-from planner.verification.residuals import COUNT, Limits, Names, Recomputed, Residual
+from planner.prepare import CONTACT_CODES, TileIndex
+from planner.verification.residuals import FINGER_COUNT, Limits, Names, Recomputed, Residual
 
 __all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
 
-JOINTS: Final = len(PHALANGES)
-
-SIDES: Final = np.array([{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in JOINT_STOPS])
-"""Signs of a joint's torque on the limit at which it stands, by code of `JOINT_STOPS`."""
-
-STOP: Final = 1e-6
-"""Largest torque that a joint's stop may seem to pull with, by rounding [N·m]."""
-
-BEFORE: Final = np.tri(JOINTS, k=-1)
-"""Ones where a phalanx (column) is before a joint (row)."""
-
-OUTWARD: Final = np.tri(JOINTS).T
+TURNED_PHALANGES: Final = np.tri(len(PHALANGES)).T
 """Ones where a joint (row) turns a phalanx (column)."""
 
-CROSS: Final = SKEW_MATRICES.transpose(0, 2, 1).reshape(9, 3)
+CROSS_PRODUCT: Final = SKEW_MATRICES.transpose(0, 2, 1).reshape(9, 3)
 """The map of p ⊗ F to the moment p × F."""
 
 
 def wrenches_of(points: Array, forces: Array) -> Array:
     """Return the wrenches (n, 6) of forces at some places, both (n, 3)."""
-    moments = (points[:, :, None] * forces[:, None]).reshape(-1, len(CROSS)) @ CROSS
+    moments = (points[:, :, None] * forces[:, None]).reshape(-1, len(CROSS_PRODUCT)) @ CROSS_PRODUCT
     return np.concatenate((forces, moments), axis=1)
 
 
@@ -71,7 +60,9 @@ def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array,
     model = hand.finger
     loss = 1.0 - model.friction
     # what is left of the tension at each phalanx's tile; a base tile comes first
-    local: Array = np.full((len(places.phalanges), JOINTS), loss) ** np.arange(JOINTS)
+    local: Array = np.full((len(places.phalanges), len(PHALANGES)), loss) ** np.arange(
+        len(PHALANGES)
+    )
     local[places.base_fingers] *= loss
     left, gain, engaged = np.zeros((3, len(places.hand)))
     left[places.phalanges], left[places.bases] = local, 1.0
@@ -142,24 +133,27 @@ class JointBalance(Limits):
         self._turns = np.zeros((len(frames), 2, 6))
         self._turns[:, 0, 2], self._turns[:, 1, :3] = -1.0, along
         directions = np.stack((np.cos(known.angles), np.sin(known.angles)), axis=2)
-        self._joints = body.finger.joint_spacing * BEFORE @ directions
+        # ones where a phalanx (column) is before a joint (row)
+        self._joints = body.finger.joint_spacing * np.tri(len(PHALANGES), k=-1) @ directions
         # friction holds the tendon of a finger that draws a tile or a nail along rock
         drawing = [
             i
             for i, holds in enumerate(touch.holding)
-            if holds and body.finger.friction > 0.0 and i // COUNT not in floating
+            if holds and body.finger.friction > 0.0 and i // FINGER_COUNT not in floating
         ]
         self._drawing = np.array(drawing, dtype=np.intp)
-        self._hand_of_finger = np.arange(len(hands)).repeat(COUNT)
+        self._hand_of_finger = np.arange(len(hands)).repeat(FINGER_COUNT)
 
         self.held: NDArray[np.bool_] | None = None
-        self.stop_fingers = self.stop_joints = NONE
+        self.stop_fingers = self.stop_joints = np.zeros(0, dtype=np.intp)
         self._sides = np.zeros(0)
         if len(touch.touching) < len(places.hand):
-            self._bears = touch.contacts[places.phalanges] != NOTHING
+            self._bears = touch.contacts[places.phalanges] != CONTACT_CODES["none"]
             alone = ~self._bears.any(axis=1, keepdims=True)
             self.held = (known.stops > 0) | alone
-            sides = SIDES[known.stops] * ~alone
+            # signs of a joint's torque on the limit at which it stands
+            signs = [{"upper": 1.0, "lower": -1.0}.get(str(stop), 0.0) for stop in JOINT_STOPS]
+            sides = np.array(signs)[known.stops] * ~alone
             self.stop_fingers, self.stop_joints = sides.nonzero()
             self._sides = sides[self.stop_fingers, self.stop_joints]
 
@@ -219,7 +213,8 @@ class JointBalance(Limits):
         if len(self.stop_fingers):
             stops, text = self.stops(again.left), " would leave its stop"
             own, name = hands[self.stop_fingers], names.of_fingers("a joint", self.stop_fingers)
-            residuals.append(Residual("least", stops, own, name, text, error=STOP))
+            # [N·m] by rounding a stop may seem to pull
+            residuals.append(Residual("least", stops, own, name, text, error=1e-6))
         return residuals
 
     def stops(self, left: Array) -> Array:
@@ -248,7 +243,7 @@ class JointBalance(Limits):
         into = wrenches_of(points, fingers.axes[:, 1])
         rows = self._axes_of(fingers.joints)
         left = fingers.torques - _turned(rows, along * fingers.shear[..., phalanges, None])
-        turns = rows @ into[phalanges].transpose(0, 2, 1) * OUTWARD
+        turns = rows @ into[phalanges].transpose(0, 2, 1) * TURNED_PHALANGES
         A, b = turns.copy(), left.copy()
         if self.held is not None:
             which, held = self.held.nonzero()
@@ -277,4 +272,4 @@ class JointBalance(Limits):
 
 def _turned(axes: Array, wrenches: Array) -> Array:
     """Return what wrenches of each finger's phalanges turn its joints with, shape (…, F, 3)."""
-    return np.asarray(np.add.reduce(axes * (OUTWARD @ wrenches), axis=-1))
+    return np.asarray(np.add.reduce(axes * (TURNED_PHALANGES @ wrenches), axis=-1))

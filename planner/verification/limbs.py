@@ -7,37 +7,19 @@ the Jacobians and the Newton–Euler pass that the program's rows are made of.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices
-from planner.prepare import BALL, Posture
+from planner.prepare import FORCE_DIRECTIONS, Posture
 from planner.question import ForceCap, Question
 from planner.result import PlanArrays
 from planner.robots import LimbTorques, LinkTree
-from planner.verification.residuals import COUNT, Limits, Names, Recomputed, Residual
+from planner.verification.residuals import FINGER_COUNT, Limits, Names, Recomputed, Residual
 
 __all__ = ["AskedLimits", "JointUse", "check_limbs", "recompute_joints"]
-
-TORQUE: Final = 1e-6
-"""Largest disagreement of a joint's torque, relative to the largest of its limb or 1 N·m."""
-
-WEIGHT: Final = 1e-9
-"""Largest disagreement of the body wrench with the robot's weight and acceleration, relative."""
-
-PLACED: Final = (0.01, 0.05)
-"""Largest distance [m] and angle [rad] of a hand from its pose by its joints."""
-
-REPORTED_POSE: Final = 1e-5
-"""Largest error of the reported distance and angle, of joints that were found [m, rad]."""
-
-BEYOND: Final = 1e-6
-"""Largest excess of an angle over its joint's limit [rad, or m]."""
-
-ARM: Final = 1.0
-"""Lever at which an error of a hand's loads turns a joint [m]: about a limb's length."""
 
 
 class JointUse(NamedTuple):
@@ -86,13 +68,13 @@ def check_limbs(
     if question.body_wrench is None:
         needed = _needed(question, own)
         off = float(np.linalg.norm(body_wrench - needed))
-        if not off <= WEIGHT * max(1.0, float(np.linalg.norm(needed))):
+        if not off <= 1e-9 * max(1.0, float(np.linalg.norm(needed))):  # relative, or of 1 N
             found.append(f"the robot's weight and acceleration ask for {off:.3g} N or N·m else")
     for limb in robot.limbs:
         said = where.joints[limb]
         torques = own.torques[limb]
         claimed = said.torques(wrenches.get(limb, np.zeros(6)))
-        allowed = TORQUE * max(1.0, float(np.abs(torques).max()))
+        allowed = 1e-6 * max(1.0, float(np.abs(torques).max()))  # relative, or of 1 N·m
         for name, torque, claim in zip(said.names, torques, claimed, strict=True):
             if not abs(torque - claim) <= allowed:
                 found.append(f"{limb}: joint {name} bears {torque:.6g} N·m, not {claim:.6g}")
@@ -113,8 +95,9 @@ def recompute_joints(limb: str, h: int, use: JointUse) -> list[Residual]:
     residuals = [Residual("use", np.concatenate((use.shares, -use.shares))[None], hand)]
     if use.passive:
         each, names = hand.repeat(len(torques)), [f"{limb}: joint {name}" for name in use.passive]
-        text, zero = " has no motor, and bears {:.6g} N·m", torques / ARM
-        residuals.append(Residual("zero", zero, each, names.__getitem__, text, (torques,)))
+        text = " has no motor, and bears {:.6g} N·m"
+        # an error of loads [N] turns a joint at a lever of a metre: about a limb's length
+        residuals.append(Residual("zero", torques, each, names.__getitem__, text, (torques,)))
     return residuals
 
 
@@ -155,9 +138,10 @@ def _needed(question: Question, own: LimbTorques) -> Array:
 def _check_places(found: list[str], question: Question, where: Posture, own: LimbTorques) -> None:
     """Check that joints put the hands where the stance has them, within the joints' limits."""
     stance = question.stance
-    most_off, most_turned = PLACED
+    most_off, most_turned = 0.01, 0.05  # [m], [rad]: up to here a posture is taken for the hand's
     solved, given_angles = stance.solved_limbs, stance.given_joints
     body = stance.body.inverse()
+    error = 1e-5  # [m, rad] of what is reported of joints that were found
     for place in stance.hands:
         pose, there = body @ place.pose, own.hands[place.limb]
         off = float(np.linalg.norm(pose.position - there.position))
@@ -168,10 +152,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
         )
         reported_off, reported_turned = where.off.get(place.limb, (0.0, 0.0))
         near = off <= most_off and turned <= most_turned
-        agrees = (
-            abs(off - reported_off) <= REPORTED_POSE
-            and abs(turned - reported_turned) <= REPORTED_POSE
-        )
+        agrees = abs(off - reported_off) <= error and abs(turned - reported_turned) <= error
         if not (near and (agrees or place.limb not in solved)):
             found.append(
                 f"{place.limb}: its joints put the hand {off:.3g} m and {turned:.3g} rad from its "
@@ -180,7 +161,7 @@ def _check_places(found: list[str], question: Question, where: Posture, own: Lim
     for limb, angles in where.angles.items():
         chain = stance.robot.chains[limb]
         beyond = np.maximum(chain.lower - angles, angles - chain.upper)
-        if not float(beyond.max()) <= BEYOND:
+        if not float(beyond.max()) <= 1e-6:  # [rad, or m] rounding of seven digits
             found.append(f"{limb}: a joint is {beyond.max():.3g} rad beyond its limit")
         if limb not in solved:
             given = given_angles.get(limb, np.clip(0.0, chain.lower, chain.upper))
@@ -211,7 +192,7 @@ class _Cap(NamedTuple):
 def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
     stance, hand = question.stance, np.array([h])
     if not isinstance(cap.most, tuple):
-        return _Cap(hand, BALL / cap.most, np.zeros((0, 3)), (), ball=True)
+        return _Cap(hand, FORCE_DIRECTIONS / cap.most, np.zeros((0, 3)), (), ball=True)
     turn = np.eye(3) if cap.frame == "hand" else stance.hands[h].pose.rotation
     if cap.frame == "body":
         turn = stance.body.rotation.T @ turn
@@ -271,10 +252,10 @@ class AskedLimits(Limits):
             numbers = j + 1, own, value
             residuals.append(Residual("zero", own - value, hand, limb, text, numbers))
         for h, present in self._present.items():
-            fingers = np.arange(COUNT * h, COUNT * (h + 1))
+            fingers = np.arange(FINGER_COUNT * h, FINGER_COUNT * (h + 1))
             name = self._names.of_fingers("tension", fingers)
             text = f" changes by {{:.6g}} N, more than {self._most:g}"
-            change, hand = tensions[fingers] - present, np.full(COUNT, h)
+            change, hand = tensions[fingers] - present, np.full(FINGER_COUNT, h)
             residuals += [
                 Residual("least", left, hand, name, text, (change,))
                 for left in (self._most - change, self._most + change)
@@ -288,7 +269,7 @@ class AskedLimits(Limits):
             if cap.ball:
                 force, limb = wrenches[cap.hand, :3], self._names.limb_of(cap.hand)
                 size = np.linalg.norm(force, axis=1)
-                left = (force @ BALL.T).max(axis=1) - size
+                left = (force @ FORCE_DIRECTIONS.T).max(axis=1) - size
                 text, by = "the hand exerts {:.6g} N, more than its rows say", (size,)
                 residuals.append(Residual("least", left, cap.hand, limb, text, by, affine=False))
         return residuals

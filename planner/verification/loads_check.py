@@ -10,7 +10,6 @@ matrix, and by the residuals that are not affine.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +20,9 @@ from hand_models.hand import FINGERS, NAIL
 from planner.result import LoadRecovery, PlanArrays
 from planner.verification.check import Check
 from planner.verification.hands import check_contacts
-from planner.verification.residuals import LOAD, NEAR, UTILISATION
+from planner.verification.residuals import TOLERANCES
 
 __all__ = ["LoadsCheck"]
-
-KINDS: Final = ("load", "palm", "wrench", "zero", "least", "error", "use")
-"""Kinds of numbers, in their order: those that something is computed of, then residuals.
-
-An ``error`` is a least value whose error is not that of the loads, over that error.
-"""
 
 most = np.maximum.reduce
 
@@ -60,7 +53,7 @@ class LoadsCheck:
         self._check, self._reader, self._columns = check, reader, columns
         self._size = max(map(len, columns))
         # what a load may add to a number that is zero: so much each, and as much without any
-        self._negligible = 0.5 * NEAR / (1.0 + self._size)
+        self._negligible = 0.5 * TOLERANCES.near / (1.0 + self._size)
         self.wrong: list[str] = []
         self.idle = 0.0
         rest, *loaded = [self._numbers(y) for y in np.eye(self._size + 1, self._size, k=-1)]
@@ -71,10 +64,12 @@ class LoadsCheck:
             owner = hand.repeat(len(rows) // len(hand)) if len(hand) else hand
             kept = self._matters(kind, rows)
             parts.append((kind, rows[kept], owner[kept]))
-        parts.sort(key=lambda part: KINDS.index(part[0]))
-        sizes = [sum(len(rows) for kind, rows, _ in parts if kind == each) for each in KINDS]
+        # what more is computed of, then residuals; an error is a least value over its own
+        kinds = ("load", "palm", "wrench", "zero", "least", "error", "use")
+        parts.sort(key=lambda part: kinds.index(part[0]))
+        sizes = [sum(len(rows) for kind, rows, _ in parts if kind == each) for each in kinds]
         ends = np.cumsum([0, *sizes]).tolist()
-        self._of = dict(zip(KINDS, map(slice, ends[:-1], ends[1:]), strict=True))
+        self._of = dict(zip(kinds, map(slice, ends[:-1], ends[1:]), strict=True))
         rows, owner = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
         matrix = np.zeros((len(rows), len(columns), self._size))
         matrix[np.arange(len(rows)), owner] = rows[:, 1:]
@@ -110,7 +105,7 @@ class LoadsCheck:
 
     def _matters(self, kind: str, rows: Array) -> NDArray[np.bool_]:
         """Return for which rows (n, 1 + m) of numbers there may be loads that they refuse."""
-        if KINDS.index(kind) < KINDS.index("zero"):
+        if kind in ("load", "palm", "wrench"):
             return np.ones(len(rows), dtype=bool)
         changing = np.abs(rows[:, 1:]).max(axis=1, initial=0.0) > self._negligible
         at_zero = {"zero": np.abs(rows[:, 0]), "use": rows[:, 0]}.get(kind, -rows[:, 0])
@@ -157,7 +152,7 @@ class LoadsCheck:
         found, of = self._matrix @ loads.ravel() + self._constant, self._of
         own = found[of["wrench"]].reshape(-1, 6)
         carried = np.abs(found[: of["palm"].stop])
-        allowed = LOAD * max(1.0, float(most(carried)))
+        allowed = TOLERANCES.load * max(1.0, float(most(carried)))
         again = max(float(most(found[of["use"]], initial=0.0)), self.idle)
         # each in terms that are false where a number is not finite
         for words in self._check.unbalanced(own, body_wrench):
@@ -166,7 +161,7 @@ class LoadsCheck:
             return "a hand's wrench"
         if not ((found[of["least"]] >= -allowed).all() and (found[of["error"]] >= -1.0).all()):
             return "a load of the wrong sign"
-        if not abs(again - utilisation) <= UTILISATION * max(1.0, again):
+        if not abs(again - utilisation) <= TOLERANCES.utilisation * max(1.0, again):
             return "the utilisation"
         if not (np.abs(found[of["zero"]]) <= allowed).all():
             return "a load or a wrench that is given"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -19,30 +20,32 @@ from planner.prepare import HandBatch
 from planner.result import PlanArrays
 
 __all__ = [
-    "COUNT",
-    "LOAD",
-    "NEAR",
-    "UTILISATION",
+    "FINGER_COUNT",
+    "TOLERANCES",
     "Limits",
     "Names",
     "Recomputed",
     "RecomputedNails",
     "Residual",
+    "VerificationTolerances",
     "allowed_errors",
     "claim",
     "is_near",
 ]
 
-LOAD: Final = 1e-6
-"""Largest disagreement of a tile's load, relative to the largest load of its hand."""
+FINGER_COUNT: Final = len(FINGERS)
 
-UTILISATION: Final = 1e-6
-"""Largest error of a utilisation that a plan says."""
 
-NEAR: Final = 1e-9
-"""Residual below which nothing can be off: the smallest error that is allowed of any."""
+@dataclass(frozen=True, slots=True)
+class VerificationTolerances:
+    """How far a plan's numbers may be from what is recomputed of them."""
 
-COUNT: Final = len(FINGERS)
+    load: float = 1e-6  # of a tile, relative to the largest load of its hand
+    utilisation: float = 1e-6
+    near: float = 1e-9  # of any residual: the smallest error that is allowed of one
+
+
+TOLERANCES: Final = VerificationTolerances()
 
 
 class RecomputedNails(NamedTuple):
@@ -180,14 +183,16 @@ def is_near(residuals: Iterable[Residual]) -> bool:
     zero = np.concatenate([r.values for r in residuals if r.kind == "zero"], axis=None)
     least = np.concatenate([r.values for r in residuals if r.kind == "least"], axis=None)
     # both are false of numbers that are not finite; no number exceeds the norm of all
-    return bool(zero.dot(zero) <= NEAR**2 and np.minimum.reduce(least) >= -NEAR)
+    return bool(
+        zero.dot(zero) <= TOLERANCES.near**2 and np.minimum.reduce(least) >= -TOLERANCES.near
+    )
 
 
 def allowed_errors(known: HandBatch, arrays: PlanArrays) -> Array:
-    """Return the error that loads of each hand may have, shape (H,), at least `LOAD` [N]."""
+    """Return the error that loads of each hand may have, shape (H,), at least 1e-6 N."""
     largest = np.fmax.reduceat(np.abs(arrays.loads).ravel(), 3 * known.places.first)
     largest = np.fmax(largest, np.abs(arrays.palms).max(axis=1))
-    return np.asarray(LOAD * np.fmax(largest, 1.0))
+    return np.asarray(TOLERANCES.load * np.fmax(largest, 1.0))
 
 
 class Names(NamedTuple):
@@ -215,7 +220,7 @@ class Names(NamedTuple):
 
     def finger(self, what: str, finger: int) -> str:
         """Return the name of something of a finger: ``front_left: tendon of inner_right``."""
-        h, i = divmod(finger, COUNT)
+        h, i = divmod(finger, FINGER_COUNT)
         return f"{self.limbs[h]}: {what} of {FINGERS[i]}"
 
     def of_fingers(self, what: str, fingers: Indices) -> Callable[[int], str]:

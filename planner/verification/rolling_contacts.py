@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,18 +17,6 @@ from hand_models.finger import Contact, FingerModel
 from hand_models.sections import Section
 
 __all__ = ["Face", "slip_of"]
-
-BESIDE: Final = 4e-3
-"""Distance beside a contact at which the rock is looked at, and at twice that [m]."""
-
-STRAIGHT: Final = 1e-12
-"""Turn of the rock's normal below which it is flat [rad]."""
-
-ROUND: Final = 1e-11
-"""Largest distance from a circle or a line of rock that counts as one [m]."""
-
-FLATTEST: Final = 10.0
-"""Radius of rock from which on faces slide on it as on a flat, by the model [m]."""
 
 
 class Face(NamedTuple):
@@ -91,7 +79,8 @@ def slip_of(
     radius = _radius(section, before)
     if radius is None:
         return None, 0.0
-    rolls, touches = face.lies and radius < FLATTEST, [face.along, along]
+    # from a radius of 10 m on the model lets faces slide as on a flat
+    rolls, touches = face.lies and radius < 10.0, [face.along, along]
     if rolls:
         touches[0] += _beside(section, radius, before, face.way)
         touches[1] += _beside(section, radius, there, way)
@@ -123,11 +112,12 @@ def _arc(section: Section, before: Array, after: Array, u: Array, lies: Array | 
     turn = math.atan2(first[0] * last[1] - first[1] * last[0], float(first @ last))
     middle = first + last
     tangent = np.array([-middle[1], middle[0]]) / float(np.linalg.norm(middle))
-    if lies is not None and abs(turn) < STRAIGHT:
+    straight = 1e-12  # [rad] turn of the normal of flat rock
+    if lies is not None and abs(turn) < straight:
         tangent = lies
     sign = math.copysign(1.0, float(tangent @ u))
     chord = float((after - before) @ tangent)
-    path = chord if abs(turn) < STRAIGHT else chord * (turn / 2.0) / math.sin(turn / 2.0)
+    path = chord if abs(turn) < straight else chord * (turn / 2.0) / math.sin(turn / 2.0)
     return sign * (path - gap * turn)
 
 
@@ -143,14 +133,16 @@ def _radius(section: Section, point: Array) -> float | None:
     """
     out = np.array(section.normal((float(point[0]), float(point[1]))))
     foot, aside = point - _clearance(section, point) * out, np.array([-out[1], out[0]])
-    near = [_clearance(section, foot + side * BESIDE * aside) for side in (1.0, -1.0)]
-    far = [_clearance(section, foot + 2.0 * side * BESIDE * aside) for side in (1.0, -1.0)]
+    beside = 4e-3  # [m] from the contact, and twice that, the rock is looked at
+    near = [_clearance(section, foot + side * beside * aside) for side in (1.0, -1.0)]
+    far = [_clearance(section, foot + 2.0 * side * beside * aside) for side in (1.0, -1.0)]
     away = 0.5 * sum(near)
     if away < 0.0:
         return None
     radius, expected = math.inf, 0.0
-    if away > ROUND:
-        radius = (BESIDE**2 - away**2) / (2.0 * away)
-        expected = math.hypot(radius, 2.0 * BESIDE) - radius
+    rounding = 1e-11  # [m] off a circle or a line
+    if away > rounding:
+        radius = (beside**2 - away**2) / (2.0 * away)
+        expected = math.hypot(radius, 2.0 * beside) - radius
     spread = [*(x - away for x in near), *(x - expected for x in far)]
-    return radius if max(map(abs, spread)) <= ROUND else None
+    return radius if max(map(abs, spread)) <= rounding else None

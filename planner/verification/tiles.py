@@ -7,7 +7,6 @@ not by the half-planes that a plan is made of; by these only what the plan says 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
@@ -15,23 +14,9 @@ from hand_models.base import Array, Indices
 from hand_models.tile import HalfPlane, Surface
 from planner.prepare import HandBatch
 from planner.result import PlanArrays
-from planner.verification.residuals import (
-    LOAD,
-    UTILISATION,
-    Limits,
-    Names,
-    Recomputed,
-    Residual,
-    claim,
-)
+from planner.verification.residuals import TOLERANCES, Limits, Names, Recomputed, Residual, claim
 
 __all__ = ["LimitCurves", "TileLimits"]
-
-SMALL: Final = 1e-300
-"""Load in place of zero, where something is divided by it [N]."""
-
-SIDES: Final = np.array([1.0, -1.0])
-"""Signs of a lateral load."""
 
 
 class LimitCurves:
@@ -86,7 +71,8 @@ class LimitCurves:
         ratio = np.minimum(np.arctan2(pull, along) * self._per_radian, 1.0)
         straight = self._flat[0] - self._loss[0] * ratio**self._exponent
         aside = self._flat[1] - self._loss[1] * ratio
-        strength = straight * (1.0 - aside * ((along - shear) / (size + SMALL)))
+        # [N] where there is no load
+        strength = straight * (1.0 - aside * ((along - shear) / (size + 1e-300)))
         return np.asarray(size - self._gain * (normal - pull) - (1.0 + relative) * strength)
 
 
@@ -158,16 +144,19 @@ class TileLimits(Limits):
         used = np.maximum.reduce(planes, axis=1)
         used[self._nails] = again.nails.used
         used, said = np.maximum(used, 0.0), planned.tile_utilisations
-        return [*residuals, claim(used, said, self._of, UTILISATION, name, ": utilisation")]
+        return [
+            *residuals,
+            claim(used, said, self._of, TOLERANCES.utilisation, name, ": utilisation"),
+        ]
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
         """Return how far loads (T, 3) are within the law's surface [N]; zero beyond half-planes.
 
         There a tile may be outside the surface, too, and the plan says that it is overloaded.
         """
-        inside = -self._curves.excess(loads[:, 0], loads[:, 1], loads[:, 2], UTILISATION)
-        if not np.minimum.reduce(inside) >= -LOAD:
-            sides = loads[:, 2:] / self._lateral * SIDES
+        inside = -self._curves.excess(loads[:, 0], loads[:, 1], loads[:, 2], TOLERANCES.utilisation)
+        if not np.minimum.reduce(inside) >= -TOLERANCES.load:
+            sides = loads[:, 2:] / self._lateral * [1.0, -1.0]  # lateral loads to either side
             planes = self._used(arrays.half_planes, loads)
             used = np.hstack([planes, sides]) * self._per_share
             inside[(used.max(axis=1) > 1.0) | self._known.touch.away] = 0.0

@@ -18,7 +18,7 @@ from hand_models.hand import SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
 from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
-from planner import EARTH, HandOnHold, Stance, settle_each
+from planner import EARTH_GRAVITY, HandOnHold, Stance, settle_each
 from service import requests
 from service.answering.own_models import BUNDLED_ROBOTS, Robots, builder_of
 
@@ -62,7 +62,7 @@ def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tup
         found = Stance(
             hands=tuple(hands_on_rocks(message.hands, robot.hand, rocks, "hands")),
             body=poses_of({"body": message.body})["body"],
-            gravity=np.array(EARTH if message.gravity is None else message.gravity),
+            gravity=np.array(EARTH_GRAVITY if message.gravity is None else message.gravity),
             robot=robot,
             joints=joints_of(message.joints),
         )

@@ -16,7 +16,7 @@ from msgspec import inspect
 
 from hand_models.base import InvalidInputError
 from hand_models.tile import Surface as Preset
-from planner import EARTH
+from planner import EARTH_GRAVITY
 from service.requests import PlanRequest, Stance, Surface
 from service.wire import Place, entered, field_names, places_at
 
@@ -67,7 +67,7 @@ class Paths:
         """Return paths into a request, without its draws."""
         document = _filled(request)
         del document["draws"]
-        document["stance"].setdefault("gravity", list(EARTH))
+        document["stance"].setdefault("gravity", list(EARTH_GRAVITY))
         return cls(document)
 
     def target(self, path: str) -> Target:

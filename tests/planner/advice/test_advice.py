@@ -16,8 +16,9 @@ from hand_models.rock import Plane
 from planner import advice
 from planner.advice import changed
 from planner.advice.body import BodySearch, slope
+from planner.advice.changes import SETTINGS
 from planner.advice.new_holds import NewHold, every_hold
-from planner.advice.trials import PLANS, WITHOUT, Trials
+from planner.advice.trials import Trials
 from planner.deadline import DeadlineError
 from planner.explanation import scene_findings
 from planner.prepare import prepare_stance
@@ -35,7 +36,7 @@ from tests.suite.helpers.stances import SANDPAPER, ask, moved, on_wall, random_q
 SEED = 32  # four hands under their own weight, no limits of their own
 
 
-def advise(asked: Question, plans: int = PLANS) -> tuple[tuple[Advice, ...], bool]:
+def advise(asked: Question, plans: int = SETTINGS.plans) -> tuple[tuple[Advice, ...], bool]:
     """What is advised of a question."""
     return advice.advise(asked, try_stance, plans)
 
@@ -254,7 +255,7 @@ def test_no_more_plans_are_made_than_are_allowed(monkeypatch):
     monkeypatch.setattr(Trials, "_try", counted)
     advise(random_question(46), 15)
     assert 0 < count <= 15
-    assert PLANS == 100
+    assert SETTINGS.plans == 100
 
 
 def test_where_time_is_over_what_was_found_is_told_and_that_it_is_not_all(monkeypatch):
@@ -325,7 +326,7 @@ def test_random_overloaded_stances_are_helped_by_what_was_promised():
         seen += 1
         told, whole = advise(asked)
         assert whole
-        counted = [each for each in told if each.kind not in WITHOUT]
+        counted = [each for each in told if each.kind not in SETTINGS.kinds_of_other_task]
         helped += any(each.holds for each in counted)
         for each in counted:
             assert not any(p.endswith("surface") or p.startswith("load") for p in each.changes)

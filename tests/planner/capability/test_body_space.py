@@ -17,7 +17,7 @@ from hand_models.base import InvalidInputError
 from hand_models.tile import Surface
 from planner.capability import WRENCH_COMPONENTS, BodySpace
 from planner.prepare import hand_space, posture
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import ForceCap, Limits, Load, Question
 from planner.solving import plan
 from service.answering import dispatch, questions
@@ -378,7 +378,7 @@ def test_where_it_all_just_holds():
     least = wall_space().plan.utilisation
     space = BodySpace(replace(question, limits=Limits(utilisation=least)))
     assert space.plan.status == "optimal"
-    assert all(space.more(way).reach >= -SLACK for way in np.vstack([np.eye(6), -np.eye(6)]))
+    assert all(space.more(way).reach >= -CAP_SLACK for way in np.vstack([np.eye(6), -np.eye(6)]))
     # more weight is more load on all of them
     assert space.more(np.eye(6)[0]).reach == pytest.approx(0.0, abs=0.1)
     assert space.acceleration([0.0, 0.0, 1.0]).reach == pytest.approx(0.0, abs=1e-2)

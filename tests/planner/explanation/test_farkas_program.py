@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from scipy.optimize import linprog
 
 from planner.explanation.infeasibility import FarkasProgram
-from planner.programs import UNLIMITED
+from planner.programs import LOAD_BOX
 
 ROWS, LOADS = 9, 4
 
@@ -34,7 +34,7 @@ def least_t(G, goal, H, h, tied, rows) -> float:
         np.append(np.zeros(LOADS), 1.0),
         A_ub=A,
         b_ub=np.concatenate([goal, -goal, h]),
-        bounds=[(-UNLIMITED, UNLIMITED)] * LOADS + [(0.0, None)],
+        bounds=[(-LOAD_BOX, LOAD_BOX)] * LOADS + [(0.0, None)],
     )
     assert result.status == 0
     return float(result.fun)
@@ -60,7 +60,7 @@ def test_the_gain_is_by_how_much_rows_must_be_broken(seed, chosen):
         assert np.abs(d).sum() + multipliers.sum() <= 1.0 + 1e-9
         # the multipliers prove what they gain
         leak = np.abs(G.T @ d - H.T @ multipliers).sum()
-        assert d @ goal - multipliers @ h - UNLIMITED * leak == pytest.approx(least, abs=1e-6)
+        assert d @ goal - multipliers @ h - LOAD_BOX * leak == pytest.approx(least, abs=1e-6)
 
 
 def test_near_a_start_turns_only_where_that_gains_more():

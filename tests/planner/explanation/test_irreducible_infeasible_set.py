@@ -16,7 +16,7 @@ from planner.explanation.irreducible_infeasible_set import (
     irreducible_set,
     sufficient_alone,
 )
-from planner.programs import UNLIMITED
+from planner.programs import LOAD_BOX
 from planner.result import LimitName
 from planner.solving import plan
 from tests.suite.helpers.named_rows import have_loads, named_rows
@@ -95,7 +95,7 @@ def test_rows_that_say_nothing_of_each_other_contradict_only_the_box(monkeypatch
         return nnls(A, b)
 
     monkeypatch.setattr("scipy.optimize.nnls", with_equations)
-    parts = system([[0, 1, 0, 0, 0, 0, 0]], [0], ("low",), goal=1.5 * UNLIMITED)
+    parts = system([[0, 1, 0, 0, 0, 0, 0]], [0], ("low",), goal=1.5 * LOAD_BOX)
     G = np.delete(np.eye(7), 1, axis=0)
     G[0, 1] = 1.0
     parts = changed(parts, G=G)
@@ -152,7 +152,7 @@ def has_loads(parts: HardRowSystem, names) -> bool:
         b_ub=parts.h[kept],
         A_eq=parts.G[tied],
         b_eq=parts.wrench[tied],
-        bounds=(-UNLIMITED, UNLIMITED),
+        bounds=(-LOAD_BOX, LOAD_BOX),
     )
     return result.status == 0
 
@@ -263,7 +263,7 @@ def test_rows_that_are_all_but_parallel_block_up_to_the_loads_where_they_meet():
         names = irreducible_set(parts, parts.constraints)
         assert names is not None
         found = blocks_up_to(parts, names)
-        assert UNLIMITED <= found <= size * (1.0 + 1e-6)
+        assert LOAD_BOX <= found <= size * (1.0 + 1e-6)
         assert not loads_within(parts, names, 0.999 * found)
         assert loads_within(parts, names, 1.01 * size)
 
@@ -272,7 +272,7 @@ def test_rows_that_contradict_each_other_block_whatever_the_loads():
     parts = system([[1.0], [-1.0]], [1.0, -2.0], ["most", "least"], goal=1.5)
     names = irreducible_set(parts, parts.constraints)
     assert names is not None
-    assert blocks_up_to(parts, names) > 1e3 * UNLIMITED
+    assert blocks_up_to(parts, names) > 1e3 * LOAD_BOX
 
 
 def loads_within(parts: HardRowSystem, names, most: float) -> bool:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from planner.explanation import limit_name, unsafe_sentence
-from planner.explanation.path_safety import GIVE
+from planner.explanation import TOLERANCES, limit_name, unsafe_sentence
 from planner.prepare import assemble, posture
 from planner.question import Limits, Load, Question
 from planner.result import LimitName, Plan, TensionPath
@@ -45,7 +44,7 @@ class Peer:
         self.A = np.vstack(
             [np.column_stack([rows.L, -rows.s]), np.column_stack([rows.H, np.zeros(len(rows.h))])]
         )
-        self.b = np.concatenate([-rows.l0, rows.h + GIVE])
+        self.b = np.concatenate([-rows.l0, rows.h + TOLERANCES.tension_change])
         pairs = list(zip(question.stance.hands, self.sets, strict=True))
         self.names = [
             limit_name(hand.limb, row)
@@ -102,7 +101,7 @@ def check(question: Question, answer: Plan, there: Peer | None = None) -> Tensio
     changes = [np.abs(planned[k] - present).max() for k, present in question.present.items()]
     assert path.largest_change == pytest.approx(max(changes), abs=1e-4)
     least = at(1.0)
-    if path.largest_change <= GIVE:
+    if path.largest_change <= TOLERANCES.tension_change:
         assert path.utilisation_at_present == pytest.approx(answer.utilisation, abs=1e-6)
     elif path.utilisation_at_present is None:
         assert least == math.inf
@@ -112,7 +111,7 @@ def check(question: Question, answer: Plan, there: Peer | None = None) -> Tensio
     if answer.status != "optimal":
         assert path.safe_part == 0.0
         return path
-    if path.largest_change <= GIVE:
+    if path.largest_change <= TOLERANCES.tension_change:
         assert path.safe
         return path
     for part in (0.0, 0.3, 0.7, 0.999):

@@ -11,8 +11,9 @@ from msgspec import structs
 from scipy.optimize import minimize
 
 from hand_models.base import wrench_transport
+from planner.floating import SETTINGS
 from planner.prepare import posture
-from planner.programs import SLACK, TWIST_UNIT, WRENCH_UNIT
+from planner.programs import CAP_SLACK, TWIST_UNIT, WRENCH_UNIT
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Plan
 from planner.solving import plan
@@ -64,12 +65,12 @@ def test_least_effort_is_no_more_and_its_sets_promise_no_less(name):
     question, margin, effort = both(name)
     assert effort.status == "optimal"
     assert effort.verified
-    assert effort.utilisation <= 1.0 + SLACK
+    assert effort.utilisation <= 1.0 + CAP_SLACK
     assert effort.effort < margin.effort
     for answer in (margin, effort):
         assert answer.effort == pytest.approx(told_effort(question, answer), rel=1e-6)
     assert promised(question, margin, 1.0) > 1e-4
-    assert promised(question, effort, 1.0 + SLACK) <= 1e-5
+    assert promised(question, effort, 1.0 + CAP_SLACK) <= 1e-5
 
 
 class Model:
@@ -152,7 +153,7 @@ def test_a_tighter_cap_costs_effort_and_is_kept():
     cap = 0.5 * (1.0 + margin.utilisation)
     answer = least(replace(question, limits=structs.replace(question.limits, utilisation=cap)))
     assert answer.status == "optimal"
-    assert answer.utilisation <= cap + SLACK
+    assert answer.utilisation <= cap + CAP_SLACK
     assert margin.effort > answer.effort > effort.effort
 
 
@@ -176,7 +177,7 @@ def test_beyond_the_cap_the_least_utilisation_is_told():
 
 def test_an_ended_budget_leaves_a_plan_and_says_so(monkeypatch):
     question, margin, _ = both("with joints")
-    monkeypatch.setattr("planner.floating.effort.PROGRAMS", 0)
+    monkeypatch.setattr("planner.floating.effort.SETTINGS", replace(SETTINGS, effort_programs=0))
     answer = least(question)
     assert answer.status == "optimal"
     assert answer.verified

@@ -16,7 +16,7 @@ from rich.console import Console
 from hand_models.compliance import CompliantHand, FloatingWrist
 from planner.deadline import Budget
 from planner.explanation import far_wrists
-from planner.floating import continuation
+from planner.floating import SETTINGS
 from planner.prepare import settle_hand
 from planner.programs import solvers, stance_program
 from planner.question import Load, Question
@@ -93,14 +93,14 @@ def test_utilisation_and_load_factor_agree(limbs, preload):
     else:
         answer = plan(question(request(limbs, preload, want=["load_factor"])))
     assert answer.load_factor is not None
-    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + solvers.SLACK)
+    assert (answer.load_factor >= 1.0) == (answer.utilisation <= 1.0 + solvers.CAP_SLACK)
 
 
 def test_budget_ends_a_search(monkeypatch):
     """With next to no programs left an answer comes at once, and is honest."""
     asked, whole, count = planned(REAR)
-    assert count <= 1.2 * continuation.PROGRAMS
-    monkeypatch.setattr("planner.solving.solve.PROGRAMS", 30)
+    assert count <= 1.2 * SETTINGS.programs
+    monkeypatch.setattr("planner.solving.solve.SETTINGS", replace(SETTINGS, programs=30))
     with counted() as solved:
         answer = plan(asked)
     assert len(solved) <= 90 < count

@@ -12,7 +12,7 @@ from hand_models.base import InvalidInputError, Pose, wrench_transport
 from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.prepare import posture
-from planner.question import EARTH, Limits, Load, Question
+from planner.question import EARTH_GRAVITY, Limits, Load, Question
 from planner.result import Plan
 from planner.robots import LinkTree, RobotFile, robosimian, robot_of
 from planner.solving import plan
@@ -204,8 +204,10 @@ def test_a_body_wrench_that_is_given_leaves_the_torques_those_of_the_load():
 def test_torques_and_the_body_wrench_scale_with_gravity(part):
     """Moon, Mars and twice the Earth, the same stance."""
     earth = random_question_with_joints(5)
-    earth = replace(earth, load=Load(), stance=replace(earth.stance, gravity=np.array(EARTH)))
-    other = replace(earth, stance=replace(earth.stance, gravity=part * np.array(EARTH)))
+    earth = replace(
+        earth, load=Load(), stance=replace(earth.stance, gravity=np.array(EARTH_GRAVITY))
+    )
+    other = replace(earth, stance=replace(earth.stance, gravity=part * np.array(EARTH_GRAVITY)))
     here, there = posture(earth), posture(other)
     np.testing.assert_allclose(
         there.weights.body_wrench, part * here.weights.body_wrench, rtol=1e-12
@@ -289,7 +291,7 @@ def test_a_body_frame_elsewhere_in_the_trunk_changes_no_torque():
     own = tree.hold_up(
         there.angles,
         {},
-        frame.rotation.T @ np.array(EARTH),
+        frame.rotation.T @ np.array(EARTH_GRAVITY),
         np.concatenate([frame.rotation.T @ np.array(load.acceleration), np.zeros(3)]),
     )
     np.testing.assert_allclose(own.body_wrench, there.weights.body_wrench, atol=1e-9)

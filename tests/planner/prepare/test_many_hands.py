@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import Question
 from planner.result import Plan
 from planner.robots import Robot
@@ -31,7 +31,7 @@ def check(asked: Question, margin: Plan, effort: Plan, tolerance: float) -> None
         assert answer.status == "optimal", answer.reason
         assert answer.verified
         assert [hand.limb for hand in answer.hands] == [hand.limb for hand in asked.stance.hands]
-        assert answer.utilisation <= 1.0 + SLACK
+        assert answer.utilisation <= 1.0 + CAP_SLACK
         assert answer.effort == pytest.approx(told_effort(asked, answer), rel=1e-6)
     best = peer.least_utilisation(asked, [hand.space for hand in margin.hands])
     assert best.status == 0, best.message
@@ -41,7 +41,7 @@ def check(asked: Question, margin: Plan, effort: Plan, tolerance: float) -> None
     assert best.fun - tolerance <= used <= best.fun + tolerance + early
     assert effort.effort <= margin.effort + 1e-9
     if not effort.warnings:
-        assert promised(asked, effort, 1.0 + SLACK) <= 10.0 * tolerance
+        assert promised(asked, effort, 1.0 + CAP_SLACK) <= 10.0 * tolerance
 
 
 @pytest.mark.parametrize("joints", [False, True], ids=["hands alone", "with joints"])

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare import BALL, FORCE_CAP, TENSION_CHANGE, hand_space
+from planner.prepare import FORCE_CAP, FORCE_DIRECTIONS, TENSION_CHANGE, hand_space
 from planner.prepare.stance_constraints import JointLoads, StanceConstraints
 from planner.programs import JOINT_TORQUE
 from tests.suite.helpers.stances import on_wall
@@ -94,8 +94,8 @@ def test_nothing_asked_adds_nothing():
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 1e-3))
 def test_26_directions_tell_the_size_of_a_force_from_above(force):
     size = math.hypot(*force)
-    told = float((BALL @ force).max())
-    assert BALL.shape == (26, 3)
+    told = float((FORCE_DIRECTIONS @ force).max())
+    assert FORCE_DIRECTIONS.shape == (26, 3)
     assert size * (1.0 - 1e-12) <= told <= 1.12 * size
 
 
@@ -104,7 +104,9 @@ def test_26_directions_enclose_the_ball_and_no_more():
     rng = np.random.default_rng(1)
     farthest = 0.0
     for way in rng.normal(size=(60, 3)):
-        found = linprog(-way, A_ub=BALL, b_ub=np.ones(len(BALL)), bounds=(None, None))
+        found = linprog(
+            -way, A_ub=FORCE_DIRECTIONS, b_ub=np.ones(len(FORCE_DIRECTIONS)), bounds=(None, None)
+        )
         farthest = max(farthest, float(np.linalg.norm(found.x)))
     assert 0.99 <= farthest <= 1.0 + 1e-9
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from hand_models.base import CruxError
-from planner.processes.worker_handles import THREADS
-from planner.processes.workers import NO_GUARD, Lost, Workers
+from planner.processes.worker_handles import SETTINGS
+from planner.processes.workers import Lost, Workers
 from tests.suite.helpers import workshop
 from tests.suite.helpers.patience import PATIENCE
 
@@ -123,7 +123,10 @@ def test_the_guard_of_a_program_is_named_only_where_that_may_be_it(monkeypatch, 
     monkeypatch.setattr("planner.processes.worker_handles._answer_each", workshop.exits)
     with Workers(workshop.naps, 2) as workers:
         reason = not_started(workers)
-    assert reason == f"processes do not start: a worker ended with status 1{NO_GUARD}"
+    assert reason.startswith(
+        "processes do not start: a worker ended with status 1 while it started"
+    )
+    assert "'if __name__ == \"__main__\":'" in reason
     assert caplog.messages == [reason]
 
 
@@ -152,12 +155,13 @@ def test_processes_that_die_before_they_have_read_what_is_large_do_not_hang(monk
 
 
 def test_each_process_does_its_linear_algebra_on_one_thread(monkeypatch):
-    monkeypatch.setenv(THREADS[0], "7")
-    monkeypatch.delenv(THREADS[1], raising=False)
+    variables = SETTINGS.thread_variables
+    monkeypatch.setenv(variables[0], "7")
+    monkeypatch.delenv(variables[1], raising=False)
     with Workers(workshop.threads, 1) as workers:
-        assert set(done(workers, list(THREADS)).values()) == {"1"}
-    assert os.environ[THREADS[0]] == "7"
-    assert THREADS[1] not in os.environ
+        assert set(done(workers, list(variables)).values()) == {"1"}
+    assert os.environ[variables[0]] == "7"
+    assert variables[1] not in os.environ
 
 
 def test_neither_side_waits_for_the_other_to_take_what_is_large():

@@ -19,7 +19,7 @@ from planner import deadline
 from planner.programs import TensionTrade, conic, program, solvers, stance_program
 from planner.programs.conic import Columns, ConicProgram, Solver, Solvers
 from planner.programs.stance_data import HandData, StanceData
-from planner.programs.stance_program import SETTINGS, StanceProgram
+from planner.programs.stance_program import CLARABEL_SETTINGS, StanceProgram
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.named_programs import program_of
 from tests.suite.helpers.patience import PATIENCE
@@ -170,8 +170,8 @@ def test_where_the_solver_gives_up_cvxpy_comes_to_the_same(data, monkeypatch, ki
     asked = real_programs(data)[kind]
     fast, further = asked.run()
     assert fast.solved
-    gives_up = conic.Solution(conic.FAILED)
-    monkeypatch.setattr(stance_program.SOLVERS, "solve", lambda *_: gives_up)
+    gives_up = conic.Solution(conic.SOLVER_ERROR)
+    monkeypatch.setattr(stance_program.WAITING_SOLVERS, "solve", lambda *_: gives_up)
     monkeypatch.setattr(Solver, "solve", lambda _: gives_up)
     slow, theirs = asked.run()
     assert slow.solved
@@ -194,7 +194,7 @@ def test_where_the_solver_gives_up_cvxpy_comes_to_the_same(data, monkeypatch, ki
 
 def test_an_answer_does_not_depend_on_the_questions_before(data):
     other = program_data(ask(on_wall(overhang=0.2, off=0.25)))
-    conic.SOLVERS.clear()
+    conic.WAITING_SOLVERS.clear()
     fresh = solvers.unique(data)
     for before in (other, data, other.turned(1.2 * other.wrench), data.turned(other.wrench)):
         solvers.unique(before)
@@ -216,7 +216,8 @@ def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
     fourth = first._replace(A=(Columns.of(np.where(np.abs(A) < 0.3, 0.0, A)),))
     kept = Solvers(2)
     for asked in (first, second, third, fourth, first):
-        found, fresh = kept.solve(asked, SETTINGS), Solver(asked, SETTINGS).solve()
+        found = kept.solve(asked, CLARABEL_SETTINGS)
+        fresh = Solver(asked, CLARABEL_SETTINGS).solve()
         assert found.status == fresh.status
         for name in ("x", "multipliers"):
             np.testing.assert_array_equal(getattr(found, name), getattr(fresh, name))
@@ -224,13 +225,13 @@ def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
 
 
 def test_threads_do_not_disturb_each_other(data):
-    conic.SOLVERS.clear()
+    conic.WAITING_SOLVERS.clear()
     wrenches = [data.wrench * (1.0 + 0.02 * i) for i in range(24)]
     alone = [solvers.unique(data.turned(w)).value for w in wrenches]
     with ThreadPoolExecutor(6) as pool:
         together = list(pool.map(lambda w: solvers.unique(data.turned(w)).value, wrenches * 4))
     assert together == alone * 4
-    assert conic.SOLVERS.info().kept <= 6
+    assert conic.WAITING_SOLVERS.info().kept <= 6
 
 
 def test_the_solvers_that_wait_are_bounded(data):
@@ -240,9 +241,9 @@ def test_the_solvers_that_wait_are_bounded(data):
         L = hand.L.copy()
         L[j, i] = 0.0 if L[j, i] else 1.0
         solvers.margin(StanceData.of((hand._replace(L=L), *data.hands[1:]), data.wrench))
-    assert conic.SOLVERS.info()[2:] == (conic.KEPT, conic.KEPT)
-    conic.SOLVERS.clear()
-    assert conic.SOLVERS.info() == stores()["solvers"] == (0, 0, 0, conic.KEPT)
+    assert conic.WAITING_SOLVERS.info()[2:] == (64, 64)
+    conic.WAITING_SOLVERS.clear()
+    assert conic.WAITING_SOLVERS.info() == stores()["solvers"] == (0, 0, 0, 64)
 
 
 def test_numbers_that_are_none_cost_only_their_own_question(data):
@@ -299,10 +300,11 @@ def test_infeasible_comes_with_its_proof():
 
 def test_the_solvers_words_are_cvxpys():
     theirs = CLARABEL.STATUS_MAP
-    assert {word: theirs.get(word) for word in conic.STATUS if word in theirs} == {
-        word: status for word, status in conic.STATUS.items() if status != conic.OUT_OF_TIME
+    known = conic.CLARABEL_STATUSES
+    assert {word: theirs.get(word) for word in known if word in theirs} == {
+        word: status for word, status in known.items() if status != conic.OUT_OF_TIME
     }
-    assert {status for word, status in theirs.items() if word not in conic.STATUS} <= {conic.FAILED}
+    assert {theirs[word] for word in theirs if word not in known} <= {conic.SOLVER_ERROR}
 
 
 def test_what_is_raised_while_a_deadline_runs_is_raised(data, monkeypatch):
@@ -346,7 +348,7 @@ def test_a_program_of_one_row_is_solved_by_hand():
     """min x + ½ (2 x²) with x ≥ −1 as −x ≤ 1: at −½, of value −¼."""
     A = (Columns.of(np.array([[-1.0]])),)
     asked = ConicProgram(np.array([2.0]), np.array([1.0]), A, np.array([1.0]), 0)
-    found = Solvers(1).solve(asked, SETTINGS)
+    found = Solvers(1).solve(asked, CLARABEL_SETTINGS)
     assert found.value == pytest.approx(-0.25, abs=1e-8)
     assert found.x == pytest.approx([-0.5], abs=1e-6)
 

@@ -12,7 +12,8 @@ from hand_models.base import InvalidInputError, Pose
 from planner.robots import RobotFile, UnreachableError, robosimian, robot_of, solve_limbs
 from planner.robots.inverse_kinematics import lower_torques
 from planner.robots.limb_batch import LimbBatch
-from planner.robots.pose_search import TOLERANCE, damped_step
+from planner.robots.pose_search import damped_step
+from planner.robots.tolerances import TOLERANCES
 from tests.suite.helpers.robots import arm
 
 EARTH = np.array([0.0, 0.0, -9.81])
@@ -137,7 +138,7 @@ def test_lowered_torques_are_a_minimum_among_the_postures_nearby(seed):
                 continue
             for _ in range(10):
                 near = damped_step(batch, near, *(each[0] for each in batch.errors(near[None])))
-            met = np.abs(batch.errors(near[None])[0][0, i]).max() <= TOLERANCE
+            met = np.abs(batch.errors(near[None])[0][0, i]).max() <= TOLERANCES.pose_error
             if not met or np.abs(near[i] - found[i]).max() > 0.1:
                 continue
             assert batch.cost(near[None])[0, i] >= least[i] * (1.0 - 1e-5)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from hand_models.base import InvalidInputError, Pose
-from planner.question import SOLVE
 from planner.robots import robosimian
 from planner.route import Move, Route, evaluate
 from planner.route.climb import stages
@@ -28,7 +27,7 @@ def raised(pose: Pose, by: float) -> Pose:
 def solved() -> Route:
     """Two moves: a hand, and after a shift of the body another one."""
     bundled = questions.route(read_route("six-moves"))
-    start = replace(bundled.start, joints=SOLVE)
+    start = replace(bundled.start, joints="solve")
     hand = next(each for each in start.hands if each.limb == "front_right")
     second = Move(replace(hand, pose=raised(hand.pose, 0.03)), raised(start.body, 0.01))
     return replace(bundled, start=start, moves=(bundled.moves[0], second))
@@ -85,7 +84,7 @@ def test_every_stage_has_the_angles_that_hold_then(climbed, solved):
     np.testing.assert_array_equal(by[1, "lift"][lifted], start[lifted])
     np.testing.assert_array_equal(by[1, "place"][lifted], first[lifted])
     # a shift changes all: those given count, those of the limb that moves next are found
-    assert by[2, "shift"][other] == SOLVE
+    assert by[2, "shift"][other] == "solve"
     assert other not in by[2, "lift"]
     np.testing.assert_array_equal(by[2, "place"][other], second[other])
     for limb in set(first) - {lifted, other}:
@@ -95,13 +94,13 @@ def test_every_stage_has_the_angles_that_hold_then(climbed, solved):
 
 def test_angles_left_out_stay_until_the_body_shifts(climbed, solved):
     route = given_by(climbed, solved)
-    bare = replace(route, moves=tuple(replace(move, joints=SOLVE) for move in route.moves))
+    bare = replace(route, moves=tuple(replace(move, joints="solve") for move in route.moves))
     by = {(s.move, s.phase): s.question.stance.joints for s in stages(bare)}
     lifted = route.moves[0].hand.limb
-    assert by[1, "place"][lifted] == SOLVE
+    assert by[1, "place"][lifted] == "solve"
     for limb in set(route.start.joints) - {lifted}:
         np.testing.assert_array_equal(by[1, "place"][limb], route.start.joints[limb])
-    assert by[2, "shift"] == by[2, "lift"] == by[2, "place"] == SOLVE
+    assert by[2, "shift"] == by[2, "lift"] == by[2, "place"] == "solve"
     assert {answer.status for answer in evaluate(bare).plans} == {"optimal"}
 
 

@@ -14,7 +14,7 @@ from planner.programs import HandData, StanceData, solvers
 from planner.question import ForceCap, Limits, Load, Question
 from planner.result import Price
 from planner.robots import RobotFile, robot_of
-from planner.solving import OBJECTIVES, plan
+from planner.solving import NAMED_OBJECTIVES, plan
 from tests.suite.helpers import peer
 from tests.suite.helpers.robots import arm
 from tests.suite.helpers.stances import CALIBRATION_LOAD, ask, on_wall, random_question
@@ -297,7 +297,7 @@ def test_the_program_of_any_number_of_hands_is_proven_by_highs(count, seed):
     value, gap = effort_gap(data, 1.0, outcome.loads)
     assert value == pytest.approx(outcome.value, abs=1e-7)
     assert -1e-6 <= gap <= 1e-5 * max(1.0, value)
-    bound = OBJECTIVES["min_effort"].bound(data, outcome, 1.0)
+    bound = NAMED_OBJECTIVES["min_effort"].bound(data, outcome, 1.0)
     assert value - 1e-5 * max(1.0, value) <= bound <= value + 1e-6
     assert solvers.used_effort(data, outcome.loads) <= value
 

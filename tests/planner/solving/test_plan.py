@@ -11,7 +11,7 @@ from hand_models.rock import Cylinder, Plane
 from hand_models.tile import inner_half_planes
 from planner.deadline import DeadlineError
 from planner.prepare import settle_hand
-from planner.programs import SLACK
+from planner.programs import CAP_SLACK
 from planner.question import Limits, Load, Question
 from planner.result import Plan
 from planner.solving import KnownStance, plan
@@ -218,7 +218,7 @@ def test_limiting_names_a_row_at_the_plans_utilisation(seeds):
         else:
             part = hand.palm.utilisation
         assert part == pytest.approx(
-            answer.utilisation, abs=2.0 * SLACK * max(1.0, answer.utilisation)
+            answer.utilisation, abs=2.0 * CAP_SLACK * max(1.0, answer.utilisation)
         )
         assert name.limb in answer.reason
         assert "\n" not in answer.reason
@@ -238,7 +238,7 @@ def test_status_follows_the_utilisation_cap_and_the_plan_does_not():
 def test_a_utilisation_just_at_the_cap_is_optimal():
     used = plan(ask(on_wall())).utilisation
     assert plan(ask(on_wall(), limits=Limits(utilisation=used))).status == "optimal"
-    just_less = used - 10.0 * SLACK
+    just_less = used - 10.0 * CAP_SLACK
     assert plan(ask(on_wall(), limits=Limits(utilisation=just_less))).status == "overloaded"
 
 

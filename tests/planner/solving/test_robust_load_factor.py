@@ -65,7 +65,7 @@ def few(monkeypatch, places: int, rounds: int) -> None:
     """Let there be fewer samples."""
     settings = replace(robust.SCATTER_SETTINGS, places=places)
     monkeypatch.setattr(robust, "SCATTER_SETTINGS", settings)
-    monkeypatch.setattr(robust, "ROUNDS", rounds)
+    monkeypatch.setattr(robust, "SETTINGS", replace(robust.SETTINGS, rounds=rounds))
 
 
 @pytest.mark.parametrize("name", ["wall-300", "ledge"])
@@ -104,7 +104,7 @@ def test_the_tenth_is_steady_under_another_scramble_and_within_its_interval(monk
     """Within a tenth of itself, or of the hundredth of a load factor where it is about none."""
     found = []
     for seed in range(4):
-        monkeypatch.setattr(robust, "SEED", seed)
+        monkeypatch.setattr(robust, "SETTINGS", replace(robust.SETTINGS, seed=seed))
         found.append(plan(asked_of(name)).robust)
     middle = float(np.mean([each.tenth for each in found]))
     for each in found:
@@ -160,7 +160,10 @@ def test_the_interval_is_that_of_a_binomial_where_places_say_nothing_and_wider_w
     taken = np.array(
         [
             np.concatenate(
-                [rng.permutation(robust.SCATTER_SETTINGS.places) for _ in range(robust.ROUNDS)]
+                [
+                    rng.permutation(robust.SCATTER_SETTINGS.places)
+                    for _ in range(robust.SETTINGS.rounds)
+                ]
             )
             for _ in range(hands)
         ]

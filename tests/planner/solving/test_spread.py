@@ -15,7 +15,6 @@ from hand_models.parameters import Draw, bundled_draws, own_draw, own_hand, own_
 from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.capability import BodySpace
-from planner.floating.continuation import BRACKET
 from planner.prepare import settle_hand
 from planner.question import Limits, Question, Stance
 from planner.result import DrawnPlan, Quantiles, Spread
@@ -152,12 +151,13 @@ def test_floating_wrists_that_begin_at_the_usual_plan_are_no_worse_than_by_thems
         asked = replace(asked, load=structs.replace(asked.load, mass=mass))
     found, apart = plan(asked).spread, planned_apart(asked)
     assert found.holds == sum(each.holds for each in apart)
+    bracket = 2e-3  # relative, of the largest factor
     for used, factor, alone in zip(found.utilisations, found.load_factors, apart, strict=True):
-        assert used <= alone.utilisation * (1.0 + BRACKET)
-        assert factor >= alone.load_factor * (1.0 - BRACKET)
+        assert used <= alone.utilisation * (1.0 + bracket)
+        assert factor >= alone.load_factor * (1.0 - bracket)
     # few come out better
     ends = [each.utilisation for each in apart]
-    assert sorted(np.abs(np.array(found.utilisations) / ends - 1.0))[-3] <= BRACKET
+    assert sorted(np.abs(np.array(found.utilisations) / ends - 1.0))[-3] <= bracket
 
 
 def test_the_plan_itself_stays():

@@ -18,7 +18,6 @@ from planner.result import LoadRecovery, SetPoints
 from planner.solving import KnownStance, plan
 from planner.streaming import WrenchStream
 from planner.streaming.interpolation import PER_RADIUS, Interpolation
-from planner.streaming.stream import RADIUS
 from planner.streaming.stream_stance import StreamStance
 from planner.verification import Check, LoadsCheck
 from tests.suite.helpers import peer
@@ -30,6 +29,7 @@ from tests.suite.helpers.streams import streamable
 WALL = ask(on_wall(), load=Load(mass=95.0, com=(0.0, 0.0, 0.0)))
 """Light enough that an interpolation's corners stay well under the cap."""
 
+RADIUS = 30.0  # [N] by default
 WEIGHT = WALL.needed_wrench()
 
 BARE = ask(on_wall(palm=False), body_wrench=np.array([0.0, 0.0, -100.0, 0.0, 0.0, 0.0]))

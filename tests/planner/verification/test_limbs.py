@@ -220,7 +220,7 @@ def test_another_wrench_that_was_asked_for_is_found():
 
 
 def test_rows_that_promise_less_force_than_there_is_are_found(monkeypatch):
-    monkeypatch.setattr(limbs, "BALL", 0.5 * limbs.BALL)
+    monkeypatch.setattr(limbs, "FORCE_DIRECTIONS", 0.5 * limbs.FORCE_DIRECTIONS)
     assert any("more than its rows say" in each for each in complaints())
 
 

@@ -178,7 +178,7 @@ def test_tiles_keep_to_their_limit_curve_as_well_as_to_their_half_planes(monkeyp
 
     loads, _ = honest()
     monkeypatch.setattr(tile_limits, "LimitCurves", weak)
-    monkeypatch.setattr(checks, "KNOWN", BoundedStore("of this test", 1))
+    monkeypatch.setattr(checks, "SETTLED_LIMITS", BoundedStore("of this test", 1))
     known = StreamStance(WALL)
     assert fault(known, loads, known.first).endswith("is beyond its limit curve")
 

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from planner.processes import PriorityLane, WorkerHandle
-from planner.processes.worker_handles import PART, _send_parts
+from planner.processes.worker_handles import SETTINGS as PROCESS_SETTINGS, _send_parts
 from service.processes import Job
 from service.serving.dispatcher import Dispatcher
 from service.serving.names import Names, digest
@@ -292,13 +292,14 @@ def test_nothing_grows_with_names_that_are_made_up():
 
 def test_an_answer_comes_in_parts_and_whole():
     # around where the last part is cut to the byte, too: it is shorter than others, be it empty
-    for size in (0, 10, *range(PART - 60, PART), 5 * PART, 1_000_000):
+    whole = PROCESS_SETTINGS.part_bytes
+    for size in (0, 10, *range(whole - 60, whole), 5 * whole, 1_000_000):
         here, there = Pipe()
         lane: PriorityLane[object, object] = PriorityLane(SimpleNamespace(), 0, here)  # type: ignore[arg-type]
         parts: list[bytes] = []
         _send_parts(SimpleNamespace(send_bytes=parts.append), b"x" * size)  # type: ignore[arg-type]
-        assert all(len(part) == PART for part in parts[:-1])
-        assert len(parts[-1]) < PART
+        assert all(len(part) == whole for part in parts[:-1])
+        assert len(parts[-1]) < whole
         for part in parts[:-1]:
             there.send_bytes(part)
             # a process that stops now keeps nobody waiting

@@ -9,7 +9,7 @@ from hand_models.base import Pose
 from hand_models.hand import Grasp
 from hand_models.rock import Cylinder, Hold
 from hand_models.tile import Surface
-from planner.question import EARTH, ForceCap, HandOnHold, Limits, Load, Question, Stance
+from planner.question import EARTH_GRAVITY, ForceCap, HandOnHold, Limits, Load, Question, Stance
 from planner.robots import Robot, RobotFile, robosimian, robot_of
 from tests.suite.helpers.robots import TWO_LINK, limbs_toml
 from tests.suite.helpers.stances import random_hold, random_surface
@@ -28,7 +28,7 @@ def at_joints(
     body: Pose | None = None,
     hold: Hold | None = None,
     surface: Surface | None = None,
-    gravity=EARTH,
+    gravity=EARTH_GRAVITY,
     **grasp,
 ) -> Stance:
     """Hands of those limbs where the angles put them, each seated on a hold of its own."""
