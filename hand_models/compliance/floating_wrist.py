@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, BoundedStore, Indices
-from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
+from hand_models.compliance.compliant_hand import CompliantHand, HandLoads, own_shears
 from hand_models.compliance.grasp import (
     CompliantGrasp,
     GraspLoads,
@@ -156,7 +156,8 @@ class FloatingWrist(CompliantGrasp):
             own, phalanges = self.hand.tiles_of(i), self.hand.tiles_of(i)[-len(PHALANGES) :]
             found = self.hand.finger_loads(i, twists[left])
             laterals = self.hand.lateral_loads(i, twists[left])
-            elements = np.concatenate([found.shears, found.normals, laterals], axis=1)
+            shears = own_shears(found, len(own))
+            elements = np.concatenate([shears, found.normals, laterals], axis=1)
             mine = np.flatnonzero(np.isin(self.layout.plane_tiles, own))
             P = rows.P[np.ix_(mine, [*own, *n + phalanges, *2 * n + own])]
             with np.errstate(invalid="ignore"):
@@ -165,7 +166,7 @@ class FloatingWrist(CompliantGrasp):
                 if len(own) > len(PHALANGES):
                     share = self.hand.settled.engagement[own[0]]
                     pressed = np.column_stack([share * pressed[:, 0], pressed])
-                drags = found.shears + self.hand.settled.surface.friction * pressed
+                drags = shears + self.hand.settled.surface.friction * pressed
                 drags += self.hand.settled.drag_allowances[own]
                 holds &= found.reached & (drags >= 0.0).all(axis=1)
             left = left[holds]
