@@ -1,5 +1,11 @@
 from .compliant_finger import STEP as STEP, FingerLoads as FingerLoads
 from .compliant_hand import CompliantHand as CompliantHand
+from .compliant_wrist import (
+    CompliantWrist as CompliantWrist,
+    CompliantWrists as CompliantWrists,
+    DrivenHand as DrivenHand,
+    WristTravel as WristTravel,
+)
 from .directional_limit import (
     Farthest as Farthest,
     farthest as farthest,

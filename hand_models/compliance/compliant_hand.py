@@ -18,7 +18,7 @@ that stays.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -37,7 +37,7 @@ from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.tendon import FingerTendon, MotorScheme, share_load
 
-__all__ = ["CompliantHand", "HandLoads"]
+__all__ = ["CompliantHand", "CompliantHands", "HandLoads"]
 
 NOTHING: Final = 1e-20
 """Load of the palm that is none: the square of a complex step leaves as much [N]."""
@@ -162,15 +162,28 @@ class CompliantHand:
         springs = np.diag(settled.engagement[own] * hand.lateral_stiffness)
         return np.asarray(np.linalg.solve(np.eye(len(own)) + springs @ flexibility, springs))
 
-    def loads(self, twists: Numbers) -> HandLoads:
-        """Return every load at some twists of the wrist, shape (m, 6) [m, rad]."""
+    def loads(self, twists: Numbers, tensions: Numbers | None = None) -> HandLoads:
+        """Return every load at some twists of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, 6)
+            [m, rad]
+        tensions : ndarray, shape (m, 4), optional
+            At which the hand has closed before its wrist moves [N]; the preload by default.
+        """
+        closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
+        bases = self._bases(range(len(FINGERS)), twists, closed if tensions is None else tensions)
+        return self._loads(twists, self._together.loads(*bases))
+
+    def _loads(self, twists: Numbers, found: FingerLoads) -> HandLoads:
+        """Return the hand's loads of those of its four fingers in their planes."""
         m, settled = len(twists), self.settled
         n = len(settled.tiles)
         kind = twists.dtype
         shears, normals, laterals = (np.zeros((m, n), dtype=kind) for _ in range(3))
         positions = np.broadcast_to(settled.positions, (m, n, 3)).astype(kind)
         axes = np.broadcast_to(settled.axes, (m, n, 3, 3)).astype(kind)
-        found = self._together.loads(*self._bases(range(len(FINGERS)), twists))
         tensions = found.motor_tensions.T
         reached = np.asarray(found.reached.all(axis=0))
         for i, (frame, own) in enumerate(zip(self.frames, self._own, strict=True)):
@@ -198,7 +211,8 @@ class CompliantHand:
 
     def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
         """Return the loads of one finger in its plane at some twists of the wrist."""
-        return self._alone[i].loads(*self._bases([i], twists)).of(0)
+        closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
+        return self._alone[i].loads(*self._bases([i], twists, closed)).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
         """Return the lateral loads of a finger's tiles at some twists, shape (m, n_i) [N]."""
@@ -215,7 +229,7 @@ class CompliantHand:
         return self._own[i]
 
     def _bases(
-        self, fingers: Iterable[int], twists: Numbers
+        self, fingers: Iterable[int], twists: Numbers, tensions: Numbers
     ) -> tuple[Numbers, Numbers, Numbers, Numbers, Numbers]:
         """Return how bases of fingers move in their planes, (F, m), as `CompliantFingers.loads`."""
         v, turn, each = twists[:, :3], twists[:, 3:], []
@@ -226,8 +240,7 @@ class CompliantHand:
             slip = -(_moved(base, v, turn) @ frame.along)
             # from x toward z is against the sense of the axis across, z × x
             turned = -(turn @ frame.across)
-            tension = np.full(len(twists), self.preload[i])
-            each.append((moved @ frame.along, moved[:, 2], turned, tension, slip))
+            each.append((moved @ frame.along, moved[:, 2], turned, tensions[:, i], slip))
         x, z, turned, tension, slip = map(np.array, zip(*each, strict=True))
         return x, z, turned, tension, slip
 
@@ -246,8 +259,12 @@ class CompliantHand:
 
         Negative where the palm moves away and so carries nothing.
         """
+        return self.palm_travel(twists) * self.palm_stiffness
+
+    def palm_travel(self, twists: Numbers) -> Numbers:
+        """Return how far the palm moves toward −x and into the rock, shape (m, 2) [m]."""
         moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
-        return moved[:, ::2] * (-1.0, 1.0) * self.palm_stiffness
+        return np.asarray(moved[:, ::2] * (-1.0, 1.0))
 
     def wrenches(self, loads: HandLoads) -> Numbers:
         """Return the wrenches on the rock, about H at rest and in its axes, shape (m, 6)."""
@@ -267,6 +284,35 @@ class CompliantHand:
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
         loads = self.loads(at + 1j * STEP * np.eye(6))
         return np.asarray(self.wrenches(loads).imag.T / STEP)
+
+
+class CompliantHands:
+    """Hands whose loads are found in one call, each about its own pose.
+
+    Parameters
+    ----------
+    hands : sequence of CompliantHand
+        All of one scheme.
+    """
+
+    def __init__(self, hands: Sequence[CompliantHand]) -> None:
+        self.hands = hands
+        fingers = [finger for hand in hands for finger in hand.fingers]
+        self._together = CompliantFingers(fingers, hands[0].scheme)
+
+    def loads(self, twists: Sequence[Numbers], tensions: Sequence[Numbers]) -> list[HandLoads]:
+        """Return the loads of each hand; arguments as of `CompliantHand.loads`, m the same."""
+        count = len(FINGERS)
+        each = [
+            hand._bases(range(count), own, closed)
+            for hand, own, closed in zip(self.hands, twists, tensions, strict=True)
+        ]
+        bases = [np.concatenate(parts) for parts in zip(*each, strict=True)]
+        found = self._together.loads(*bases)
+        return [
+            hand._loads(own, FingerLoads(*(part[count * h : count * (h + 1)] for part in found)))
+            for h, (hand, own) in enumerate(zip(self.hands, twists, strict=True))
+        ]
 
 
 def own_shears(found: FingerLoads, count: int) -> Numbers:

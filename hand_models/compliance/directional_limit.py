@@ -21,8 +21,8 @@ from hand_models.wrench_spaces import Row, WrenchSpace, linear_program
 
 __all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
 
-UNITS: Final = {"v": 1e-3, "w": 1e-2}
-"""Units of displacements and turns of a wrist [m, rad]."""
+UNITS: Final = {"v": 1e-3, "w": 1e-2, "t": 100.0}
+"""Units of displacements and turns of a wrist, and of tensions [m, rad, N]."""
 
 FIRST_BOX: Final = 1.0
 LARGEST_BOX: Final = 4.0

@@ -13,7 +13,7 @@ each of its ways of carrying is a set of its own. A tendon's stick and slip stay
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,7 +76,10 @@ class FloatingWrist(CompliantGrasp):
     tension_limit: float | None = None
     palm: PalmMode = "off"
 
-    columns, range_rows = WRIST, rows_of_range(WRIST)
+    columns: ClassVar[tuple[str, ...]] = WRIST
+    range_rows = rows_of_range(WRIST)
+    driven: ClassVar[bool] = False
+    """Whether its motors keep the tensions that a plan asks for, instead of standing still."""
 
     def __post_init__(self) -> None:
         self.layout = layout_of(self.hand.settled, sticking=False)
@@ -138,8 +141,16 @@ class FloatingWrist(CompliantGrasp):
         return LoadRows(layout.rows, P, p, np.hstack([HELD, np.zeros_like(HELD)]), s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at some twists of the wrist, shape (m, 6)."""
-        return self._grasp_loads(self.hand.loads(twists))
+        """Return loads and wrenches at some poses of the wrist, shape (m, d)."""
+        return self._grasp_loads(self.hand_loads(twists))
+
+    def closed_at(self, y: Array) -> Array:
+        """Return the tensions at which the hand has closed for a pose (d,), shape (4,) [N]."""
+        return self.hand.preload
+
+    def hand_loads(self, y: Numbers) -> HandLoads:
+        """Return the hand's loads at some poses of the wrist, shape (m, d)."""
+        return self.hand.loads(y)
 
     def _grasp_loads(self, loads: HandLoads) -> GraspLoads:
         elements = [loads.shears, loads.normals, loads.laterals, loads.tensions, loads.palm]
@@ -171,6 +182,10 @@ class FloatingWrist(CompliantGrasp):
                 holds &= found.reached & (drags >= 0.0).all(axis=1)
             left = left[holds]
         return left
+
+    def palm_mode(self, y: Array, given: PalmMode) -> PalmMode:
+        """Return how the palm carries at a pose; a mode that the set was linearised in."""
+        return given
 
     def palm_modes(self) -> tuple[PalmMode, ...]:
         """Return the ways in which the palm can carry."""
@@ -233,9 +248,17 @@ class FloatingWrist(CompliantGrasp):
         known = dict(zip(keys, self._kept.find(keys), strict=True))
         new = [at for at, key in zip(twists, keys, strict=True) if known[key] is None]
         if new:
-            parts = self.hand.loads(np.concatenate([complex_steps(at) for at in new]))
-            each = [np.split(part, len(new)) for part in parts]
-            made = [(at.tobytes(), HandLoads(*own)) for at, *own in zip(new, *each, strict=True)]
-            self._kept.keep(made)
-            known.update(made)
+            steps = np.concatenate([complex_steps(at) for at in new])
+            known.update(self.keep(np.array(new), self.hand_loads(steps)))
         return [loads for key in keys if (loads := known[key]) is not None]
+
+    def knows(self, poses: Array) -> bool:
+        """Return whether the loads about all of some poses are kept."""
+        return None not in self._kept.find([at.tobytes() for at in poses])
+
+    def keep(self, poses: Array, loads: HandLoads) -> list[tuple[bytes, HandLoads]]:
+        """Keep the loads at the complex steps from some poses (k, d), and return those of each."""
+        each = [np.split(part, len(poses)) for part in loads]
+        made = [(at.tobytes(), HandLoads(*own)) for at, *own in zip(poses, *each, strict=True)]
+        self._kept.keep(made)
+        return made

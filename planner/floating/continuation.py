@@ -17,8 +17,9 @@ import numpy as np
 
 from planner import deadline
 from planner.deadline import Budget
+from planner.floating.elastic_search import find_wrists
 from planner.floating.palm_modes import NEARBY, exchanged, first_plan, starts
-from planner.floating.wrist_iteration import WristSolution, solve_wrists
+from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import NO_WRENCH, HandSets
 from planner.programs import SLACK
 
@@ -106,7 +107,7 @@ def least_use(
         Of the body wrench, as far as it has been sought: None for a plan within its limits.
     """
     choices = starts(hands, 1.0, budget)
-    plan = None if near is None else solve_wrists(hands, near.point, budget.part(FIRST))
+    plan = None if near is None else find_wrists(hands, near.point, budget.part(FIRST))
     if plan is None or not plan.exact:
         near, plan = None, first_plan(hands, 1.0, choices, budget.part(FIRST))
     if deadline.expired():
@@ -238,7 +239,7 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
             aim = 1.0
         if aim < LEAST:
             break
-        there = solve_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        there = find_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
         if there.exact:
             now = there
         elif aim > factor or best is not None:
@@ -256,7 +257,7 @@ def _carried_on(hands: HandSets, at: WristSolution, budget: Budget) -> WristSolu
     for _ in range(HALVINGS):
         if budget.ended:
             break
-        there = solve_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
+        there = find_wrists(hands, replace(now.point, factor=aim), budget, NEARBY)
         if there.exact and aim == 1.0:
             return there
         now, aim = (there, 1.0) if there.exact else (now, 0.5 * (now.point.factor + aim))

@@ -17,8 +17,9 @@ from hand_models.compliance import PALM_MODES, PalmMode
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from planner import deadline, programs
 from planner.deadline import Budget
+from planner.floating.elastic_search import find_wrists
 from planner.floating.goals import LEAST_USE, Goal
-from planner.floating.wrist_iteration import ROUNDS, WristSolution, solve_wrists
+from planner.floating.wrist_iteration import ROUNDS, WristSolution
 from planner.prepare import HandSets
 from planner.programs import SLACK
 
@@ -50,14 +51,17 @@ def first_plan(
     for palms in choices:
         most = NEARBY if failed else ROUNDS
         start = replace(hands.at_rest(palms), factor=factor)
-        found = solve_wrists(hands, start, budget, most)
+        if hands.springy:
+            # palms on their springs draw the search to where fingers hold little
+            start = find_wrists(hands.without_palms(), start, budget, most).point
+        found = find_wrists(hands, start, budget, most)
         if found.exact:
             return found
         failed.append(found)
         if budget.ended:
             break
     if not failed:
-        return solve_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
+        return find_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
     return min(failed, key=lambda found: found.measure.missing)
 
 
@@ -105,7 +109,7 @@ def exchanged(
         if new is None or budget.ended:
             break
         tried.add(new)
-        there = solve_wrists(hands, replace(found.point, palms=new), budget, NEARBY, goal)
+        there = find_wrists(hands, replace(found.point, palms=new), budget, NEARBY, goal)
         value = goal.value(found.measure)
         lower = value - SLACK * max(1.0, value)
         if there.exact and goal.value(there.measure) < lower:

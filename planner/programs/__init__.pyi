@@ -1,5 +1,10 @@
 from .conic import PROVEN as PROVEN, UNBOUNDED as UNBOUNDED, Outcome as Outcome, Reached as Reached
-from .program import TIE as TIE, UNLIMITED as UNLIMITED, tie_weight as tie_weight
+from .program import (
+    TIE as TIE,
+    UNLIMITED as UNLIMITED,
+    Elastic as Elastic,
+    tie_weight as tie_weight,
+)
 from .solvers import (
     SLACK as SLACK,
     TensionTrade as TensionTrade,
@@ -7,6 +12,7 @@ from .solvers import (
     body_wrench as body_wrench,
     curved as curved,
     effort as effort,
+    elastic as elastic,
     holds as holds,
     least_tensions as least_tensions,
     less_tension as less_tension,
@@ -29,6 +35,7 @@ from .stance_data import (
     TWIST_UNIT as TWIST_UNIT,
     WRENCH_UNIT as WRENCH_UNIT,
     WRIST_RANGE as WRIST_RANGE,
+    WRIST_TRAVEL as WRIST_TRAVEL,
     HandData as HandData,
     ScaledRows as ScaledRows,
     StanceData as StanceData,

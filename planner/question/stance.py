@@ -10,6 +10,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose, finite_vector
+from hand_models.compliance import WristTravel
 from hand_models.fixed_wrist import SEATS, SeatRule
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Hold
@@ -26,7 +27,7 @@ __all__ = [
     "known_limbs",
 ]
 
-WristMode = Literal["fixed", "floating"]
+WristMode = Literal["fixed", "floating", "compliant"]
 
 WRISTS: Final = get_args(WristMode)
 """Modes of a wrist."""
@@ -111,9 +112,11 @@ class HandOnHold:
     hold_in_hand : Pose, optional
         The hold's frame in H. With neither, the hand is seated on the hold.
     grasp : Grasp
-    wrist : {'fixed', 'floating'}
+    wrist : {'fixed', 'floating', 'compliant'}
         Whether its motors give each tendon the tension that the plan asks for while the wrist keeps
-        its pose, or stand still while the wrist gives way.
+        its pose, stand still while the wrist gives way, or drive the tendons while it does.
+    wrist_travel : WristTravel, optional
+        Range in which a compliant wrist may settle; `WristTravel` by default.
     tendon_preload : ndarray, shape (4,), optional
         Tensions that the tendons of a floating hand hold at rest [N]; the closing tension by
         default.
@@ -137,6 +140,7 @@ class HandOnHold:
     grasp: Grasp = field(default_factory=Grasp)
     wrist: WristMode = "fixed"
     tendon_preload: Array | None = None
+    wrist_travel: WristTravel | None = None
     wrench: tuple[float | None, ...] | None = None
     seat: SeatRule = "rest"
     seat_direction: Array | None = None
@@ -144,8 +148,13 @@ class HandOnHold:
 
     def __post_init__(self) -> None:
         known_choice(self.wrist, WRISTS, "wrist")
+        if self.wrist_travel is not None and self.wrist != "compliant":
+            raise InvalidInputError(
+                "only a compliant wrist has a travel; valid is none, or wrist compliant",
+                field="wrist_travel",
+            )
         if self.tendon_preload is not None:
-            if self.wrist == "fixed":
+            if self.wrist != "floating":
                 raise InvalidInputError(
                     "only a floating wrist holds a preload; valid is none, or wrist floating",
                     field="tendon_preload",

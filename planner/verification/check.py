@@ -79,7 +79,8 @@ class SettledLimits:
             for h, place in enumerate(places)
             if place.wrist == "floating"
         }
-        self._balance = balance = JointBalance(names, self.wound)
+        giving = [h for h, place in enumerate(places) if place.wrist != "fixed"]
+        self._balance = balance = JointBalance(names, giving)
         self.nails = nails = NailLimits(names)
         drives = DriveLimits(names, balance.left, strength, nails.fingers)
         self.limits = (balance, TileLimits(names, nails.tiles), drives, HandLimits(names))
@@ -91,7 +92,8 @@ class SettledLimits:
         if not any(arrays.wrists):
             loads, left = balance.loads(f, lateral)
             return Recomputed(arrays, loads, left, f, loads[:, 0], nails)
-        # the motors of hands that float stand still where they have tightened their tendons
+        # motors of hands that float stand still where they have tightened their tendons, those of
+        # compliant ones keep the tension
         wound = f.copy()
         for h, tension in self.wound.items():
             wound[COUNT * h : COUNT * (h + 1)] = tension
@@ -256,5 +258,6 @@ class Check:
     def _wrists(self, arrays: PlanArrays) -> Iterator[str]:
         """Yield hands whose wrists are not what they are in the question."""
         for place, wrist in zip(self.question.stance.hands, arrays.wrists, strict=True):
-            if (wrist is not None) != (place.wrist == "floating"):
+            mode = "fixed" if wrist is None else ("compliant" if wrist.driven else "floating")
+            if mode != place.wrist:
                 yield f"{place.limb}: the wrist is not {place.wrist}"

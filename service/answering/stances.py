@@ -171,6 +171,7 @@ def _hand(
         at=seat,
         grasp=message.grasp,
         wrist=message.wrist,
+        wrist_travel=message.wrist_travel,
         tendon_preload=array_of(message.tendon_preload),
         wrench=message.wrench,
         seat=message.seat,
@@ -362,7 +363,7 @@ def _check_costs(stance: requests.Stance) -> None:
 
 def _half_planes(hand: requests.Hand) -> int:
     given = hand.surface.half_planes if isinstance(hand.surface, requests.Surface) else None
-    return (FLOATING if hand.wrist == "floating" else 1) * (given or 1)
+    return (1 if hand.wrist == "fixed" else FLOATING) * (given or 1)
 
 
 def _points(hold: requests.Hold, rocks: dict[str, requests.Rock]) -> int:
