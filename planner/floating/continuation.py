@@ -115,7 +115,7 @@ def least_use(
     most: LargestFactor | None = None
     if not _held(plan) and np.abs(hands.wrench[:6]).max() > NO_WRENCH:
         along = budget.part(ALONG)
-        for way in _ways(hands, plan, along, up=near is None):
+        for way in _ways(hands, plan, along, up=near is None and hands.together is None):
             if most is None or way.most.factor > most.factor:
                 most = way.most
             onward = way.whole or _carried_on(hands, way.at, along)

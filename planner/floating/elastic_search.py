@@ -68,9 +68,12 @@ def find_wrists(
     within = 1.0  # one `TWIST_UNIT` and 100 N, for which linearised sets are good
     now = searching(hands, goal, start, within)
     firm = _firm(now.sets)
-    merit, rounds = _merit(now), 0
+    merit, rounds, past = _merit(now), 0, [math.inf] * 6
     while rounds < most and not budget.ended:
         rounds += 1
+        if past[-6] - merit < 1e-3 * merit:  # six rounds for a thousandth: it creeps along a kink
+            break
+        past.append(merit)
         outcome = programs.elastic(now.sets.data, PRICE, now.point.loads, firm)
         budget.spend()
         if not outcome.solved:

@@ -221,8 +221,8 @@ class HandSets:
 
     def without_palms(self) -> HandSets:
         """Return the same hands, of whose compliant ones no palm carries."""
-        idle = [w.without_palm() if isinstance(w, CompliantWrist) else w for w in self.wrists]
-        return replace(self, wrists=tuple(idle))
+        wrists = [w.without_palm() if isinstance(w, CompliantWrist) else w for w in self.wrists]
+        return replace(self, wrists=tuple(wrists))
 
     @property
     def idle(self) -> tuple[PalmMode | None, ...]:
@@ -321,7 +321,7 @@ class HandSets:
         return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
 
     def near_rest(self, point: LinearisationPoint) -> bool:
-        """Return whether no wrist is farther from rest than a small twist."""
+        """Return whether all wrists are within a small twist of rest."""
         return self.step(self.at_rest(point.palms), point.loads) <= FARTHEST
 
     def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:

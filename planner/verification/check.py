@@ -66,6 +66,7 @@ class SettledLimits:
     Attributes
     ----------
     names : Names
+    tiles : TileLimits
     limits : tuple of Limits
         But for nails, whose residuals come with what is recomputed of them.
     """
@@ -83,7 +84,8 @@ class SettledLimits:
         self._balance = balance = JointBalance(names, giving)
         self.nails = nails = NailLimits(names)
         drives = DriveLimits(names, balance.left, strength, nails.fingers)
-        self.limits = (balance, TileLimits(names, nails.tiles), drives, HandLimits(names))
+        self.tiles = tiles = TileLimits(names, nails.tiles)
+        self.limits = (balance, tiles, drives, HandLimits(names))
 
     def recompute(self, found: list[str], arrays: PlanArrays) -> Recomputed:
         """Return what tensions, or where wrists go, do to the fingers; with the plan's numbers."""
@@ -142,7 +144,8 @@ class Check:
         self.strength = most if cap is None else min(most, cap)
         self.settled = _settled_limits(known, stance.hands, self.strength)
         self.limbs = self.settled.names.limbs
-        self._limits = (*self.settled.limits, AskedLimits(question, self.settled.names))
+        asked = AskedLimits(question, self.settled.names, self.settled.tiles)
+        self._limits = (*self.settled.limits, asked)
         poses = [place.pose for place in stance.hands]
         into_body = stance.body.rotation.T
         turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
