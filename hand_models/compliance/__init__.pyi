@@ -4,7 +4,6 @@ from .compliant_wrist import (
     CompliantWrist as CompliantWrist,
     CompliantWrists as CompliantWrists,
     DrivenHand as DrivenHand,
-    WristTravel as WristTravel,
 )
 from .directional_limit import (
     Farthest as Farthest,

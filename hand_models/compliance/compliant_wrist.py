@@ -14,54 +14,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from functools import lru_cache
-from typing import Annotated, Final
+from typing import Final
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, Strict
+from hand_models.base import Array
 from hand_models.compliance.compliant_hand import CompliantHand, CompliantHands, HandLoads
 from hand_models.compliance.floating_wrist import PALM_MODES, WRIST, FloatingWrist, PalmMode
 from hand_models.compliance.grasp import LoadRows, complex_steps, rows_of_range
 from hand_models.compliance.rolling import Numbers
-from hand_models.hand import FINGERS, SettledHand
+from hand_models.hand import FINGERS, SettledHand, WristTravel
 from hand_models.wrench_spaces import Row, WrenchSpace
 
-__all__ = ["CompliantWrist", "CompliantWrists", "DrivenHand", "WristTravel"]
+__all__ = ["CompliantWrist", "CompliantWrists", "DrivenHand"]
 
 TENDONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
 """Columns of a driven hand's tensions [N]."""
-
-Travel = Annotated[float, Meta(ge=0.0, le=0.05)]
-Angle = Annotated[float, Meta(ge=0.0, le=0.3)]
-
-
-class WristTravel(Strict, frozen=True):
-    """The range in which a compliant wrist may settle, about its place at rest.
-
-    Attributes
-    ----------
-    position : float
-        Along each axis of H, either way [m].
-    inward : float
-        Toward the rock, +z of H, in place of ``position`` [m]. Contact states stay those of the
-        closed hand, and moving inward is what they bear least.
-    angle : float
-        About each axis of H, either way [rad].
-    """
-
-    position: Annotated[Travel, Meta(description="along each axis of H, either way [m]")] = 0.004
-    inward: Annotated[Travel, Meta(description="toward the rock, along +z of H [m]")] = 0.001
-    angle: Annotated[Angle, Meta(description="about each axis of H, either way [rad]")] = 0.04
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Least and largest of each component of the twist, shape (6,) [m, rad]."""
-        most = np.array([self.position] * 3 + [self.angle] * 3)
-        least = -most
-        most[2] = min(self.inward, self.position)
-        return least, most
 
 
 class DrivenHand(CompliantHand):
@@ -160,7 +129,7 @@ class CompliantWrist(FloatingWrist):
         """Return a set with hard rows that keep the wrist within its travel."""
         names, H = _travel_rows()
         least, most = self.travel.bounds
-        h = np.concatenate([most, -least]) * np.abs(H[:, len(TENDONS) :]).sum(axis=1)
+        h = np.concatenate([most, np.negative(least)]) * np.abs(H[:, len(TENDONS) :]).sum(axis=1)
         return WrenchSpace(
             origin=space.origin,
             generators=space.generators,

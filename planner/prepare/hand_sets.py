@@ -1,7 +1,7 @@
-"""The hands of a stance about a point: sets of floating ones linearised there, of the others fixed.
+"""The hands of a stance about a point: sets linearised there where wrists give way, or fixed.
 
-A point is where each floating wrist is and what each other hand carries. Sets are exact where they
-are linearised, so what they say of their point is what the model says.
+A point is a pose of each wrist that gives way, and loads of each other hand. Sets are exact where
+they are linearised.
 """
 
 from __future__ import annotations
@@ -69,8 +69,7 @@ class LinearisationPoint:
     Attributes
     ----------
     loads : tuple of ndarray
-        y of each hand: loads [N], or the twist of a floating wrist [m, rad], of a compliant one
-        its tensions and its twist.
+        y of each hand: loads [N], the twist of a floating wrist [m, rad], or tensions and twist.
     palms : tuple of PalmMode or None
         How each floating hand's palm carries; None for a hand with a fixed wrist.
     factor : float
@@ -140,7 +139,7 @@ class Sets(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HandSets:
-    """The hands of a stance, as the planner sees them.
+    """The hands of a stance.
 
     Attributes
     ----------
@@ -158,9 +157,8 @@ class HandSets:
     held : tuple of ndarray, shape (nb − 6, 6)
         Of `HandData.of`.
     added : tuple of StanceConstraints
-        What the stance adds to each hand's set; `spaces` have it already. Joints and their
-        Jacobians are those at which the hand rests: a floating wrist that gives way by a
-        millimetre or some ten milliradians hardly moves them.
+        What the stance adds to each hand's set; `spaces` have it already. Joints are those at which
+        the hand rests: a wrist that gives way by millimetres hardly moves them.
     data : StanceData
         Of hands with a fixed wrist; of floating ones a place to fill.
     floating : bool

@@ -312,10 +312,13 @@ class Elastic(StanceProgram):
         balance = self.G @ z + lacks - exceeds == self.data.offset
         limits, hard = self.L @ z + self.l0 <= u, self.H @ z <= self.h + self.gives @ v
         wrong = cp.sum(lacks) + cp.sum(exceeds) + cp.sum(v)
-        near = 0.5 * self.nearness * cp.sum_squares(z - self.near)
+        # ½ ε ‖z − z₀‖², but for its constant
+        near = (
+            cp.sum(cp.multiply(0.5 * self.nearness, cp.square(z))) - self.nearness * self.near @ z
+        )
         problem = cp.Problem(
             cp.Minimize(u + self.penalty * wrong + near),
-            [balance, limits, hard, v >= 0.0, lacks >= 0.0, exceeds >= 0.0],
+            [balance, limits, hard, lacks >= 0.0, exceeds >= 0.0, v >= 0.0],
         )
         return Definition(problem, (u, lacks, exceeds, v, z), (balance, limits, hard))
 

@@ -10,9 +10,8 @@ from typing import Final, Literal, get_args
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose, finite_vector
-from hand_models.compliance import WristTravel
 from hand_models.fixed_wrist import SEATS, SeatRule
-from hand_models.hand import FINGERS, Grasp
+from hand_models.hand import FINGERS, Grasp, WristTravel
 from hand_models.rock import Hold
 from hand_models.tile import Surface
 from planner.robots import Robot, robosimian

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from hand_models.base import Acceleration, Coordinate, Name, Position, Strict
-from hand_models.compliance import WristTravel
-from hand_models.hand import Grasp
+from hand_models.hand import Grasp, WristTravel
 from service.requests.holds import Hold, Rock, Surface
 from service.requests.request import FourTensions, Pose, WrenchEntries, WrenchEntry
 
