@@ -1,7 +1,6 @@
 """The hands of a stance about a point: sets linearised there where wrists give way, or fixed.
 
-A point is a pose of each wrist that gives way, and loads of each other hand. Sets are exact where
-they are linearised.
+A point is a pose of each wrist that gives way, and loads of each other hand; sets are exact there.
 """
 
 from __future__ import annotations
