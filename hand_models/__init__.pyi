@@ -16,6 +16,7 @@ from .hand import (
     Grasp as Grasp,
     SettledHand as SettledHand,
     SpinyHand as SpinyHand,
+    WristTravel as WristTravel,
     spiny_hand as spiny_hand,
 )
 from .rock import (

@@ -1,5 +1,10 @@
 from .compliant_finger import COMPLEX_STEP as COMPLEX_STEP, FingerLoads as FingerLoads
 from .compliant_hand import CompliantHand as CompliantHand
+from .compliant_wrist import (
+    CompliantWrist as CompliantWrist,
+    CompliantWrists as CompliantWrists,
+    DrivenHand as DrivenHand,
+)
 from .directional_limit import (
     Farthest as Farthest,
     farthest as farthest,

@@ -1,4 +1,4 @@
-"""The loads of one finger whose base moves a little while its tiles stay in the rock (Section 5.3).
+"""The loads of fingers whose bases move a little while their tiles stay in the rock (Section 5.3).
 
     base (x, z, ψ) → contacts and joints (`resettling`) → tendon and shears (`tendon_regimes`)
       → normals from the balance of the joints (Eqs. 4–7) → the force and moment on the rock.
@@ -7,6 +7,8 @@ Shears follow the contact stiffness of each tile and the tendon's friction (Appe
 joint's pulley has the tension t_i of its own phalanx, so that joint i balances when
 
     Σ_{j ≥ i} [T_j (d_ij × u_j) − N_j (d_ij × n_j)] + t_i r_i − K_i q_i − p_i = 0.
+
+All fingers of a hand, or of many hands, are found in one call; one finger is a batch of one.
 """
 
 from __future__ import annotations
@@ -18,176 +20,239 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hand_models.base import Array
 from hand_models.compliance.rolling import Numbers, RollingContact
-from hand_models.finger import PHALANGES, FingerModel, SettledFinger
+from hand_models.finger import PHALANGES, SettledFinger
 from hand_models.sections import Section
-from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, TendonState
+from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, pad_tiles
 
-__all__ = ["CompliantFinger", "FingerLoads"]
+__all__ = ["CompliantFingers", "FingerAtRest", "FingerLoads"]
 
 COMPLEX_STEP = 1e-30
 """Size of complex steps, whose error is its square."""
 
 
-class FingerLoads(NamedTuple):
-    """A finger's loads, shapes (m, …); n is 3, or 4 where a base tile comes first on the tendon.
-
-    Attributes
-    ----------
-    shears : ndarray, shape (m, n)
-        T of each tile [N].
-    normals : ndarray, shape (m, 3)
-        N of each phalanx [N].
-    tensions : ndarray, shape (m, n)
-        t of each phalanx [N].
-    stop_torques : ndarray, shape (m, 3)
-        What turns each joint that no contact holds, closing [N·m].
-    points : ndarray, shape (m, 3, 2)
-        Contacts (x, z) in F, which stays where the base was at rest [m].
-    directions : ndarray, shape (m, 3, 2)
-        Unit vectors in F along which tiles drag away from the base: along the phalanges, but for
-        contacts that press aside.
-    reached : ndarray of bool, shape (m,)
-        Whether every phalanx still finds its rock.
-    """
-
-    shears: Numbers
-    normals: Numbers
-    tensions: Numbers
-    stop_torques: Numbers
-    points: Numbers
-    directions: Numbers
-    reached: NDArray[np.bool_]
-
-    @property
-    def forces(self) -> Numbers:
-        """F of each phalanx on the rock, (x, z) in F, shape (m, 3, 2) [N]; no base tile's."""
-        u = self.directions
-        across = np.stack([-u[..., 1], u[..., 0]], axis=-1)
-        shears = self.shears[:, -3:]
-        return np.asarray(self.normals[..., None] * across - shears[..., None] * u)
-
-    @property
-    def planar_wrench(self) -> Numbers:
-        """F_x, F_z and M, from x toward z about the origin of F, shape (m, 3) [N, N·m]."""
-        forces, points = self.forces, self.points
-        moments = points[..., 0] * forces[..., 1] - points[..., 1] * forces[..., 0]
-        return np.asarray(
-            np.concatenate([forces.sum(axis=1), moments.sum(axis=1)[:, None]], axis=1)
-        )
-
-
-class CompliantFinger:
+class FingerAtRest(NamedTuple):
     """A finger at rest on rock, about which its base may move.
 
-    Parameters
+    Attributes
     ----------
     finger : SettledFinger
         Its proximal joint at the origin of F.
     section : Section or None
         The rock in its plane.
     tendon : FingerTendon
-        With the friction that holds the tendon; phalanges without rock under their tiles are taken
-        out here. One more entry than phalanges if a base tile comes first.
-    state : TendonState
-        At rest: tensions and shears, the base tile's first.
-    scheme : {'held', 'tension'}
-        What the motor does.
-    depths : sequence of float, optional
-        How far the tiles of the three phalanges are pressed in; not at all by default [m].
+        With the friction that holds the tendon. One more tile than phalanges if a base tile comes
+        first.
+    closing_friction : float
+        μ of the tendon on closing.
+    shears : ndarray, shape (n, 2)
+        Of each tile at zero tension [N], and per newton of tension; the base tile's first.
+    depths : sequence of float
+        How far the tiles of the three phalanges are pressed in [m].
     """
 
-    def __init__(
-        self,
-        finger: SettledFinger,
-        section: Section | None,
-        tendon: FingerTendon,
-        state: TendonState,
-        scheme: MotorScheme,
-        depths: Sequence[float] = (0.0,) * len(PHALANGES),
-    ) -> None:
-        self.finger = finger
-        self.base_tile = len(tendon.pulley_radii) > len(PHALANGES)
-        stiffness = np.array(tendon.contact_stiffness)
-        stiffness[-3:] = np.where(finger.touching, stiffness[-3:], 0.0)
-        tendon = replace(tendon, contact_stiffness=tuple(stiffness.tolist()))
-        self.regimes = TendonRegimes(tendon, state, scheme)
-        self._resettling = RollingContact(finger, section, depths)
+    finger: SettledFinger
+    section: Section | None
+    tendon: FingerTendon
+    closing_friction: float
+    shears: Array
+    depths: Sequence[float] = (0.0,) * len(PHALANGES)
 
     @property
-    def model(self) -> FingerModel:
-        """The finger's numbers."""
-        return self.finger.model
+    def base_tile(self) -> bool:
+        """Whether a tile on its base comes first on the tendon."""
+        return len(self.shears) > len(PHALANGES)
+
+    @property
+    def losses(self) -> Array:
+        """Tension in each phalanx at rest, per newton of the motor's (Eq. 8), shape (n,)."""
+        return np.asarray((1.0 - self.closing_friction) ** np.arange(len(self.shears), dtype=float))
+
+    @property
+    def anchored(self) -> FingerTendon:
+        """The tendon without tiles under which there is no rock."""
+        stiffness = np.array(self.tendon.contact_stiffness)
+        stiffness[-len(PHALANGES) :] *= self.finger.touching
+        return replace(self.tendon, contact_stiffness=tuple(stiffness.tolist()))
+
+
+class FingerLoads(NamedTuple):
+    """Loads of F fingers at m places of their bases, shapes (F, m, …).
+
+    Attributes
+    ----------
+    shears : ndarray, shape (F, m, 3)
+        T of each phalanx's tile [N].
+    base_shears : ndarray, shape (F, m)
+        T of base tiles; zero of fingers without one [N].
+    normals : ndarray, shape (F, m, 3)
+        N of each phalanx [N].
+    tensions : ndarray, shape (F, m, 3)
+        t of each phalanx [N].
+    motor_tensions : ndarray, shape (F, m)
+        t of the first tile from the motor [N].
+    stop_torques : ndarray, shape (F, m, 3)
+        What turns each joint that no contact holds, closing [N·m].
+    points : ndarray, shape (F, m, 3, 2)
+        Contacts (x, z) in F, which stays where the base was at rest [m].
+    directions : ndarray, shape (F, m, 3, 2)
+        Unit vectors in F along which tiles drag away from the base: along the phalanges, but for
+        contacts that press aside.
+    reached : ndarray of bool, shape (F, m)
+        Whether every phalanx still finds its rock.
+    """
+
+    shears: Numbers
+    base_shears: Numbers
+    normals: Numbers
+    tensions: Numbers
+    motor_tensions: Numbers
+    stop_torques: Numbers
+    points: Numbers
+    directions: Numbers
+    reached: NDArray[np.bool_]
+
+    def of(self, finger: int) -> FingerLoads:
+        """Return the loads of one finger, shapes (m, …)."""
+        return FingerLoads(*(part[finger] for part in self))
+
+    @property
+    def forces(self) -> Numbers:
+        """F of each phalanx on the rock, (x, z) in F, shape (..., 3, 2) [N]; no base tile's."""
+        u = self.directions
+        across = np.stack([-u[..., 1], u[..., 0]], axis=-1)
+        return np.asarray(self.normals[..., None] * across - self.shears[..., None] * u)
+
+    @property
+    def planar_wrench(self) -> Numbers:
+        """F_x, F_z and M, from x toward z about the origin of F, shape (..., 3) [N, N·m]."""
+        forces, points = self.forces, self.points
+        moments = points[..., 0] * forces[..., 1] - points[..., 1] * forces[..., 0]
+        sums = [forces.sum(axis=-2), moments.sum(axis=-1)[..., None]]
+        return np.asarray(np.concatenate(sums, axis=-1))
+
+
+class CompliantFingers:
+    """Fingers at rest on rock, about which their bases may move.
+
+    Parameters
+    ----------
+    fingers : sequence of FingerAtRest, length F
+    scheme : {'held', 'tension'}
+        What the motors do.
+    """
+
+    def __init__(self, fingers: Sequence[FingerAtRest], scheme: MotorScheme) -> None:
+        models = [each.finger.model for each in fingers]
+        self._rolling = RollingContact(
+            [each.finger for each in fingers],
+            [each.section for each in fingers],
+            [list(each.depths) for each in fingers],
+        )
+        losses = pad_tiles([each.losses for each in fingers], 0.0)
+        self._regimes = TendonRegimes([each.anchored for each in fingers], losses, scheme)
+        self._at_rest = [pad_tiles([each.shears[:, k] for each in fingers], 0.0) for k in (0, 1)]
+        self._base = np.array([each.base_tile for each in fingers])
+        self._stiffness = np.array([model.joint_stiffness for model in models])[:, None]
+        self._preload = np.array([model.joint_preload for model in models])[:, None]
+        self._radii = np.array([model.pulley_radii for model in models])[:, None]
+        self._angles = np.array([each.finger.joint_angles for each in fingers])[:, None]
+        count = len(PHALANGES)
+        # each free joint begins a link with one phalanx that bears
+        self._held_by = np.zeros((len(fingers), count, count))
+        for pairs, each in zip(self._held_by, fingers, strict=True):
+            pairs[list(each.finger.bearing), list(each.finger.free)] = 1.0
 
     def loads(
-        self, x: Numbers, z: Numbers, turn: Numbers, base_slip: Numbers | None = None
+        self,
+        x: Numbers,
+        z: Numbers,
+        turn: Numbers,
+        tension: Numbers,
+        base_slip: Numbers | None = None,
     ) -> FingerLoads:
-        """Return the loads after displacements of the base.
+        """Return the loads after displacements of the bases.
 
         Parameters
         ----------
-        x, z, turn : ndarray, shape (m,)
+        x, z, turn : ndarray, shape (F, m)
             As of `RollingContact.move` [m, rad].
-        base_slip : ndarray, shape (m,), optional
-            Of the base tile along the rock, toward the base [m]; zero by default.
+        tension : ndarray, shape (F, m)
+            At which the fingers have closed [N].
+        base_slip : ndarray, shape (F, m), optional
+            Of base tiles along the rock, toward the base [m]; zero by default.
         """
-        posture = self._resettling.move(x, z, turn)
-        slips, turns = posture.slips, posture.turns
-        if self.base_tile:
-            first = 0.0 * slips[:, :1] if base_slip is None else base_slip[:, None]
-            slips = np.concatenate([first, slips], axis=1)
-            turns = np.concatenate([0.0 * turns[:, :1], turns], axis=1)
+        posture = self._rolling.move(x, z, turn)
+        first = 0.0 * posture.slips[..., 0] if base_slip is None else base_slip
+        slips = self._of_tiles(posture.slips, first)
+        turns = self._of_tiles(posture.turns, 0.0 * first)
+        zero, per_newton = self._at_rest
+        at_rest = zero[:, None] + tension[..., None] * per_newton[:, None]
         with np.errstate(invalid="ignore"):
-            response = self.regimes.respond(slips, turns)
-        angles = posture.angles + np.array([contact.tilt for contact in self.finger.contacts])
+            response = self._regimes.respond(slips, turns, tension, at_rest)
+        shears, tensions = (
+            self._of_phalanges(part) for part in (response.shears, response.tensions)
+        )
+        angles = posture.angles + self._rolling.tilts
         u = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         normals, torques = self._balance(
-            response.shears[:, -3:],
-            response.tensions[:, -3:],
-            self.finger.joint_angles + posture.turns,
-            u,
-            posture.joints,
-            posture.points,
+            shears, tensions, posture.turns, u, posture.joints, posture.points
         )
         return FingerLoads(
-            shears=response.shears,
+            shears=shears,
+            base_shears=np.where(self._base[:, None], response.shears[..., 0], 0.0),
             normals=normals,
-            tensions=response.tensions,
+            tensions=tensions,
+            motor_tensions=response.tensions[..., 0],
             stop_torques=torques,
             points=posture.points,
             directions=u,
             reached=posture.reached,
         )
 
+    def _of_tiles(self, of_phalanges: Numbers, first: Numbers) -> Numbers:
+        """Return numbers of phalanges as those of tiles, base tiles' first, padded at the end."""
+        if not self._base.any():
+            return of_phalanges
+        after = np.concatenate([first[..., None], of_phalanges], axis=-1)
+        padded = np.concatenate([of_phalanges, 0.0 * first[..., None]], axis=-1)
+        return np.where(self._base[:, None, None], after, padded)
+
+    def _of_phalanges(self, of_tiles: Numbers) -> Numbers:
+        """Return numbers of tiles without base tiles, shape (F, m, 3)."""
+        if not self._base.any():
+            return of_tiles
+        return np.where(self._base[:, None, None], of_tiles[..., 1:], of_tiles[..., :-1])
+
     def _balance(
         self,
         shears: Numbers,
         tensions: Numbers,
-        joint_angles: Numbers,
+        turns: Numbers,
         u: Numbers,
         joints: Numbers,
         points: Numbers,
     ) -> tuple[Numbers, Numbers]:
         """Return the normals that balance the free joints, and what is left at the others."""
-        model = self.model
-        rest = tensions * np.array(model.pulley_radii)
-        rest = rest - np.array(model.joint_stiffness) * joint_angles - np.array(model.joint_preload)
-        count = len(PHALANGES)
-        arms = {}
-        for i in range(count):
-            for j in range(i, count):
-                dx = points[:, j, 0] - joints[:, i, 0]
-                dz = points[:, j, 1] - joints[:, i, 1]
-                rest[:, i] += shears[:, j] * (dx * u[:, j, 1] - dz * u[:, j, 0])
-                arms[i, j] = dx * u[:, j, 0] + dz * u[:, j, 1]
-        normals = np.zeros_like(rest)
-        # each free joint begins a link with one phalanx that bears: from the tip, one unknown each
-        pairs = list(zip(self.finger.free, self.finger.bearing, strict=True))
-        for joint, phalanx in reversed(pairs):
-            later = (normals[:, j] * arms[joint, j] for _, j in pairs if j > phalanx)
-            normals[:, phalanx] = (rest[:, joint] - sum(later)) / arms[joint, phalanx]
-        for i in range(count):
-            for j in range(i, count):
-                rest[:, i] -= normals[:, j] * arms[i, j]
-        rest[:, list(self.finger.free)] = 0.0
-        return normals, rest
+        d = points[..., None, :, :] - joints[..., :, None, :]
+        later = np.triu(np.ones((len(PHALANGES),) * 2))
+        u = u[..., None, :, :]
+        across = (d[..., 0] * u[..., 1] - d[..., 1] * u[..., 0]) * later
+        arms = (d[..., 0] * u[..., 0] + d[..., 1] * u[..., 1]) * later
+        springs = self._stiffness * (self._angles + turns) + self._preload
+        rest = tensions * self._radii - springs + (across * shears[..., None, :]).sum(axis=-1)
+        held_by = self._held_by[:, None]
+        free, bears = held_by.sum(axis=-2) > 0.0, held_by.sum(axis=-1) > 0.0
+        # one equation for each phalanx: of its joint, or that it presses nothing
+        rows = np.where(
+            bears[..., None], held_by @ (arms * bears[..., None, :]), np.eye(len(later))
+        )
+        own = np.diagonal(rows, axis1=-2, axis2=-1)
+        lost = ~(np.isfinite(rows.real).all(axis=(-1, -2)) & (own != 0.0).all(axis=-1))
+        rows[lost] = np.eye(len(later))
+        aims = held_by @ rest[..., None]
+        normals = np.linalg.solve(rows, aims)[..., 0]
+        normals[lost] = np.nan
+        left = rest - (arms * normals[..., None, :]).sum(axis=-1)
+        return normals, np.where(free, 0.0, left)

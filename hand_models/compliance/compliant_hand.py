@@ -18,7 +18,7 @@ that stays.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -26,13 +26,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError, skew
-from hand_models.compliance.compliant_finger import COMPLEX_STEP, CompliantFinger, FingerLoads
+from hand_models.compliance.compliant_finger import (
+    COMPLEX_STEP,
+    CompliantFingers,
+    FingerAtRest,
+    FingerLoads,
+)
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
-from hand_models.tendon import FingerTendon, share_load
+from hand_models.tendon import FingerTendon, MotorScheme, share_load
 
-__all__ = ["CompliantHand", "HandLoads"]
+__all__ = ["CompliantHand", "CompliantHands", "HandLoads"]
 
 
 class HandLoads(NamedTuple):
@@ -94,6 +99,7 @@ class CompliantHand:
         self,
         settled: SettledHand,
         preload: ArrayLike | None = None,
+        scheme: MotorScheme = "held",
     ) -> None:
         if settled.grasp.fingernail:
             raise UnsupportedError("a hand that clings with its nails cannot float")
@@ -101,7 +107,10 @@ class CompliantHand:
         self.settled = settled
         self.preload = _preload(preload, settled)
         self.frames = hand.frames(settled.grasp.outer_rotation)
-        self.fingers = tuple(self._finger(i, name) for i, name in enumerate(FINGERS))
+        self.scheme: MotorScheme = scheme
+        self.fingers = [self._finger(i, name) for i, name in enumerate(FINGERS)]
+        self._together = CompliantFingers(self.fingers, scheme)
+        self._alone = [CompliantFingers([finger], scheme) for finger in self.fingers]
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
         self.palm_stiffness = np.zeros(2)
@@ -115,22 +124,20 @@ class CompliantHand:
             each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
             self.palm_stiffness += share * np.array(each)
 
-    def _finger(self, i: int, name: str) -> CompliantFinger:
+    def _finger(self, i: int, name: str) -> FingerAtRest:
         settled, hand = self.settled, self.settled.hand
         base_tile = name.startswith("outer")
         own = settled.finger_of == i
-        tension = float(self.preload[i])
         tendon = FingerTendon.from_table(hand.table, base_tile)
-        shears = settled.loads[own, 0] @ np.array([1.0, tension])
-        return CompliantFinger(
+        return FingerAtRest(
             settled.fingers[i],
             hand.section(name, settled.hold, settled.grasp, settled.seating.pose),
             replace(
                 tendon.engaged(settled.engagement[own]),
                 friction=max(tendon.friction, hand.tendon_friction),
             ),
-            tendon.closed(tension, shears),
-            "held",
+            tendon.friction,
+            settled.loads[own, 0],
             # as it has closed: where tiles bear does not change with tension (Eq. 14)
             [each * settled.closing_tension for each in hand.depths[base_tile]],
         )
@@ -150,40 +157,48 @@ class CompliantHand:
         springs = np.diag(settled.engagement[own] * hand.lateral_stiffness)
         return np.asarray(np.linalg.solve(np.eye(len(own)) + springs @ flexibility, springs))
 
-    def loads(self, twists: Numbers) -> HandLoads:
-        """Return every load at some twists of the wrist, shape (m, 6) [m, rad]."""
+    def loads(self, twists: Numbers, tensions: Numbers | None = None) -> HandLoads:
+        """Return every load at some twists of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, 6)
+            [m, rad]
+        tensions : ndarray, shape (m, 4), optional
+            At which the hand has closed before its wrist moves [N]; the preload by default.
+        """
+        closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
+        bases = self._bases(range(len(FINGERS)), twists, closed if tensions is None else tensions)
+        return self._loads(twists, self._together.loads(*bases))
+
+    def _loads(self, twists: Numbers, found: FingerLoads) -> HandLoads:
+        """Return the hand's loads of those of its four fingers in their planes."""
         m, settled = len(twists), self.settled
         n = len(settled.tiles)
         kind = twists.dtype
         shears, normals, laterals = (np.zeros((m, n), dtype=kind) for _ in range(3))
-        tensions = np.zeros((m, len(FINGERS)), dtype=kind)
         positions = np.broadcast_to(settled.positions, (m, n, 3)).astype(kind)
         axes = np.broadcast_to(settled.axes, (m, n, 3, 3)).astype(kind)
-        reached = np.ones(m, dtype=bool)
-        torques, up = [], np.array([0.0, 0.0, 1.0])
+        tensions = found.motor_tensions.T
+        reached = np.asarray(found.reached.all(axis=0))
+        up = np.array([0.0, 0.0, 1.0])
         for i, (frame, own) in enumerate(zip(self.frames, self._own, strict=True)):
-            found = self.finger_loads(i, twists)
-            reached &= found.reached
-            shears[:, own] = found.shears
-            tensions[:, i] = found.tensions[:, 0]
+            shears[:, own] = own_shears(found.of(i), len(own))
             laterals[:, own] = self.lateral_loads(i, twists)
             phalanges = own[-len(PHALANGES) :]
-            normals[:, phalanges] = found.normals
-            positions[:, phalanges] = (
-                frame.joint + found.points[..., :1] * frame.along + found.points[..., 1:] * up
-            )
-            u = found.directions
+            normals[:, phalanges] = found.normals[i]
+            place, u = found.points[i], found.directions[i]
+            positions[:, phalanges] = frame.joint + place[..., :1] * frame.along
+            positions[:, phalanges] += place[..., 1:] * up
             axes[:, phalanges, 0] = -(u[..., :1] * frame.along + u[..., 1:] * up)
             axes[:, phalanges, 1] = u[..., :1] * up - u[..., 1:] * frame.along
-            torques.append(found.stop_torques)
         palm = self.palm_loads(twists)
         return HandLoads(
             shears=shears,
             normals=normals,
             laterals=laterals,
             tensions=tensions,
-            stop_torques=self._pushing(torques, m),
-            # [N] the square of a complex step leaves as much of a palm that has no load
+            stop_torques=self._pushing(found.stop_torques),
             palm=np.where(palm.real > 1e-20, palm, 0.0 * palm),
             positions=positions,
             axes=axes,
@@ -192,8 +207,8 @@ class CompliantHand:
 
     def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
         """Return the loads of one finger in its plane at some twists of the wrist."""
-        x, z, turned, base_slip = self._base(i, twists[:, :3], twists[:, 3:])
-        return self.fingers[i].loads(x, z, turned, base_slip)
+        closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
+        return self._alone[i].loads(*self._bases([i], twists, closed)).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
         """Return the lateral loads of a finger's tiles at some twists, shape (m, n_i) [N]."""
@@ -209,31 +224,43 @@ class CompliantHand:
         """Return the tiles of a finger."""
         return self._own[i]
 
-    def _base(self, i: int, v: Numbers, turn: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-        """Return how the base of a finger moves in its plane, and its base tile along the rock."""
-        frame = self.frames[i]
-        moved = _moved(frame.joint, v, turn)
-        base = self.settled.positions[self._own[i][0]]
-        slip = -(_moved(base, v, turn) @ frame.along)
-        # from x toward z is against the sense of the axis across, z × x
-        return moved @ frame.along, moved[:, 2], -(turn @ frame.across), slip
+    def _bases(
+        self, fingers: Iterable[int], twists: Numbers, tensions: Numbers
+    ) -> tuple[Numbers, Numbers, Numbers, Numbers, Numbers]:
+        """Return how bases of fingers move in their planes, (F, m), as `CompliantFingers.loads`."""
+        v, turn, each = twists[:, :3], twists[:, 3:], []
+        for i in fingers:
+            frame = self.frames[i]
+            moved = _moved(frame.joint, v, turn)
+            base = self.settled.positions[self._own[i][0]]
+            slip = -(_moved(base, v, turn) @ frame.along)
+            # from x toward z is against the sense of the axis across, z × x
+            turned = -(turn @ frame.across)
+            each.append((moved @ frame.along, moved[:, 2], turned, tensions[:, i], slip))
+        x, z, turned, tension, slip = map(np.array, zip(*each, strict=True))
+        return x, z, turned, tension, slip
 
-    def _pushing(self, torques: Sequence[Numbers], m: int) -> Numbers:
+    def _pushing(self, torques: Numbers) -> Numbers:
         """Return the torques on stops, positive where they are pushed."""
         pushing = [
-            torques[i][:, j]
+            torques[i, :, j]
             * (1.0 if self.settled.fingers[i].contacts[j].stop == "upper" else -1.0)
             for i, j, _ in self.settled.stops
         ]
-        return np.stack(pushing, axis=-1) if pushing else np.zeros((m, 0), dtype=torques[0].dtype)
+        nothing = np.zeros((torques.shape[1], 0), dtype=torques.dtype)
+        return np.stack(pushing, axis=-1) if pushing else nothing
 
     def palm_loads(self, twists: Numbers) -> Numbers:
         """Return what the palm's shear and pressing would be as two-sided springs, (m, 2) [N].
 
         Negative where the palm moves away and so carries nothing.
         """
+        return self.palm_travel(twists) * self.palm_stiffness
+
+    def palm_travel(self, twists: Numbers) -> Numbers:
+        """Return how far the palm moves toward −x and into the rock, shape (m, 2) [m]."""
         moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
-        return moved[:, ::2] * (-1.0, 1.0) * self.palm_stiffness
+        return np.asarray(moved[:, ::2] * (-1.0, 1.0))
 
     def wrenches(self, loads: HandLoads) -> Numbers:
         """Return the wrenches on the rock, about H at rest and in its axes, shape (m, 6)."""
@@ -253,6 +280,42 @@ class CompliantHand:
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
         loads = self.loads(at + 1j * COMPLEX_STEP * np.eye(6))
         return np.asarray(self.wrenches(loads).imag.T / COMPLEX_STEP)
+
+
+class CompliantHands:
+    """Hands whose loads are found in one call, each about its own pose.
+
+    Parameters
+    ----------
+    hands : sequence of CompliantHand
+        All of one scheme.
+    """
+
+    def __init__(self, hands: Sequence[CompliantHand]) -> None:
+        self.hands = hands
+        fingers = [finger for hand in hands for finger in hand.fingers]
+        self._together = CompliantFingers(fingers, hands[0].scheme)
+
+    def loads(self, twists: Sequence[Numbers], tensions: Sequence[Numbers]) -> list[HandLoads]:
+        """Return the loads of each hand; arguments as of `CompliantHand.loads`, m the same."""
+        count = len(FINGERS)
+        each = [
+            hand._bases(range(count), own, closed)
+            for hand, own, closed in zip(self.hands, twists, tensions, strict=True)
+        ]
+        bases = [np.concatenate(parts) for parts in zip(*each, strict=True)]
+        found = self._together.loads(*bases)
+        return [
+            hand._loads(own, FingerLoads(*(part[count * h : count * (h + 1)] for part in found)))
+            for h, (hand, own) in enumerate(zip(self.hands, twists, strict=True))
+        ]
+
+
+def own_shears(found: FingerLoads, count: int) -> Numbers:
+    """Return the shears of a finger's tiles, its base tile's first if there are so many, (m, n)."""
+    if count == len(PHALANGES):
+        return found.shears
+    return np.concatenate([found.base_shears[:, None], found.shears], axis=1)
 
 
 def _moved(place: Array, v: Numbers, turn: Numbers) -> Numbers:

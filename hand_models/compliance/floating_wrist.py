@@ -13,13 +13,13 @@ each of its ways of carrying is a set of its own. A tendon's stick and slip stay
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, BoundedStore, Indices
-from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
+from hand_models.compliance.compliant_hand import CompliantHand, HandLoads, own_shears
 from hand_models.compliance.grasp import (
     CompliantGrasp,
     GraspLoads,
@@ -70,7 +70,10 @@ class FloatingWrist(CompliantGrasp):
     tension_limit: float | None = None
     palm: PalmMode = "off"
 
-    columns, range_rows = WRIST_COLUMNS, rows_of_range(WRIST_COLUMNS)
+    columns: ClassVar[tuple[str, ...]] = WRIST_COLUMNS
+    range_rows = rows_of_range(WRIST_COLUMNS)
+    driven: ClassVar[bool] = False
+    """Whether its motors keep the tensions that a plan asks for, instead of standing still."""
 
     def __post_init__(self) -> None:
         self.layout = layout_of(self.hand.settled, sticking=False)
@@ -136,8 +139,16 @@ class FloatingWrist(CompliantGrasp):
         return LoadRows(layout.rows, P, p, held, s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at some twists of the wrist, shape (m, 6)."""
-        return self._grasp_loads(self.hand.loads(twists))
+        """Return loads and wrenches at some poses of the wrist, shape (m, d)."""
+        return self._grasp_loads(self.hand_loads(twists))
+
+    def closed_at(self, y: Array) -> Array:
+        """Return the tensions at which the hand has closed for a pose (d,), shape (4,) [N]."""
+        return self.hand.preload
+
+    def hand_loads(self, y: Numbers) -> HandLoads:
+        """Return the hand's loads at some poses of the wrist, shape (m, d)."""
+        return self.hand.loads(y)
 
     def _grasp_loads(self, loads: HandLoads) -> GraspLoads:
         elements = [loads.shears, loads.normals, loads.laterals, loads.tensions, loads.palm]
@@ -154,7 +165,8 @@ class FloatingWrist(CompliantGrasp):
             own, phalanges = self.hand.tiles_of(i), self.hand.tiles_of(i)[-len(PHALANGES) :]
             found = self.hand.finger_loads(i, twists[left])
             laterals = self.hand.lateral_loads(i, twists[left])
-            elements = np.concatenate([found.shears, found.normals, laterals], axis=1)
+            shears = own_shears(found, len(own))
+            elements = np.concatenate([shears, found.normals, laterals], axis=1)
             mine = np.flatnonzero(np.isin(self.layout.plane_tiles, own))
             P = rows.P[np.ix_(mine, [*own, *n + phalanges, *2 * n + own])]
             with np.errstate(invalid="ignore"):
@@ -163,11 +175,15 @@ class FloatingWrist(CompliantGrasp):
                 if len(own) > len(PHALANGES):
                     share = self.hand.settled.engagement[own[0]]
                     pressed = np.column_stack([share * pressed[:, 0], pressed])
-                drags = found.shears + self.hand.settled.surface.friction * pressed
+                drags = shears + self.hand.settled.surface.friction * pressed
                 drags += self.hand.settled.drag_allowances[own]
                 holds &= found.reached & (drags >= 0.0).all(axis=1)
             left = left[holds]
         return left
+
+    def palm_mode(self, y: Array, given: PalmMode) -> PalmMode:
+        """Return how the palm carries at a pose; a mode that the set was linearised in."""
+        return given
 
     def palm_modes(self) -> tuple[PalmMode, ...]:
         """Return the ways in which the palm can carry."""
@@ -231,9 +247,17 @@ class FloatingWrist(CompliantGrasp):
         known = dict(zip(keys, self._kept.find(keys), strict=True))
         new = [at for at, key in zip(twists, keys, strict=True) if known[key] is None]
         if new:
-            parts = self.hand.loads(np.concatenate([complex_steps(at) for at in new]))
-            each = [np.split(part, len(new)) for part in parts]
-            made = [(at.tobytes(), HandLoads(*own)) for at, *own in zip(new, *each, strict=True)]
-            self._kept.keep(made)
-            known.update(made)
+            steps = np.concatenate([complex_steps(at) for at in new])
+            known.update(self.keep(np.array(new), self.hand_loads(steps)))
         return [loads for key in keys if (loads := known[key]) is not None]
+
+    def knows(self, poses: Array) -> bool:
+        """Return whether the loads about all of some poses are kept."""
+        return None not in self._kept.find([at.tobytes() for at in poses])
+
+    def keep(self, poses: Array, loads: HandLoads) -> list[tuple[bytes, HandLoads]]:
+        """Keep the loads at the complex steps from some poses (k, d), and return those of each."""
+        each = [np.split(part, len(poses)) for part in loads]
+        made = [(at.tobytes(), HandLoads(*own)) for at, *own in zip(poses, *each, strict=True)]
+        self._kept.keep(made)
+        return made

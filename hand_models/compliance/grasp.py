@@ -11,7 +11,7 @@ so that with e and w linearised about a pose they are a `WrenchSpace`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -115,8 +115,8 @@ class CompliantGrasp(ABC):
         What its loads and wrenches must keep to.
     """
 
-    columns: tuple[str, ...]
-    range_rows: tuple[Row, ...]
+    columns: ClassVar[tuple[str, ...]]
+    range_rows: ClassVar[tuple[Row, ...]]
     load_rows: LoadRows
 
     @abstractmethod
@@ -160,9 +160,12 @@ class CompliantGrasp(ABC):
         return self._about(at, self.loads_at(complex_steps(at)), *none, within)
 
     def _pose(self, twist: ArrayLike | None) -> Array:
-        if twist is None:
-            return np.zeros(len(self.columns))
-        return np.asarray(twist, dtype=float)
+        return self.at_rest if twist is None else np.asarray(twist, dtype=float)
+
+    @property
+    def at_rest(self) -> Array:
+        """Pose at which the grasp is at rest, shape (d,)."""
+        return np.zeros(len(self.columns))
 
     def _about(
         self, at: Array, found: GraspLoads, more: Array, most: Array, within: ArrayLike | None
@@ -215,7 +218,7 @@ def _affine(values: Numbers, at: Array) -> tuple[Array, Array]:
 def rows_of_range(columns: tuple[str, ...]) -> tuple[Row, ...]:
     """Return the hard rows that keep the components of a wrist's pose within a range."""
     return tuple(
-        Row(None, None, "wrist_range", "hard", f"wrist_range/{name.split('/')[1]}{sign}")
+        Row(None, None, "wrist_range", "hard", f"wrist_range/{name.removeprefix('wrist/')}{sign}")
         for sign in "+-"
         for name in columns
     )

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import InvalidInputError, check_positive
-from hand_models.compliance.compliant_finger import CompliantFinger, FingerLoads
+from hand_models.compliance.compliant_finger import CompliantFingers, FingerAtRest, FingerLoads
 from hand_models.compliance.grasp import CompliantGrasp, GraspLoads, LoadRows, rows_of_range
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES, FingerModel, settle_finger
@@ -116,9 +116,8 @@ class Gripper(CompliantGrasp):
             raise InvalidInputError(
                 f"the fingers do not lie on a surface of {1e3 * diameter:g} mm", field="diameter"
             )
-        shears = finger.shears(tension) @ np.array([1.0, tension])
         tendon = FingerTendon.from_table(table)
-        self.finger = CompliantFinger(
+        own = FingerAtRest(
             finger,
             self.section,
             replace(
@@ -126,9 +125,11 @@ class Gripper(CompliantGrasp):
                 friction=max(table.scalar("tendon", "holding_friction"), tendon.friction),
                 entry_friction=table.scalar("gripper", "entry_friction"),
             ),
-            tendon.closed(tension, shears),
-            "tension",
+            tendon.friction,
+            finger.shears(tension),
         )
+        self.finger, self.tension = finger, tension
+        self._fingers = CompliantFingers([own] * len(GRIPPER_SIDES), "tension")
         self.load_rows = self._load_rows()
 
     def _load_rows(self) -> LoadRows:
@@ -160,8 +161,13 @@ class Gripper(CompliantGrasp):
         inward = self.half_spacing * cosine
         deeper, across = z - self.origin_height * cosine, x - self.origin_height * sine
         aside = self.half_spacing * sine
-        right = self.finger.loads(inward + across, deeper - aside, -turn)
-        return right, self.finger.loads(inward - across, deeper + aside, turn)
+        found = self._fingers.loads(
+            np.array([inward + across, inward - across]),
+            np.array([deeper - aside, deeper + aside]),
+            np.array([-turn, turn]),
+            np.full((len(GRIPPER_SIDES), len(x)), self.tension),
+        )
+        return found.of(0), found.of(1)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
         """Return loads and wrenches, about G's origin in the contract's signs, at wrist poses."""

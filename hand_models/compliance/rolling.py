@@ -26,12 +26,12 @@ import cmath
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from hand_models.base import Array
 from hand_models.finger import PHALANGES, Contact, SettledFinger, middle_of_bed
 from hand_models.sections import Section, Vector2
 
@@ -42,7 +42,7 @@ Numbers = NDArray[Any]
 
 
 class MovedPosture(NamedTuple):
-    """Fingers after their bases have moved, shapes (..., 3) or (..., 3, 2).
+    """F fingers after their bases have moved, shapes (F, m, 3) or (F, m, 3, 2).
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class MovedPosture(NamedTuple):
         δx of each phalanx along the rock, toward the base; 0 without contact [m].
     joints, points : ndarray
         (x, z) in F of each joint and of each contact [m].
-    reached : ndarray of bool, shape (...)
+    reached : ndarray of bool, shape (F, m)
         Whether every phalanx still finds its rock.
     """
 
@@ -75,123 +75,113 @@ def bearing_angle(x: Numbers, z: Numbers) -> Numbers:
     return np.asarray(angle + 1j * (x.real * z.imag - z.real * x.imag) / square)
 
 
-@dataclass(frozen=True)
-class _Link:
+class _Link(NamedTuple):
     """Phalanges that turn as one about a free joint, and the rock under the one that bears.
 
     Lengths "along" and "above" are in axes of the bearing phalanx that are turned by its contact's
-    tilt: the contact presses upward in them.
+    tilt: the contact presses upward in them. Of one finger these are numbers, of F fingers arrays
+    of shape (F, 1).
 
     Attributes
     ----------
     bearing : int
+        -1 where no link begins.
     along, above : float
-        The bearing phalanx's joint from the link's first [m].
-    height : float
-        Of the contact above that joint [m].
+        Where the contact's axes begin, and how high the contact is, from the link's joint [m].
     rest : float
         Angle of the axes at rest [rad].
     rolls : bool
         Whether its face rolls on the circle; otherwise its point slides.
+    flat : bool
+        Whether the rock is a straight line; ``radius`` then stands for nothing.
     start, end : float
         Where on the phalanx the contact may roll to [m].
     contact : float
         c⁰ at rest, or the place of the point that slides [m].
     depth : float
         How far the tile is pressed in [m].
-    point, into : tuple of float
-        A place (x, z) of the face, at c⁰ [m], and the unit vector into the rock there.
+    point_x, point_z, into_x, into_z : float
+        A place of the face, at c⁰ [m], and the unit vector into the rock there.
     radius : float
-        Of the rock there; infinite where it is flat [m].
+        Of the rock there [m].
     offset : float
         Of the contact's path from the rock: what spines reach across [m].
     """
 
-    bearing: int
-    along: float
-    above: float
-    height: float
-    rest: float
-    rolls: bool
-    start: float
-    end: float
-    contact: float
-    depth: float
-    point: Vector2
-    into: Vector2
-    radius: float
-    offset: float
+    bearing: Any = -1
+    along: Any = 0.0
+    above: Any = 0.0
+    rest: Any = 0.0
+    rolls: Any = False
+    flat: Any = False
+    start: Any = 0.0
+    end: Any = 0.0
+    contact: Any = 0.0
+    depth: Any = 0.0
+    point_x: Any = 0.0
+    point_z: Any = 1.0
+    into_x: Any = 0.0
+    into_z: Any = 1.0
+    radius: Any = 1.0
+    offset: Any = 0.0
 
     def turn(self, jx: Numbers, jz: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-        """Return how far the bearing phalanx turns, the contact goes along it, and it slips.
+        """Return how far bearing phalanges turn, contacts go along them, and they slip.
 
-        NaN where it finds no rock. ``jx``, ``jz``: places of the link's joint.
+        NaN where a phalanx finds no rock.
+
+        Parameters
+        ----------
+        jx, jz : ndarray, shape (F, m)
+            Places of the links' joints [m].
         """
-        c: Numbers = np.full(jx.shape, self.contact)
-        if math.isinf(self.radius):
-            turn = self._touch_line(jx, jz)
-            px, pz = self._place(jx, jz, turn, c)
-            # along the line, from the tangent (into_z, −into_x) that points away from the base
-            arc = (px - self.point[0]) * self.into[1] - (pz - self.point[1]) * self.into[0]
-            return turn, 0.0 * c, -arc
         reach = self.radius + self.offset
-        ox = self.point[0] + reach * self.into[0]
-        oz = self.point[1] + reach * self.into[1]
+        ox, oz = self.point_x + reach * self.into_x, self.point_z + reach * self.into_z
         dx, dz = ox - jx, oz - jz
         square = dx * dx + dz * dz
-        distance, bearing = np.sqrt(square), bearing_angle(dx, dz)
-        above = self.above + self.height
-        if self.rolls:
-            away = reach + above
-            rolled = np.sqrt(square - away * away) - self.along
-            angle = bearing - np.arcsin(away / distance)
-            near = ~(rolled.real >= self.start)
-            far = rolled.real > self.end
-            c = np.where(near, self.start, np.where(far, self.end, rolled))
-            beyond = near | far
-        else:
-            angle, beyond = bearing, np.ones(jx.shape, dtype=bool)
-        if beyond.any():
-            ahead = self.along + c
-            arm = np.sqrt(ahead * ahead + above * above)
-            cosine = (arm * arm + square - reach * reach) / (2.0 * arm * distance)
-            touch = bearing - np.arccos(cosine) - bearing_angle(ahead, above + 0.0 * ahead)
-            angle = np.where(beyond, touch, angle)
+        away = reach + self.above
+        rolled = np.sqrt(square - away * away) - self.along
+        near = ~(rolled.real >= self.start)
+        far = rolled.real > self.end
+        c = np.where(near, self.start, np.where(far, self.end, rolled))
+        c = np.where(self.rolls, c, self.contact)
+        ahead = self.along + c
+        arm = np.sqrt(ahead * ahead + self.above * self.above)
+        # a face is tangent to the circle; a point slides on it, or along the line
+        tangent = bearing_angle(dx, dz) - np.arcsin(away / np.sqrt(square))
+        cosine = (arm * arm + square - reach * reach) / (2.0 * arm * np.sqrt(square))
+        gap = (self.point_x - jx) * self.into_x + (self.point_z - jz) * self.into_z
+        toward = np.where(
+            self.flat,
+            np.arctan2(self.into_z, self.into_x) - np.arccos(gap / arm),
+            bearing_angle(dx, dz) - np.arccos(cosine),
+        )
+        touch = toward - bearing_angle(ahead, self.above + 0.0 * ahead)
+        angle = np.where(self.rolls & ~near & ~far, tangent, touch)
         turn = _within_half_a_turn(angle - self.rest)
-        px, pz = self._place(jx, jz, turn, c)
-        # the contact seen from the circle's centre, turned from where it was at rest
-        ax, az = -self.into[0], -self.into[1]
-        cosine, sine = (px - ox) * ax + (pz - oz) * az, (pz - oz) * ax - (px - ox) * az
-        rolled = c - self.contact
-        arc = self.radius * bearing_angle(cosine, sine)
-        aside = self._aside(c) - self._aside(np.array(self.contact))
-        return turn, rolled + aside, rolled - arc
-
-    def _aside(self, c: Numbers) -> Numbers:
-        """Return how far from c⁰ the middle of the pressures is: of a parabola cut short [m]."""
-        if not (self.rolls and self.depth > 0.0):
-            return 0.0 * c
-        widest = math.sqrt(2.0 * self.depth * self.radius)
-        reaches = [
-            np.where(room.real < widest, room, widest) for room in (c - self.start, self.end - c)
-        ]
-        return middle_of_bed(reaches, [1.0 / self.radius] * 2, self.depth)
-
-    def _touch_line(self, jx: Numbers, jz: Numbers) -> Numbers:
-        ahead, above = self.along + self.contact, self.above + self.height
-        arm = math.hypot(ahead, above)
-        gap = (self.point[0] - jx) * self.into[0] + (self.point[1] - jz) * self.into[1]
-        toward = math.atan2(self.into[1], self.into[0])
-        angle = toward - np.arccos(gap / arm) - math.atan2(above, ahead)
-        return _within_half_a_turn(angle - self.rest)
-
-    def _place(
-        self, jx: Numbers, jz: Numbers, turn: Numbers, c: Numbers
-    ) -> tuple[Numbers, Numbers]:
-        """Return (x, z) of the contact."""
         cosine, sine = np.cos(self.rest + turn), np.sin(self.rest + turn)
-        ahead, above = self.along + c, self.above + self.height
-        return jx + ahead * cosine - above * sine, jz + ahead * sine + above * cosine
+        px = jx + ahead * cosine - self.above * sine
+        pz = jz + ahead * sine + self.above * cosine
+        # the contact seen from the circle's centre, turned from where it was at rest; on a line
+        # along the tangent (into_z, −into_x) that points away from the base
+        seen = bearing_angle(
+            (ox - px) * self.into_x + (oz - pz) * self.into_z,
+            (px - ox) * self.into_z - (pz - oz) * self.into_x,
+        )
+        line = (px - self.point_x) * self.into_z - (pz - self.point_z) * self.into_x
+        went = c - self.contact
+        aside = self._aside(c) - self._aside(self.contact)
+        return turn, went + aside, went - np.where(self.flat, line, self.radius * seen)
+
+    def _aside(self, c: Any) -> Numbers:
+        """Return how far from c⁰ the middle of the pressures is: of a parabola cut short [m]."""
+        pressed = self.rolls & (self.depth > 0.0)
+        depth = np.where(pressed, self.depth, 1.0)
+        widest = np.sqrt(2.0 * depth * self.radius)
+        rooms = (c - self.start, self.end - c)
+        reaches = [np.where(pressed & (room.real < widest), room, widest) for room in rooms]
+        middle = middle_of_bed(reaches, [1.0 / self.radius] * 2, depth)
+        return np.asarray(np.where(pressed, middle, 0.0))
 
 
 def _within_half_a_turn(angle: Numbers) -> Numbers:
@@ -199,82 +189,95 @@ def _within_half_a_turn(angle: Numbers) -> Numbers:
 
 
 class RollingContact:
-    """A settled finger whose base may move.
+    """Settled fingers whose bases may move.
 
     Parameters
     ----------
-    finger : SettledFinger
-        At rest, its proximal joint at the origin of F.
-    section : Section or None
-        The rock in its plane, in F; None if there is none.
-    depths : sequence of float, optional
-        How far its tiles are pressed in; not at all by default [m].
+    fingers : sequence of SettledFinger, length F
+        At rest, each with its proximal joint at the origin of its F.
+    sections : sequence of Section or None
+        The rock in each finger's plane, in its F; None if there is none.
+    depths : array_like, shape (F, 3), optional
+        How far their tiles are pressed in; not at all by default [m].
     """
 
     def __init__(
         self,
-        finger: SettledFinger,
-        section: Section | None,
-        depths: Sequence[float] = (0.0,) * len(PHALANGES),
+        fingers: Sequence[SettledFinger],
+        sections: Sequence[Section | None],
+        depths: ArrayLike = 0.0,
     ) -> None:
-        self.finger = finger
-        self._angles = [contact.angle for contact in finger.contacts]
-        self._links: dict[int, _Link] = {}
-        free = list(finger.free)
-        for joint, end in itertools.pairwise([*free, len(finger.contacts)]):
-            phalanges = range(joint, end)
-            bears = [i for i in phalanges if finger.contacts[i].kind != "none"]
-            if bears and section is not None:
-                self._links[joint] = _link(finger, section, joint, bears[0], depths[bears[0]])
+        pressed = np.broadcast_to(np.asarray(depths), (len(fingers), len(PHALANGES)))
+        each = [_links(*own) for own in zip(fingers, sections, pressed.tolist(), strict=True)]
+        self._links = [
+            _Link(*(np.array(column)[:, None] for column in zip(*links, strict=True)))
+            for links in zip(*each, strict=True)
+        ]
+
+        def of_contacts(name: str) -> Array:
+            return np.array([[getattr(c, name) for c in f.contacts] for f in fingers])[:, None]
+
+        self._angles, self.tilts = of_contacts("angle"), of_contacts("tilt")
+        heights = np.array([finger.model.tile_height for finger in fingers])[:, None, None]
+        self._along, self._heights = of_contacts("along"), heights + of_contacts("rise")
+        self._spacing = np.array([finger.model.joint_spacing for finger in fingers])[:, None]
 
     def move(self, x: Numbers, z: Numbers, turn: Numbers) -> MovedPosture:
-        """Return the finger after displacements of its base.
+        """Return fingers after displacements of their bases.
 
         Parameters
         ----------
-        x, z : ndarray, shape (...)
+        x, z : ndarray, shape (F, m)
             Of the proximal joint in F [m].
-        turn : ndarray, shape (...)
+        turn : ndarray, shape (F, m)
             ψ of the base, from x toward z [rad].
         """
-        contacts, spacing = self.finger.contacts, self.finger.model.joint_spacing
-        nothing = 0.0 * (x + z + turn)
-        jx, jz = x + nothing, z + nothing
-        base = turned = turn + nothing
-        angles: list[Numbers] = []
-        rolled: list[Numbers] = [nothing] * len(contacts)
-        slips: list[Numbers] = [nothing] * len(contacts)
-        joints: list[tuple[Numbers, Numbers]] = []
-        for i, rest in enumerate(self._angles):
-            if i in self._links:
-                link = self._links[i]
+        jx = x + 0.0 * (z + turn)
+        jz, base = z + 0.0 * jx, turn + 0.0 * jx
+        shape = (*jx.shape, len(PHALANGES))
+        theta, rolled, slips = (np.zeros(shape, dtype=jx.dtype) for _ in range(3))
+        joints = np.zeros((*shape, 2), dtype=jx.dtype)
+        turned = base
+        for i, link in enumerate(self._links):
+            begins = link.bearing >= 0
+            if begins.any():
                 with np.errstate(invalid="ignore", divide="ignore"):
-                    turned, rolled[link.bearing], slips[link.bearing] = link.turn(jx, jz)
-            angle = rest + turned
-            angles.append(angle)
-            joints.append((jx, jz))
-            jx, jz = jx + spacing * np.cos(angle), jz + spacing * np.sin(angle)
-        theta = np.stack(angles, axis=-1)
-        on = np.stack(rolled, axis=-1)
-        starts = np.stack([np.stack(pair, axis=-1) for pair in joints], axis=-2)
+                    turn, roll, slip = link.turn(jx, jz)
+                turned = np.where(begins, turn, turned)
+                for j in range(i, len(PHALANGES)):
+                    bears = link.bearing == j
+                    rolled[..., j] += np.where(bears, roll, 0.0)
+                    slips[..., j] += np.where(bears, slip, 0.0)
+            theta[..., i] = self._angles[..., i] + turned
+            joints[..., i, 0], joints[..., i, 1] = jx, jz
+            jx = jx + self._spacing * np.cos(theta[..., i])
+            jz = jz + self._spacing * np.sin(theta[..., i])
         cosine, sine = np.cos(theta), np.sin(theta)
-        tilts = np.array([each.tilt for each in contacts])
-        c = np.array([each.along for each in contacts]) + on * np.cos(tilts)
-        height = self.finger.model.tile_height + np.array([each.rise for each in contacts])
-        height = height + on * np.sin(tilts)
-        points = starts + np.stack(
+        c = self._along + rolled * np.cos(self.tilts)
+        height = self._heights + rolled * np.sin(self.tilts)
+        points = joints + np.stack(
             [c * cosine - height * sine, c * sine + height * cosine], axis=-1
         )
-        change = theta - np.array(self._angles)
+        change = theta - self._angles
         before = np.concatenate([base[..., None], change[..., :-1]], axis=-1)
         return MovedPosture(
             angles=theta,
             turns=change - before,
-            slips=np.stack(slips, axis=-1),
-            joints=starts,
+            slips=slips,
+            joints=joints,
             points=points,
             reached=np.isfinite(theta.real).all(axis=-1),
         )
+
+
+def _links(finger: SettledFinger, section: Section | None, depths: Sequence[float]) -> list[_Link]:
+    """Return the link that begins at each joint of a finger."""
+    found = [_Link() for _ in PHALANGES]
+    for joint, end in itertools.pairwise([*finger.free, len(finger.contacts)]):
+        bears = [i for i in range(joint, end) if finger.contacts[i].kind != "none"]
+        if bears and section is not None:
+            found[joint] = _link(finger, section, joint, bears[0], depths[bears[0]])
+    return found
 
 
 def _link(finger: SettledFinger, section: Section, first: int, bearing: int, depth: float) -> _Link:
@@ -308,17 +311,19 @@ def _link(finger: SettledFinger, section: Section, first: int, bearing: int, dep
     return _Link(
         bearing=bearing,
         along=ahead.real,
-        above=ahead.imag,
-        height=arm.imag,
+        above=ahead.imag + arm.imag,
         rest=contact.angle + contact.tilt,
         rolls=rolls,
+        flat=flat,
         start=start,
         end=end,
         contact=arm.real,
         depth=depth,
-        point=point,
-        into=into,
-        radius=math.inf if flat else 1.0 / curvature,
+        point_x=point[0],
+        point_z=point[1],
+        into_x=into[0],
+        into_z=into[1],
+        radius=10.0 if flat else 1.0 / curvature,
         offset=gap if rolls else max(gap, 0.0),
     )
 

@@ -255,7 +255,9 @@ class PhalanxShape(NamedTuple):
         return np.asarray(level)
 
 
-def middle_of_bed(reaches: Iterable[Pressed], bends: Iterable[float], depth: float) -> Pressed:
+def middle_of_bed(
+    reaches: Iterable[Pressed], bends: Iterable[float | Pressed], depth: float | Pressed
+) -> Pressed:
     """Return how far from where a face touches rock the middle of its bed's pressures is [m].
 
     Parameters

@@ -11,7 +11,7 @@ from msgspec.structs import force_setattr
 
 from hand_models.base import InvalidFieldError, Strict, Tension, check_positive
 
-__all__ = ["Grasp"]
+__all__ = ["Grasp", "WristTravel"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,3 +76,40 @@ class Grasp(Strict, frozen=True):
     def pinch(self) -> bool:
         """True if the outer fingers oppose the inner ones."""
         return self.outer_rotation >= math.pi - ROTATION_TOLERANCES.pinch
+
+
+Travel = Annotated[float, Meta(ge=0.0, le=0.05)]
+Turn = Annotated[float, Meta(ge=0.0, le=0.3)]
+
+
+class WristTravel(Strict, frozen=True):
+    """The range in which a compliant wrist may settle, about its place at rest.
+
+    Attributes
+    ----------
+    position : float
+        Along each axis of H, either way [m].
+    inward : float
+        Toward the rock, +z of H, if that is less [m]. Contact states stay those of the closed
+        hand, and moving inward is what they bear least.
+    angle : float
+        About each axis of H, either way [rad].
+    """
+
+    position: Annotated[Travel, Meta(description="along each axis of H, either way [m]")] = 0.004
+    inward: Annotated[Travel, Meta(description="toward the rock, along +z of H [m]")] = 0.001
+    angle: Annotated[Turn, Meta(description="about each axis of H, either way [rad]")] = 0.04
+
+    def __post_init__(self) -> None:
+        for name, value in (("position", self.position), ("inward", self.inward)):
+            if not 0.0 <= value <= 0.05:  # farther, no twist of a wrist is small
+                raise InvalidFieldError(f"must be 0 to 0.05 m, got {value:g}", field=name)
+        if not 0.0 <= self.angle <= 0.3:
+            raise InvalidFieldError(f"must be 0 to 0.3 rad, got {self.angle:g}", field="angle")
+
+    @property
+    def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Least and largest of each component of the twist [m, rad]."""
+        most = (self.position,) * 3 + (self.angle,) * 3
+        least = tuple([-end for end in most])
+        return least, (*most[:2], min(self.inward, self.position), *most[3:])

@@ -5,4 +5,8 @@ from .load_sharing import (
     share_load as share_load,
     shear_capacity as shear_capacity,
 )
-from .regimes import MotorScheme as MotorScheme, TendonRegimes as TendonRegimes
+from .regimes import (
+    MotorScheme as MotorScheme,
+    TendonRegimes as TendonRegimes,
+    pad_tiles as pad_tiles,
+)

@@ -189,6 +189,29 @@ class FingerTendon:
         SolverError
             If rounding errors keep the solution from being found.
         """
+        after, shears = self._changed(state, shift, turn, None)
+        first, mu = float(after[0]), self.entry_friction
+        motor = min(max(state.motor_tension, first / (1.0 + mu)), first / (1.0 - mu))
+        return TendonState(motor, after, shears)
+
+    def kept(
+        self,
+        state: TendonState,
+        shift: Sequence[float] | Array | None = None,
+        turn: Sequence[float] | Array | None = None,
+    ) -> TendonState:
+        """Change the load while the motor keeps its tension; parameters and errors as `held`."""
+        after, shears = self._changed(state, shift, turn, state.motor_tension)
+        return TendonState(state.motor_tension, after, shears)
+
+    def _changed(
+        self,
+        state: TendonState,
+        shift: Sequence[float] | Array | None,
+        turn: Sequence[float] | Array | None,
+        motor: float | None,
+    ) -> tuple[Array, Array]:
+        """Return tensions and shears after a change of load, at a motor's tension or held."""
         k, c, n = np.array(self.contact_stiffness), self.pulley_ratio, len(self.pulley_radii)
         pushed = k * self._of_phalanges("shift", shift)
         wound = np.array(self.pulley_radii) * self._of_phalanges("turn", turn)
@@ -196,28 +219,33 @@ class FingerTendon:
         give = 1.0 / (k + self.spring_stiffness)
         unit = c**2 * float(give.mean())
         # t_i = (1 − μ_i) t_{i−1} + 2 μ_i a_i by t_0 and the a of boundaries that have friction
-        mu = np.append(0.0, np.full(n - 1, self.friction))
+        mu = np.full(n, self.friction)
+        mu[0] = 0.0 if motor is None else self.entry_friction
         rubs, columns = mu > LEAST_FRICTION, np.eye(n + 1)
         rows = [columns[0]]
         for mu_i, column in zip(mu, columns[1:], strict=True):
             rows.append((1.0 - mu_i) * rows[-1] + 2.0 * mu_i * column)
-        tensions = np.array(rows)[:, np.append(True, rubs)]
+        # t_0 is unknown where the motor is held: its boundary moves only where it is slack
+        by_first, by_others = np.array(rows)[:, :1], np.array(rows)[:, 1:][:, rubs]
+        moves = np.flatnonzero(rubs)
+        if motor is None:
+            moves, tensions, given = np.append(0, moves), np.hstack([by_first, by_others]), 0.0
+        else:
+            tensions, given = by_others, motor
+        known = given * by_first[:, 0]
 
         def passed(given: Array) -> Array:
             """Return v, what the phalanges from each boundary on give, in newtons."""
             return np.asarray(np.cumsum(given[::-1], axis=0)[::-1] / unit)
 
-        moves = np.append(0, np.flatnonzero(rubs))
-        free = passed(wound - c * give * (c * state.tensions + pushed))[moves]
+        free = passed(wound - c * give * (c * (state.tensions - known[1:]) + pushed))[moves]
         found = stick_slip(
             (passed(c**2 * give[:, None] * tensions[1:])[moves], free),
-            (tensions[:-1][rubs], np.zeros(len(moves) - 1)),
+            (tensions[:-1][rubs], known[:-1][rubs]),
         )
-        after = tensions[1:] @ found
+        after = known[1:] + tensions[1:] @ found
         travel = give * (c * (after - state.tensions) - pushed)
-        first, mu_1 = float(found[0]), self.entry_friction
-        motor = min(max(state.motor_tension, first / (1.0 + mu_1)), first / (1.0 - mu_1))
-        return TendonState(motor, after, state.shears + pushed + k * travel)
+        return after, state.shears + pushed + k * travel
 
     def _of_phalanges(self, field: str, values: Sequence[float] | Array | None) -> Array:
         n = len(self.pulley_radii)

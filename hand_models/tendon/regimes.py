@@ -1,37 +1,38 @@
-"""Stick and slip of a finger's tendon for many changes of load at once.
+"""Stick and slip of many fingers' tendons for many changes of load at once.
 
 `FingerTendon` solves one change of load as a complementarity problem. From one state of rest, every
 choice of which boundaries stick and which way the others slip (a *regime*) makes the tensions an
-affine function of the change:
+affine function of the change,
 
-    t = a + B_x (k δx) + B_q (r δq),
+    t = a f + B_x (k δx) + B_q (r δq),
 
-and exactly one regime is consistent for each change of load, all of them on their seams. There are
-3ⁿ regimes of n boundaries, few enough to try them all.
+linear, too, in the motor's tension f at rest. Exactly one regime is consistent for each change of
+load, all of them on their seams. There are 3ⁿ regimes of n boundaries, few enough to try them all.
 
-Everything here also takes complex numbers, so that derivatives are found by complex steps; they are
-those of the regime.
+Tendons over fewer tiles than others get padded ones at their ends, which take up nothing. All
+arrays may be complex, so that derivatives are found by complex steps; they are those of the regime.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices
-from hand_models.tendon.finger_tendon import LEAST_FRICTION, FingerTendon, TendonState
+from hand_models.tendon.finger_tendon import LEAST_FRICTION, FingerTendon
 
-__all__ = ["MotorScheme", "TendonRegimes", "TendonResponse"]
+__all__ = ["MotorScheme", "TendonRegimes", "TendonResponse", "pad_tiles"]
 
 MotorScheme = Literal["held", "tension"]
 """Motor while the load changes: it stands still (held), or keeps its tension."""
 
 
 class TendonResponse(NamedTuple):
-    """Tensions and shears of a finger's tendon, shapes (m, n); ``regime`` has shape (m,).
+    """Tensions and shears of F fingers' tendons, shapes (F, m, n); ``regime`` has shape (F, m).
 
     Attributes
     ----------
@@ -47,142 +48,152 @@ class TendonResponse(NamedTuple):
     regime: Indices
 
 
+def pad_tiles(rows: Sequence[Sequence[float] | Array], fill: float) -> Array:
+    """Return numbers of each finger's tiles as one array, padded at the end, shape (F, n)."""
+    count = max(map(len, rows))
+    return np.array([[*row, *[fill] * (count - len(row))] for row in rows], dtype=float)
+
+
 class TendonRegimes:
-    """A finger's tendon and tiles about a state of rest.
+    """Tendons and tiles of F fingers about states of rest, which are linear in motors' tensions.
 
     Parameters
     ----------
-    tendon : FingerTendon
-    state : TendonState
-        At rest, without slack.
+    tendons : sequence of FingerTendon
+    losses : ndarray, shape (F, n)
+        Tension in each phalanx at rest, per newton of the motor's.
     scheme : {'held', 'tension'}
-        What the motor does.
+        What motors do.
     """
 
-    def __init__(self, tendon: FingerTendon, state: TendonState, scheme: MotorScheme) -> None:
-        self.tendon = tendon
-        self.state = state
+    def __init__(self, tendons: Sequence[FingerTendon], losses: Array, scheme: MotorScheme) -> None:
         self.scheme = scheme
-        n = len(tendon.pulley_radii)
-        mu = np.full(n, tendon.friction)
-        mu[0] = tendon.entry_friction
+        self._losses = losses
+        self._stiffness = pad_tiles([tendon.contact_stiffness for tendon in tendons], 0.0)
+        self._radii = pad_tiles([tendon.pulley_radii for tendon in tendons], 0.0)
+        self._ratio = np.array([tendon.pulley_ratio for tendon in tendons])[:, None]
+        count, n = losses.shape
+        own = pad_tiles([np.ones(len(tendon.pulley_radii)) for tendon in tendons], 0.0)
+        springs = np.array([tendon.spring_stiffness for tendon in tendons])[:, None]
+        self._give = own / (self._stiffness + np.where(own > 0.0, springs, 1.0))
+        mu = np.array([tendon.friction for tendon in tendons])[:, None] * own
+        mu[:, 0] = [tendon.entry_friction for tendon in tendons]
         self._mu = np.where(mu > LEAST_FRICTION, mu, 0.0)
-        stiffness = np.array(tendon.contact_stiffness)
-        self._stiffness = stiffness
-        self._radii = np.array(tendon.pulley_radii)
-        self._give = 1.0 / (stiffness + tendon.spring_stiffness)
-        self._unit = tendon.pulley_ratio**2 * float(self._give.mean())
-        # v = travel @ t + constant + by_push @ pushed + by_turn @ wound, in newtons (over `unit`)
-        later = np.triu(np.ones((n, n))) / self._unit
-        c = tendon.pulley_ratio
-        self._travel = later * (c**2 * self._give)
-        self._by_push = -later * (c * self._give)
-        self._by_turn = later
-        self._constant = -self._travel @ state.tensions
-        self._regimes = [r for r in map(self._regime, self._choices(n)) if r is not None]
+        # v = travel @ t + by_push @ pushed + by_turn @ wound + constant f, in newtons (over `unit`)
+        unit = self._ratio**2 * (self._give.sum(axis=1) / own.sum(axis=1))[:, None]
+        later = np.triu(np.ones((n, n))) / unit[..., None]
+        travel = later * (self._ratio**2 * self._give)[:, None, :]
+        by_push = -later * (self._ratio * self._give)[:, None, :]
+        constant = -np.einsum("fij,fj->fi", travel, losses)
+        given = np.concatenate([by_push, later, constant[..., None]], axis=-1)
+        self._signs, slipping = self._choices(count, n)
+        # where next to nothing slips is looked for first
+        ends = np.searchsorted(slipping, [1, 2, 2 * n + 1])
+        self._groups = [np.arange(start, end) for start, end in itertools.pairwise([0, *ends])]
+        self._tensions = np.stack(
+            [self._regime(signs, travel, given) for signs in np.moveaxis(self._signs, 1, 0)], axis=1
+        )
+        self._travels = travel[:, None] @ self._tensions + given[:, None]
 
-    def _choices(self, n: int) -> list[tuple[int, ...]]:
-        """Return regimes: 0 sticks, 1 slips toward the motor, −1 away; all 2 if slack."""
-        options: list[tuple[int, ...]] = []
-        for i, mu in enumerate(self._mu):
-            if i == 0 and self.scheme == "held":
-                options.append((0,))
-            else:
-                options.append((0, 1, -1) if mu > 0.0 else (1,))
-        choices = sorted(itertools.product(*options), key=lambda c: sum(map(abs, c)))
-        if self.scheme == "held":
+    def _choices(self, count: int, n: int) -> tuple[Indices, Indices]:
+        """Return the signs of every finger's boundaries in every regime, shape (F, R, n).
+
+        0 sticks, 1 slips toward the motor, −1 away; all are 2 where the tendon is slack.
+        And how many boundaries slip in each, in rising order, shape (R,).
+        """
+        held = self.scheme == "held"
+        options = [(0,) if held and i == 0 else (0, 1, -1) for i in range(n)]
+        choices = sorted(itertools.product(*options), key=lambda signs: sum(map(abs, signs)))
+        if held:
             choices.append((2,) * n)
-        return choices
+        signs = np.tile(np.array(choices), (count, 1, 1))
+        slides = self._mu == 0.0
+        slides[:, 0] &= not held
+        signs = np.where(slides[:, None] & (signs != 2), 1, signs)
+        return signs, np.abs(choices).sum(axis=1)
 
-    def _regime(self, choice: tuple[int, ...]) -> _Regime | None:
-        """Return the affine map of a regime."""
-        n = len(choice)
-        rows, constant = np.zeros((n, n)), np.zeros(n)
-        by_push, by_turn = np.zeros((n, n)), np.zeros((n, n))
-        for i, sign in enumerate(choice):
-            if sign == 0:
-                rows[i] = self._travel[i]
-                constant[i] = -self._constant[i]
-                by_push[i], by_turn[i] = -self._by_push[i], -self._by_turn[i]
-                continue
-            rows[i, i] = 1.0
-            factor = 0.0 if sign == 2 else 1.0 - sign * self._mu[i]
-            if i:
-                rows[i, i - 1] = -factor
-            else:
-                constant[i] = factor * self.state.motor_tension
-        if abs(np.linalg.det(rows)) < np.finfo(float).tiny:
-            return None
-        inverse = np.asarray(np.linalg.inv(rows), dtype=float)
-        return _Regime(choice, inverse @ constant, inverse @ by_push, inverse @ by_turn)
+    def _regime(self, signs: Indices, travel: Array, given: Array) -> Array:
+        """Return tensions by (pushed, wound, f) in a regime of each finger, (F, n, 2 n + 1)."""
+        n = signs.shape[1]
+        sticks = (signs == 0)[..., None]
+        factor = np.where(signs == 2, 0.0, 1.0 - signs * self._mu)
+        slides = np.eye(n) - factor[..., None] * np.eye(n, k=-1)
+        rows = np.where(sticks, travel, slides)
+        aims = np.where(sticks, -given, 0.0)
+        aims[:, 0, -1] = np.where(sticks[:, 0, 0], aims[:, 0, -1], factor[:, 0])
+        return np.asarray(np.linalg.solve(rows, aims))
 
-    def respond(self, slips: NDArray[Any], turns: NDArray[Any]) -> TendonResponse:
+    def respond(
+        self,
+        slips: NDArray[Any],
+        turns: NDArray[Any],
+        tension: NDArray[Any],
+        at_rest: NDArray[Any],
+    ) -> TendonResponse:
         """Return tensions and shears after changes of load, each from the state of rest.
 
         Parameters
         ----------
-        slips : ndarray, shape (m, n)
+        slips : ndarray, shape (F, m, n)
             δx_i of each phalanx along the rock, toward the finger's base [m].
-        turns : ndarray, shape (m, n)
+        turns : ndarray, shape (F, m, n)
             δq_i of each joint, closing [rad].
+        tension : ndarray, shape (F, m)
+            Of each motor at rest [N].
+        at_rest : ndarray, shape (F, m, n)
+            Shears at rest [N].
         """
-        pushed, wound = slips * self._stiffness, turns * self._radii
-        first = self._regimes[0]
-        tensions = first.tensions(pushed, wound)
-        regime = np.zeros(len(slips), dtype=np.intp)
-        wrong: Indices = np.flatnonzero(
-            ~(self._contradiction(first, tensions, pushed, wound) <= BASE_TOLERANCES.force)
-        )
-        least = np.full(len(wrong), np.inf)
-        left = np.arange(len(wrong))
-        for k, candidate in enumerate(self._regimes):
-            those = wrong[left]
-            tried = candidate.tensions(pushed[those], wound[those])
-            off = self._contradiction(candidate, tried, pushed[those], wound[those])
-            better = off < least[left]
-            least[left[better]] = off[better]
-            tensions[those[better]] = tried[better]
-            regime[those[better]] = k
-            left = left[~(off <= BASE_TOLERANCES.force)]
-            if not len(left):
-                break
-        rise = self.tendon.pulley_ratio * (tensions - self.state.tensions)
-        travel = self._give * (rise - pushed)
-        shears = self.state.shears + pushed + self._stiffness * travel
+        pushed = slips * self._stiffness[:, None]
+        given = [pushed, turns * self._radii[:, None], tension[..., None]]
+        changes = np.concatenate(given, axis=-1)
+        regime = self._consistent(changes.real)
+        tensions = np.empty(pushed.shape, dtype=changes.dtype)
+        for i, found in enumerate(regime):
+            for k in np.unique(found):
+                those = found == k
+                tensions[i, those] = changes[i, those] @ self._tensions[i, k].T
+        rise = self._ratio[:, None] * (tensions - tension[..., None] * self._losses[:, None])
+        travel = self._give[:, None] * (rise - pushed)
+        shears = at_rest + pushed + self._stiffness[:, None] * travel
         return TendonResponse(tensions, shears, regime)
 
-    def _contradiction(
-        self, regime: _Regime, tensions: NDArray[Any], pushed: NDArray[Any], wound: NDArray[Any]
-    ) -> Array:
-        """Return by how many newtons each change of load contradicts a regime, shape (m,)."""
-        t = tensions.real
-        v = t @ self._travel.T + self._constant
-        v = v + pushed.real @ self._by_push.T + wound.real @ self._by_turn.T
-        worst = np.zeros(len(t))
-        for i, sign in enumerate(regime.choice):
-            if sign == 2:
-                if i == 0:
-                    worst = np.maximum(worst, -v[:, 0])
-            elif sign == 0:
-                if i == 0 and self.scheme == "held":
-                    worst = np.maximum(worst, -t[:, 0])
-                    continue
-                before = t[:, i - 1] if i else np.full(len(t), self.state.motor_tension)
-                mu = self._mu[i]
-                worst = np.maximum(worst, (1.0 - mu) * before - t[:, i])
-                worst = np.maximum(worst, t[:, i] - (1.0 + mu) * before)
-            elif self._mu[i] > 0.0:
-                worst = np.maximum(worst, -sign * v[:, i])
-        return worst
+    def _consistent(self, changes: Array) -> Indices:
+        """Return the regime of each change of load (F, m, 2 n + 1), shape (F, m).
 
+        The first that does not contradict itself; by rounding, that which does least.
+        """
+        first, *later = self._groups
+        least = self._contradictions(np.arange(len(changes)), first, changes)[..., 0]
+        found = np.zeros(least.shape, dtype=np.intp)
+        for i in np.flatnonzero((least > 0.0).any(axis=1)):
+            for group in later:
+                left = np.flatnonzero(least[i] > 0.0)
+                # so many at once, which bounds the memory
+                for those in np.array_split(left, -(-len(left) // 4096)) if len(left) else ():
+                    off = self._contradictions(np.array([i]), group, changes[i : i + 1, those])[0]
+                    best = off.argmin(axis=1)
+                    worst = off[np.arange(len(those)), best]
+                    better = worst < least[i, those]
+                    found[i, those[better]] = group[best[better]]
+                    least[i, those[better]] = worst[better]
+        return found
 
-class _Regime(NamedTuple):
-    """Boundaries that slip, and the tensions then: a + B_x pushed + B_q wound."""
-
-    choice: tuple[int, ...]
-    constant: Array
-    by_push: Array
-    by_turn: Array
-
-    def tensions(self, pushed: NDArray[Any], wound: NDArray[Any]) -> NDArray[Any]:
-        return np.asarray(self.constant + pushed @ self.by_push.T + wound @ self.by_turn.T)
+    def _contradictions(self, fingers: Indices, group: Indices, changes: Array) -> Array:
+        """Return by how many newtons changes (k, m, 2 n + 1) contradict regimes, (k, m, R)."""
+        own = fingers[:, None], group
+        signs, mu = self._signs[own][:, :, None], self._mu[fingers][:, None, None]
+        with np.errstate(invalid="ignore"):
+            t = changes[:, None] @ np.swapaxes(self._tensions[own], -1, -2)
+            v = changes[:, None] @ np.swapaxes(self._travels[own], -1, -2)
+            motor = np.broadcast_to(changes[:, None, :, -1:], t[..., :1].shape)
+            before = np.concatenate([motor, t[..., :-1]], axis=-1)
+            stuck = np.maximum((1.0 - mu) * before - t, t - (1.0 + mu) * before)
+            off = np.where(signs == 0, stuck, np.where(mu > 0.0, -signs * v, 0.0))
+            if self.scheme == "held":
+                slack = (signs == 2).all(axis=-1)[..., 0]
+                off[slack] = 0.0
+                off[..., 0] = np.where(slack[..., None], -v[..., 0], -t[..., 0])
+            worst = np.swapaxes(off.max(axis=-1), 1, 2)
+        return np.where(
+            worst <= BASE_TOLERANCES.force, 0.0, np.where(np.isnan(worst), np.inf, worst)
+        )

@@ -240,7 +240,7 @@ def size_of(direction: Array) -> float:
 
 
 def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
-    """Return where floating wrists are in a plan; without one, at rest as they can do most."""
+    """Return where wrists that give way are in a plan; without one, at rest as they can do most."""
     if planned.hands is None:
         palms = [None if wrist is None else widest_at_rest(wrist)[0] for wrist in hands.wrists]
         return hands.at_rest(palms)
@@ -248,7 +248,9 @@ def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
     loads, palms = list(point.loads), list(point.palms)
     for i, hand in enumerate(planned.hands):
         if hand.wrist is not None:
-            loads[i], palms[i] = hand.wrist.twist, hand.wrist.palm
+            tensions = hand.tensions[: len(point.loads[i]) - len(hand.wrist.twist)]
+            loads[i] = np.concatenate([tensions, hand.wrist.twist])
+            palms[i] = hand.wrist.palm
     return LinearisationPoint(tuple(loads), tuple(palms))
 
 

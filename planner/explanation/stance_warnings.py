@@ -202,7 +202,7 @@ def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
     found = []
     hands, wrists = prepared.batch.hands, prepared.hands.wrists
     for limb, hand, wrist in zip(prepared.limbs, hands, wrists, strict=True):
-        if wrist is None:
+        if wrist is None or wrist.driven:
             continue
         needs = []
         for t in np.flatnonzero(hand.touching):
@@ -227,7 +227,7 @@ def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
     """Yield a sentence for each floating hand that its preload alone overloads."""
     tension_limit = prepared.question.limits.tendon_tension
     for limb, wrist in zip(prepared.limbs, prepared.hands.wrists, strict=True):
-        if wrist is None:
+        if wrist is None or wrist.driven:
             continue
         most = float(wrist.hand.preload.max())
         if tension_limit is not None and most > tension_limit:

@@ -17,9 +17,10 @@ import numpy as np
 
 from planner import deadline
 from planner.deadline import Budget
+from planner.floating.elastic_search import find_wrists
 from planner.floating.goals import SETTINGS
 from planner.floating.palm_modes import exchanged, first_plan, starts
-from planner.floating.wrist_iteration import WristSolution, solve_wrists
+from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import TOLERANCES, HandSets
 from planner.programs import CAP_SLACK
 
@@ -74,7 +75,7 @@ def least_use(
     """
     choices = starts(hands, 1.0, budget)
     first = SETTINGS.first_programs
-    plan = None if near is None else solve_wrists(hands, near.point, budget.part(first))
+    plan = None if near is None else find_wrists(hands, near.point, budget.part(first))
     if plan is None or not plan.exact:
         near, plan = None, first_plan(hands, 1.0, choices, budget.part(first))
     if deadline.expired():
@@ -82,7 +83,7 @@ def least_use(
     most: LargestFactor | None = None
     if not _held(plan) and np.abs(hands.wrench[:6]).max() > TOLERANCES.body_wrench:
         along = budget.part(190)  # programs
-        for way in _ways(hands, plan, along, up=near is None):
+        for way in _ways(hands, plan, along, up=near is None and hands.together is None):
             if most is None or way.most.factor > most.factor:
                 most = way.most
             onward = way.whole or _carried_on(hands, way.at, along)
@@ -208,7 +209,7 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
             aim = 1.0
         if aim < least:
             break
-        there = solve_wrists(hands, replace(now.point, factor=aim), budget, SETTINGS.rounds_nearby)
+        there = find_wrists(hands, replace(now.point, factor=aim), budget, SETTINGS.rounds_nearby)
         if there.exact:
             now = there
         elif aim > factor or best is not None:
@@ -226,7 +227,7 @@ def _carried_on(hands: HandSets, at: WristSolution, budget: Budget) -> WristSolu
     for _ in range(8):  # halvings of what is left
         if budget.ended:
             break
-        there = solve_wrists(hands, replace(now.point, factor=aim), budget, SETTINGS.rounds_nearby)
+        there = find_wrists(hands, replace(now.point, factor=aim), budget, SETTINGS.rounds_nearby)
         if there.exact and aim == 1.0:
             return there
         now, aim = (there, 1.0) if there.exact else (now, 0.5 * (now.point.factor + aim))

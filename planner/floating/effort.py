@@ -21,13 +21,15 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array
+from hand_models.compliance import pose_units
 from planner import programs
 from planner.deadline import Budget
+from planner.floating.elastic_search import find_wrists
 from planner.floating.goals import SETTINGS, Goal, bent_root
 from planner.floating.palm_modes import exchanged
-from planner.floating.wrist_iteration import WristSolution, solve_wrists
+from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
-from planner.programs import CAP_SLACK, TWIST_UNIT, Outcome, StanceData
+from planner.programs import CAP_SLACK, Outcome, StanceData
 
 __all__ = ["LeastEffort", "best_within", "with_room"]
 
@@ -139,12 +141,12 @@ def best_within(
     # in `TWIST_UNIT`: farther, where loads of one step from rest are no longer sure, less
     # would be no gain
     away = [
-        np.maximum(4.0 * TWIST_UNIT, np.abs(y)) if wrist is not None else y
+        np.maximum(4.0 * pose_units(wrist.columns), np.abs(y)) if wrist is not None else y
         for wrist, y in zip(hands.wrists, plan.point.loads, strict=True)
     ]
     least = goal(cap, away)
     budget = budget.part(SETTINGS.effort_programs)
-    found = solve_wrists(hands, plan.point, budget, goal=least)
+    found = find_wrists(hands, plan.point, budget, goal=least)
     if not found.exact or least.value(found.measure) > least.value(plan.measure):
         sets = hands.sets(plan.point, 1.0, least.farthest)
         return replace(plan, found="unproven", sets=sets, outcome=least.solve(sets.data))

@@ -35,6 +35,9 @@ class FloatingSettings:
     rounds: int = 40  # for one choice of palm modes, at most
     rounds_nearby: int = 16  # from a plan, or where another search has failed, at most
     first_range: float = 4.0  # about a point, in `TWIST_UNIT`
+    closeness: float = 4e-6  # of a point to the best of the sets about it, relative
+    price: float = 2.0
+    """Of a `WRENCH_UNIT` of missing force, and of `LOAD_UNIT` of a broken row, per utilisation."""
     small_factors: tuple[float, ...] = (0.5, 0.1)
     """Of the body wrench, from which the largest is sought where the whole has no plan."""
     binding_multiplier: float = 1e-6  # above this it binds

@@ -16,8 +16,9 @@ from hand_models.compliance import PALM_MODES, PalmMode
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from planner import deadline, programs
 from planner.deadline import Budget
+from planner.floating.elastic_search import find_wrists
 from planner.floating.goals import LEAST_USE, SETTINGS, Goal
-from planner.floating.wrist_iteration import WristSolution, solve_wrists
+from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import HandSets
 from planner.programs import CAP_SLACK
 
@@ -34,14 +35,17 @@ def first_plan(
     for palms in choices:
         most = SETTINGS.rounds_nearby if failed else SETTINGS.rounds
         start = replace(hands.at_rest(palms), factor=factor)
-        found = solve_wrists(hands, start, budget, most)
+        if hands.springy:
+            # palms on their springs draw the search to where fingers hold little
+            start = find_wrists(hands.without_palms(), start, budget, most).point
+        found = find_wrists(hands, start, budget, most)
         if found.exact:
             return found
         failed.append(found)
         if budget.ended:
             break
     if not failed:
-        return solve_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
+        return find_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
     return min(failed, key=lambda found: found.measure.missing)
 
 
@@ -91,7 +95,7 @@ def exchanged(
             break
         tried.add(new)
         turned = replace(found.point, palms=new)
-        there = solve_wrists(hands, turned, budget, SETTINGS.rounds_nearby, goal)
+        there = find_wrists(hands, turned, budget, SETTINGS.rounds_nearby, goal)
         value = goal.value(found.measure)
         lower = value - CAP_SLACK * max(1.0, value)
         if there.exact and goal.value(there.measure) < lower:

@@ -35,7 +35,15 @@ from planner.floating.goals import LEAST_USE, SETTINGS, Goal
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import Outcome
 
-__all__ = ["WristSolution", "disagreements", "solve_wrists"]
+__all__ = [
+    "WristSolution",
+    "disagreements",
+    "gap",
+    "made_exact",
+    "repaired",
+    "searching",
+    "solve_wrists",
+]
 
 NOT_SOLVED: Final = Outcome(False, "none", 0, math.nan)
 """Before anything is solved."""
@@ -82,7 +90,7 @@ class WristSolution:
         return self.found != "nothing"
 
 
-def _searching(
+def searching(
     hands: HandSets,
     goal: Goal,
     point: LinearisationPoint,
@@ -109,7 +117,7 @@ def solve_wrists(
     Where the search ends without proof, or its budget does, the point is made exact there. At a
     deadline the best exact point on the way is what was found.
     """
-    now = _searching(hands, goal, start, SETTINGS.first_range)
+    now = searching(hands, goal, start, SETTINGS.first_range)
     passed: WristSolution | None = None
     within, penalty, stalled = SETTINGS.first_range, goal.least_penalty, 0
     weights, root, rounds = NOT_SOLVED, None, 0
@@ -121,7 +129,7 @@ def solve_wrists(
         if outcome.solved:
             if goal.exact(now.measure, hands):
                 here = replace(now, found="least", outcome=outcome, rounds=rounds)
-                if _gap(goal, now, outcome) <= 4e-6:  # nothing in the sets is better
+                if gap(goal, now, outcome) <= SETTINGS.closeness:  # nothing in the sets is better
                     return here
                 passed = replace(here, found="unproven")
             penalty = max(penalty, 2.0 * goal.dearest(outcome))
@@ -142,32 +150,32 @@ def solve_wrists(
             if not step.solved or stalled > 4:
                 break
         size = hands.step(now.point, step.loads)
-        there = _searching(hands, goal, replace(now.point, loads=step.loads), within, now.sets)
+        there = searching(hands, goal, replace(now.point, loads=step.loads), within, now.sets)
         before, after = (goal.merit(state.measure, penalty) for state in (now, there))
         if not outcome.solved:
             stalled += not after < before - 0.02 * abs(before)
         direct = after < before
         if outcome.solved and there.sets.finite and not direct:
-            there = _repaired(hands, goal, there, within)
+            there = repaired(hands, goal, there, within)
             after = goal.merit(there.measure, penalty)
         if hands.near_rest(there.point) and there.sets.finite and after < before:
             if not direct and outcome.solved and goal.promised is not None:
                 direct = before - after >= goal.promised * (before - outcome.value)
             if direct and size > 0.8 * within:
                 within = min(2.5 * within, 30.0)  # in `TWIST_UNIT`, where a step reaches its end
-                there = _searching(hands, goal, there.point, within, error=there.error)
+                there = searching(hands, goal, there.point, within, error=there.error)
             now, root = there, None
         else:
             within = 0.3 * min(within, size)  # where steps do not lower the merit
             if within < 1e-3:  # in `TWIST_UNIT`: only a kink spoils such steps
                 break
-            now = _searching(hands, goal, now.point, within, error=now.error)
+            now = searching(hands, goal, now.point, within, error=now.error)
     if passed is not None and deadline.expired():
         return replace(passed, rounds=rounds)
-    return _made_exact(hands, goal, now, rounds, budget)
+    return made_exact(hands, goal, now, rounds, budget)
 
 
-def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -> WristSolution:
+def repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -> WristSolution:
     """Return a point with less missing and broken, hardly moving: a second-order correction.
 
     The smallest step that balances, and puts hard rows that are broken on their limits; those that
@@ -196,14 +204,14 @@ def _repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) 
     point = replace(state.point, loads=moved)
     if not hands.near_rest(point):
         return state
-    return _searching(hands, goal, point, within, state.sets)
+    return searching(hands, goal, point, within, state.sets)
 
 
-def _made_exact(
+def made_exact(
     hands: HandSets, goal: Goal, start: WristSolution, rounds: int, budget: Budget
 ) -> WristSolution:
     """Make the point exact at which a search ended without proof."""
-    now = start = _searching(hands, goal, start.point, SETTINGS.first_range, error=start.error)
+    now = start = searching(hands, goal, start.point, SETTINGS.first_range, error=start.error)
     for _ in range(12):
         if deadline.expired():
             break
@@ -215,14 +223,14 @@ def _made_exact(
             if goal.value(now.measure) - value <= 1e-3 * max(1.0, value):
                 return replace(now, found="unproven", outcome=outcome, rounds=rounds)
             break
-        before, now, rounds = now, _repaired(hands, goal, now, SETTINGS.first_range), rounds + 1
+        before, now, rounds = now, repaired(hands, goal, now, SETTINGS.first_range), rounds + 1
         lost, left = (goal.wrong(state.measure) for state in (before, now))
         if not now.sets.finite or not left < 0.5 * lost:
             break
     return replace(start, rounds=rounds)
 
 
-def _gap(goal: Goal, state: WristSolution, outcome: Outcome) -> float:
+def gap(goal: Goal, state: WristSolution, outcome: Outcome) -> float:
     """Return how far a point is above the best of its sets, relative."""
     value = goal.value(state.measure)
     return (value - outcome.value) / max(1.0, value)

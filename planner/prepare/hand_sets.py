@@ -1,7 +1,6 @@
-"""The hands of a stance about a point: sets of floating ones linearised there, of the others fixed.
+"""The hands of a stance about a point: sets linearised there where wrists give way, or fixed.
 
-A point is where each floating wrist is and what each other hand carries. Sets are exact where they
-are linearised, so what they say of their point is what the model says.
+A point is a pose of each wrist that gives way, and loads of each other hand; sets are exact there.
 """
 
 from __future__ import annotations
@@ -15,7 +14,15 @@ import numpy as np
 import scipy
 
 from hand_models.base import Array, InvalidInputError, UnsupportedError
-from hand_models.compliance import CompliantHand, FloatingWrist, PalmMode
+from hand_models.compliance import (
+    CompliantHand,
+    CompliantWrist,
+    CompliantWrists,
+    DrivenHand,
+    FloatingWrist,
+    PalmMode,
+    pose_units,
+)
 from hand_models.hand import SettledHand
 from hand_models.wrench_spaces import WRENCH_SCALE, WrenchSpace
 from planner import programs
@@ -49,7 +56,7 @@ class LinearisationPoint:
     Attributes
     ----------
     loads : tuple of ndarray
-        y of each hand: loads [N], or the twist of a floating wrist [m, rad].
+        y of each hand: loads [N], the twist of a floating wrist [m, rad], or tensions and twist.
     palms : tuple of PalmMode or None
         How each floating hand's palm carries; None for a hand with a fixed wrist.
     factor : float
@@ -75,12 +82,15 @@ class ExactMeasure(NamedTuple):
     effort : float
         What `programs.effort` makes least: the sum of squared relative tensions and joint torques,
         and of fixed hands a little of what makes their other loads unique.
+    excess : float
+        Sum of the violations of all hard rows, scaled.
     """
 
     utilisation: float
     missing: float
     broken: float
     effort: float
+    excess: float
 
     def exact(self, hands: HandSets) -> bool:
         """Return whether the body wrench is balanced and no hard row is broken."""
@@ -97,14 +107,15 @@ class Sets(NamedTuple):
 
     def measure(self, loads: Sequence[Array]) -> ExactMeasure:
         """Return what loads do, exact for those of the point."""
-        used, broken, effort = -math.inf, 0.0, 0.0
+        used, broken, excess, effort = -math.inf, 0.0, 0.0, 0.0
         for hand, y in zip(self.data.hands, loads, strict=True):
             z = y / hand.unit
             used = max(used, float((hand.L @ z + hand.l0).max()))
-            broken = max(broken, float((hand.H @ z - hand.h).max(initial=0.0)))
+            over = np.maximum(hand.H @ z - hand.h, 0.0)
+            broken, excess = max(broken, float(over.max(initial=0.0))), excess + float(over.sum())
             effort += float(np.sum((hand.E @ z + hand.e0) ** 2) + np.sum(hand.rest * z**2))
         missing = programs.body_wrench(self.data, loads) - self.data.wrench
-        return ExactMeasure(used, float(np.abs(missing).sum()), broken, effort)
+        return ExactMeasure(used, float(np.abs(missing).sum()), broken, effort, excess)
 
     @property
     def finite(self) -> bool:
@@ -116,12 +127,12 @@ class Sets(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HandSets:
-    """The hands of a stance, as the planner sees them.
+    """The hands of a stance.
 
     Attributes
     ----------
     spaces : tuple of WrenchSpace
-        Of floating hands, at rest with idle palms.
+        Of hands that give way, at rest with idle palms.
     scaled : tuple of ScaledRows
         Their rows.
     wrists : tuple of FloatingWrist or None
@@ -134,13 +145,14 @@ class HandSets:
     held : tuple of ndarray, shape (nb − 6, 6)
         Of `HandData.of`.
     added : tuple of StanceConstraints
-        What the stance adds to each hand's set; `spaces` have it already. Joints and their
-        Jacobians are those at which the hand rests: a floating wrist that gives way by a
-        millimetre or some ten milliradians hardly moves them.
+        What the stance adds to each hand's set; `spaces` have it already. Joints are those at which
+        the hand rests: a wrist that gives way by millimetres hardly moves them.
     data : StanceData
         Of hands with a fixed wrist; of floating ones a place to fill.
     floating : bool
-        Whether any wrist floats.
+        Whether any wrist gives way.
+    together : CompliantWrists or None
+        The compliant ones of them, if there are any.
     """
 
     spaces: tuple[WrenchSpace, ...]
@@ -152,6 +164,7 @@ class HandSets:
     added: tuple[StanceConstraints, ...]
     data: StanceData
     floating: bool
+    together: CompliantWrists | None
 
     @classmethod
     def of(
@@ -169,7 +182,9 @@ class HandSets:
         data = StanceData.of(hands_data(scaled, transports, held), wrench)
         floating = any(wrist is not None for wrist in wrists)
         of_all = wrists, transports, wrench, held, added
-        return cls(tuple(spaces), scaled, *of_all, data, floating)
+        compliant = [wrist for wrist in wrists if isinstance(wrist, CompliantWrist)]
+        together = CompliantWrists(compliant) if compliant else None
+        return cls(tuple(spaces), scaled, *of_all, data, floating, together)
 
     def with_sets(
         self,
@@ -186,13 +201,24 @@ class HandSets:
         return replace(self, wrench=needed, data=self.data.turned(needed))
 
     @property
+    def springy(self) -> bool:
+        """True if the palm of a compliant hand carries by its springs."""
+        return any(isinstance(w, CompliantWrist) and w.palm_carries for w in self.wrists)
+
+    def without_palms(self) -> HandSets:
+        """Return the same hands, of whose compliant ones no palm carries."""
+        wrists = [w.without_palm() if isinstance(w, CompliantWrist) else w for w in self.wrists]
+        return replace(self, wrists=tuple(wrists))
+
+    @property
     def idle(self) -> tuple[PalmMode | None, ...]:
         """Modes in which no floating hand's palm carries."""
         return tuple(None if wrist is None else "off" for wrist in self.wrists)
 
     def at_rest(self, palms: Sequence[PalmMode | None]) -> LinearisationPoint:
         """Return the point at which wrists are at rest, and the other hands carry nothing."""
-        loads = [np.zeros(len(space.columns)) for space in self.spaces]
+        pairs = zip(self.wrists, self.spaces, strict=True)
+        loads = [np.zeros(len(s.columns)) if w is None else w.at_rest for w, s in pairs]
         return LinearisationPoint(tuple(loads), tuple(palms))
 
     def sets(
@@ -215,17 +241,24 @@ class HandSets:
             whole = point.factor == 1.0
             data = self.data if whole else self.data.turned(self.goal(point.factor))
             return Sets(self.spaces, data)
-        reach = None if within is None else within * TWIST_UNIT
+        self._prepare([y[None] for y in point.loads])
         spaces, parts = list(self.spaces), list(self.data.hands)
         for i, (wrist, y, palm) in enumerate(
             zip(self.wrists, point.loads, point.palms, strict=True)
         ):
             if wrist is not None:
+                reach = None if within is None else within * pose_units(wrist.columns)
                 space = wrist.linearised(y, palm, reach)
                 if farthest is not None:
                     space = _near_rest(space, farthest[i])
                 spaces[i], parts[i] = self._floating_hand(i, space)
         return Sets(tuple(spaces), StanceData.of(tuple(parts), self.goal(point.factor)))
+
+    def _prepare(self, poses: Sequence[Array]) -> None:
+        """Find the loads of all compliant hands at some poses of each in one call."""
+        if self.together is not None:
+            pairs = zip(self.wrists, poses, strict=True)
+            self.together.prepare([at for w, at in pairs if isinstance(w, CompliantWrist)])
 
     def _floating_hand(self, i: int, space: WrenchSpace) -> tuple[WrenchSpace, HandData]:
         """Return the set of a floating hand with what the stance adds, and its data."""
@@ -252,16 +285,20 @@ class HandSets:
         ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by differences of slopes; zero for fixed wrists. Weights ε
         of the rows of effort are none by default.
         """
-        difference = 1e-3  # of slopes, in `TWIST_UNIT`
-        balance, aside = duals.balance_dual, difference * np.diag(TWIST_UNIT)
+        difference = 1e-3  # of slopes, in the units of poses
+        balance, bent = duals.balance_dual, []
         assert balance is not None
-        bent = []
+        units = [hand.unit for hand in self.data.hands]
+        poses = [
+            np.vstack([y, y + difference * np.diag(unit)])
+            for y, unit in zip(point.loads, units, strict=True)
+        ]
+        self._prepare(poses)
         for i, (wrist, y) in enumerate(zip(self.wrists, point.loads, strict=True)):
             slopes = np.zeros((1 + len(y), len(y)))
             if wrist is not None:
                 limit, hard = duals.limit_duals[i], duals.hard_duals[i]
-                at = np.vstack([y, y + aside])
-                each = wrist.linearised_each(at, point.palms[i], within * TWIST_UNIT)
+                each = wrist.linearised_each(poses[i], point.palms[i], within * units[i])
                 for j, space in enumerate(each):
                     hand = self._floating_hand(i, space)[1]
                     slopes[j] = hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance
@@ -278,7 +315,7 @@ class HandSets:
     def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:
         """Return how far the wrists move from a point to loads, in `TWIST_UNIT`."""
         moved = [
-            float(np.abs((y - at) / TWIST_UNIT).max())
+            float(np.abs((y - at) / pose_units(wrist.columns)).max())
             for wrist, y, at in zip(self.wrists, loads, point.loads, strict=True)
             if wrist is not None
         ]
@@ -338,6 +375,8 @@ def wrist_at(
     if hand.wrist == "fixed":
         return None
     try:
+        if hand.wrist == "compliant":
+            return CompliantWrist(DrivenHand(settled), tension_limit, hand.wrist_travel)
         return FloatingWrist(CompliantHand(settled, hand.tendon_preload), tension_limit)
     except InvalidInputError as error:
         if isinstance(error, UnsupportedError):

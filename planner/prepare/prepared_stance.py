@@ -179,10 +179,11 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
     """Return what joints, caps and present tensions add to the set of each hand."""
     stance, limits = question.stance, question.limits
     change = limits.tension_change
+    margins = limits.hold_margin > 0.0 or limits.least_tension > 0.0
     found = []
     for hand in stance.hands:
         cap, frame = limits.per_hand.get(hand.limb), None
-        if where is None and cap is None and change is None:
+        if where is None and cap is None and change is None and not margins:
             found.append(NO_CONSTRAINTS)
             continue
         if cap is not None:
@@ -199,6 +200,8 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
                 frame=frame,
                 present=question.present.get(hand.limb),
                 change=math.inf if change is None else change,
+                margin=limits.hold_margin,
+                least=limits.least_tension,
             )
         )
     return tuple(found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, UnsupportedError
 from hand_models.compliance import FloatingWrist, PalmMode
 from hand_models.fixed_wrist import PULL_OFF, best_seats, wrench_space
 from hand_models.hand import Placement, SettledHand, SpinyHand
@@ -109,8 +109,16 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
     ------
     InvalidInputError
         If the stance has no such hand, or the hold cannot be where it is.
+    UnsupportedError
+        If its wrist is compliant: what tensions and poses give together is far from a polyhedron.
     """
     settled, wrist = _hand_at(stance, limb)
+    if wrist is not None and wrist.driven:
+        raise UnsupportedError(
+            f"the wrench space of {limb} is curved, as its wrist is compliant; valid for a wrench "
+            "space is fixed or floating",
+            field="stance.hands.wrist",
+        )
     if wrist is None:
         return RestingHand(settled, wrench_space(settled))
     palm, space, error = widest_at_rest(wrist)
@@ -126,8 +134,9 @@ def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
         If the stance has no such hand, its wrist is fixed, or the hold cannot be where it is.
     """
     _, wrist = _hand_at(stance, limb)
-    if wrist is None:
-        raise InvalidInputError(f"the wrist of {limb} is fixed; floating is needed", field="limb")
+    if wrist is None or wrist.driven:
+        mode = "fixed" if wrist is None else "compliant"
+        raise InvalidInputError(f"the wrist of {limb} is {mode}; floating is needed", field="limb")
     return wrist
 
 

@@ -7,13 +7,15 @@ any other:
   one without a motor it is zero (hard);
 - a hand's force on the rock, in a named frame, is at most u times a cap;
 - a tendon's tension changes by no more than so much from what it is now (hard).
+
+A margin on what holds at zero, and a least tension, tighten hard rows that the set has.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import compress
 from typing import Final, Literal, NamedTuple
 
@@ -136,6 +138,10 @@ class StanceConstraints:
         Present tensions [N].
     change : float
         Largest change from those [N].
+    margin : float
+        Force by which tiles and bare frames are to hold [N].
+    least : float
+        Tension of every tendon [N].
     """
 
     joints: JointLoads | None = None
@@ -143,6 +149,8 @@ class StanceConstraints:
     frame: Array | None = None
     present: Array | None = None
     change: float = np.inf
+    margin: float = 0.0
+    least: float = 0.0
 
     def on(self, space: WrenchSpace) -> WrenchSpace:
         """Return a hand's set with these rows.
@@ -150,6 +158,8 @@ class StanceConstraints:
         Limit rows are ``D w + d0 ≤ u s`` of the hand's wrench w, hard rows ``C w ≤ 0`` or of its
         tensions.
         """
+        if self.margin or self.least:
+            space = self._tightened(space)
         D, d0, s = [np.zeros((0, 6))], [np.zeros(0)], [np.zeros(0)]
         H, h = [space.H], [space.h]
         limits, hard = list[Row](), list[Row]()
@@ -200,6 +210,16 @@ class StanceConstraints:
             h=np.concatenate(h),
             D=space.D,
         )
+
+    def _tightened(self, space: WrenchSpace) -> WrenchSpace:
+        """Return a set whose hard rows hold by what the stance asks for."""
+        by = {
+            "slack_tendon": self.least,
+            "dragged_backwards": self.margin,
+            "frame_pulled": self.margin,
+        }
+        room = [by.get(row.limit, 0.0) for row in space.rows[len(space.s) :]]
+        return replace(space, h=space.h - np.array(room))
 
     def _cap(self) -> tuple[tuple[str, ...], Array, Array]:
         """Return names, directions (n, 3) and sizes (n,) of what caps the hand's force."""

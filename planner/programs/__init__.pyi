@@ -3,7 +3,12 @@ from .conic import (
     Outcome as Outcome,
     Reached as Reached,
 )
-from .program import LOAD_BOX as LOAD_BOX, TIE_WEIGHT as TIE_WEIGHT, tie_weight as tie_weight
+from .program import (
+    LOAD_BOX as LOAD_BOX,
+    TIE_WEIGHT as TIE_WEIGHT,
+    Elastic as Elastic,
+    tie_weight as tie_weight,
+)
 from .solvers import (
     CAP_SLACK as CAP_SLACK,
     TensionTrade as TensionTrade,
@@ -11,6 +16,7 @@ from .solvers import (
     body_wrench as body_wrench,
     curved as curved,
     effort as effort,
+    elastic as elastic,
     holds as holds,
     least_tensions as least_tensions,
     less_tension as less_tension,
@@ -33,6 +39,7 @@ from .stance_data import (
     TWIST_UNIT as TWIST_UNIT,
     WRENCH_UNIT as WRENCH_UNIT,
     WRIST_RANGE as WRIST_RANGE,
+    WRIST_TRAVEL as WRIST_TRAVEL,
     HandData as HandData,
     ScaledRows as ScaledRows,
     StanceData as StanceData,

@@ -8,8 +8,9 @@ wrench o_h + V_h y_h on the rock. Carried to the body, the rock's reactions give
 Below these six rows the balance has one for each component of a hand's wrench that is given
 (`held`). What joints, caps and largest changes of tension say are rows of the hands' sets.
 
-Three programs share these rows: `Best`, of least utilisation or least squares; `Reach`, of how far
-body wrenches go; and `Nearest`, of how near. With what is least they have names:
+Four programs share these rows: `Best`, of least utilisation or least squares; `Reach`, of how far
+body wrenches go; `Nearest`, of how near; and `Elastic`, whose rows give at a price. With what is
+least they have names:
 
 ==============  =============================================================================
 `margin`        min u                              least utilisation; its duals are the prices
@@ -21,6 +22,7 @@ body wrenches go; and `Nearest`, of how near. With what is least they have names
 `reach`         max c·t with W + B t for W         how far body wrenches go, under a cap
 `load_factor`   max s with s W in place of W       at utilisation 1
 `nearest`       min ‖S (W − Σ …)‖                  hard rows alone, loads up to `LOAD_BOX`
+`elastic`       min u + ρ (‖W − Σ …‖₁ + 1ᵀv)       hard rows exceeded by v
 ==============  =============================================================================
 
 Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
@@ -34,6 +36,7 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
@@ -46,7 +49,7 @@ from planner.programs.stance_program import (
     StanceProgram,
 )
 
-__all__ = ["LOAD_BOX", "TIE_WEIGHT", "Best", "Nearest", "Reach", "tie_weight"]
+__all__ = ["LOAD_BOX", "TIE_WEIGHT", "Best", "Elastic", "Nearest", "Reach", "tie_weight"]
 
 LOAD_BOX: Final = 1e4
 """Box, in `LOAD_UNIT`, on loads at no matter what utilisation: far beyond any strength."""
@@ -278,3 +281,73 @@ class Nearest(StanceProgram):
         P, q = np.zeros((2, A.shape[1]))
         q[0] = 1.0
         return ConicProgram(P, q, (Columns.of(A),), b, zero, second_order=1 + count)
+
+
+class Elastic(StanceProgram):
+    """min u + ρ (‖W − w‖₁ + 1ᵀv) + ½ ε ‖z − z₀‖²: hard rows give by v ≥ 0, unless they are firm.
+
+    It has a solution wherever the firm rows have. ``value`` is that of the first two terms.
+
+    Parameters
+    ----------
+    data : StanceData
+    penalty : float
+        ρ
+    near : ndarray, shape (M,)
+        z₀
+    firm : ndarray of bool, shape (Σ nh,)
+        Hard rows that do not give.
+    nearness : float, optional
+        ε, which makes the solution unique.
+    """
+
+    def __init__(
+        self,
+        data: StanceData,
+        penalty: float,
+        near: Array,
+        firm: NDArray[np.bool_],
+        nearness: float = 1e-3,
+    ) -> None:
+        super().__init__(data)
+        self.penalty, self.near, self.nearness = penalty, near, nearness
+        self.gives = np.eye(len(firm))[:, ~firm]
+        self.wanted = 1 + 2 * len(self.G) + self.gives.shape[1]
+
+    def define(self) -> Definition:
+        import cvxpy as cp
+
+        z, u, v = self.loads(), cp.Variable(), cp.Variable(self.gives.shape[1])
+        lacks, exceeds = cp.Variable(len(self.G)), cp.Variable(len(self.G))
+        balance = self.G @ z + lacks - exceeds == self.data.offset
+        limits, hard = self.L @ z + self.l0 <= u, self.H @ z <= self.h + self.gives @ v
+        wrong = cp.sum(lacks) + cp.sum(exceeds) + cp.sum(v)
+        # ½ ε ‖z − z₀‖², but for its constant
+        near = (
+            cp.sum(cp.multiply(0.5 * self.nearness, cp.square(z))) - self.nearness * self.near @ z
+        )
+        problem = cp.Problem(
+            cp.Minimize(u + self.penalty * wrong + near),
+            [balance, limits, hard, lacks >= 0.0, exceeds >= 0.0, v >= 0.0],
+        )
+        return Definition(problem, (u, lacks, exceeds, v, z), (balance, limits, hard))
+
+    def conic(self) -> ConicProgram:
+        """Columns u, what lacks, what exceeds, v, and z."""
+        count, wanted = len(self.G), self.wanted
+        front, loads, b = self.blocks(wanted, below=wanted - 1)
+        front[:count, 1 : 1 + count] = np.eye(count)
+        front[:count, 1 + count : 1 + 2 * count] = -np.eye(count)
+        front[self.of_limits, 0] = -1.0
+        front[self.of_limits.stop : len(b) - wanted + 1, 1 + 2 * count :] = -self.gives
+        front[len(b) - wanted + 1 :, 1:] = -np.eye(wanted - 1)
+        P, q = np.zeros((2, wanted + self.size))
+        P[wanted:], q[wanted:] = self.nearness, -self.nearness * self.near
+        q[0], q[1:wanted] = 1.0, self.penalty
+        return ConicProgram(P, q, (Columns.of(front), loads), b, count)
+
+    def solve(self) -> Outcome:
+        outcome, found = self.run()
+        if found is None:
+            return outcome
+        return replace(outcome, value=float(found[0] + self.penalty * found[1:].sum()))

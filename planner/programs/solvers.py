@@ -10,12 +10,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from hand_models.base import Array
 from hand_models.parameters import ParameterTable
 from planner import deadline
 from planner.programs.conic import OUT_OF_TIME, Outcome, Reached
-from planner.programs.program import Best, Nearest, Reach, Residuals, tie_weight
+from planner.programs.program import Best, Elastic, Nearest, Reach, Residuals, tie_weight
 from planner.programs.stance_data import StanceData
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "body_wrench",
     "curved",
     "effort",
+    "elastic",
     "holds",
     "least_tensions",
     "less_tension",
@@ -160,6 +162,13 @@ def effort(data: StanceData, cap: float) -> Outcome:
     e0 = np.concatenate([hand.e0 for hand in data.hands])
     rest = np.concatenate([hand.rest for hand in data.hands])
     return Best(data, cap=cap, weights=rest, residuals=Residuals(E, -e0, 1.0)).solve()
+
+
+def elastic(
+    data: StanceData, penalty: float, near: Sequence[Array], firm: NDArray[np.bool_]
+) -> Outcome:
+    """Solve `Elastic` about loads; ``value`` is the utilisation and what is wrong at its price."""
+    return Elastic(data, penalty, np.concatenate(near) / data.rows.unit, firm).solve()
 
 
 def load_factor(data: StanceData) -> Outcome:

@@ -1,6 +1,6 @@
 """The rows of a stance's hands, nondimensional: what the conic programs are given.
 
-Loads are over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`), body wrenches over
+Loads are over `LOAD_UNIT` (a wrist's twist over `TWIST_UNIT`), body wrenches over
 `WRENCH_UNIT`, limit rows over their capacities: one physical scaling for all programs.
 
 `ScaledRows` are all of a hand's data but its part of the balance: the same wherever the hand is.
@@ -30,6 +30,7 @@ __all__ = [
     "TWIST_UNIT",
     "WRENCH_UNIT",
     "WRIST_RANGE",
+    "WRIST_TRAVEL",
     "HandData",
     "HandRows",
     "ScaledRows",
@@ -43,10 +44,13 @@ LOAD_UNIT: Final = 100.0
 """Scale of a hand's loads y [N]."""
 
 TWIST_UNIT: Final = pose_units(WRIST_COLUMNS)
-"""Scale of a floating wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
+"""Scale of a wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
 
 WRIST_RANGE: Final = "wrist_range"
-"""Name of the hard rows within which a floating hand's set is linearised."""
+"""Name of the hard rows within which the set of a hand that gives way is linearised."""
+
+WRIST_TRAVEL: Final = "wrist_travel"
+"""Name of the hard rows that keep a compliant wrist within its travel."""
 
 JOINT_TORQUE: Final = "joint_torque"
 """Name of the limit rows of a limb's joints that turn."""
@@ -147,7 +151,8 @@ class _Roles(NamedTuple):
 def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Roles:
     """Return the roles of names; ``count`` of the rows are limits."""
     limits = rows[:count]
-    floats = columns == WRIST_COLUMNS
+    floats = columns[-len(WRIST_COLUMNS) :] == WRIST_COLUMNS
+    unit = pose_units(columns) if floats else np.full(len(columns), LOAD_UNIT)
     tensions = np.array([name.endswith("/tension") for name in columns])
     place = {name: j for j, name in enumerate(columns)}
     measures = {}
@@ -164,8 +169,8 @@ def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Role
     weight = np.where(tensions, 1.0, 1e-4)
     measured = np.array(list(measures), dtype=np.intp)
     roles = _Roles(
-        unit=TWIST_UNIT if floats else np.full(len(columns), LOAD_UNIT),
-        scale=TWIST_UNIT if floats else LOAD_UNIT,
+        unit=unit,
+        scale=unit if floats else LOAD_UNIT,
         weight=weight,
         other=np.where(tensions, 0.0, 0.1),  # of that weight
         measured=measured,

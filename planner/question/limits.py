@@ -32,6 +32,9 @@ Frame = Literal["hand", "body", "world"]
 LEAST_LIMIT: Final = 1e-3
 """Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""
 
+MOST_MARGIN: Final = 1e3
+"""Largest margin or least tension that may be asked for [N]."""
+
 Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
 JointTorque = Annotated[float, Meta(ge=0.0, le=1e6)]
 Torques = Annotated[
@@ -134,6 +137,11 @@ class Limits(Strict, frozen=True):
         By limb.
     tension_change : float, optional
         Largest change of a tendon's tension from the present one [N].
+    hold_margin : float
+        Force by which every tile on rock is to be short of being dragged backwards, and every bare
+        frame pressed on [N].
+    least_tension : float
+        Of every tendon [N]: a slack finger that holds by its wrist's travel alone is a trap.
     """
 
     utilisation: Utilisation = 1.0
@@ -146,6 +154,11 @@ class Limits(Strict, frozen=True):
     tension_change: Annotated[
         Tension | None, Meta(description="largest change from the present tensions [N]")
     ] = None
+    hold_margin: Annotated[
+        float,
+        Meta(ge=0.0, le=1e3, description="by which tiles are short of being dragged backwards [N]"),
+    ] = 0.0
+    least_tension: Annotated[float, Meta(ge=0.0, le=1e3, description="of every tendon [N]")] = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.utilisation <= 1.0:
@@ -156,6 +169,12 @@ class Limits(Strict, frozen=True):
             most = getattr(self, name)
             if most is not None:
                 check_positive(most, "N", name)
+        for name in ("hold_margin", "least_tension"):
+            least = getattr(self, name)
+            if not 0.0 <= least <= MOST_MARGIN:
+                raise InvalidFieldError(
+                    f"must be 0 to {MOST_MARGIN:g} N, got {least:g}", field=name
+                )
         torque = self.joint_torque
         if torque is None:
             return

@@ -96,7 +96,7 @@ class Question:
         self._check_limits()
         self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
-        if "robust" in self.want and "floating" in wrists.values():
+        if "robust" in self.want and {*wrists.values()} != {"fixed"}:
             raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
         present = {}
         for limb, tensions in self.present.items():

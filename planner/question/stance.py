@@ -11,7 +11,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, Pose, finite_vector
 from hand_models.fixed_wrist import SEAT_RULES, SeatRule
-from hand_models.hand import FINGERS, Grasp
+from hand_models.hand import FINGERS, Grasp, WristTravel
 from hand_models.rock import Hold
 from hand_models.tile import Surface
 from planner.robots import Robot, robosimian
@@ -25,7 +25,7 @@ __all__ = [
     "known_limbs",
 ]
 
-WristMode = Literal["fixed", "floating"]
+WristMode = Literal["fixed", "floating", "compliant"]
 
 EARTH_GRAVITY: Final = (0.0, 0.0, -9.81)
 """Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
@@ -94,9 +94,11 @@ class HandOnHold:
     hold_in_hand : Pose, optional
         The hold's frame in H. With neither, the hand is seated on the hold.
     grasp : Grasp
-    wrist : {'fixed', 'floating'}
+    wrist : {'fixed', 'floating', 'compliant'}
         Whether its motors give each tendon the tension that the plan asks for while the wrist keeps
-        its pose, or stand still while the wrist gives way.
+        its pose, stand still while the wrist gives way, or drive the tendons while it does.
+    wrist_travel : WristTravel, optional
+        Range in which a compliant wrist may settle; `WristTravel` by default.
     tendon_preload : ndarray, shape (4,), optional
         Tensions that the tendons of a floating hand hold at rest [N]; the closing tension by
         default.
@@ -120,6 +122,7 @@ class HandOnHold:
     grasp: Grasp = field(default_factory=Grasp)
     wrist: WristMode = "fixed"
     tendon_preload: Array | None = None
+    wrist_travel: WristTravel | None = None
     wrench: tuple[float | None, ...] | None = None
     seat: SeatRule = "rest"
     seat_direction: Array | None = None
@@ -127,8 +130,13 @@ class HandOnHold:
 
     def __post_init__(self) -> None:
         known_choice(self.wrist, get_args(WristMode), "wrist")
+        if self.wrist_travel is not None and self.wrist != "compliant":
+            raise InvalidInputError(
+                "only a compliant wrist has a travel; valid is none, or wrist compliant",
+                field="wrist_travel",
+            )
         if self.tendon_preload is not None:
-            if self.wrist == "fixed":
+            if self.wrist != "floating":
                 raise InvalidInputError(
                     "only a floating wrist holds a preload; valid is none, or wrist floating",
                     field="tendon_preload",

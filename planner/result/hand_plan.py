@@ -39,12 +39,15 @@ class WristPlan:
     error : float
         How far the set before the last was off where the wrist went: forces, and moments over
         0.1 m [N]. The plan itself is exact.
+    driven : bool
+        Whether the wrist is compliant: its motors keep the tensions at which the hand has closed.
     """
 
     twist: Array
     palm: PalmMode
     rounds: int
     error: float
+    driven: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,14 @@ floating hand the model itself says what it carries where its wrist goes.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, Indices
-from hand_models.compliance import CompliantHand
+from hand_models.compliance import FloatingWrist
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, layout_of
 from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
@@ -297,29 +298,37 @@ def _drawn_tendons(known: HandBatch) -> tuple[Array, Array, Array]:
 
 
 def recover_floating_hand(
-    limb: str, settled: SettledHand, hand: CompliantHand, space: WrenchSpace, wrist: WristPlan
+    limb: str,
+    settled: SettledHand,
+    wrist: FloatingWrist,
+    space: WrenchSpace,
+    y: Array,
+    pose: WristPlan,
 ) -> HandPlan:
-    """Turn the pose of a floating hand's wrist into tile loads and forces, by the model itself.
+    """Turn the pose of a wrist that gives way into tile loads and forces, by the model itself.
 
     Parameters
     ----------
     limb : str
     settled : SettledHand
         At rest.
-    hand : CompliantHand
+    wrist : FloatingWrist
     space : WrenchSpace
         Its set, linearised at that pose.
-    wrist : WristPlan
+    y : ndarray
+        The pose, in the set's columns.
+    pose : WristPlan
     """
-    found = hand.loads(wrist.twist[None])
+    hand, closed = wrist.hand, wrist.closed_at(y)
+    found = wrist.hand_loads(y[None])
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]
     tensions = found.tensions[0]
-    rows, of_tiles = space.utilisations(wrist.twist), layout_of(settled, sticking=False).plane_tiles
+    rows, of_tiles = space.utilisations(y), layout_of(settled, sticking=False).plane_tiles
     used = np.zeros(len(loads))
     np.maximum.at(used, of_tiles, rows[: len(of_tiles)])
     known, drive = HandBatch.of((settled,)), settled.hand.drive
-    # the winch stands still from the preload on
-    at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * hand.preload[settled.finger_of]
+    # the winch stands still from there on
+    at_rest = settled.loads[:, 0, 0] + settled.loads[:, 0, 1] * closed[settled.finger_of]
     drawn = np.add.reduceat(at_rest, known.places.first_of_finger)
     joints, losses, nails = _drawn_tendons(known)
     shear, pressing = found.palm[0]
@@ -334,7 +343,7 @@ def recover_floating_hand(
         limb=limb,
         wrench=hand.wrenches(found)[0],
         tensions=tensions,
-        drives=drive.driven(tensions, (joints, hand.preload, drawn, losses, nails)),
+        drives=drive.driven(tensions, (joints, closed, drawn, losses, nails)),
         loads=loads,
         forces=np.einsum("tk,tkx->tx", loads, axes),
         positions=positions,
@@ -349,5 +358,5 @@ def recover_floating_hand(
         seating=settled.seating,
         closures=settled.closures,
         space=space,
-        wrist=wrist,
+        wrist=replace(pose, palm=wrist.palm_mode(y, pose.palm)),
     )

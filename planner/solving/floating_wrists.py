@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hand_models.compliance import WRIST_COLUMNS
 from planner import deadline, programs
 from planner.deadline import Budget, late
 from planner.explanation import idle_preloads
@@ -39,11 +40,14 @@ class FloatingSolution(Solution):
         Where the search for the least utilisation ended.
     factor : LargestFactor or None
         The largest load factor that the search met.
+    driven : tuple of bool
+        Which hands' motors keep their tensions while the wrist gives way.
     """
 
     search: WristSolution
     usual: WristSolution
     factor: LargestFactor | None
+    driven: tuple[bool, ...]
 
     @property
     def proven(self) -> bool:
@@ -77,11 +81,13 @@ class FloatingSolution(Solution):
 
     def _at(self, search: WristSolution) -> FloatingSolution:
         """Return the same with the loads of a search, of which nothing is proven without proof."""
-        palms = zip(search.point.loads, search.point.palms, strict=True)
+        pairs = zip(search.point.loads, search.point.palms, self.driven, strict=True)
         poses = tuple(
             [
-                None if palm is None else WristPlan(y, palm, search.rounds, search.error)
-                for y, palm in palms
+                None
+                if palm is None
+                else WristPlan(y[-len(WRIST_COLUMNS) :], palm, search.rounds, search.error, driven)
+                for y, palm, driven in pairs
             ]
         )
         found = replace(
@@ -96,7 +102,7 @@ class FloatingSolution(Solution):
         return LoadFactor(most.factor, least=not most.sure)
 
     def no_answer(self, prepared: PreparedStance) -> str:
-        reason = "no pose of the floating wrists was found that balances the body"
+        reason = "no pose of the wrists was found that balances the body"
         if wrench_is_given(prepared):
             reason += " with the wrenches that they are given; that is no proof of none"
         idle = idle_preloads(prepared)
@@ -129,6 +135,7 @@ def floating_solution(
         search=search,
         usual=search,
         factor=factor,
+        driven=tuple([wrist is not None and wrist.driven for wrist in prepared.hands.wrists]),
     )
     if not search.exact:
         return replace(found, sets=prepared.hands.sets(search.point))
@@ -164,8 +171,7 @@ def _less_tense_beside(prepared: PreparedStance, search: WristSolution) -> Wrist
 
 
 def wrench_is_given(prepared: PreparedStance) -> bool:
-    """Return whether a floating hand's wrench is given: sets linearised elsewhere prove little."""
+    """Return whether the wrench of a hand that gives way is given: other sets prove little."""
     return any(
-        hand.wrist == "floating" and hand.wrench is not None
-        for hand in prepared.question.stance.hands
+        hand.wrist != "fixed" and hand.wrench is not None for hand in prepared.question.stance.hands
     )

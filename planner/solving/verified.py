@@ -117,7 +117,7 @@ def _hand(prepared: PreparedStance, solution: Solution, index: int) -> HandPlan:
         alone, own = HandBatch.of((settled,)), (space,)
         arrays, _, _ = LoadRecovery(alone, own).read((solution.loads[index],))
         return arrays.hands((limb,), alone, own)[0]
-    return recover_floating_hand(limb, settled, wrist.hand, space, pose)
+    return recover_floating_hand(limb, settled, wrist, space, solution.loads[index], pose)
 
 
 def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Verified | Failed:

@@ -60,6 +60,7 @@ class SettledLimits:
     Attributes
     ----------
     names : Names
+    tiles : TileLimits
     limits : tuple of Limits
         But for nails, whose residuals come with what is recomputed of them.
     """
@@ -73,10 +74,12 @@ class SettledLimits:
             for h, place in enumerate(places)
             if place.wrist == "floating"
         }
-        self._balance = balance = JointBalance(names, self.wound)
+        giving = [h for h, place in enumerate(places) if place.wrist != "fixed"]
+        self._balance = balance = JointBalance(names, giving)
         self.nails = nails = NailLimits(names)
         drives = DriveLimits(names, balance.left, strength, nails.fingers)
-        self.limits = (balance, TileLimits(names, nails.tiles), drives, HandLimits(names))
+        self.tiles = tiles = TileLimits(names, nails.tiles)
+        self.limits = (balance, tiles, drives, HandLimits(names))
 
     def recompute(self, found: list[str], arrays: PlanArrays) -> Recomputed:
         """Return what tensions, or where wrists go, do to the fingers; with the plan's numbers."""
@@ -85,7 +88,8 @@ class SettledLimits:
         if not any(arrays.wrists):
             loads, left = balance.loads(f, lateral)
             return Recomputed(arrays, loads, left, f, loads[:, 0], nails)
-        # the motors of hands that float stand still where they have tightened their tendons
+        # motors of hands that float stand still where they have tightened their tendons, those of
+        # compliant ones keep the tension
         wound = f.copy()
         for h, tension in self.wound.items():
             wound[FINGER_COUNT * h : FINGER_COUNT * (h + 1)] = tension
@@ -136,7 +140,8 @@ class Check:
         self.strength = most if cap is None else min(most, cap)
         self.settled = _settled_limits(known, stance.hands, self.strength)
         self.limbs = self.settled.names.limbs
-        self._limits = (*self.settled.limits, AskedLimits(question, self.settled.names))
+        asked = AskedLimits(question, self.settled.names, self.settled.tiles)
+        self._limits = (*self.settled.limits, asked)
         poses = [place.pose for place in stance.hands]
         into_body = stance.body.rotation.T
         turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
@@ -252,5 +257,6 @@ class Check:
     def _wrists(self, arrays: PlanArrays) -> Iterator[str]:
         """Yield hands whose wrists are not what they are in the question."""
         for place, wrist in zip(self.question.stance.hands, arrays.wrists, strict=True):
-            if (wrist is not None) != (place.wrist == "floating"):
+            mode = "fixed" if wrist is None else ("compliant" if wrist.driven else "floating")
+            if mode != place.wrist:
                 yield f"{place.limb}: the wrist is not {place.wrist}"

@@ -140,7 +140,7 @@ def _move(
     if exact:
         tendon, state = _tendon(hand, own, float(wound[finger]), fingers.shear[rows])
         base = -float(moved(hand.positions[own[0]], wrist) @ frame.along)
-        held = tendon.held(
+        held = (tendon.kept if wrist.driven else tendon.held)(
             state,
             [base, *slips] if outer else slips,
             [0.0, *turns] if outer else turns,
@@ -220,8 +220,15 @@ def _check_palm(
         stiffness += share * float(sharing.tile_stiffness.sum())
         whole += share * len(engaged)
     step = moved(hand.palm.centre, wrist)
-    shear = max(-stiffness * step[0], 0.0)
-    pressing = max(body.palm_pressing_stiffness * whole * step[2], 0.0)
+    if wrist.driven:
+        # springs that set in over 0.1 mm of travel, and each tile's over 0.02 mm about its gap
+        shear = stiffness * (math.hypot(step[0], 1e-4) - step[0]) / 2.0
+        beyond = step[2] - np.maximum(hand.palm.gaps[list(hand.palm.engaged)], 0.0)
+        pressed = (np.hypot(beyond, 2e-5) + beyond) / 2.0
+        pressing = body.palm_pressing_stiffness * float(pressed @ hand.palm.engagement)
+    else:
+        shear = max(-stiffness * step[0], 0.0)
+        pressing = max(body.palm_pressing_stiffness * whole * step[2], 0.0)
     off = np.abs(force - np.array([-shear, 0.0, pressing])).max()
     if not off <= allowed:
         found.append(

@@ -18,6 +18,7 @@ from planner.question import ForceCap, Question
 from planner.result import PlanArrays
 from planner.robots import LimbTorques, LinkTree
 from planner.verification.residuals import FINGER_COUNT, Limits, Names, Recomputed, Residual
+from planner.verification.tiles import TileLimits
 
 __all__ = ["AskedLimits", "JointUse", "check_limbs", "recompute_joints"]
 
@@ -211,9 +212,10 @@ class AskedLimits(Limits):
     ----------
     question : Question
     names : Names
+    tiles : TileLimits
     """
 
-    def __init__(self, question: Question, names: Names) -> None:
+    def __init__(self, question: Question, names: Names, tiles: TileLimits) -> None:
         hands, limits, present = question.stance.hands, question.limits, question.present
         self._names = names
         self._caps = [
@@ -234,11 +236,18 @@ class AskedLimits(Limits):
             if place.limb in present and limits.tension_change is not None
         }
         self._most = limits.tension_change or 0.0
+        self._tiles, self._margin, self._least = tiles, limits.hold_margin, limits.least_tension
+        self._hand = np.arange(len(hands)).repeat(FINGER_COUNT)
 
     def recompute(self, again: Recomputed) -> list[Residual]:
         """Return what tensions and wrenches leave of what is asked."""
         tensions, wrenches = again.arrays.tensions, again.arrays.wrenches
-        residuals: list[Residual] = []
+        residuals = self._tiles.holding(again.loads, self._margin) if self._margin else []
+        if self._least:
+            name = self._names.of_fingers("tension", np.arange(len(tensions)))
+            text = f" is {{:.6g}} N, less than {self._least:g}"
+            left = tensions - self._least
+            residuals.append(Residual("least", left, self._hand, name, text, (tensions,)))
         for cap in self._caps:
             force, limb = wrenches[cap.hand[0], :3], self._names.limb_of(cap.hand)
             residuals.append(Residual("use", (cap.use @ force)[None], cap.hand))

@@ -129,16 +129,8 @@ class TileLimits(Limits):
 
         The plan says with the tiles' what is used of nails.
         """
-        known, name, planned = self._known, self._names.tile, again.arrays
-        shear, normal, _ = again.loads.T
-        bases, pressed = known.places.bases, normal.copy()
-        pressed[bases] = known.engagement[bases] * normal[bases + 1]
-        backwards = " is pulled off or dragged backwards: {:.3g} N along, {:.3g} N across"
-        rubs, across = shear + known.friction * pressed + self._allowances, (shear, normal)
-        residuals = [Residual("least", rubs, self._of, name, backwards, across)]
-        if self._framed:
-            text, pressed = ": its bare frame would be pulled off", normal * known.touch.framed
-            residuals.append(Residual("least", pressed, self._of, name, text))
+        name, planned = self._names.tile, again.arrays
+        residuals = self.holding(again.loads)
         planes = self._used(planned.half_planes, again.loads) * self._per_share
         residuals.append(Residual("use", planes, self._of))
         used = np.maximum.reduce(planes, axis=1)
@@ -148,6 +140,25 @@ class TileLimits(Limits):
             *residuals,
             claim(used, said, self._of, TOLERANCES.utilisation, name, ": utilisation"),
         ]
+
+    def holding(self, loads: Array, margin: float = 0.0) -> list[Residual]:
+        """Return what loads (T, 3) leave of friction and of bare frames' pressing, past a margin.
+
+        Tiles that touch nothing are never short of a margin.
+        """
+        known, name = self._known, self._names.tile
+        shear, normal, _ = loads.T
+        bases, pressed = known.places.bases, normal.copy()
+        pressed[bases] = known.engagement[bases] * normal[bases + 1]
+        by = f", less than {margin:g} N from it" if margin else ""
+        backwards = " is pulled off or dragged backwards: {:.3g} N along, {:.3g} N across" + by
+        rubs, across = shear + known.friction * pressed + self._allowances, (shear, normal)
+        rubs -= margin * known.touch.touches
+        residuals = [Residual("least", rubs, self._of, name, backwards, across)]
+        if self._framed:
+            text, framed = ": its bare frame would be pulled off" + by, known.touch.framed
+            residuals.append(Residual("least", (normal - margin) * framed, self._of, name, text))
+        return residuals
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
         """Return how far loads (T, 3) are within the law's surface [N]; zero beyond half-planes.

@@ -219,7 +219,7 @@ def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
     if wrist is None:
         return replies.Wrist(mode="fixed")
     return replies.Wrist(
-        mode="floating",
+        mode="compliant" if wrist.driven else "floating",
         twist=wrist.twist.tolist(),
         palm=wrist.palm,
         rounds=wrist.rounds,

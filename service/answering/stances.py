@@ -153,6 +153,7 @@ def _hand(
         at=seat,
         grasp=message.grasp,
         wrist=message.wrist,
+        wrist_travel=message.wrist_travel,
         tendon_preload=array_of(message.tendon_preload),
         wrench=message.wrench,
         seat=message.seat,

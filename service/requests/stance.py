@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from hand_models.base import Acceleration, Coordinate, Name, Position, Strict
-from hand_models.hand import Grasp
+from hand_models.hand import Grasp, WristTravel
 from service.requests.holds import Hold, Rock, Surface
 from service.requests.request import FourTensions, Pose, WrenchEntries, WrenchEntry
 
@@ -93,9 +93,15 @@ class Hand(Strict, frozen=True, kw_only=True):
     surface: Annotated[Name | Surface, Meta(description="a preset's name, or numbers")]
     grasp: Grasp = Grasp()
     wrist: Annotated[
-        Literal["fixed", "floating"],
-        Meta(description="floating: the motors stand still, and the wrist gives way"),
+        Literal["fixed", "floating", "compliant"],
+        Meta(
+            description="floating: the motors stand still, and the wrist gives way; compliant: the "
+            "tendons are driven, and the wrist gives way"
+        ),
     ] = "fixed"
+    wrist_travel: Annotated[
+        WristTravel | None, Meta(description="range in which a compliant wrist may settle")
+    ] = None
     tendon_preload: Preload | None = None
     wrench: Annotated[
         tuple[Planned, Planned, Planned, Planned, Planned, Planned] | None,

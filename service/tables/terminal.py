@@ -162,8 +162,8 @@ def progress(title: str, *, line: str | None = None, counted: bool = False) -> I
 
 
 def waiting(title: str, request: PlanRequest) -> AbstractContextManager[None]:
-    """Show that an answer takes a while, as plans with floating wrists do."""
-    floats = any(hand.wrist == "floating" for hand in request.stance.hands)
+    """Show that an answer takes a while, as plans with wrists that give way do."""
+    floats = any(hand.wrist != "fixed" for hand in request.stance.hands)
     return working(title) if floats else nullcontext()
 
 

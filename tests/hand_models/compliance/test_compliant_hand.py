@@ -9,10 +9,10 @@ import pytest
 from hand_models import InvalidInputError
 from hand_models.base import UnsupportedError
 from hand_models.compliance import COMPLEX_STEP, PALM_MODES, CompliantHand, FloatingWrist
+from hand_models.compliance.compliant_finger import CompliantFingers
 from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import FINGERS, Grasp
 from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
-from hand_models.tendon import TendonRegimes
 from hand_models.tile import Surface
 from tests.suite.helpers.hands import HAND, changed_hand, partly
 
@@ -82,8 +82,9 @@ def test_a_finger_stiffens_the_grasp_through_its_twist(name, finger):
         [[*frame.across, *np.cross(p, frame.across)] for p in hand.settled.positions[own]]
     )
     lateral = slopes(lambda twists: hand.lateral_loads(finger, twists), np.zeros(6))
-    steps = 1j * COMPLEX_STEP * np.eye(3)
-    in_plane = hand.fingers[finger].loads(*steps).planar_wrench.imag.T / COMPLEX_STEP
+    alone = CompliantFingers([hand.fingers[finger]], "held")
+    steps = (1j * COMPLEX_STEP * np.eye(3))[:, None]
+    in_plane = alone.loads(*steps, np.full((1, 3), 37.0)).planar_wrench[0].imag.T / COMPLEX_STEP
     expected = J.T @ in_plane @ J + across.T @ lateral
 
     def wrenches(twists):
@@ -107,16 +108,17 @@ def test_pulling_off_drags_the_tiles_and_takes_their_pressing():
 
 def test_a_held_motor_is_stiffer_than_one_that_keeps_its_tension():
     # without friction in the tendon, only the motor keeps it from running
-    finger = compliant("pinch", hand=changed_hand("tendon", "holding_friction", 0.0)).fingers[1]
-    steps = 1j * COMPLEX_STEP * np.eye(3)
-    pulled = np.array([[0.0], [-3e-4], [0.0]])
-    held = finger.loads(*steps).planar_wrench.imag, finger.loads(*pulled).tensions
-    assert finger.regimes.scheme == "held"
-    finger.regimes = TendonRegimes(finger.regimes.tendon, finger.regimes.state, "tension")
-    kept = finger.loads(*steps).planar_wrench.imag, finger.loads(*pulled).tensions
-    assert held[0][0, 0] > 1.05 * kept[0][0, 0]
-    assert np.abs(kept[1] - 37.0).max() < 1e-9
-    assert np.abs(held[1] - 37.0).max() > 0.1
+    free = compliant("pinch", hand=changed_hand("tendon", "holding_friction", 0.0)).fingers[1]
+    steps = (1j * COMPLEX_STEP * np.eye(3))[:, None]
+    pulled = np.array([0.0, -3e-4, 0.0])[:, None, None]
+    slopes_of, tensions = {}, {}
+    for scheme in ("held", "tension"):
+        finger = CompliantFingers([free], scheme)
+        slopes_of[scheme] = finger.loads(*steps, np.full((1, 3), 37.0)).planar_wrench[0].imag
+        tensions[scheme] = finger.loads(*pulled, np.full((1, 1), 37.0)).tensions
+    assert slopes_of["held"][0, 0] > 1.05 * slopes_of["tension"][0, 0]
+    assert np.abs(tensions["tension"] - 37.0).max() < 1e-9
+    assert np.abs(tensions["held"] - 37.0).max() > 0.1
 
 
 def test_symmetric_hands_answer_mirrored_twists_with_mirrored_wrenches():

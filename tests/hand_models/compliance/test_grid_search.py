@@ -67,7 +67,7 @@ def test_a_grippers_finger_is_the_scalar_model_step_by_step():
         x + spread * (math.cos(turn) - 1.0) - deep * math.sin(turn),
         z - spread * math.sin(turn) - deep * (math.cos(turn) - 1.0),
     )
-    rest = gripper.finger.finger
+    rest = gripper.finger
     model: FingerModel = rest.model
     moved = settle_finger(model, gripper.section, base)
     centre, radius = gripper.section.centre, gripper.section.radius

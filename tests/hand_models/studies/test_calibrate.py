@@ -83,7 +83,7 @@ def test_the_unloaded_normals_follow_from_joint_balance_by_hand():
     table = gripper_table()
     gripper = FIT.gripper(FIT.start())
     loads, _ = gripper.finger_loads(np.zeros((1, 3)))
-    finger = gripper.finger.finger
+    finger = gripper.finger
     model = finger.model
     # the distal joint: f r = K q + p − T h + N c, whatever the others carry
     torque = 37.0 * model.pulley_radii[2] - model.joint_stiffness[2] * finger.joint_angles[2]

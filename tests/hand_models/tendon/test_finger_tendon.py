@@ -206,10 +206,14 @@ def test_tiles_partly_on_the_rock_give_that_part_of_a_whole_tiles_shear():
     assert some.contact_stiffness[0] == whole.contact_stiffness[0]
     assert some.contact_stiffness[2] == 0.0
     slips = np.array([[1e-4, -2e-4, 3e-4], [0.0, 0.0, 0.0]])
-    drags = [
-        TendonRegimes(tendon, tendon.closed(CLOSING, part * ENGAGED), "tension")
-        .respond(slips, np.zeros((2, 3)))
-        .shears
-        for tendon, part in ((whole, 1.0), (some, share))
+    states = [
+        tendon.closed(CLOSING, part * ENGAGED) for tendon, part in ((whole, 1.0), (some, share))
     ]
+    losses = np.array([state.tensions for state in states]) / CLOSING
+    at_rest = np.array([[state.shears] * 2 for state in states])
+    drags = (
+        TendonRegimes([whole, some], losses, "tension")
+        .respond(np.array([slips] * 2), np.zeros((2, 2, 3)), np.full((2, 2), CLOSING), at_rest)
+        .shears
+    )
     np.testing.assert_allclose(drags[1], share * drags[0], rtol=1e-12, atol=1e-12)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from hand_models.compliance import COMPLEX_STEP
-from hand_models.tendon import FingerTendon, TendonRegimes
+from hand_models.tendon import FingerTendon, TendonRegimes, pad_tiles
+from hand_models.tendon.regimes import TendonResponse
 from tests.hand_models.tendon.test_finger_tendon import by_enumeration
 
 MOTOR_SCHEMES = ("held", "tension")
@@ -22,6 +23,17 @@ def random_tendon(rng, friction, entry):
     return tendon, tendon.closed(37.0, rng.uniform(2.0, 9.0, n))
 
 
+def respond(tendon, state, scheme, slips, turns):
+    """Return what one tendon does after changes of load (m, n), as the only finger."""
+    losses = state.tensions / state.motor_tension
+    regimes = TendonRegimes([tendon], losses[None], scheme)
+    m = len(slips)
+    tension = np.full((1, m), state.motor_tension)
+    at_rest = np.broadcast_to(state.shears, (1, m, len(losses)))
+    found = regimes.respond(slips[None], turns[None], tension, at_rest)
+    return TendonResponse(*(part[0] for part in found))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", MOTOR_SCHEMES)
 @pytest.mark.parametrize(("friction", "entry"), [(0.34, 0.34), (0.34, 0.0), (0.1, 0.0), (0.0, 0.0)])
@@ -31,7 +43,7 @@ def test_every_change_of_load_is_the_only_consistent_one(scheme, friction, entry
     tendon, state = random_tendon(rng, friction, entry)
     n = len(tendon.pulley_radii)
     slips, turns = size * rng.normal(size=(4, n)), 30.0 * size * rng.normal(size=(4, n))
-    found = TendonRegimes(tendon, state, scheme).respond(slips, turns)
+    found = respond(tendon, state, scheme, slips, turns)
     for i in range(4):
         tension = None if scheme == "held" else 37.0
         alone = by_enumeration(tendon, state, slips[i], turns[i], tension)
@@ -46,10 +58,9 @@ def test_small_changes_stick_and_large_ones_slip():
     tendon, _ = random_tendon(np.random.default_rng(3), 0.34, 0.0)
     # closed without loss, so that friction may turn either way
     state = replace(tendon, friction=0.0).closed(37.0, [5.0] * len(tendon.pulley_radii))
-    regimes = TendonRegimes(tendon, state, "held")
     n = len(tendon.pulley_radii)
     sizes = np.array([1e-6, 5e-3])
-    found = regimes.respond(sizes[:, None] * np.ones(n), np.zeros((2, n)))
+    found = respond(tendon, state, "held", sizes[:, None] * np.ones(n), np.zeros((2, n)))
     assert found.regime[0] == 0
     assert found.regime[1] != 0
     # where nothing slips the tile follows the winding: δT = k (δx − r δq / c_p) (Eq. 20)
@@ -62,11 +73,43 @@ def test_small_changes_stick_and_large_ones_slip():
 def test_slopes_are_those_of_the_regime(scheme):
     rng = np.random.default_rng(5)
     tendon, state = random_tendon(rng, 0.34, 0.2)
-    regimes = TendonRegimes(tendon, state, scheme)
     n, small = len(tendon.pulley_radii), 1e-9
     for size in (1e-4, 2e-3):
         at, way = size * rng.normal(size=(1, n)), rng.normal(size=(1, n))
         none = np.zeros((1, n))
-        exact = regimes.respond(at + 1j * COMPLEX_STEP * way, none).shears.imag / COMPLEX_STEP
-        ends = [regimes.respond(at + side * small * way, none).shears for side in (1.0, -1.0)]
+        exact = (
+            respond(tendon, state, scheme, at + 1j * COMPLEX_STEP * way, none).shears.imag
+            / COMPLEX_STEP
+        )
+        ends = [
+            respond(tendon, state, scheme, at + side * small * way, none).shears
+            for side in (1.0, -1.0)
+        ]
         np.testing.assert_allclose(exact, (ends[0] - ends[1]) / (2.0 * small), rtol=1e-5, atol=1e-3)
+
+
+@pytest.mark.parametrize("scheme", MOTOR_SCHEMES)
+def test_tendons_of_other_lengths_change_nothing_of_each_other(scheme):
+    rng = np.random.default_rng(8)
+    pairs = []
+    while {len(state.shears) for _, state in pairs} != {3, 4} or len(pairs) < 5:
+        pairs.append(random_tendon(rng, 0.34, 0.1))
+    m = 50
+    slips, turns = (
+        [size * rng.normal(size=(m, len(state.shears))) for _, state in pairs]
+        for size in (2e-3, 0.05)
+    )
+    losses = pad_tiles([state.tensions / state.motor_tension for _, state in pairs], 0.0)
+    regimes = TendonRegimes([tendon for tendon, _ in pairs], losses, scheme)
+
+    def padded(parts):
+        return np.array([np.pad(part, ((0, 0), (0, 4 - part.shape[1]))) for part in parts])
+
+    tension = np.full((len(pairs), m), 37.0)
+    rest = pad_tiles([state.shears for _, state in pairs], 0.0)[:, None] + np.zeros((1, m, 1))
+    found = regimes.respond(padded(slips), padded(turns), tension, rest)
+    for i, (tendon, state) in enumerate(pairs):
+        alone = respond(tendon, state, scheme, slips[i], turns[i])
+        n = len(state.shears)
+        np.testing.assert_allclose(found.tensions[i, :, :n], alone.tensions, atol=1e-9)
+        np.testing.assert_allclose(found.shears[i, :, :n], alone.shears, atol=1e-9)

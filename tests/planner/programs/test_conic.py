@@ -70,6 +70,13 @@ KINDS: dict[str, Callable[[StanceData, Draw], StanceProgram]] = {
         [draw(len(hand.l0), 3) for hand in data.hands],
     ),
     "Nearest": lambda data, draw: program.Nearest(data),
+    "Elastic": lambda data, draw: program_of(
+        solvers.elastic,
+        data,
+        2.0,
+        [draw(len(hand.unit)) for hand in data.hands],
+        np.arange(len(hard_rows(data))) % 3 == 0,
+    ),
     "Nearest, some kept": lambda data, draw: program.Nearest(data, len(data.wrench) - 6),
 }
 
@@ -142,6 +149,11 @@ def test_the_solver_gets_what_cvxpy_would_give_it(kind, shapes):
         assert dims.soc == [ours.second_order] * bool(ours.second_order)
 
 
+def hard_rows(data: StanceData) -> np.ndarray:
+    """Right-hand sides of all hard rows."""
+    return np.concatenate([hand.h for hand in data.hands])
+
+
 def real_programs(data: StanceData) -> dict[str, StanceProgram]:
     """All of a stance that can be held."""
     loads = solvers.unique(data).loads
@@ -156,6 +168,9 @@ def real_programs(data: StanceData) -> dict[str, StanceProgram]:
         "Effort": program_of(solvers.effort, data, 1.1),
         "LoadFactor": program_of(solvers.load_factor, data),
         "Reach": program.Reach(data, np.ones(1), up),
+        "Elastic": program_of(
+            solvers.elastic, data, 2.0, loads, np.zeros(len(hard_rows(data)), dtype=bool)
+        ),
         "Nearest": program.Nearest(data.turned(1e4 * data.wrench)),
     }
 

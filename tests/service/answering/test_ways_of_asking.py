@@ -50,6 +50,7 @@ PLACED = {
 }
 """A hand on a ball of the wall, by its place."""
 
+TRAVEL = {"angle": 0.02}
 THERE = {"point": [0.0, -0.45, 0.6], "approach": [1.0, 0.0, 0.0]}
 
 # of each field of each part of a request, what to write where
@@ -101,6 +102,8 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     "Limits.tension_change": [
         {"limits.tension_change": 30.0, "present": {RIGHT: [60.0, 80.0, 80.0, 60.0]}}
     ],
+    "Limits.hold_margin": [{"limits.hold_margin": 4.0}],
+    "Limits.least_tension": [{"limits.least_tension": 35.0}],
     "ForceCap.largest_force": [
         {"limits.per_hand": {RIGHT: {"largest_force": [[-400, 400], None, [-50, 200]]}}}
     ],
@@ -135,7 +138,13 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
         {HAND + "surface": {"shear_limit": 50}},
     ],
     "Hand.grasp": [{HAND + "grasp": {}}],
-    "Hand.wrist": [{HAND + "wrist": "floating"}],
+    "Hand.wrist": [{HAND + "wrist": "floating"}, {HAND + "wrist": "compliant"}],
+    "Hand.wrist_travel": [{HAND + "wrist": "compliant", HAND + "wrist_travel": TRAVEL}],
+    "WristTravel.position": [
+        {HAND + "wrist": "compliant", HAND + "wrist_travel": {"position": 2e-3}}
+    ],
+    "WristTravel.inward": [{HAND + "wrist": "compliant", HAND + "wrist_travel": {"inward": 2e-3}}],
+    "WristTravel.angle": [{HAND + "wrist": "compliant", HAND + "wrist_travel": TRAVEL}],
     "Hand.tendon_preload": [
         {HAND + "wrist": "floating", HAND + "tendon_preload": [30.0, 30.0, 30.0, 30.0]}
     ],

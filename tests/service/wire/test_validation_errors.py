@@ -133,7 +133,12 @@ INVALID = [
     ((*FRONT, "surface"), 3, f"{HAND}.surface", "a string or an object"),
     ((*FRONT, "grasp", "outer_rotation"), 4.0, f"{HAND}.grasp.outer_rotation", "<= 3.14"),
     ((*FRONT, "grasp", "palm"), 1, f"{HAND}.grasp.palm", "true or false"),
-    ((*FRONT, "wrist"), "limp", f"{HAND}.wrist", "'limp' is not known; valid: fixed, floating"),
+    (
+        (*FRONT, "wrist"),
+        "limp",
+        f"{HAND}.wrist",
+        "'limp' is not known; valid: compliant, fixed, floating",
+    ),
     (("load", "mass"), "heavy", "load.mass", "a number or null, got a string"),
     (("load", "acceleration"), None, "load.acceleration", "a list"),
     (("body_wrench",), [0.0] * 6, "body_wrench", "give body_wrench or load, not both"),

@@ -1,0 +1,124 @@
+"""Find tensions and wrists of compliant hands by linearising sets whose rows give at a price.
+
+From rest the sets about a point have no plan as a rule: a wrist gives by millimetres, and a
+linearised set is good for one. So the balance and the hard rows may be missed, at a price ρ, and
+each round solves `programs.elastic` on the sets about its point, within a range about it. A step
+must lower the merit
+
+    u + ρ (|missing body wrench| + excesses of all hard rows)
+
+of the model itself; where it does by less than promised, a few of Newton's steps first restore
+what the curvature of the sets has cost. This is sequential ℓ₁ linear programming with a trust
+range (Fletcher, Practical Methods of Optimization, ch. 12 and 14). At the end the point is made
+exact, and the sets about it prove the utilisation the least of these sets, or do not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array
+from planner import programs
+from planner.deadline import Budget
+from planner.floating.goals import LEAST_USE, SETTINGS, Goal
+from planner.floating.wrist_iteration import (
+    WristSolution,
+    gap,
+    made_exact,
+    repaired,
+    searching,
+    solve_wrists,
+)
+from planner.prepare import HandSets, LinearisationPoint, Sets
+from planner.programs import WRIST_RANGE
+
+__all__ = ["find_wrists"]
+
+
+def find_wrists(
+    hands: HandSets,
+    start: LinearisationPoint,
+    budget: Budget,
+    most: int = SETTINGS.rounds,
+    goal: Goal = LEAST_USE,
+) -> WristSolution:
+    """Find the best point for a goal from a start: `solve_wrists`, or as here where hands comply.
+
+    Parameters
+    ----------
+    hands : HandSets
+    start : LinearisationPoint
+    budget : Budget
+    most : int, optional
+        Rounds.
+    goal : Goal, optional
+    """
+    if hands.together is None or goal is not LEAST_USE:
+        return solve_wrists(hands, start, budget, most, goal)
+    within = 1.0  # one `TWIST_UNIT` and 100 N, for which linearised sets are good
+    now = searching(hands, goal, start, within)
+    firm = _firm(now.sets)
+    merit, rounds, past = _merit(now), 0, [math.inf] * 6
+    while rounds < most and not budget.ended:
+        rounds += 1
+        if past[-6] - merit < 1e-3 * merit:  # six rounds for a thousandth: it creeps along a kink
+            break
+        past.append(merit)
+        outcome = programs.elastic(now.sets.data, SETTINGS.price, now.point.loads, firm)
+        budget.spend()
+        if not outcome.solved:
+            break
+        promised = merit - outcome.value
+        if promised < 1e-5:  # of the utilisation: nothing better about the point
+            break
+        there = _moved(hands, goal, now, outcome.loads, within)
+        after = _merit(there)
+        for _ in range(3):
+            if not there.sets.finite or merit - after >= 0.7 * promised:
+                break
+            restored = repaired(hands, goal, there, within)
+            better = _merit(restored)
+            if not better < after:
+                break
+            there, after = restored, better
+        gained = (merit - after) / promised
+        if after < merit - 1e-9:
+            now, merit = there, after
+            within = min(2.0 * within, 4.0) if gained > 0.7 else within
+            within = 0.5 * within if gained < 0.25 else within
+        else:
+            within *= 0.4
+        if within < 1e-3:  # only a kink spoils steps of a micrometre and 0.1 N
+            break
+        now = searching(hands, goal, now.point, within, error=now.error)
+    found = made_exact(hands, goal, now, rounds, budget)
+    proven = found.exact and gap(goal, found, found.outcome) <= SETTINGS.closeness
+    return replace(found, found="least") if proven else found
+
+
+def _merit(state: WristSolution) -> float:
+    """Return the utilisation, and what is wrong at its price; infinite where rock is lost."""
+    if not state.sets.finite:
+        return math.inf
+    return state.measure.utilisation + SETTINGS.price * (
+        state.measure.missing + state.measure.excess
+    )
+
+
+def _moved(
+    hands: HandSets, goal: Goal, now: WristSolution, loads: Sequence[Array], within: float
+) -> WristSolution:
+    point = LinearisationPoint(tuple(loads), now.point.palms, now.point.factor)
+    return searching(hands, goal, point, within, now.sets)
+
+
+def _firm(sets: Sets) -> NDArray[np.bool_]:
+    """Return which hard rows of all hands only say how far a round goes."""
+    return np.array(
+        [row.limit == WRIST_RANGE for space in sets.spaces for row in space.rows[len(space.s) :]]
+    )
