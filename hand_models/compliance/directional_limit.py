@@ -45,7 +45,7 @@ class Farthest:
 
 def pose_units(columns: tuple[str, ...]) -> Array:
     """Return the unit of each component of a pose, from its name [m, rad]."""
-    units = {"v": 1e-3, "w": 1e-2}  # of displacements and turns of a wrist
+    units = {"v": 1e-3, "w": 1e-2, "t": 100.0}  # of displacements and turns of a wrist
     return np.array([units[name.split("/")[1][0]] for name in columns])
 
 

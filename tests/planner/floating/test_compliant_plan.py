@@ -1,0 +1,185 @@
+"""Plans of hands whose tendons are driven while their wrists settle."""
+
+from dataclasses import replace
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+
+from hand_models.base import UnsupportedError, wrench_transport
+from hand_models.compliance import DrivenHand
+from hand_models.hand import WristTravel
+from planner.deadline import Budget
+from planner.floating.elastic_search import find_wrists
+from planner.prepare import prepare_stance, settle_hand
+from planner.question import Question
+from planner.result import Plan
+from planner.solving import KnownStance, plan
+from service.answering import questions
+from service.commands.stances import read_request
+from tests.suite.helpers.checks import problems
+
+
+@cache
+def asked(
+    name: str = "wall-300", *, palm: bool = True, travel: WristTravel | None = None
+) -> Question:
+    """Return a bundled stance whose wrists comply."""
+    question = questions.question(read_request(name))
+    hands = [
+        replace(
+            hand,
+            wrist="compliant",
+            wrist_travel=travel,
+            tendon_preload=None,
+            grasp=hand.grasp if palm else msgspec.structs.replace(hand.grasp, palm=False),
+        )
+        for hand in question.stance.hands
+    ]
+    stance = replace(question.stance, hands=tuple(hands))
+    return replace(question, stance=stance, want=frozenset())
+
+
+@cache
+def answered(name: str = "wall-300", *, palm: bool = True) -> Plan:
+    return plan(asked(name, palm=palm))
+
+
+def test_the_model_confirms_the_plan_and_the_body_is_balanced() -> None:
+    question, answer = asked(), answered()
+    assert answer.status == "optimal"
+    assert answer.verified
+    total, body = np.zeros(6), question.stance.body.inverse()
+    for place, hand in zip(question.stance.hands, answer.hands, strict=True):
+        assert hand.wrist is not None
+        assert hand.wrist.driven
+        model = DrivenHand(settle_hand(place, question.stance))
+        loads = model.loads(hand.wrist.twist[None], hand.tensions[None])
+        np.testing.assert_allclose(hand.loads, loads.tile_loads[0], atol=1e-9)
+        np.testing.assert_allclose(hand.wrench, model.wrenches(loads)[0], atol=1e-9)
+        total -= wrench_transport(body @ place.pose) @ hand.wrench
+    np.testing.assert_allclose(total, answer.body_wrench, atol=1e-5)
+
+
+def test_wrists_stay_within_their_travel() -> None:
+    least, most = WristTravel().bounds
+    for hand in answered().hands:
+        assert (hand.wrist.twist >= np.array(least) - 1e-9).all()
+        assert (hand.wrist.twist <= np.array(most) + 1e-9).all()
+
+
+@pytest.mark.parametrize("palm", [True, False])
+def test_wall_300_holds_eight_per_cent_more_with_and_without_palms(palm: bool) -> None:
+    question = replace(asked(palm=palm), want=frozenset(["load_factor"]))
+    assert plan(question).load_factor == pytest.approx(1.084, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["wall-300", "overhang"])
+def test_palms_never_make_a_plan_worse(name: str) -> None:
+    with_palms, without = answered(name), answered(name, palm=False)
+    assert with_palms.utilisation <= without.utilisation + 1e-3
+
+
+def test_a_longer_travel_is_never_worse() -> None:
+    used = [
+        plan(asked(palm=False, travel=WristTravel(1e-3 * mm, 1e-3, 1e-2 * mm))).utilisation
+        for mm in (1, 2, 4)
+    ]
+    assert used[1] <= used[0] + 1e-3
+    assert used[2] <= used[1] + 1e-3
+
+
+def test_the_order_of_hands_does_not_matter() -> None:
+    question = asked()
+    stance = replace(question.stance, hands=question.stance.hands[::-1])
+    turned = plan(replace(question, stance=stance))
+    assert turned.utilisation == pytest.approx(answered().utilisation, rel=1e-3)
+
+
+def test_a_known_stance_answers_as_a_plan_does() -> None:
+    answer = KnownStance(asked()).plan(answered().body_wrench)
+    assert answer.utilisation == pytest.approx(answered().utilisation, rel=1e-6)
+
+
+@pytest.mark.parametrize("what", ["twist", "tension", "shear", "palm", "mode"])
+def test_the_check_finds_what_is_wrong(what: str) -> None:
+    question, answer = asked(), answered()
+    assert not problems(question, answer)
+    hand = answer.hands[1]
+    if what == "twist":
+        aside = hand.wrist.twist + np.array([0.0, 0.0, 1e-6, 0.0, 0.0, 0.0])
+        hand = replace(hand, wrist=replace(hand.wrist, twist=aside))
+    elif what == "tension":
+        hand = replace(hand, tensions=hand.tensions + np.array([0.0, 0.01, 0.0, 0.0]))
+    elif what == "shear":
+        loads = hand.loads.copy()
+        loads[4, 0] += 0.01
+        hand = replace(hand, loads=loads)
+    elif what == "palm":
+        force = hand.palm.force + np.array([0.0, 0.0, 0.1])
+        hand = replace(hand, palm=msgspec.structs.replace(hand.palm, force=force))
+    else:
+        hand = replace(hand, wrist=replace(hand.wrist, driven=False))
+    hands = (answer.hands[0], hand, *answer.hands[2:])
+    assert problems(question, replace(answer, hands=hands))
+
+
+@pytest.mark.parametrize("wrist", ["fixed", "compliant"])
+def test_margins_hold_and_the_check_knows_them(wrist: str) -> None:
+    question = asked("slab")
+    hands = [replace(hand, wrist=wrist) for hand in question.stance.hands]
+    limits = msgspec.structs.replace(question.limits, hold_margin=4.0, least_tension=35.0)
+    free = replace(question, stance=replace(question.stance, hands=tuple(hands)))
+    bound = replace(free, limits=limits)
+    answer, without = plan(bound), plan(free)
+    assert answer.verified
+    assert answer.utilisation >= without.utilisation - 1e-3
+    assert problems(bound, without)
+    for place, hand in zip(bound.stance.hands, answer.hands, strict=True):
+        settled = settle_hand(place, bound.stance)
+        assert (hand.tensions >= 35.0 - 1e-6).all()
+        phalanges = settled.touching & np.array([tile.phalanx != "base" for tile in settled.tiles])
+        shear, normal = hand.loads[phalanges, 0], hand.loads[phalanges, 1]
+        room = shear + settled.surface.friction * normal + settled.drag_allowances[phalanges]
+        assert (room >= 4.0 - 1e-6).all()
+
+
+def test_hands_on_their_nails_are_refused() -> None:
+    with pytest.raises(UnsupportedError):
+        plan(asked("ledge"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["wall-300", "overhang", "slab", "boulders"])
+def test_random_starts_within_the_travel_end_alike(name: str) -> None:
+    hands, rng = prepare_stance(asked(name)).hands, np.random.default_rng(0)
+    used = []
+    for _ in range(20):
+        loads = []
+        for wrist in hands.wrists:
+            least, most = map(np.array, wrist.travel.bounds)
+            twist = least + (most - least) * rng.uniform(0.15, 0.85, 6)
+            loads.append(np.concatenate([rng.uniform(10.0, 120.0, 4), twist]))
+        start = replace(hands.at_rest(hands.idle), loads=tuple(loads))
+        start = find_wrists(hands.without_palms(), start, Budget(320)).point
+        found = find_wrists(hands, start, Budget(320))
+        used.append(found.measure.utilisation if found.exact else np.inf)
+    # on rough and on flat rock some end at kinks some per cent away
+    within, most = {"wall-300": (0.01, 19), "overhang": (0.01, 18)}.get(name, (0.04, 17))
+    assert (np.array(used) <= (1.0 + within) * min(used)).sum() >= most
+
+
+@pytest.mark.slow
+def test_hands_a_hair_aside_give_much_the_same_plan() -> None:
+    question, rng, used = asked(), np.random.default_rng(1), []
+    for _ in range(12):
+        hands = []
+        for hand in question.stance.hands:
+            pose = replace(hand.pose, position=hand.pose.position + rng.uniform(-5e-5, 5e-5, 3))
+            hands.append(replace(hand, pose=pose))
+        moved = replace(question, stance=replace(question.stance, hands=tuple(hands)))
+        used.append(plan(moved).utilisation)
+    off = np.abs(np.array(used) / answered().utilisation - 1.0)
+    assert np.median(off) <= 0.01
+    assert off.max() <= 0.05
