@@ -44,6 +44,7 @@ from .question import (
     BodyRange as BodyRange,
     ForceCap as ForceCap,
     HandOnHold as HandOnHold,
+    LimbStiffness as LimbStiffness,
     Limits as Limits,
     Load as Load,
     Objective as Objective,

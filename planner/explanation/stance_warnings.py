@@ -247,7 +247,7 @@ def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
 
 
 def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
-    """Yield a sentence for each wrist of a plan that goes too far for its loads to be sure."""
+    """Yield a sentence for each wrist of a plan that goes too far to be sure, or does not stay."""
     for hand in hands:
         if hand.wrist is None:
             continue
@@ -258,4 +258,10 @@ def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
                 f"{hand.limb}: the wrist moves {1e3 * moved:.0f} mm and turns "
                 f"{1e3 * turned:.0f} mrad: loads are of one step from rest, contacts may have "
                 "changed"
+            )
+        least = hand.wrist.least_stiffness
+        if least is not None and not least > 0.0:
+            yield (
+                f"{hand.limb}: the wrist does not stay: hand and limb together have a least "
+                f"stiffness of {least:.3g} N/m; make limb_stiffness larger"
             )

@@ -6,6 +6,7 @@ from .draws import (
 from .limits import (
     BodyRange as BodyRange,
     ForceCap as ForceCap,
+    LimbStiffness as LimbStiffness,
     Limits as Limits,
     Objective as Objective,
     Want as Want,

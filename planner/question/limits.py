@@ -17,6 +17,7 @@ from hand_models.base import Force, InvalidFieldError, Name, Strict, Tension, ch
 __all__ = [
     "BodyRange",
     "ForceCap",
+    "LimbStiffness",
     "Limits",
     "Objective",
     "Want",
@@ -200,6 +201,33 @@ def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
         f"(not all of a limb), got {', '.join(f'{most:g}' for most in given)}",
         field=field,
     )
+
+
+class LimbStiffness(Strict, frozen=True, kw_only=True):
+    """The stiffness with which limbs hold their wrists at pose targets.
+
+    Attributes
+    ----------
+    position : float
+        Along each axis of H [N/m].
+    angle : float
+        About each axis of H [N·m/rad].
+    """
+
+    position: Annotated[float, Meta(ge=1.0, le=1e9, description="along each axis of H [N/m]")]
+    angle: Annotated[float, Meta(ge=1e-2, le=1e9, description="about each axis of H [N·m/rad]")]
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (
+            ("position", self.position, "N/m"),
+            ("angle", self.angle, "N·m/rad"),
+        ):
+            check_positive(value, unit, name)
+
+    @property
+    def each(self) -> tuple[float, ...]:
+        """Stiffness of each component of a wrist's twist [N/m, N·m/rad]."""
+        return (self.position,) * 3 + (self.angle,) * 3
 
 
 class BodyRange(Strict, frozen=True):

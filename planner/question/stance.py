@@ -14,6 +14,7 @@ from hand_models.fixed_wrist import SEAT_RULES, SeatRule
 from hand_models.hand import FINGERS, Grasp, WristTravel
 from hand_models.rock import Hold
 from hand_models.tile import Surface
+from planner.question.limits import LimbStiffness
 from planner.robots import Robot, robosimian
 
 __all__ = [
@@ -209,6 +210,8 @@ class Stance:
         Angles of each limb's joints [rad], [m] of joints that slide, of every limb that holds on
         at least; or that they are to be found, of a limb or of all. None: nothing is said of them,
         and torques do not count.
+    limb_stiffness : LimbStiffness, optional
+        With which limbs hold wrists that give way: plans then have a pose target for each.
     """
 
     hands: tuple[HandOnHold, ...]
@@ -216,6 +219,7 @@ class Stance:
     gravity: Array = field(default_factory=lambda: np.array(EARTH_GRAVITY))
     robot: Robot = field(default_factory=robosimian)
     joints: Mapping[str, Array | Literal["solve"]] | Literal["solve"] | None = None
+    limb_stiffness: LimbStiffness | None = None
 
     def __post_init__(self) -> None:
         self._check_hands()

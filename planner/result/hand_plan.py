@@ -41,6 +41,12 @@ class WristPlan:
         0.1 m [N]. The plan itself is exact.
     driven : bool
         Whether the wrist is compliant: its motors keep the tensions at which the hand has closed.
+    pose_target : ndarray, shape (6,), or None
+        Where the limb's controller is to aim, as ``twist``: x + K⁻¹ w, for limbs of stiffness K;
+        None where nothing is said of it [m, rad].
+    least_stiffness : float or None
+        Least eigenvalue of the symmetric part of K_g + K, of the hand on its rock and the limb;
+        turns over 0.1 m [N/m]. Where it is not positive the wrist does not stay.
     """
 
     twist: Array
@@ -48,6 +54,8 @@ class WristPlan:
     rounds: int
     error: float
     driven: bool = False
+    pose_target: Array | None = None
+    least_stiffness: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

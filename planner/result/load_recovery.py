@@ -29,6 +29,7 @@ from planner.prepare import (
     tile_index_of,
 )
 from planner.programs import LOAD_UNIT, ScaledRows, is_effort
+from planner.question import LimbStiffness
 from planner.result.hand_plan import HandPlan, PlanArrays, WristPlan
 from planner.result.plain_parts import Palm
 
@@ -304,6 +305,7 @@ def recover_floating_hand(
     space: WrenchSpace,
     y: Array,
     pose: WristPlan,
+    stiffness: LimbStiffness | None = None,
 ) -> HandPlan:
     """Turn the pose of a wrist that gives way into tile loads and forces, by the model itself.
 
@@ -318,9 +320,12 @@ def recover_floating_hand(
     y : ndarray
         The pose, in the set's columns.
     pose : WristPlan
+    stiffness : LimbStiffness, optional
+        Of the limb.
     """
     hand, closed = wrist.hand, wrist.closed_at(y)
     found = wrist.hand_loads(y[None])
+    wrench, pose = hand.wrenches(found)[0], replace(pose, palm=wrist.palm_mode(y, pose.palm))
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]
     tensions = found.tensions[0]
     rows, of_tiles = space.utilisations(y), layout_of(settled, sticking=False).plane_tiles
@@ -341,7 +346,7 @@ def recover_floating_hand(
     )
     return HandPlan(
         limb=limb,
-        wrench=hand.wrenches(found)[0],
+        wrench=wrench,
         tensions=tensions,
         drives=drive.driven(tensions, (joints, closed, drawn, losses, nails)),
         loads=loads,
@@ -358,5 +363,19 @@ def recover_floating_hand(
         seating=settled.seating,
         closures=settled.closures,
         space=space,
-        wrist=replace(pose, palm=wrist.palm_mode(y, pose.palm)),
+        wrist=_aimed(pose, wrench, space, stiffness),
     )
+
+
+def _aimed(
+    pose: WristPlan, wrench: Array, space: WrenchSpace, stiffness: LimbStiffness | None
+) -> WristPlan:
+    """Return a wrist's pose with where its limb is to aim, and how stiff both are together."""
+    if stiffness is None:
+        return pose
+    limb, count = np.array(stiffness.each), len(pose.twist)
+    # of turns over 0.1 m, so that all are in newtons per metre
+    over = np.array([1.0] * 3 + [10.0] * 3)
+    both = over[:, None] * (space.generators[:, -count:] + np.diag(limb)) * over
+    least = float(np.linalg.eigvalsh(0.5 * (both + both.T))[0])
+    return replace(pose, pose_target=pose.twist + wrench / limb, least_stiffness=least)

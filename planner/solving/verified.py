@@ -117,7 +117,8 @@ def _hand(prepared: PreparedStance, solution: Solution, index: int) -> HandPlan:
         alone, own = HandBatch.of((settled,)), (space,)
         arrays, _, _ = LoadRecovery(alone, own).read((solution.loads[index],))
         return arrays.hands((limb,), alone, own)[0]
-    return recover_floating_hand(limb, settled, wrist, space, solution.loads[index], pose)
+    stiffness, y = prepared.question.stance.limb_stiffness, solution.loads[index]
+    return recover_floating_hand(limb, settled, wrist, space, y, pose, stiffness)
 
 
 def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Verified | Failed:

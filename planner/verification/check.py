@@ -256,7 +256,18 @@ class Check:
 
     def _wrists(self, arrays: PlanArrays) -> Iterator[str]:
         """Yield hands whose wrists are not what they are in the question."""
-        for place, wrist in zip(self.question.stance.hands, arrays.wrists, strict=True):
+        stance = self.question.stance
+        stiffness = None if stance.limb_stiffness is None else np.array(stance.limb_stiffness.each)
+        hands = zip(stance.hands, arrays.wrists, arrays.wrenches, strict=True)
+        for place, wrist, wrench in hands:
             mode = "fixed" if wrist is None else ("compliant" if wrist.driven else "floating")
             if mode != place.wrist:
                 yield f"{place.limb}: the wrist is not {place.wrist}"
+            target = None if wrist is None else wrist.pose_target
+            if wrist is None or (target is None and stiffness is None):
+                continue
+            off = np.inf
+            if target is not None and stiffness is not None:
+                off = np.abs(stiffness * (target - wrist.twist) - wrench).max()
+            if not off <= 1e-9 * max(1.0, np.abs(wrench).max()):  # by rounding
+                yield f"{place.limb}: a limb that aims at its pose target exerts another wrench"

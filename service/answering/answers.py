@@ -224,6 +224,8 @@ def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
         palm=wrist.palm,
         rounds=wrist.rounds,
         error=finite(wrist.error),
+        pose_target=_listed(wrist.pose_target),
+        least_stiffness=finite(wrist.least_stiffness),
     )
 
 

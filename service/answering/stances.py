@@ -65,6 +65,7 @@ def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tup
             gravity=np.array(EARTH_GRAVITY if message.gravity is None else message.gravity),
             robot=robot,
             joints=joints_of(message.joints),
+            limb_stiffness=message.limb_stiffness,
         )
         return found, rocks
 
@@ -329,12 +330,12 @@ def _check_costs(stance: requests.Stance) -> None:
     LimitError
         The field is relative to the stance.
     """
-    # a floating hand's plan is found in several rounds
+    # a plan of wrists that give way is found in several rounds
     rounds = 4
     # four hands with 64 half-planes have some 7500 rows in a program
     most_planes = 256
     planes = sum(
-        (rounds if hand.wrist == "floating" else 1) * _half_planes(hand) for hand in stance.hands
+        (1 if hand.wrist == "fixed" else rounds) * _half_planes(hand) for hand in stance.hands
     )
     if planes > most_planes:
         raise LimitError(

@@ -74,7 +74,9 @@ class Wrist(Struct, kw_only=True):
     ``off``, ``drags``, ``presses`` or ``drags_and_presses``. ``rounds``: how often the hands' sets
     were linearised. ``error``: how far the set of the last step was off at its end [N, moments over
     0.1 m]; the plan is exact. Of a wrench space, how far it is off at most where it reaches
-    farthest along the axes.
+    farthest along the axes. ``pose_target``: where a limb of the stance's ``limb_stiffness`` is to
+    aim, as ``twist`` [m, rad]. ``least_stiffness``: of the hand on its rock and that limb together,
+    turns over 0.1 m [N/m]; where it is not positive the wrist does not stay.
     """
 
     mode: str
@@ -82,6 +84,8 @@ class Wrist(Struct, kw_only=True):
     palm: str | None = None
     rounds: int | None = None
     error: float | None = None
+    pose_target: Vector | None = None
+    least_stiffness: float | None = None
 
 
 class Generator(Struct):

@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from hand_models.base import Acceleration, Coordinate, Name, Position, Strict
 from hand_models.hand import Grasp, WristTravel
+from planner import LimbStiffness
 from service.requests.holds import Hold, Rock, Surface
 from service.requests.request import FourTensions, Pose, WrenchEntries, WrenchEntry
 
@@ -143,6 +144,10 @@ class Stance(Strict, frozen=True, kw_only=True):
             "of a limb or of all; either way hands may be 10 mm and 0.05 rad off; with joints "
             "their torques count"
         ),
+    ] = None
+    limb_stiffness: Annotated[
+        LimbStiffness | None,
+        Meta(description="with which limbs hold wrists that give way: replies have pose targets"),
     ] = None
     rocks: Annotated[
         dict[Name, Rock],

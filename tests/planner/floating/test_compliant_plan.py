@@ -13,7 +13,7 @@ from hand_models.hand import WristTravel
 from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists
 from planner.prepare import prepare_stance, settle_hand
-from planner.question import Question
+from planner.question import LimbStiffness, Question
 from planner.result import Plan
 from planner.solving import KnownStance, plan
 from service.answering import questions
@@ -143,6 +143,33 @@ def test_margins_hold_and_the_check_knows_them(wrist: str) -> None:
         shear, normal = hand.loads[phalanges, 0], hand.loads[phalanges, 1]
         room = shear + settled.surface.friction * normal + settled.drag_allowances[phalanges]
         assert (room >= 4.0 - 1e-6).all()
+
+
+def test_a_limb_that_aims_at_its_pose_target_exerts_the_wrench() -> None:
+    limbs = LimbStiffness(position=5e3, angle=100.0)
+    question = asked()
+    question = replace(question, stance=replace(question.stance, limb_stiffness=limbs))
+    answer = plan(question)
+    for place, hand in zip(question.stance.hands, answer.hands, strict=True):
+        wrist, model = hand.wrist, DrivenHand(settle_hand(place, question.stance))
+        pull = (wrist.pose_target - wrist.twist) * ([5e3] * 3 + [100.0] * 3)
+        np.testing.assert_allclose(pull, hand.wrench, atol=1e-9)
+        # stiffness of the hand at its tensions, by central differences
+        small = np.array([1e-8] * 3 + [1e-7] * 3)
+        ends = [
+            model.wrenches(
+                model.loads(wrist.twist + sign * np.diag(small), np.tile(hand.tensions, (6, 1)))
+            )
+            for sign in (1.0, -1.0)
+        ]
+        own = ((ends[0] - ends[1]) / (2.0 * small[:, None])).T
+        over = np.diag([1.0] * 3 + [10.0] * 3)
+        both = over @ (own + np.diag([5e3] * 3 + [100.0] * 3)) @ over
+        least = np.linalg.eigvalsh(0.5 * (both + both.T))[0]
+        assert wrist.least_stiffness == pytest.approx(least, rel=1e-2)
+    aside = replace(answer.hands[0].wrist, pose_target=answer.hands[0].wrist.pose_target + 1e-9)
+    hands = (replace(answer.hands[0], wrist=aside), *answer.hands[1:])
+    assert problems(question, replace(answer, hands=hands))
 
 
 def test_hands_on_their_nails_are_refused() -> None:

@@ -50,6 +50,7 @@ PLACED = {
 }
 """A hand on a ball of the wall, by its place."""
 
+LIMBS_GIVE = {"position": 5000.0, "angle": 100.0}
 TRAVEL = {"angle": 0.02}
 THERE = {"point": [0.0, -0.45, 0.6], "approach": [1.0, 0.0, 0.0]}
 
@@ -121,6 +122,9 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     ],
     "Stance.gravity": [{"stance.gravity": [1.0, 0.5, -9.0]}],
     "Stance.body": [{"stance.joints": "solve", "stance.body.position": [-0.42, 0.02, 0.0]}],
+    "Stance.limb_stiffness": [{"stance.limb_stiffness": LIMBS_GIVE, HAND + "wrist": "compliant"}],
+    "LimbStiffness.position": [{"stance.limb_stiffness": LIMBS_GIVE, HAND + "wrist": "floating"}],
+    "LimbStiffness.angle": [{"stance.limb_stiffness": LIMBS_GIVE}],
     "Stance.joints": [{"stance.joints": None}, {"stance.joints": "solve"}],
     "Stance.rocks": [
         {
