@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import click
 
 from hand_models.base import DISTRIBUTION_NAME
-from service.tables.command_line import VERBOSITY_KEY, ExitStatus
+from service.tables import VERBOSITY_KEY, ExitStatus
 
 __all__ = ["COMMANDS_BY_NAME", "crux", "run"]
 
