@@ -30,7 +30,7 @@ from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = ["Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
+__all__ = ["GripperSweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
 
 RAYS: Final = 300
 CUTS: Final = 4
@@ -141,7 +141,7 @@ def radius_axes(table: ParameterTable, points: int = POINTS) -> tuple[Axis, Axis
 
 
 @dataclass(frozen=True)
-class Sweep:
+class GripperSweep:
     """A map that a caller asks for, as a study.
 
     Attributes
@@ -222,7 +222,7 @@ class Sweep:
         return {"sweep": figure}
 
 
-run, plot = Sweep().run, Sweep().plot
+run, plot = GripperSweep().run, GripperSweep().plot
 """Run and plot the study without options: the axes and the conditions of Fig. 16."""
 
 

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import InvalidInputError, within
+from hand_models.base import InvalidInputError, errors_under
 from hand_models.compliance import Gripper, pulled_off
 from hand_models.experiments.force_limits import PARAMETER_STUDIES
 from hand_models.parameters import (
@@ -70,7 +70,7 @@ class Conditions:
         """
         surface = None
         if self.surface != SANDPAPER:
-            with within("surface"):
+            with errors_under("surface"):
                 surface = pulled_off(Surface.named(self.surface), table)
         return Gripper(self.diameter, self.tension, surface, table, most_pressing)
 

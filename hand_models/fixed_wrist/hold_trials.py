@@ -26,7 +26,7 @@ from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["AT_BORDER", "WAYS", "FoundHold", "Trial", "grid_of_trials", "try_holds"]
+__all__ = ["AT_BORDER", "WAYS", "FoundHold", "HoldTrial", "grid_of_trials", "try_holds"]
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
 """Why a hand is not asked for there."""
@@ -46,7 +46,7 @@ RAYS: Final = 5
 """Along each side of the square in which the plane of the rock about a point is found."""
 
 
-class Trial(NamedTuple):
+class HoldTrial(NamedTuple):
     """A hand that may be at a point of a rock; all in the rock's frame.
 
     Attributes
@@ -101,7 +101,7 @@ def grid_of_trials(
     radius: float,
     most: int | None = None,
     report: Progress | None = None,
-) -> list[Trial]:
+) -> list[HoldTrial]:
     """Return places on a grid across z of a rock's frame.
 
     Parameters
@@ -149,7 +149,7 @@ def grid_of_trials(
         a + 0.5 * ((b - a) % spacing) + spacing * np.arange(number)
         for a, b, number in zip(low[:2], high[:2], each_way, strict=True)
     ]
-    found: list[Trial] = []
+    found: list[HoldTrial] = []
     points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist()
     for number, (x, y) in enumerate(points):
         if report is not None:
@@ -168,7 +168,7 @@ def grid_of_trials(
             size = math.hypot(slope[0], slope[1], 1.0)
             toward = -float(slope[0]) / size, -float(slope[1]) / size, 1.0 / size
         found += [
-            Trial(point, toward, math.tau * k / angles, rotation)
+            HoldTrial(point, toward, math.tau * k / angles, rotation)
             for k in range(angles)
             for rotation in rotations
         ]
@@ -190,7 +190,7 @@ def try_holds(
     hand: SpinyHand,
     rock: Mesh,
     surface: Surface,
-    trials: Sequence[Trial],
+    trials: Sequence[HoldTrial],
     seat: str = "rest",
     *,
     robust: bool = False,
@@ -202,7 +202,7 @@ def try_holds(
     hand : SpinyHand
     rock : Mesh
     surface : Surface
-    trials : sequence of Trial
+    trials : sequence of HoldTrial
     seat : {'rest', 'best'}, optional
     robust : bool, optional
         Whether also what is left of it over a scatter of each place.

@@ -15,7 +15,15 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
-from hand_models.hand import FINGERS, FINGERTIP_FORCE, HELD, NAIL, NAIL_SHEAR, SettledHand, Tile
+from hand_models.hand import (
+    FINGERS,
+    FINGERTIP_FORCE,
+    HELD,
+    NAIL,
+    NAIL_SHEAR,
+    SettledHand,
+    SettledTile,
+)
 from hand_models.tile import Surface, inner_half_planes
 from hand_models.wrench_spaces import Row
 
@@ -131,7 +139,7 @@ def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
 
 @lru_cache(maxsize=KEPT)
 def row_layout(
-    tiles: tuple[Tile, ...],
+    tiles: tuple[SettledTile, ...],
     lateral: bool,
     pieces: tuple[str, ...],
     stops: tuple[tuple[int, int], ...],
@@ -142,7 +150,7 @@ def row_layout(
 
     Parameters
     ----------
-    tiles : tuple of Tile
+    tiles : tuple of SettledTile
     lateral : bool
         Whether fingers with a tile on rock resist sideways.
     pieces : tuple of str

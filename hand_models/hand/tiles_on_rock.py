@@ -28,7 +28,7 @@ from hand_models.hand.finger_frames import (
 from hand_models.hand.hooked_nails import Nails
 from hand_models.hand.names import CONTACTS, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
-from hand_models.hand.settled_hand import Palm, Tile
+from hand_models.hand.settled_hand import SettledPalm, SettledTile
 from hand_models.tile import engaged_share
 
 __all__ = ["HandTiles", "hand_tiles", "palms_on_rock", "tiles_on_rock"]
@@ -67,7 +67,7 @@ for finger_of in FINGER_OF.values():
 class HandTiles(NamedTuple):
     """The tiles of one hand; attributes as of `SettledHand`."""
 
-    tiles: tuple[Tile, ...]
+    tiles: tuple[SettledTile, ...]
     finger_of: Indices
     positions: Array
     axes: Array
@@ -147,16 +147,16 @@ def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
 
 
 @lru_cache(maxsize=4096)
-def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
+def _named(kinds: bytes, nails: bool) -> tuple[SettledTile, ...]:
     """Return tiles from the codes of their contacts."""
     names = [NAMES[i] for i in ORDER[nails].tolist()]
     return tuple(
-        Tile(finger, part, CONTACTS[kind])
+        SettledTile(finger, part, CONTACTS[kind])
         for (finger, part), kind in zip(names, kinds, strict=True)
     )
 
 
-def palms_on_rock(placed: PlacedHands) -> list[Palm]:
+def palms_on_rock(placed: PlacedHands) -> list[SettledPalm]:
     """Return the palm of each hand; a tile is engaged with rock within the spines' travel."""
     hand = placed.hand
     gaps = np.array(placed.gaps)[:, BASES:]
@@ -171,7 +171,7 @@ def palms_on_rock(placed: PlacedHands) -> list[Palm]:
         if not placement.grasp.palm:
             engaged = ()
         parts = tuple([share[i] for i in engaged])
-        palm = Palm(own, engaged, parts, centre, 0.0, 0.0)
+        palm = SettledPalm(own, engaged, parts, centre, 0.0, 0.0)
         if engaged:
             weights = np.array(parts) / sum(parts)
             centre[:2] = weights @ hand.palm_tiles[list(engaged), :2]

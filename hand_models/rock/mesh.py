@@ -24,7 +24,7 @@ from hand_models.rock.smoothing import OutlinedHold
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import (
     TriangleCells,
-    borders,
+    border_edges,
     bridge,
     cut,
     weld,
@@ -100,7 +100,7 @@ class Mesh(OutlinedHold):
 
     @cached_property
     def border(self) -> Array:
-        return borders(self.triangles, self._scale.bridged_gap)
+        return border_edges(self.triangles, self._scale.bridged_gap)
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:

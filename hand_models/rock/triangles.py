@@ -19,7 +19,7 @@ from hand_models.rock.surface import Triangles
 
 __all__ = [
     "TriangleCells",
-    "borders",
+    "border_edges",
     "bridge",
     "connected",
     "cut",
@@ -177,7 +177,7 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
     return Triangles(np.where(spike[:, None], mean, vertices), faces)
 
 
-def borders(triangles: Triangles, gap: float) -> Array:
+def border_edges(triangles: Triangles, gap: float) -> Array:
     """Return the ends of every edge that only one triangle has, shape (n, 2, 3) [m].
 
     Left out are borders of holes that are no wider than ``gap`` along any axis [m].

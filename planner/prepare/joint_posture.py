@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import scipy
 
-from hand_models.base import Array, InvalidInputError, Pose, within, wrench_transport
+from hand_models.base import Array, InvalidInputError, Pose, errors_under, wrench_transport
 from planner.prepare.stance_constraints import JointLoads
 from planner.question import Question, Stance, Weights
 from planner.robots import UnreachableError, carriers, held_up, solve_limbs
@@ -98,7 +98,7 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
         limb: np.asarray(angles.get(limb, chain.rest), dtype=float)
         for limb, chain in robot.chains.items()
     }
-    with within("load"):
+    with errors_under("load"):
         linear, angular = load.motion(stance)
         frames = carriers(robot, whole, load.payloads)
     statics = robot.statics(whole, -linear, np.concatenate([np.zeros(3), angular]))
@@ -154,7 +154,7 @@ def torque_limits(question: Question) -> dict[str, Array]:
 def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     """Return given angles, which must be possible and where the hands' poses are."""
     joints, solved = stance.given_joints, stance.solved_limbs
-    with within("stance.joints"):
+    with errors_under("stance.joints"):
         stance.robot.checked_angles(joints)
     for limb in poses:
         if limb not in joints and limb not in solved:

@@ -17,7 +17,7 @@ from hand_models.base import (
     Position,
     Strict,
     check_positive,
-    within,
+    errors_under,
 )
 from planner.robots import Payload
 
@@ -165,7 +165,7 @@ class Load(Strict, frozen=True):
         hands = {hand.limb: hand.pose for hand in stance.hands}
         body, places = stance.body.inverse(), []
         for i, payload in enumerate(self.payloads):
-            with within(f"payloads[{i}]"):
+            with errors_under(f"payloads[{i}]"):
                 check_carrier(stance.robot, payload)
                 if payload.link == stance.robot.description.body:
                     places.append(np.array(payload.com))

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final, Protocol
 
-from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
+from hand_models.base import Array, InvalidInputError, check_positive, errors_under, finite_vector
 from hand_models.hand import FINGERS
-from hand_models.parameters import Draw
+from hand_models.parameters import ParameterSample
 from planner.question.draws import drawn_hands
 from planner.question.limits import (
     OBJECTIVES,
@@ -74,7 +74,7 @@ class Question:
     objective: Objective | OwnObjective = "max_margin"
     present: Mapping[str, Array] = field(default_factory=dict)
     deadline: float | None = None
-    draws: tuple[Draw, ...] | None = None
+    draws: tuple[ParameterSample, ...] | None = None
     explain: bool = True
     body_range: BodyRange = field(default_factory=BodyRange)
 
@@ -131,7 +131,7 @@ class Question:
                 raise InvalidInputError(
                     f"from 1 to {MOST_DRAWS} draws are needed, got {len(self.draws)}", field="draws"
                 )
-        with within("draws"):
+        with errors_under("draws"):
             drawn_hands(self.stance.robot.hand, self.draws)
 
     def _check_limits(self) -> None:

@@ -15,7 +15,7 @@ from msgspec import UNSET
 
 from hand_models.base import Array
 from hand_models.compliance import PalmMode
-from hand_models.hand import FINGERS, NAIL, Seating, Tile as NamedTile
+from hand_models.hand import FINGERS, NAIL, Seating, SettledTile
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, concatenated
@@ -101,7 +101,7 @@ class HandPlan:
     engagement: Array
     limit_shares: Array
     tile_utilisations: Array
-    tiles: tuple[NamedTile, ...]
+    tiles: tuple[SettledTile, ...]
     half_planes: tuple[HalfPlane, ...]
     palm: Palm[Array]
     utilisation: float
@@ -191,7 +191,7 @@ class PlanArrays(NamedTuple):
     palm_utilisations: Array
     wrenches: Array
     utilisations: Array
-    tiles: tuple[tuple[NamedTile, ...], ...]
+    tiles: tuple[tuple[SettledTile, ...], ...]
     half_planes: tuple[tuple[HalfPlane, ...], ...]
     engaged: tuple[Sequence[int], ...]
     wrists: tuple[WristPlan | None, ...]

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, within
+from hand_models.base import Array, InvalidInputError, errors_under
 from planner.robots.robot_file import RobotDescription, section_table
 from planner.robots.urdf import JointElement, Urdf
 
@@ -81,7 +81,7 @@ def limb_joints(
     body, chains = described.body, {}
     for limb, mount in described.mounts.items():
         field = f"limbs.{limb}.link"
-        with within(field):
+        with errors_under(field):
             chains[limb] = tree.chain(body, mount.link, locked)
         if not chains[limb]:
             stuck = [each.name for each in tree.chain(body, mount.link, ()) if _stuck(each)]
@@ -96,7 +96,7 @@ def limb_joints(
             )
     _require_own(chains, described.locked)
     for limb, chain in chains.items():
-        with within(f"limbs.{limb}.link"):
+        with errors_under(f"limbs.{limb}.link"):
             between = f"between {body!r} and {described.mounts[limb].link!r}"
             _require_moved(chain, between, described.locked)
     return chains

@@ -16,7 +16,7 @@ from typing import Final, Literal
 from msgspec import structs
 
 from hand_models.base import Array, InvalidInputError, Pose
-from hand_models.parameters import Draw
+from hand_models.parameters import ParameterSample
 from planner.question import (
     SOLVE,
     HandOnHold,
@@ -103,7 +103,7 @@ class Route:
     objective: Objective = "max_margin"
     explain: bool = True
     want: frozenset[Want] = frozenset()
-    draws: tuple[Draw, ...] | None = None
+    draws: tuple[ParameterSample, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from hand_models.base import Array, EmptySetError, InvalidInputError, LimitError
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, robustness, tension_limits
-from hand_models.hand import FINGERS, SettledHand, Tile, closing_sequence, nearby_closures
+from hand_models.hand import FINGERS, SettledHand, SettledTile, closing_sequence, nearby_closures
 from hand_models.wrench_spaces import WrenchSpace
 from planner import WristPlan, deadline, resting_hand
 from service import replies
@@ -114,7 +114,7 @@ def _contacts(settled: SettledHand) -> list[replies.Contact]:
     ]
 
 
-def _stop(settled: SettledHand, tile: Tile) -> str | None:
+def _stop(settled: SettledHand, tile: SettledTile) -> str | None:
     if tile.phalanx not in PHALANGES:
         return None
     finger = settled.fingers[FINGERS.index(tile.finger)]

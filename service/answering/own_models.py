@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from hand_models.base import InvalidInputError, in_file, within
+from hand_models.base import InvalidInputError, errors_under, in_file
 from hand_models.hand import spiny_hand
 from hand_models.parameters import ParameterTable, load_own_hand, own_draw, own_hand
 from planner import Robot, RobotFile, robosimian, robot_of
@@ -88,7 +88,7 @@ def read_draws(path: Path) -> list[Draw]:
             raise InvalidInputError("a list is needed, [[draws]], and nothing else", field="draws")
         found = []
         for i, draw in enumerate(given):
-            with within(f"draws[{i}]"):
+            with errors_under(f"draws[{i}]"):
                 if not isinstance(draw, Mapping):
                     raise InvalidInputError("hand or surfaces is needed")
                 own_draw(draw)

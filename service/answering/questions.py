@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hand_models.base import InvalidInputError, within
-from hand_models.parameters import Draw, own_draw
+from hand_models.base import InvalidInputError, errors_under
+from hand_models.parameters import ParameterSample, own_draw
 from planner import Load, Question
 from service import requests
 from service.answering.own_models import ROBOTS, Robots
@@ -87,11 +87,11 @@ def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
     )
 
 
-def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
+def _draws(messages: Sequence[requests.Draw]) -> tuple[ParameterSample, ...] | None:
     """Return a caller's own draws; None for the bundled ones."""
     found = []
     for i, message in enumerate(messages):
-        with within(f"draws[{i}]"):
+        with errors_under(f"draws[{i}]"):
             found.append(own_draw({"hand": message.hand, "surfaces": message.surfaces}))
     return tuple(found) or None
 

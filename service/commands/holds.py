@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
     Outcome = fixed_wrist.FoundHold | InvalidInputError
-    Pair = tuple[fixed_wrist.Trial, fixed_wrist.FoundHold]
+    Pair = tuple[fixed_wrist.HoldTrial, fixed_wrist.FoundHold]
 
 __all__ = ["holds"]
 
@@ -214,7 +214,7 @@ def holds(
 
 def _keep(
     title: str,
-    trials: Sequence[fixed_wrist.Trial],
+    trials: Sequence[fixed_wrist.HoldTrial],
     tried: Generator[tuple[int, Outcome], None, None],
     outcomes: dict[int, Outcome],
 ) -> None:
@@ -245,7 +245,7 @@ def _reason(error: InvalidInputError) -> str:
 
 
 def _refusals(
-    trials: Sequence[fixed_wrist.Trial], outcomes: Mapping[int, Outcome]
+    trials: Sequence[fixed_wrist.HoldTrial], outcomes: Mapping[int, Outcome]
 ) -> list[dict[str, Any]]:
     """Return the points where hands cannot be, with the number of trials for each reason."""
     found: dict[tuple[float, float, float], Counter[str]] = {}
@@ -255,7 +255,7 @@ def _refusals(
     return [{"point": point, "reasons": dict(reasons)} for point, reasons in found.items()]
 
 
-def _entry(trial: fixed_wrist.Trial, found: fixed_wrist.FoundHold) -> dict[str, Any]:
+def _entry(trial: fixed_wrist.HoldTrial, found: fixed_wrist.FoundHold) -> dict[str, Any]:
     """Return a hold as JSON values."""
     from hand_models import fixed_wrist
 
@@ -289,7 +289,7 @@ def _entry(trial: fixed_wrist.Trial, found: fixed_wrist.FoundHold) -> dict[str, 
 
 
 def _draw(
-    mesh: Any, trials: list[fixed_wrist.Trial], found: list[Pair], path: Path, name: str
+    mesh: Any, trials: list[fixed_wrist.HoldTrial], found: list[Pair], path: Path, name: str
 ) -> None:
     import numpy as np
 
@@ -314,7 +314,7 @@ def _finite(value: float) -> str:
 
 
 def _print(
-    trials: list[fixed_wrist.Trial],
+    trials: list[fixed_wrist.HoldTrial],
     found: list[Pair],
     refused: Counter[str],
     oddities: Sequence[str],

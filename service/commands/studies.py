@@ -72,7 +72,7 @@ def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
     of_rock = {key: given.pop(key) for key in ("diameter", "tension", "surface") if key in given}
     if "measures" in given:
         given["measures"] = tuple(dict.fromkeys(given["measures"]))
-    return experiments.Sweep(
+    return experiments.GripperSweep(
         conditions=replace(experiments.Conditions.of_fig16()[0], **of_rock), **given
     )
 

@@ -8,7 +8,7 @@ from typing import Final
 import click
 from click.core import ParameterSource
 
-from hand_models.base import InvalidInputError, within
+from hand_models.base import InvalidInputError, errors_under
 from service import processes, sweeping, tables
 from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
@@ -96,7 +96,7 @@ def sweep(
         raise InvalidInputError("is of one number that varies alone", field="--tolerance")
     pair = None if over is None else over.split(",")
     if pair is not None:
-        with within("--over"):
+        with errors_under("--over"):
             design.places_of(pair)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)

@@ -10,8 +10,8 @@ from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     Axis,
     Conditions,
+    GripperSweep,
     HullPoints,
-    Sweep,
     radius_axes,
     rest_state,
     sharpened,
@@ -109,7 +109,7 @@ def test_a_grasp_that_cannot_be_is_a_cell_of_its_own(table):
     found = sweep_map(table, bases, slope, CONDITIONS, ["normal"], quiet)
     assert found["state"].tolist() == [["holds", "no grasp"]] * 2
     with pytest.raises(InvalidInputError, match="too far"):
-        Sweep("gripper.base_half_spacing=0.4:0.5:2", "gripper.pull_off_slope=3:4:2").run(
+        GripperSweep("gripper.base_half_spacing=0.4:0.5:2", "gripper.pull_off_slope=3:4:2").run(
             quiet, hand_table()
         )
 
@@ -119,7 +119,7 @@ def test_a_hand_of_ones_own_is_where_the_sweep_begins():
     radii = hand_table().quantity("finger", "pulley_radii")
     own = Quantity([0.0055, 0.0040, 0.0020], radii.unit, "assumed")
     hand = hand_table().replaced(ParameterTable({"finger": {"pulley_radii": own}}))
-    sweep = Sweep(
+    sweep = GripperSweep(
         "finger.pulley_radii[1]=0.003:0.004:2",
         "finger.pulley_radii[2]=0.001:0.002:2",
         CONDITIONS,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import spearmanr
 
 from hand_models.base import InvalidInputError, Pose
-from hand_models.parameters import Draw, bundled_draws, own_draw, own_hand, own_surfaces
+from hand_models.parameters import ParameterSample, bundled_draws, own_draw, own_hand, own_surfaces
 from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.capability import BodySpace
@@ -32,7 +32,7 @@ def entry(value, unit: str) -> dict[str, object]:
     return {"value": value, "unit": unit, "source": "assumed"}
 
 
-def drawn(rock: float | None = None, **hand) -> Draw:
+def drawn(rock: float | None = None, **hand) -> ParameterSample:
     """A draw with another strength of rock, and entries of the hand by section."""
     surfaces = {} if rock is None else {"rock": {"shear_limit": entry(rock, "N")}}
     return own_draw({"hand": hand, "surfaces": surfaces})
@@ -63,7 +63,7 @@ def asked_of(name: str, **kwargs) -> Question:
     )
 
 
-def on_draw(asked: Question, draw: Draw) -> Question:
+def on_draw(asked: Question, draw: ParameterSample) -> Question:
     """The same question of a robot that has a draw's hands, on rock that has its strength."""
     stance = asked.stance
     surfaces = own_surfaces(draw.surfaces)
