@@ -12,7 +12,7 @@ from planner.advice.combinations import CombinationSearch
 from planner.advice.hands import TURNS, WAYS, closings, grasps, lettings, placed
 from planner.advice.new_holds import try_new_holds
 from planner.advice.strength import lighter, stronger
-from planner.advice.trials import PLANS, Attempt, Trial, Trials, Tried
+from planner.advice.trials import PLANS, Attempt, StanceTrial, Trials, Tried
 from planner.deadline import DeadlineError
 from planner.programs import SLACK
 from planner.question import Question
@@ -150,7 +150,7 @@ def _ranked(trials: Trials) -> list[Tried]:
     return found
 
 
-def _advice(trials: Trials, change: Change, trial: Trial) -> Advice:
+def _advice(trials: Trials, change: Change, trial: StanceTrial) -> Advice:
     """Return a change and its trial as an advice."""
     holds, factor = trials.holds(trial.utilisation), trial.load_factor()
     return Advice(

@@ -58,7 +58,7 @@ def measured(draw: ParameterSample, hand: ParameterTable) -> dict[str, Array]:
 
     Parameters
     ----------
-    draw : Draw
+    draw : ParameterSample
     hand : ParameterTable
         All numbers of the hand that the draw changes.
 

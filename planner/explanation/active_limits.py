@@ -21,7 +21,7 @@ __all__ = [
     "close_to",
     "joint_name",
     "limit_name",
-    "unit_of",
+    "limit_unit",
 ]
 
 BINDING: Final = 1e-6
@@ -37,7 +37,7 @@ UNITS: Final = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·
 """Units of limits that are not in newtons."""
 
 
-def unit_of(limit: str) -> str:
+def limit_unit(limit: str) -> str:
     """Return the unit of a limit's capacity."""
     return UNITS.get(limit, "N")
 
@@ -119,7 +119,7 @@ class ActiveLimits:
         dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
         each = self._weights * utilisation / self._capacities
         price = np.bincount(self._of_row, each, len(names)).tolist()
-        return tuple(Price.of(names[i], price[i], unit_of(names[i].limit)) for i in dear)
+        return tuple(Price.of(names[i], price[i], limit_unit(names[i].limit)) for i in dear)
 
     def limiting(
         self, used: Array, utilisation: float, idle: Sequence[LimitUse]

@@ -23,10 +23,10 @@ __all__ = [
     "body_wrench",
     "curved",
     "effort",
-    "holds",
     "least_tensions",
     "less_tension",
     "load_factor",
+    "loads_are_feasible",
     "margin",
     "nearest",
     "nearest_body",
@@ -186,7 +186,7 @@ def nearest_body(data: StanceData) -> Outcome:
     return Nearest(data, len(data.wrench) - 6).solve()
 
 
-def holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
+def loads_are_feasible(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
     """Return whether loads y balance, and keep hard rows and limits at a cap, within `SLACK`."""
     error = np.abs(body_wrench(data, loads) - data.wrench).max()
     balances = bool(error <= SLACK * max(1.0, float(np.abs(data.wrench).max())))

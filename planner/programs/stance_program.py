@@ -27,8 +27,8 @@ from planner.programs.conic import (
     SOLVERS,
     Columns,
     ConicProgram,
+    ConicSolver,
     Outcome,
-    Solver,
 )
 from planner.programs.stance_data import StanceData, parted
 
@@ -201,7 +201,7 @@ class StanceProgram(ABC):
         for settings in self.settings[1:]:
             if found.status in ENDS or deadline.expired():
                 break
-            found = Solver(program, settings).solve()
+            found = ConicSolver(program, settings).solve()
         ended = found.status in ENDS or deadline.expired()
         if not ended and all(
             np.isfinite(part).all()

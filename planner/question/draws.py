@@ -61,7 +61,7 @@ def drawn_hands(
     ----------
     hand : HandModel
         Of the stance: what a draw leaves open is as with this one.
-    draws : tuple of Draw, optional
+    draws : tuple of ParameterSample, optional
         The bundled ones by default.
 
     Raises

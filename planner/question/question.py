@@ -57,7 +57,7 @@ class Question:
         Tensions of tendons now, by limb [N].
     deadline : float, optional
         How long the answer may take [s]; as long as it takes by default.
-    draws : tuple of Draw, optional
+    draws : tuple of ParameterSample, optional
         Samples of the ``spread``; those of ``draws.toml`` by default.
     explain : bool
         Whether it is proven and reported what keeps an overloaded or infeasible stance from a plan.

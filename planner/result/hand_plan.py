@@ -69,7 +69,7 @@ class HandPlan:
         Share of each tile's spines that are on the rock, and part of a whole tile's strength that
         limits its load, as of `SettledHand`.
     tile_utilisations : ndarray, shape (n,)
-    tiles : tuple of Tile
+    tiles : tuple of SettledTile
         Their names and contacts.
     half_planes : tuple of HalfPlane
         Limits of each whole tile that is no nail.
@@ -171,7 +171,7 @@ class PlanArrays(NamedTuple):
     palm_utilisations : ndarray, shape (H,)
     wrenches : ndarray, shape (H, 6)
     utilisations : ndarray, shape (H,)
-    tiles : tuple of tuple of Tile
+    tiles : tuple of tuple of SettledTile
     half_planes : tuple of tuple of HalfPlane
         Of each hand's whole tiles.
     engaged : tuple of sequence of int

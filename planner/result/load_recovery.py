@@ -113,7 +113,7 @@ def _layout_of(
 
     Parameters
     ----------
-    tiles : tuple of tuple of Tile
+    tiles : tuple of tuple of SettledTile
         By hand, and so are the others.
     columns : tuple of tuple of str
     names : tuple of tuple of Row

@@ -91,7 +91,7 @@ class Route:
         As of every stage's question.
     want : frozenset of str
         Extras of every stage's question, beside its load factor.
-    draws : tuple of Draw, optional
+    draws : tuple of ParameterSample, optional
         As of every stage's question.
     """
 

@@ -30,7 +30,7 @@ import numpy.typing as npt
 from hand_models.base import Array
 from planner.programs import StanceData
 
-__all__ = ["ApartError", "Face", "Mask", "Optimum", "Point", "Rows", "optimum"]
+__all__ = ["ActiveFace", "ApartError", "Mask", "Optimum", "Point", "Rows", "optimum"]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -99,7 +99,7 @@ class ApartError(Exception):
     """Active rows do not meet."""
 
 
-class Face:
+class ActiveFace:
     """The points where some rows are active, ready for Newton's steps.
 
     Parameters
@@ -186,14 +186,14 @@ class Optimum(NamedTuple):
     """An optimum, and the face that it is the least point of."""
 
     point: Point
-    face: Face
+    face: ActiveFace
 
 
 def optimum(
     rows: Rows,
     Q: Array,
     start: Point,
-    first: Mask | Face,
+    first: Mask | ActiveFace,
     rounds: int,
     weight: float = 1.0,
     *,
@@ -207,7 +207,7 @@ def optimum(
     Q : ndarray, shape (M,)
     start : Point
         About feasible, unless its active rows are those of the optimum.
-    first : ndarray of bool or Face
+    first : ndarray of bool or ActiveFace
         The rows that are active at first.
     rounds : int
         Sets of active rows that are tried at most.
@@ -221,12 +221,12 @@ def optimum(
     ApartError
         If active rows do not meet.
     """
-    face = first if isinstance(first, Face) else None
-    active = first.active.copy() if isinstance(first, Face) else first.copy()
+    face = first if isinstance(first, ActiveFace) else None
+    active = first.active.copy() if isinstance(first, ActiveFace) else first.copy()
     z, u, multipliers = start.z, start.u, np.where(active, start.multipliers, 0.0)
     for taken in range(rounds):
         if face is None:
-            face = Face(rows, Q, active)
+            face = ActiveFace(rows, Q, active)
         found = face.least(Point(z, u, multipliers), weight, fixed=fixed)
         after = rows.room(found.z, found.u)
         after[active] = 0.0

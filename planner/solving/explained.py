@@ -26,11 +26,11 @@ from planner.explanation import (
     far_wrists,
     idle_preloads,
     limit_sentence,
+    limit_unit,
     overload_sentence,
     shortfall_sentence,
     strained_preloads,
     tension_path,
-    unit_of,
     unsafe_sentence,
 )
 from planner.prepare import PreparedStance
@@ -295,5 +295,5 @@ def _prices(binding: ActiveLimits, found: Verified, idle: Sequence[LimitUse]) ->
     if most is not None and most.utilisation > found.utilisation + SLACK:
         # a limb without a hand bears the most: nothing else counts
         price = most.utilisation / most.capacity
-        return (Price.of(most.name, price, unit_of(most.name.limit)),)
+        return (Price.of(most.name, price, limit_unit(most.name.limit)),)
     return binding.prices(found.solution.least.value)

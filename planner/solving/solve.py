@@ -12,7 +12,7 @@ import numpy as np
 
 from hand_models.base import Array, finite_vector
 from planner import deadline, programs
-from planner.advice import Trial, advise
+from planner.advice import StanceTrial, advise
 from planner.deadline import Budget, late_sentence
 from planner.explanation import LimitUse, certify
 from planner.floating import PROGRAMS
@@ -184,7 +184,7 @@ def try_stance(
     prepared: PreparedStance,
     idle: Sequence[LimitUse] | None = None,
     near: Solution | None = None,
-) -> Trial:
+) -> StanceTrial:
     """Return the verified plan of a stance, of which no store keeps anything.
 
     Parameters
@@ -203,7 +203,7 @@ def try_stance(
     overloaded = checks.overloaded
     factor = partial(load_factor_of, prepared, answer, budget, overloaded=overloaded)
     solution, whole = answer.solution, answer.whole
-    return Trial(prepared, solution.sets.data, solution.least, whole, factor)
+    return StanceTrial(prepared, solution.sets.data, solution.least, whole, factor)
 
 
 class KnownStance:

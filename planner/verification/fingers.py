@@ -15,11 +15,11 @@ from planner.prepare import CONTACTS
 from planner.result import PlanArrays
 from planner.verification.residuals import (
     COUNT,
-    Limits,
-    Names,
+    PartNames,
     Recomputed,
     RecomputedNails,
     Residual,
+    ResidualLimits,
     claim,
 )
 
@@ -39,12 +39,12 @@ SIDES: Final = np.array([[1.0], [-1.0]])
 """Signs of a lateral reaction to either side."""
 
 
-class DriveLimits(Limits):
+class DriveLimits(ResidualLimits):
     """Limits of tendons, motors and fingers, and the angles of their winches.
 
     Parameters
     ----------
-    names : Names
+    names : PartNames
     left : ndarray, shape (T,)
         Part of a tendon's tension that is left at each tile.
     strength : float
@@ -53,7 +53,7 @@ class DriveLimits(Limits):
         Fingers whose nails hook.
     """
 
-    def __init__(self, names: Names, left: Array, strength: float, hooked: Indices) -> None:
+    def __init__(self, names: PartNames, left: Array, strength: float, hooked: Indices) -> None:
         known = names.known
         hands, index, body = known.hands, known.places, known.hands[0].hand
         self._names, self._places, self._body, self._hooked = names, index, body, hooked
@@ -117,7 +117,7 @@ class NailLimits:
 
     Parameters
     ----------
-    names : Names
+    names : PartNames
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class NailLimits:
         Which of the tiles they are, and whose, counted through all hands.
     """
 
-    def __init__(self, names: Names) -> None:
+    def __init__(self, names: PartNames) -> None:
         known, self._names = names.known, names
         self.tiles = np.flatnonzero(known.touch.contacts == CONTACTS[NAIL])
         self.fingers = known.places.finger[self.tiles]

@@ -17,7 +17,7 @@ from planner.prepare import BALL, Posture
 from planner.question import ForceCap, Question
 from planner.result import PlanArrays
 from planner.robots import LimbTorques, LinkTree
-from planner.verification.residuals import COUNT, Limits, Names, Recomputed, Residual
+from planner.verification.residuals import COUNT, PartNames, Recomputed, Residual, ResidualLimits
 
 __all__ = ["AskedLimits", "JointUse", "check_limbs", "recompute_joints"]
 
@@ -223,16 +223,16 @@ def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
     return _Cap(hand, turn[axis] / ends[axis, end][:, None], none, axes, ball=False)
 
 
-class AskedLimits(Limits):
+class AskedLimits(ResidualLimits):
     """Limits that a question puts on hands: caps, given wrenches, small changes of tensions.
 
     Parameters
     ----------
     question : Question
-    names : Names
+    names : PartNames
     """
 
-    def __init__(self, question: Question, names: Names) -> None:
+    def __init__(self, question: Question, names: PartNames) -> None:
         hands, limits, present = question.stance.hands, question.limits, question.present
         self._names = names
         self._caps = [

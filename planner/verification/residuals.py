@@ -1,8 +1,8 @@
 """Residuals of limits and laws in a plan's numbers, and whether they are more than rounding.
 
-Every kind of limit (`Limits`) recomputes its residuals from the numbers of a plan, and nothing else
-says what the limit is: the check of a plan judges these, and the check of a stream tabulates those
-that are affine in the loads.
+Every kind of limit (`ResidualLimits`) recomputes its residuals from the numbers of a plan, and
+nothing else says what the limit is: the check of a plan judges these, and the check of a stream
+tabulates those that are affine in the loads.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ __all__ = [
     "LOAD",
     "NEAR",
     "UTILISATION",
-    "Limits",
-    "Names",
+    "PartNames",
     "Recomputed",
     "RecomputedNails",
     "Residual",
+    "ResidualLimits",
     "allowed_errors",
     "claim",
     "is_near",
@@ -140,7 +140,7 @@ class Residual(NamedTuple):
             yield self.name(row) + self.text.format(*numbers)
 
 
-class Limits(ABC):
+class ResidualLimits(ABC):
     """One kind of limits of the hands of a stance."""
 
     @abstractmethod
@@ -190,7 +190,7 @@ def allowed_errors(known: HandBatch, arrays: PlanArrays) -> Array:
     return np.asarray(LOAD * np.fmax(largest, 1.0))
 
 
-class Names(NamedTuple):
+class PartNames(NamedTuple):
     """Names of what hands have: ``front_left: proximal tile of inner_right``."""
 
     limbs: tuple[str, ...]

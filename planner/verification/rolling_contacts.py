@@ -16,7 +16,7 @@ from hand_models.base import Array
 from hand_models.finger import Contact, FingerModel
 from hand_models.sections import Section
 
-__all__ = ["Face", "slip_of"]
+__all__ = ["TileFace", "slip_of"]
 
 BESIDE: Final = 4e-3
 """Distance beside a contact at which the rock is looked at, and at twice that [m]."""
@@ -31,7 +31,7 @@ FLATTEST: Final = 10.0
 """Radius of rock from which on faces slide on it as on a flat, by the model [m]."""
 
 
-class Face(NamedTuple):
+class TileFace(NamedTuple):
     """A tile's face in its phalanx's axes, turned by the contact's tilt.
 
     Attributes
@@ -57,7 +57,7 @@ class Face(NamedTuple):
     lies: bool
 
     @classmethod
-    def of(cls, contact: Contact, model: FingerModel, depth: float) -> Face:
+    def of(cls, contact: Contact, model: FingerModel, depth: float) -> TileFace:
         way = contact.angle + contact.tilt
         arm = complex(contact.along, model.tile_height + contact.rise)
         arm *= cmath.rect(1.0, -contact.tilt)
@@ -78,7 +78,7 @@ class Face(NamedTuple):
 
 
 def slip_of(
-    section: Section, face: Face, points: tuple[Array, Array], after: tuple[float, Array]
+    section: Section, face: TileFace, points: tuple[Array, Array], after: tuple[float, Array]
 ) -> tuple[float | None, float]:
     """Return how far a tile slipped, and how far off the place is where it is said to bear [m].
 

@@ -24,7 +24,7 @@ from hand_models import Grasp, Plane, Sphere
 from hand_models.base import Pose
 from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plan_plots, plot_plan
-from planner.pictures.plan_scene import scene_of, view_directions
+from planner.pictures.plan_scene import drawn_scene, view_directions
 from planner.pictures.plan_views import BODY, COLOURS, LIMB, silhouette
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.robots import RobotFile, robot_of
@@ -209,7 +209,7 @@ def test_under_a_ceiling_the_body_and_its_weight_are_seen_beside_the_hands(off):
     question = Question(on_wall(overhang=math.pi / 2, off=off))
     plan = replace(answered("ceiling")[1], hands=None, joints=None, certificate=None)
     axes = draw_plan(plan, question).axes[0]
-    scene = scene_of(plan, question)
+    scene = drawn_scene(plan, question)
 
     def seen(places):
         return np.column_stack(proj3d.proj_transform(*np.transpose(places), axes.get_proj())[:2])
@@ -284,7 +284,7 @@ def test_large_numbers_stay_in_their_cells():
 @pytest.mark.parametrize("name", ["solved", "overloaded"])
 def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name):
     question, plan = answered(name)
-    *forces, load = scene_of(plan, question).arrows
+    *forces, load = drawn_scene(plan, question).arrows
     ends, colours = arrows(panels(drawn(name))[1])
     assert len(ends) == len(forces) + 1
     for arrow, colour, hand, planned in zip(
@@ -305,7 +305,7 @@ def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name
 def test_limbs_are_drawn_where_the_model_has_them(name):
     question, plan = answered(name)
     stance = question.stance
-    lines = [line.points for line in scene_of(plan, question).lines if line.kind == "limb"]
+    lines = [line.points for line in drawn_scene(plan, question).lines if line.kind == "limb"]
     limbs = dict(zip(stance.robot.limbs, lines, strict=True))
     space, facing, _ = panels(drawn(name))
     for limb, in_space, from_behind in zip(
@@ -398,10 +398,10 @@ def test_hands_and_limbs_are_named_and_hands_behind_each_other_share_a_note():
 def test_the_load_is_called_a_weight_only_where_it_is_the_robots():
     for name in ("solved", "plain"):
         question, plan = answered(name)
-        assert scene_of(plan, question).arrows[-1].text == "weight 1082 N"
+        assert drawn_scene(plan, question).arrows[-1].text == "weight 1082 N"
         assert "weight 1082 N" in words(drawn(name).axes[1])
     question, plan = answered("overloaded")
-    load = scene_of(plan, question).arrows[-1]
+    load = drawn_scene(plan, question).arrows[-1]
     assert load.text == "load 3924 N"
     np.testing.assert_allclose(load.start, question.stance.body.apply((0.1, 0.2, -0.1)))
     np.testing.assert_allclose(load.force, [0.0, 0.0, -400.0 * 9.81])
@@ -409,7 +409,7 @@ def test_the_load_is_called_a_weight_only_where_it_is_the_robots():
     given = Question(question.stance, body_wrench=np.array([500.0, 0, 0, 0, 0, 30.0]))
     com = question.stance.robot.com_at(plan.joints)
     about = -np.array([0.0, 0, 30.0]) + np.cross(com, [500.0, 0, 0])
-    load = scene_of(solve.plan(given), given).arrows[-1]
+    load = drawn_scene(solve.plan(given), given).arrows[-1]
     assert load.text == f"load 500 N\nand {np.linalg.norm(about):.0f} N·m"
 
 
@@ -468,7 +468,7 @@ def test_a_scene_has_all_capsules_as_triangles_that_face_outward():
     question, plan = answered("solved")
     robot, body = question.stance.robot, question.stance.body
     ends, radii = robot.placed_capsules(plan.joints), robot.capsules.radii
-    scene = scene_of(plan, question)
+    scene = drawn_scene(plan, question)
     drawn_capsules = [*triangles(scene, "body"), *triangles(scene, "link")]
     assert len(drawn_capsules) == len(ends)
     for found, segment, radius in zip(drawn_capsules, ends, radii, strict=True):
@@ -479,7 +479,7 @@ def test_a_scene_has_all_capsules_as_triangles_that_face_outward():
         assert ((outward * away).sum(axis=1) >= -1e-15).all()
     question, plan = answered("plain")
     assert plan.joints is None
-    assert triangles(scene_of(plan, question), "link") == []
+    assert triangles(drawn_scene(plan, question), "link") == []
 
 
 def test_the_outline_of_a_convex_surface_is_the_hull_of_how_it_is_seen():
@@ -500,7 +500,7 @@ def test_the_outline_of_a_convex_surface_is_the_hull_of_how_it_is_seen():
 
 def test_a_robot_without_capsules_of_its_body_has_the_hull_of_its_shoulders():
     question, plan = answered("two limbs")
-    (torso,) = triangles(scene_of(plan, question), "body")
+    (torso,) = triangles(drawn_scene(plan, question), "body")
     shoulders = [
         question.stance.body.apply(question.stance.robot.link_chain(plan.joints, limb)[0])
         for limb in question.stance.robot.limbs
@@ -514,7 +514,7 @@ def test_a_scene_is_plain_data_of_which_matplotlib_knows_nothing():
     code = "import sys, planner.pictures.plan_scene; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
     assert done.stdout.strip() == "False"
-    scene = scene_of(plan, question)
+    scene = drawn_scene(plan, question)
     assert {surface.kind for surface in scene.surfaces} == {"rock", "palm", "body", "link"}
     assert all(surface.triangles.shape[1:] == (3, 3) for surface in scene.surfaces)
     assert [arrow.kind for arrow in scene.arrows] == ["force"] * 4 + ["load"]

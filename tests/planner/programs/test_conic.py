@@ -17,7 +17,7 @@ from hand_models.base import stores
 from hand_models.rock import Cylinder
 from planner import deadline
 from planner.programs import TensionTrade, conic, program, solvers, stance_program
-from planner.programs.conic import Columns, ConicProgram, Solver, Solvers
+from planner.programs.conic import Columns, ConicProgram, ConicSolver, Solvers
 from planner.programs.stance_data import HandData, StanceData
 from planner.programs.stance_program import SETTINGS, StanceProgram
 from tests.suite.helpers.checkout import ROOT
@@ -170,9 +170,9 @@ def test_where_the_solver_gives_up_cvxpy_comes_to_the_same(data, monkeypatch, ki
     asked = real_programs(data)[kind]
     fast, further = asked.run()
     assert fast.solved
-    gives_up = conic.Solution(conic.FAILED)
+    gives_up = conic.ConicSolution(conic.FAILED)
     monkeypatch.setattr(stance_program.SOLVERS, "solve", lambda *_: gives_up)
-    monkeypatch.setattr(Solver, "solve", lambda _: gives_up)
+    monkeypatch.setattr(ConicSolver, "solve", lambda _: gives_up)
     slow, theirs = asked.run()
     assert slow.solved
     ours, value = (
@@ -216,7 +216,7 @@ def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
     fourth = first._replace(A=(Columns.of(np.where(np.abs(A) < 0.3, 0.0, A)),))
     kept = Solvers(2)
     for asked in (first, second, third, fourth, first):
-        found, fresh = kept.solve(asked, SETTINGS), Solver(asked, SETTINGS).solve()
+        found, fresh = kept.solve(asked, SETTINGS), ConicSolver(asked, SETTINGS).solve()
         assert found.status == fresh.status
         for name in ("x", "multipliers"):
             np.testing.assert_array_equal(getattr(found, name), getattr(fresh, name))
