@@ -74,7 +74,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
         contacts=_contacts(settled),
         closing=[],
         tension_limits=[
-            replies.TensionLimit(
+            replies.TensionLimitReply(
                 finger=each.finger, tension=finite(each.tension), phalanx=each.phalanx
             )
             for each in tension_limits(settled)
@@ -96,11 +96,11 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> Wrench
     return reply
 
 
-def _contacts(settled: SettledHand) -> list[replies.Contact]:
+def _contacts(settled: SettledHand) -> list[replies.ContactReply]:
     """Return the contact of each tile with the rock."""
     places = zip(settled.tiles, settled.positions.tolist(), settled.axes.tolist(), strict=True)
     return [
-        replies.Contact(
+        replies.ContactReply(
             finger=tile.finger,
             phalanx=tile.phalanx,
             contact=tile.contact,
@@ -121,13 +121,13 @@ def _stop(settled: SettledHand, tile: SettledTile) -> str | None:
     return finger.contacts[PHALANGES.index(tile.phalanx)].stop
 
 
-def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
+def _closings(settled: SettledHand) -> list[replies.ClosingSequenceReply]:
     """Return the closure of each finger, and those for rock a little elsewhere."""
     return [
-        replies.ClosingSequence(
+        replies.ClosingSequenceReply(
             finger=closing.finger,
             stages=[
-                replies.ClosingStage(part=each.part, starts=each.starts, ends=each.ends)
+                replies.ClosingStageReply(part=each.part, starts=each.starts, ends=each.ends)
                 for each in closing.stages
             ],
             in_order=bool(closing.in_order),
@@ -218,10 +218,10 @@ def _add_views(
         reply.warnings = []
 
 
-def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
+def _half_spaces(space: WrenchSpace) -> replies.HalfSpacesReply:
     deadline.check(REACH)
     faces = space.half_spaces()
-    return replies.HalfSpaces(
+    return replies.HalfSpacesReply(
         normals=faces.normals.tolist(),
         offsets=faces.offsets.tolist(),
         equations=replies.HalfSpaceEquations(

@@ -20,7 +20,7 @@ from service.answering.stances import (
     stance,
     with_rocks,
 )
-from service.replies import RouteReply, RouteStage
+from service.replies import RouteReply, RouteStageReply
 
 if TYPE_CHECKING:
     from planner import Route
@@ -125,7 +125,7 @@ def climb(request: requests.RouteRequest, robots: Robots = ROBOTS) -> RouteReply
         load_factor_status=result.load_factor_status,
         limiting=crux.limiting,
         stages=[
-            RouteStage(
+            RouteStageReply(
                 move=stage.move,
                 phase=stage.phase,
                 limb=stage.limb,

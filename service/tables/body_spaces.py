@@ -50,7 +50,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     _print_accelerations(reply, out)
 
 
-def _print_section(section: replies.BodySection, out: Console) -> None:
+def _print_section(section: replies.BodySectionReply, out: Console) -> None:
     """Print the size of a plane's part that is held."""
     plane = f"plane of {' and '.join(section.axes)}, {OTHERS[section.others]}"
     if not section.inner or section.gap is None:

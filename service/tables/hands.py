@@ -145,7 +145,7 @@ def _print_closing(reply: replies.WrenchSpaceReply, out: Console) -> None:
     print_rows(rows, columns, out, title)
 
 
-def _nearby_sentence(closing: replies.ClosingSequence) -> str:
+def _nearby_sentence(closing: replies.ClosingSequenceReply) -> str:
     """Return in a sentence which closures a finger has on rock a little elsewhere."""
     ends = f", or {', '.join(closing.nearby)}" if closing.nearby else ""
     return (

@@ -141,7 +141,9 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
         yield f"{1e3 * reply.time.total:.0f} ms"
 
 
-def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out: Console) -> None:
+def _print_certificate(
+    proof: replies.CertificateReply, needed: Sequence[float], out: Console
+) -> None:
     """Print the missing wrench, the nearest one that is held, and the limits in the way."""
     if proof.shortfall is not None and proof.nearest is not None:
         where = "at any utilisation"
@@ -205,7 +207,7 @@ def _load_factor(reply: replies.PlanReply) -> str:
     return f"{reply.load_factor:.3f}"
 
 
-def _print_hands(hands: Sequence[replies.Hand], out: Console) -> None:
+def _print_hands(hands: Sequence[replies.HandReply], out: Console) -> None:
     """Print the load of each hand, the twist of floating wrists, and the tendons of each finger."""
     print_rows(hands, HANDS, out, "wrench on the rock, in H [N, N·m], and the palm's part")
     floating = [hand for hand in hands if hand.wrist.twist is not None]

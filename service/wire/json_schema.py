@@ -38,7 +38,7 @@ from service.wire.keys import (
     service_key,
 )
 
-__all__ = ["KEYS", "MESSAGES", "schema"]
+__all__ = ["KEYS", "MESSAGES", "part_name", "schema"]
 
 MESSAGES: Final[tuple[type[msgspec.Struct], ...]] = (
     PlanRequest,
@@ -69,8 +69,8 @@ KEYS: Final[dict[str, tuple[type[msgspec.Struct] | None, tuple[type[msgspec.Stru
 }
 """Request of each key, if it takes one, and the possible replies."""
 
-REPLIES: Final = "service.replies."
-"""Module prefix of parts of replies; a part of a request may have the same name."""
+ALIKE: Final = frozenset({"Hand"})
+"""Names of a request's part that a reply's part has too; the reply's keeps its ending ``Reply``."""
 
 
 def schema() -> dict[str, Any]:
@@ -81,12 +81,14 @@ def schema() -> dict[str, Any]:
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGES, Quantity), ref_template="#/$defs/{name}"
     )
-    names = {name: _plain_name(name, part["title"]) for name, part in parts.items()}
+    names = {name: part_name(part["title"]) for name, part in parts.items()}
     assert len({*names.values()}) == len(parts)
-    for part in parts.values():
+    for name, part in parts.items():
+        if part["title"].endswith("Reply"):
+            part["title"] = names[name]
         # fields of later versions are left out
-        for name in LATER.keys() & part.get("properties", {}).keys():
-            del part["properties"][name]
+        for field in LATER.keys() & part.get("properties", {}).keys():
+            del part["properties"][field]
         # keep the first sentence of a docstring
         if "description" in part:
             part["description"] = part["description"].partition("\n\n")[0]
@@ -99,9 +101,11 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _plain_name(name: str, title: str) -> str:
-    """Return a part's name without module and parameters; a reply's part gets the suffix Reply."""
-    return title.partition("[")[0] + ("Reply" if name.startswith(REPLIES) else "")
+def part_name(title: str) -> str:
+    """Return the schema's name of a class: no parameters, and no Reply after a part of a reply."""
+    name = title.partition("[")[0]
+    short = name.removesuffix("Reply")
+    return name if short in ALIKE or name in {each.__name__ for each in MESSAGES} else short
 
 
 def _renamed(part: Any, names: Mapping[str, str]) -> Any:

@@ -20,7 +20,7 @@ from planner.robots import robosimian
 from planner.solving import plan
 from service.answering import questions
 from service.answering.answers import plan_reply
-from service.replies import Certificate, PlanReply
+from service.replies import CertificateReply, PlanReply
 from service.requests import PlanRequest
 from service.tables import print_plan
 from tests.suite.helpers import peer
@@ -246,7 +246,7 @@ def test_weak_joints_are_named():
 # As it travels ----------------------------------------------------------------------------------
 
 
-def reply_of(request: dict) -> tuple[PlanReply, Certificate]:
+def reply_of(request: dict) -> tuple[PlanReply, CertificateReply]:
     question = questions.question(msgspec.convert(request, PlanRequest))
     reply = plan_reply(plan(question), None, model=True)
     read = msgspec.json.decode(msgspec.json.encode(reply), type=PlanReply)
