@@ -24,7 +24,7 @@ from service.wire import PLAN, Answer, Format, MalformedError
 if TYPE_CHECKING:
     from planner import RobotFile
 
-__all__ = ["About", "Setting", "about", "answer_chunk", "grouped", "own_versions"]
+__all__ = ["About", "Setting", "about", "answer_chunk", "grouping_order", "own_versions"]
 
 SETTINGS: Final = 4
 """Settings whose models and files a process keeps."""
@@ -209,7 +209,7 @@ def _digest(*parts: msgspec.Raw) -> bytes:
     return found.digest()
 
 
-def grouped(abouts: Sequence[About]) -> list[int]:
+def grouping_order(abouts: Sequence[About]) -> list[int]:
     """Return the indices of questions so that what is about the same stands together.
 
     Groups, and questions within them, stay in the order of their first ones.

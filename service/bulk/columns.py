@@ -16,7 +16,7 @@ from hand_models.hand import FINGERS
 from planner import LimitName
 from service.replies import AXES, ErrorDetail
 
-__all__ = ["INDEX", "Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
+__all__ = ["INDEX", "Column", "TableRow", "chosen_columns", "columns_of", "route_columns", "row_of"]
 
 Kind = Literal["int", "float", "bool", "text"]
 
@@ -54,7 +54,7 @@ class Column(NamedTuple):
     path: tuple[str | int, ...] = ()
 
 
-class Row(msgspec.Struct):
+class TableRow(msgspec.Struct):
     """Row of a table for one answer: the chosen values, and always its status and error."""
 
     values: list[Any]
@@ -172,12 +172,12 @@ def chosen_columns(
     )
 
 
-def row_of(payload: bytes, columns: Sequence[Column]) -> Row:
+def row_of(payload: bytes, columns: Sequence[Column]) -> TableRow:
     """Return a reply in JSON, brief or whole, or an error as a row of columns but ``index``."""
     reply = msgspec.json.decode(payload)
     error = reply.get("error")
     values = _readable(reply)
-    return Row(
+    return TableRow(
         [_at(values, column.path or (column.name,)) for column in columns if column.name != INDEX],
         reply.get("status"),
         None if error is None else msgspec.convert(error, ErrorDetail),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import Setting, about, grouped
+from service.bulk.chunks import Setting, about, grouping_order
 from service.bulk.pools import LARGEST, Here, Pool, pool_on
 from service.requests import PlanRequest, RouteRequest
 from service.wire import PLAN, Answer, Format, LostError, MalformedError, encode_error, identifier
@@ -210,7 +210,7 @@ class _Work:
         """Give out chunks of questions about the same, as far as may be."""
         abouts = [about(payload, self._form) for _, payload in window]
         chunk, size, rock = _Chunk([], []), 0, b""
-        for k in grouped(abouts):
+        for k in grouping_order(abouts):
             place, payload = window[k]
             size += len(payload)
             if chunk.places and (len(chunk.places) == self._together or size > BYTES):

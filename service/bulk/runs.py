@@ -20,7 +20,7 @@ import msgspec
 
 from hand_models.base import InvalidInputError
 from planner import Time
-from service.bulk.columns import INDEX, Column, Row, row_of
+from service.bulk.columns import INDEX, Column, TableRow, row_of
 from service.bulk.exports import exporter_at
 from service.bulk.headers import HEADER, RESUME, Header
 from service.bulk.lines import Asked
@@ -208,7 +208,7 @@ class ReplyLines(Run):
         return reply.outcome
 
 
-class _RowLine(Row, omit_defaults=True, kw_only=True):
+class _RowLine(TableRow, omit_defaults=True, kw_only=True):
     """A row as a line: with a digest of the question that it answers."""
 
     asked: str
@@ -272,7 +272,7 @@ class TableLines(Run):
                 f"{table}: no table that a batch has written, or a sweep", field=RESUME
             )
 
-    def row(self, payload: bytes) -> Row:
+    def row(self, payload: bytes) -> TableRow:
         """Return what the table says of the answer to the next question."""
         return row_of(payload, self._described)
 
@@ -290,7 +290,7 @@ class TableLines(Run):
             values = ([i, *each] for i, each in enumerate(values))
         self._export(self._table, self._described, values)
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[TableRow]:
         """Yield the rows of what is answered, in order."""
         assert self.file is not None
         with self.file.open("rb") as lines:

@@ -229,7 +229,7 @@ def demo(picture: Path, own: options.Own, as_json: bool) -> int:
             stance = msgspec.structs.replace(request.stance, joints=None)
             request = msgspec.structs.replace(request, stance=stance)
             reply = client.plan(request)
-    tables.draw_plan(answering.planned(request, own.robots), picture)
+    tables.write_plan_picture(answering.planned(request, own.robots), picture)
     status = tables.show(reply, as_json)
     if not as_json:
         tables.console().print(f"picture: {picture}")

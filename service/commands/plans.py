@@ -81,7 +81,7 @@ def plan(
             full = request.detail in (None, "full") and not brief
             bare = _without_palms(request, robots) if full else None
         if picture is not None:
-            tables.draw_plan(answer, picture)
+            tables.write_plan_picture(answer, picture)
     if not as_json:
         _print(answer, bare, brief)
         if advised or (not brief and answer.reply.status in OVER):

@@ -80,7 +80,7 @@ class HoldTrials:
 
         Parameters
         ----------
-        trials : sequence of Trial
+        trials : sequence of HoldTrial
         robust : bool, optional
             As of `hand_models.fixed_wrist.try_holds`.
 

@@ -10,7 +10,7 @@ from typing import Final, Literal
 from planner import Lane, Make, Station, resident
 from service.processes import Job
 from service.replies import ProcessHealth
-from service.serving.question import Question
+from service.serving.question import PendingQuestion
 from service.wire import Answer
 
 __all__ = ["Crew"]
@@ -68,7 +68,7 @@ class Crew:
 
     def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
         self._make, self.workers, self._memory = make, workers, memory
-        self.work: dict[Lane[Job, Answer], Question | None] = {}
+        self.work: dict[Lane[Job, Answer], PendingQuestion | None] = {}
         self.rests_until = 0.0
         self.failed_starts = 0
         self.start = 0.0
@@ -178,14 +178,14 @@ class Crew:
 
     def stop_worker(
         self, station: Station[Job, Answer], *, dead: bool = False
-    ) -> tuple[str, list[Question]]:
+    ) -> tuple[str, list[PendingQuestion]]:
         """End a process; parameters as for `Station.kill`.
 
         Returns
         -------
         how : str
             How it ended.
-        left : list of Question
+        left : list of PendingQuestion
             Questions that it had, and nobody has replied to.
         """
         asked = [self.work.pop(lane, None) for lane in station.lanes]
@@ -198,7 +198,7 @@ class Crew:
         left = [each for each in asked if each is not None and not each.replied]
         return station.kill(dead=dead), left
 
-    def left(self) -> list[Question]:
+    def left(self) -> list[PendingQuestion]:
         """Return the questions in work that nobody has replied to."""
         return [each for each in self.work.values() if each is not None and not each.replied]
 

@@ -26,11 +26,11 @@ from planner import DeadlineError, Lane, Station
 from service.processes import Job
 from service.serving.crew import Crew
 from service.serving.mail import Replies, Sender, reply_to
-from service.serving.names import Names
-from service.serving.question import Question, client_of, take
+from service.serving.names import ClientNames
+from service.serving.question import PendingQuestion, client_of, received_question
 from service.serving.shares import Shares
 from service.serving.waiting import Costs, Kind, Waiting
-from service.serving.watch import State, Watch
+from service.serving.watch import ServiceState, Watch
 from service.wire import PLAN, STREAM, Answer, Format, LostError, encode_error
 
 __all__ = ["Dispatcher"]
@@ -86,7 +86,7 @@ class Dispatcher:
         self._crew, self._seconds, self._inquire = crew, seconds, inquire
         self.watch = Watch(robot, self._state)
         self._replies = Replies(self.watch)
-        self._names, self._shares = Names(), Shares()
+        self._names, self._shares = ClientNames(), Shares()
         self._costs = Costs(self._shares)
         self._waiting = Waiting(self._shares)
         self._started = threading.Event()
@@ -234,7 +234,7 @@ class Dispatcher:
 
     def _admit(self, query: zenoh.Query, key: str, arrived: float) -> None:
         try:
-            question = take(query, key, arrived, self._seconds)
+            question = received_question(query, key, arrived, self._seconds)
         except Exception:
             log.exception("a query at %s cannot be read", key)
             unread = CruxError("the service could not read the query; its log says why")
@@ -254,7 +254,7 @@ class Dispatcher:
         self._shares.asks(question.place)
         self._put(self._costs.kind(question), question)
 
-    def _put(self, kind: Kind, question: Question) -> None:
+    def _put(self, kind: Kind, question: PendingQuestion) -> None:
         """Let a question wait; refuse the one that then has no room as busy."""
         if refused := self._waiting.put(kind, question):
             self._replies.busy(refused, len(self._waiting) / self._crew.workers)
@@ -283,7 +283,7 @@ class Dispatcher:
             if question := self._waiting.take(*kinds):
                 self._give(lane, question)
 
-    def _give(self, lane: Lane[Job, Answer], question: Question) -> None:
+    def _give(self, lane: Lane[Job, Answer], question: PendingQuestion) -> None:
         question.begun = time.perf_counter()
         self._crew.work[lane] = question
         rehearsal = question.name == STREAM and not question.rehearsed
@@ -353,22 +353,22 @@ class Dispatcher:
 
     def _end_process(
         self, station: Station[Job, Answer], why: str | None = None
-    ) -> tuple[str, list[Question]]:
+    ) -> tuple[str, list[PendingQuestion]]:
         """End a process, which another replaces; as `Crew.stop_worker`."""
         how, left = self._crew.stop_worker(station, dead=why is None)
         self.watch.ended(station.process.pid, why or how)
         return how, left
 
-    def _state(self) -> State:
+    def _state(self) -> ServiceState:
         """Return what the service does, to whatever thread."""
         if threading.current_thread() is self._thread or not self._thread.is_alive():
-            return State(self._crew.states(), self._waiting.counts())
-        found: SimpleQueue[State] = SimpleQueue()
+            return ServiceState(self._crew.states(), self._waiting.counts())
+        found: SimpleQueue[ServiceState] = SimpleQueue()
         self._post(lambda: found.put(self._state()))
         try:
             return found.get(timeout=STATE_TIMEOUT)
         except Empty:
-            return State([], {})
+            return ServiceState([], {})
 
     # the end -------------------------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from typing import Final
 
 from cachetools import LRUCache, TTLCache
 
-__all__ = ["SHARED", "Names", "digest"]
+__all__ = ["SHARED", "ClientNames", "digest"]
 
 SHARED: Final = ""
 """The place of all clients that cannot be distinguished."""
@@ -34,7 +34,7 @@ def digest(secret: bytes) -> bytes:
     return hashlib.sha256(secret).digest()
 
 
-class Names:
+class ClientNames:
     """Links and proofs that are known of the sessions that ask. For one thread.
 
     Attributes

@@ -23,7 +23,7 @@ from service.wire import (
     encode_error,
 )
 
-__all__ = ["LARGE", "Question", "client_of", "take"]
+__all__ = ["LARGE", "PendingQuestion", "client_of", "received_question"]
 
 READ: Final = 2**20
 """Most bytes of a payload that is read before its turn; a process reads larger ones."""
@@ -52,7 +52,7 @@ class _Head(msgspec.Struct):
 
 
 @dataclass(eq=False, slots=True)
-class Question:
+class PendingQuestion:
     """A query on its way.
 
     Attributes
@@ -138,7 +138,9 @@ def client_of(query: zenoh.Query) -> str:
     return "" if source is None else str(source.source_id.zid)
 
 
-def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Question:
+def received_question(
+    query: zenoh.Query, key: str, arrived: float, longest: float
+) -> PendingQuestion:
     """Return a query as a question.
 
     Parameters
@@ -166,7 +168,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
             payload = given.to_bytes()
     except LimitError as error:
         fault = error
-    question = Question(
+    question = PendingQuestion(
         query=query,
         key=key,
         name=name,
@@ -184,7 +186,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
     return question
 
 
-def _read(question: Question) -> None:
+def _read(question: PendingQuestion) -> None:
     try:
         head = question.form.decode(question.payload, _Head)
     except (MalformedError, msgspec.ValidationError):

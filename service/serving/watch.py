@@ -21,10 +21,10 @@ from prometheus_client.registry import Collector
 
 from hand_models.base import installed_version
 from service.replies import HealthReply, LastFailure, ProcessHealth
-from service.serving.question import Question
+from service.serving.question import PendingQuestion
 from service.wire import Answer, Format
 
-__all__ = ["State", "Watch"]
+__all__ = ["ServiceState", "Watch"]
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ FAILURES: Final = frozenset({"failed", "internal", "lost", "deadline"})
 """Statuses and kinds of error that are the service's, and not the question's."""
 
 
-class State(NamedTuple):
+class ServiceState(NamedTuple):
     """State of a service at this moment.
 
     Attributes
@@ -61,7 +61,7 @@ class Watch:
         Returns what the service does at this moment.
     """
 
-    def __init__(self, robot: str, state: Callable[[], State]) -> None:
+    def __init__(self, robot: str, state: Callable[[], ServiceState]) -> None:
         self._robot, self._version, self._state = robot, installed_version(), state
         self._started = time.time()
         self._failure: LastFailure | None = None
@@ -98,12 +98,12 @@ class Watch:
         """
         start_http_server(port, addr=LOOPBACK, registry=self.registry)
 
-    def count(self, question: Question, status: str, worked: float) -> None:
+    def count(self, question: PendingQuestion, status: str, worked: float) -> None:
         """Count a reply.
 
         Parameters
         ----------
-        question : Question
+        question : PendingQuestion
         status : str
             Of the reply, or the kind of an error.
         worked : float
@@ -169,7 +169,7 @@ class Watch:
 class _Now(Collector):
     """Metrics that are read at the moment when they are asked for."""
 
-    def __init__(self, state: Callable[[], State], started: float) -> None:
+    def __init__(self, state: Callable[[], ServiceState], started: float) -> None:
         self._state, self._started = state, started
 
     def describe(self) -> list[Metric]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hand_models.base import InvalidInputError, LimitError
 from service.requests import PlanRequest
-from service.sweeping.paths import Paths, Steps, Target, put
+from service.sweeping.paths import Paths, Steps, Target, set_value
 from service.sweeping.variation import Value, Variation
 from service.wire import Format, decode_request
 
@@ -161,7 +161,7 @@ class Design:
         varied: list[Steps] = []
         for target, value in zip(self.targets, point, strict=True):
             for steps in target.steps:
-                put(self._paths.document, steps, value)
+                set_value(self._paths.document, steps, value)
             varied += target.steps
         self._paths.follow(varied)
         return form.encode(self._paths.document)

@@ -18,9 +18,9 @@ from hand_models.base import InvalidInputError
 from hand_models.tile import Surface as Preset
 from planner import EARTH
 from service.requests import PlanRequest, Stance, Surface
-from service.wire import Place, entered, field_names, places_at
+from service.wire import PossibleType, entered, field_names, places_at
 
-__all__ = ["Paths", "Steps", "Target", "put"]
+__all__ = ["Paths", "Steps", "Target", "set_value"]
 
 Steps = tuple[str | int, ...]
 """Keys and indices from the document to a value."""
@@ -104,7 +104,7 @@ class Paths:
         names = path.replace("[", ".").replace("]", "").split(".")
         if names[0] in _fields(Stance):
             names.insert(0, "stance")
-        found: list[tuple[Steps, list[Place]]] = [((), places_at(PlanRequest, ()))]
+        found: list[tuple[Steps, list[PossibleType]]] = [((), places_at(PlanRequest, ()))]
         for name in names:
             found = [each for end in found for each in self._entered(path, name, *end)]
         for steps, places in found:
@@ -128,11 +128,11 @@ class Paths:
             share = _at(self.document, steps)["shear_limit"] / preset.shear_limit
             for key in FORCES:
                 if (*steps, key) not in given:
-                    put(self.document, (*steps, key), share * getattr(preset, key))
+                    set_value(self.document, (*steps, key), share * getattr(preset, key))
 
     def _entered(
-        self, path: str, name: str, steps: Steps, places: list[Place]
-    ) -> list[tuple[Steps, list[Place]]]:
+        self, path: str, name: str, steps: Steps, places: list[PossibleType]
+    ) -> list[tuple[Steps, list[PossibleType]]]:
         """Return the entries of a name or index, or all of them, with what may stand there."""
         value = self._opened(path, steps, places)
         places = _meant(places, value)
@@ -163,7 +163,7 @@ class Paths:
             for step in (dict.fromkeys(known.values()) if name in several else [known[name]])
         ]
 
-    def _opened(self, path: str, steps: Steps, places: list[Place]) -> Any:
+    def _opened(self, path: str, steps: Steps, places: list[PossibleType]) -> Any:
         """Return the value that a path leads through; put there, if it is left out."""
         value = _at(self.document, steps)
         kinds = [each.kind for each in places]
@@ -171,11 +171,11 @@ class Paths:
             value = next(
                 (_default(each) for each in kinds if isinstance(each, inspect.StructType)), {}
             )
-            put(self.document, steps, value)
+            set_value(self.document, steps, value)
         elif isinstance(value, str) and any(_is_surface(kind) for kind in kinds):
             self.presets[steps], preset = value, Preset.named(value)
             value = {key: getattr(preset, key) for key in _fields(Surface)}
-            put(self.document, steps, value)
+            set_value(self.document, steps, value)
         if isinstance(value, (dict, list)):
             return value
         words = self._words(steps)
@@ -193,7 +193,7 @@ class Paths:
         unit = entry.get("unit") if isinstance(entry, dict) else None
         return (unit,) if isinstance(unit, str) and steps[4:5] == ("value",) else ()
 
-    def _listed(self, steps: Steps, places: list[Place], value: Any) -> list[str]:
+    def _listed(self, steps: Steps, places: list[PossibleType], value: Any) -> list[str]:
         """Return the names that are valid one step further."""
         limbs = [hand["limb"] for hand in self.document["stance"]["hands"]]
         if isinstance(value, list):
@@ -214,7 +214,7 @@ class Paths:
         return ".".join(words[1:] if words[1:] and words[0] == "stance" else words) or "a request"
 
 
-def put(document: Any, steps: Steps, value: Any) -> None:
+def set_value(document: Any, steps: Steps, value: Any) -> None:
     """Set a value in a document."""
     _at(document, steps[:-1])[steps[-1]] = value
 
@@ -259,7 +259,7 @@ def _is_surface(kind: inspect.Type) -> bool:
     return isinstance(kind, inspect.StructType) and kind.cls is Surface
 
 
-def _meant(places: list[Place], value: Any) -> list[Place]:
+def _meant(places: list[PossibleType], value: Any) -> list[PossibleType]:
     """Return the places of compounds that a value is one of."""
     found = []
     for place in places:

@@ -24,7 +24,6 @@ from .terminal import (
     EXIT_STATUS as EXIT_STATUS,
     FAILED as FAILED,
     OVERLOADED as OVERLOADED,
-    draw_plan as draw_plan,
     filling_folder as filling_folder,
     note as note,
     progress as progress,
@@ -35,5 +34,6 @@ from .terminal import (
     verbosity as verbosity,
     waiting as waiting,
     working as working,
+    write_plan_picture as write_plan_picture,
     writing as writing,
 )

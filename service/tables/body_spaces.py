@@ -11,7 +11,15 @@ from rich.text import Text
 from planner import COMPONENTS, OTHERS
 from service import replies
 from service.replies import BodySpaceReply
-from service.tables.layout import in_colour, name, number, print_rows, print_warnings, text, unit_of
+from service.tables.layout import (
+    axis_unit,
+    in_colour,
+    name,
+    number,
+    print_rows,
+    print_warnings,
+    text,
+)
 
 __all__ = ["print_body_space"]
 
@@ -40,7 +48,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
         f"{axis} {value:z.1f}" for axis, value in zip(COMPONENTS, reply.body_wrench, strict=True)
     )
     out.print(f"body wrench asked for (in B): {asked} [N, N·m]")
-    axis = name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}")
+    axis = name("axis", lambda row: f"{row[0]} {axis_unit(row[0][1:])}")
     ends = [number(part, f"1.{part}", "z.1f") for part in ("more", "pure", "extent")]
     title = "how far body wrenches that are held go along the axes of B"
     print_rows(reply.capability.items(), (axis, *ends, LETS_GO), out, title)
@@ -58,7 +66,7 @@ def _print_section(section: replies.BodySectionReply, out: Console) -> None:
         return
     corners = np.array(section.inner)
     ranges = ", ".join(
-        f"{axis} {low:z.1f} to {high:z.1f} {unit_of(axis)}"
+        f"{axis} {low:z.1f} to {high:z.1f} {axis_unit(axis)}"
         for axis, low, high in zip(
             section.axes, corners.min(axis=0), corners.max(axis=0), strict=True
         )

@@ -17,7 +17,7 @@ __all__ = [
     "print_advice",
     "robust_sentence",
     "spread_sentence",
-    "within",
+    "with_interval",
     "words_of",
 ]
 
@@ -47,7 +47,7 @@ def print_advice(reply: PlanReply, out: Console) -> None:
         out.print("of all changes that were tried none would help")
 
 
-def within(value: float, spread: Quantiles | None) -> str:
+def with_interval(value: float, spread: Quantiles | None) -> str:
     """Return a number with its 5 to 95 % interval, if that is known.
 
     The interval has the first decimal in which its ends differ, the number one more.

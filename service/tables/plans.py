@@ -14,7 +14,7 @@ from rich.text import Text
 
 import planner
 from service import replies
-from service.tables.extras import robust_sentence, spread_sentence, within
+from service.tables.extras import robust_sentence, spread_sentence, with_interval
 from service.tables.layout import (
     in_colour,
     in_order,
@@ -130,11 +130,11 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
     """Yield the main numbers of a plan; intervals take the place of less important ones."""
     used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
     if reply.utilisation is not None:
-        yield f"utilisation {within(reply.utilisation, used)}"
+        yield f"utilisation {with_interval(reply.utilisation, used)}"
     if reply.load_factor is None:
         yield f"load factor {_load_factor(reply)}"
     else:
-        yield f"load factor {within(reply.load_factor, factor)}"
+        yield f"load factor {with_interval(reply.load_factor, factor)}"
     if spread is None:
         if reply.effort is not None:
             yield f"effort {reply.effort:.3g}"

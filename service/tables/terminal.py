@@ -23,7 +23,6 @@ __all__ = [
     "EXIT_STATUS",
     "FAILED",
     "OVERLOADED",
-    "draw_plan",
     "filling_folder",
     "note",
     "progress",
@@ -34,6 +33,7 @@ __all__ = [
     "verbosity",
     "waiting",
     "working",
+    "write_plan_picture",
     "writing",
 ]
 
@@ -102,7 +102,7 @@ def tell_solver(reply: replies.PlanReply) -> None:
         )
 
 
-def draw_plan(answer: answering.Planned, picture: Path) -> None:
+def write_plan_picture(answer: answering.Planned, picture: Path) -> None:
     """Draw a plan in its stance."""
     with writing(picture):
         planner.plot_plan(answer.plan, answer.question, picture)

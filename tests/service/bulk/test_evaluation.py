@@ -17,7 +17,7 @@ from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
-from service.bulk.chunks import About, Setting, about, grouped, own_versions
+from service.bulk.chunks import About, Setting, about, grouping_order, own_versions
 from service.bulk.evaluation import AHEAD, WINDOW
 from service.bulk.pools import LARGEST, Here
 from service.requests import PlanRequest
@@ -181,7 +181,7 @@ def test_answers_are_in_order_however_chunks_come_back(picks, width):
 @given(st.lists(st.tuples(st.sampled_from("ab"), st.sampled_from("xy"))))
 def test_groups_stand_together_and_keep_their_order(pairs):
     abouts = [About(rock.encode(), hands.encode()) for rock, hands in pairs]
-    order = grouped(abouts)
+    order = grouping_order(abouts)
     assert sorted(order) == list(range(len(pairs)))
     for keys in ([abouts[i].rock for i in order], [abouts[i] for i in order]):
         runs = [key for key, _ in itertools.groupby(keys)]

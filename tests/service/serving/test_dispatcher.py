@@ -198,7 +198,7 @@ def test_a_query_that_cannot_be_read_is_replied_to(
         raise ZeroDivisionError
 
     with monkeypatch.context() as patch:
-        patch.setattr(dispatcher, "take", fails)
+        patch.setattr(dispatcher, "received_question", fails)
         assert kind(client.ask({"echo": 1})) == "internal"
     assert "pid" in client.ask({"echo": 1})
 

@@ -16,8 +16,8 @@ from planner.processes.stations import PART, _send_parts
 from service.processes import Job
 from service.serving.crew import Crew
 from service.serving.dispatcher import Dispatcher
-from service.serving.names import SHARED, Names, digest
-from service.serving.question import ATTACHED, LARGE, Question, take
+from service.serving.names import SHARED, ClientNames, digest
+from service.serving.question import ATTACHED, LARGE, PendingQuestion, received_question
 from service.serving.shares import ACTIVE, LAST, PAYS, Shares
 from service.serving.waiting import ALL, EACH, HELD, SHARE, Costs, Kind, Waiting
 from service.wire import Answer
@@ -26,10 +26,10 @@ from tests.suite.helpers.checkout import ROOT
 
 def question(
     place: str = "a", size: int = 10, seconds: float = 60.0, client: str | None = None
-) -> Question:
+) -> PendingQuestion:
     now, payload, query = time.perf_counter(), bytes(size), SimpleNamespace()
     name = place if client is None else client
-    return Question(query, "key", "plan", name, now, payload, "", seconds, place=place)  # type: ignore[arg-type]
+    return PendingQuestion(query, "key", "plan", name, now, payload, "", seconds, place=place)  # type: ignore[arg-type]
 
 
 # Room ---------------------------------------------------------------------------------------------
@@ -38,7 +38,7 @@ def question(
 def test_large_questions_of_one_client_leave_room_for_all_others():
     waiting = Waiting(Shares())
 
-    def has_room(asked: Question, kind: Kind = Kind.OTHER) -> bool:
+    def has_room(asked: PendingQuestion, kind: Kind = Kind.OTHER) -> bool:
         return waiting.put(kind, asked) is None
 
     assert has_room(question("greedy", SHARE))
@@ -246,7 +246,7 @@ def test_a_stance_that_was_dear_where_it_was_new_has_the_lane_once_it_is_not():
 
 
 def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
-    names = Names()
+    names = ClientNames()
     names.linked.add("victim")
     assert names.place("victim", b"") == "victim"
     for made_up in ("x", "y", "", "victim "):
@@ -271,7 +271,7 @@ def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
 
 
 def test_nothing_grows_with_names_that_are_made_up():
-    names, shares = Names(), Shares()
+    names, shares = ClientNames(), Shares()
     for i in range(10_000):
         names.is_to_prove(str(i), b"x")
         names.proven(str(i), b"x")
@@ -338,14 +338,14 @@ class Payload(bytes):
         return bytes(self)
 
 
-def taken_of(payload: bytes, encoding: str, attached: bytes | None = None) -> Question:
+def taken_of(payload: bytes, encoding: str, attached: bytes | None = None) -> PendingQuestion:
     query = SimpleNamespace(
         payload=Payload(payload),
         encoding=encoding,
         source_info=None,
         attachment=None if attached is None else Payload(attached),
     )
-    return take(query, "crux/robosimian/plan", 0.0, 10.0)  # type: ignore[arg-type]
+    return received_question(query, "crux/robosimian/plan", 0.0, 10.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
