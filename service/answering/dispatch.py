@@ -47,16 +47,16 @@ from service.wire import (
 
 __all__ = [
     "SERVICES",
+    "answer_plan",
+    "answer_with_advice",
     "handle",
-    "plan",
     "planned",
-    "with_advice",
 ]
 
 log = logging.getLogger(__name__)
 
 
-def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlanReply:
+def answer_plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlanReply:
     """Answer a plan request.
 
     Parameters
@@ -74,7 +74,7 @@ def plan(request: PlanRequest, robots: Robots = ROBOTS) -> PlanReply | BriefPlan
 
 
 def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
-    """Answer a plan request as `plan` does, and keep the question and the plan."""
+    """Answer a plan request as `answer_plan` does, and keep the question and the plan."""
     detail = request.detail or "full"
     if detail != "full":
         # compute only what the reply contains
@@ -86,7 +86,7 @@ def planned(request: PlanRequest, robots: Robots = ROBOTS) -> Planned:
     return Planned.of(asked, answer, request.id, detail, model="model" in request.want)
 
 
-def with_advice(answer: Planned) -> Planned:
+def answer_with_advice(answer: Planned) -> Planned:
     """Return an answer with advice, if its reply is whole and has none yet."""
     if not isinstance(answer.reply, PlanReply) or answer.plan.advice is not None:
         return answer
@@ -103,9 +103,9 @@ def with_advice(answer: Planned) -> Planned:
 
 
 def _wrench_space(asked: WrenchSpaceRequest, robots: Robots, _: Streams) -> Reply:
-    from service.answering.hand_spaces import wrench_space
+    from service.answering.hand_spaces import answer_wrench_space
 
-    return wrench_space(asked, robots)
+    return answer_wrench_space(asked, robots)
 
 
 def _body_space(asked: BodySpaceRequest, robots: Robots, _: Streams) -> Reply:

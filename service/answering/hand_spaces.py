@@ -26,7 +26,7 @@ from service.answering.stances import stance
 from service.replies import AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest
 
-__all__ = ["wrench_space"]
+__all__ = ["answer_wrench_space"]
 
 V = TypeVar("V")
 
@@ -49,8 +49,8 @@ SIDES: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in AXES)
 BOTH_WAYS: Final = np.vstack([np.eye(len(AXES)), -np.eye(len(AXES))])
 
 
-def wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> WrenchSpaceReply:
-    """Answer a wrench-space request; parameters as for `plan`.
+def answer_wrench_space(request: WrenchSpaceRequest, robots: Robots = ROBOTS) -> WrenchSpaceReply:
+    """Answer a wrench-space request; parameters as for `answer_plan`.
 
     Raises
     ------

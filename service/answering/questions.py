@@ -25,7 +25,7 @@ from service.replies import RouteReply, RouteStageReply
 if TYPE_CHECKING:
     from planner import Route
 
-__all__ = ["climb", "question", "route"]
+__all__ = ["climb", "question", "route_of"]
 
 
 def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question:
@@ -59,7 +59,7 @@ def question(request: requests.PlanRequest, robots: Robots = ROBOTS) -> Question
     )
 
 
-def route(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
+def route_of(request: requests.RouteRequest, robots: Robots = ROBOTS) -> Route:
     """Return the climb of a route file; parameters as for `question`.
 
     Raises
@@ -112,7 +112,7 @@ def climb(request: requests.RouteRequest, robots: Robots = ROBOTS) -> RouteReply
     """
     from planner import evaluate
 
-    result = evaluate(route(request, robots), workers=1)
+    result = evaluate(route_of(request, robots), workers=1)
     crux = result.plans[result.crux]
     return RouteReply(
         id=request.id,

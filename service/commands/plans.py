@@ -116,7 +116,7 @@ def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
     """Search for advice that makes a stance hold, or hold more, and print it."""
     better = "hold" if answer.reply.status in OVER else "be better"
     with tables.working(f"looking for what would {better}"):
-        found = answering.with_advice(answer)
+        found = answering.answer_with_advice(answer)
     assert isinstance(found.reply, replies.PlanReply)  # as a person is given
     assert isinstance(answer.reply, replies.PlanReply)
     if not brief:
@@ -171,7 +171,7 @@ def _without_palms(
     stance = replace(request.stance, hands=hands)
     alone = replace(request, stance=stance, want=["load_factor"], draws=[], explain=False)
     try:
-        reply = answering.plan(alone, robots)
+        reply = answering.answer_plan(alone, robots)
     except planner.DeadlineError:
         return None
     assert isinstance(reply, replies.PlanReply)  # of a whole request

@@ -103,7 +103,7 @@ def _one(
     as_json: bool,
 ) -> int:
     """Evaluate one route, and write its report."""
-    climb = answering.route(request, own.robots)
+    climb = answering.route_of(request, own.robots)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     tables.write_alone(folder / "route", folder)

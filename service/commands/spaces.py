@@ -49,10 +49,10 @@ def wrench_space(
     robots = own.robots
     plan = own.asked(stances.read_request(stance))
     request = requests.WrenchSpaceRequest(v=1, stance=plan.stance, limb=limb)
-    reply = answering.wrench_space(request, robots)
+    reply = answering.answer_wrench_space(request, robots)
     if robust:
         alone = msgspec.structs.replace(request, want=["robust"])
-        reply.robust = answering.wrench_space(alone, robots).robust
+        reply.robust = answering.answer_wrench_space(alone, robots).robust
     found = None
     if per_axis is not None:
         wrist = planner.floating_wrist(answering.stance(request.stance, robots), limb)

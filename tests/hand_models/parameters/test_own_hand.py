@@ -376,7 +376,7 @@ def test_the_file_has_the_last_word_over_the_stance(
     got = told(capfd)
     np.testing.assert_allclose(np.linalg.norm(got["body_wrench"][:3]), weight, rtol=1e-9)
     both = own_hand(THICK.replaced(own("hand", "mass", 4.6)))
-    want = dispatch.plan(with_hand(request_for(mass=None), both))
+    want = dispatch.answer_plan(with_hand(request_for(mass=None), both))
     assert got["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
 
 
@@ -468,7 +468,7 @@ def alone() -> Iterator[zenoh.Session]:
 @pytest.mark.slow
 def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Session) -> None:
     asked = [request_for(), request_for(THICK), request_for(WEAK), request_for(THICK, WEAK)]
-    want = [untimed(dispatch.plan(request)) for request in asked]
+    want = [untimed(dispatch.answer_plan(request)) for request in asked]
     assert len({reply["utilisation"] for reply in want}) >= 2
     order = [i for _ in range(5) for i in (0, 1, 2, 3, 1, 0)]
     with PlanService(alone, workers=1), ThreadPoolExecutor(4) as pool:
@@ -501,16 +501,18 @@ def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(
         with zenoh.open(client_config(served.endpoint)) as session:
             client = CruxClient(session, timeout=PATIENCE)
             for request in (plain, with_hand(plain, THICK), with_hand(plain, heavy)):
-                want = dispatch.plan(over_default(request, default))
+                want = dispatch.answer_plan(over_default(request, default))
                 assert untimed(client.plan(request)) == untimed(want)
             back = own("structure", "held_mass", 50.0)
-            assert untimed(client.plan(with_hand(plain, back))) == untimed(dispatch.plan(plain))
+            assert untimed(client.plan(with_hand(plain, back))) == untimed(
+                dispatch.answer_plan(plain)
+            )
         stance = file(json.dumps(wall_request(HEAVY)), "stance.json")
         flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting"]
         flags += ["--timeout", str(PATIENCE)]
         hand = file(entry_toml("structure", "held_mass", 45.0), "mine.toml")
         assert run(["query", stance, *flags, "--json", "--hand", hand]) in (0, 3)
-        want = dispatch.plan(with_hand(plain, own("structure", "held_mass", 45.0)))
+        want = dispatch.answer_plan(with_hand(plain, own("structure", "held_mass", 45.0)))
         assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
     finally:
         served.stop(signal.SIGTERM)

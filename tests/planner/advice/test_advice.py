@@ -59,7 +59,7 @@ def asked() -> PlanRequest:
 
 @pytest.fixture(scope="module")
 def reply(asked):
-    return answering.plan(asked)
+    return answering.answer_plan(asked)
 
 
 def of_kind(told, kind: str) -> list[Advice]:
@@ -72,7 +72,7 @@ def test_each_advice_gives_what_it_promised_when_its_request_is_planned(asked, r
     for sent in reply.advice:
         told = msgspec.json.decode(msgspec.json.encode(sent), type=Advice)
         written = msgspec.json.encode(advised(asked, told))
-        answer = answering.plan(msgspec.json.decode(written, type=PlanRequest))
+        answer = answering.answer_plan(msgspec.json.decode(written, type=PlanRequest))
         assert answer.verified
         assert answer.status == told.status
         assert answer.utilisation == pytest.approx(told.utilisation, abs=1e-6)

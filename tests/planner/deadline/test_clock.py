@@ -37,7 +37,7 @@ from planner.solving import (
 )
 from service import answering
 from service.answering import dispatch, questions
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from service.serving import CruxClient
 from service.wire import ServiceError
@@ -485,7 +485,7 @@ def test_a_deadline_that_is_no_number_is_refused_by_name():
 def test_on_the_command_line_a_deadline_that_is_too_short_is_a_failure(tmp_path, capfd):
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request() | {"deadline": 1e-6}))
-    assert run(["plan", str(path), "--json"]) == 1
+    assert run_command_line(["plan", str(path), "--json"]) == 1
     out, err = capfd.readouterr()
     assert out == ""
     assert err.startswith("crux: deadline: 1e-06 s were over before the hands were closed")
@@ -494,20 +494,20 @@ def test_on_the_command_line_a_deadline_that_is_too_short_is_a_failure(tmp_path,
 
 
 def test_on_the_command_line_the_plan_without_palms_may_come_too_late(tmp_path, capfd, monkeypatch):
-    original = answering.plan
+    original = answering.answer_plan
 
     def plan_late(request, robots):
         with deadline.within(1e-9):
             return original(request, robots)
 
-    monkeypatch.setattr(answering, "plan", plan_late)
+    monkeypatch.setattr(answering, "answer_plan", plan_late)
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request() | {"deadline": LONG}))
-    assert run(["plan", str(path), "--json"]) == 0
+    assert run_command_line(["plan", str(path), "--json"]) == 0
     reply = json.loads(capfd.readouterr().out)
     assert reply["load_factor_without_palm"] is None
     assert reply["load_factor"] > 1.0
-    assert run(["plan", str(path)]) == 0
+    assert run_command_line(["plan", str(path)]) == 0
     assert "load factor without the palms" not in capfd.readouterr().out
 
 

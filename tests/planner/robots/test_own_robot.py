@@ -318,7 +318,7 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
         arms, simian = (
             CruxClient(alone, name, timeout=PATIENCE) for name in ("arms", "robosimian")
         )
-        want = dispatch.plan(request, robots_of(own))
+        want = dispatch.answer_plan(request, robots_of(own))
         for asked in (request, with_robot(request, own)):
             assert arms.plan(asked).utilisation == pytest.approx(want.utilisation, rel=1e-9)
         space = WrenchSpaceRequest(v=1, stance=request.stance, limb="right")
@@ -358,7 +358,7 @@ def test_serve_and_query_a_robot_and_a_hand(
     flags = [*flags_to(served), "--robot", str(file), "--hand", str(hand)]
     assert run(["query", written(hanging(file)), *flags]) == 0
     request = with_hand(plan_request(hanging(file)), read_hand(hand))
-    want = dispatch.plan(request, robots_of(read_robot(file)))
+    want = dispatch.answer_plan(request, robots_of(read_robot(file)))
     assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
 
 

@@ -27,7 +27,7 @@ def raised(pose: Pose, by: float) -> Pose:
 @pytest.fixture(scope="module")
 def solved() -> Route:
     """Two moves: a hand, and after a shift of the body another one."""
-    bundled = questions.route(read_route("six-moves"))
+    bundled = questions.route_of(read_route("six-moves"))
     start = replace(bundled.start, joints=SOLVE)
     hand = next(each for each in start.hands if each.limb == "front_right")
     second = Move(replace(hand, pose=raised(hand.pose, 0.03)), raised(start.body, 0.01))
@@ -167,7 +167,7 @@ def test_a_route_of_a_file_takes_them(climbed):
     place = angles_of(climbed, 1, "place")["front_left"]
     text["moves"][0]["joints"] = {"front_left": place.tolist(), "rear_left": "solve"}
     request = decode_request(json.dumps(text).encode(), RouteRequest)
-    result = evaluate(questions.route(request))
+    result = evaluate(questions.route_of(request))
     assert [answer.status for answer in result.plans] == ["optimal"] * 3
     np.testing.assert_array_equal(result.plans[2].joints["front_left"], place)
     assert set(result.plans[0].joints) == set(robosimian().limbs)

@@ -32,7 +32,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 @pytest.fixture(scope="module")
 def route() -> Route:
-    return questions.route(read_route("six-moves"))
+    return questions.route_of(read_route("six-moves"))
 
 
 @pytest.fixture(scope="module")

@@ -139,9 +139,9 @@ def test_the_same_in_this_process() -> None:
     from service import WrenchSpaceRequest
 
     request = msgspec.convert(asked(1), WrenchSpaceRequest)
-    reply = answering.wrench_space(msgspec.structs.replace(request, want=["half_spaces"]))
+    reply = answering.answer_wrench_space(msgspec.structs.replace(request, want=["half_spaces"]))
     assert reply.vertices is None
-    assert reply.half_spaces == answering.wrench_space(request).half_spaces
+    assert reply.half_spaces == answering.answer_wrench_space(request).half_spaces
 
 
 def test_a_floating_wrist_that_nothing_holds_some_way_adds_nothing() -> None:

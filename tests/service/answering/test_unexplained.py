@@ -76,5 +76,5 @@ def test_every_stance_of_a_route_is_asked_alike():
     request = {"v": 1, "stance": stance, "moves": [move]}
     for explain in (True, False):
         asked = decode_request(msgspec.json.encode(request | {"explain": explain}), RouteRequest)
-        asked_of = [each.question for each in stages(questions.route(asked))]
+        asked_of = [each.question for each in stages(questions.route_of(asked))]
         assert [each.explain for each in asked_of] == [explain] * 3

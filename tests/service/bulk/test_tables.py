@@ -70,7 +70,7 @@ def test_rows_tell_what_replies_do(ending, lines, tmp_path, capfd):
     assert err.startswith("crux: line 11: stance: ")
     rows = content(path)
     assert [int(row["index"]) for row in rows] == list(range(COUNT))
-    plan = dispatch.plan(plan_request(wall_request(HEAVY + 1) | {"id": "r1"}))
+    plan = dispatch.answer_plan(plan_request(wall_request(HEAVY + 1) | {"id": "r1"}))
     row = rows[1]
     assert (row["id"], row["status"]) == ("r1", "overloaded")
     assert float(row["utilisation"]) == plan.utilisation
@@ -121,7 +121,7 @@ def test_explanations_are_in_a_table_if_they_are_asked_for(lines, tmp_path, capf
     asked = ["batch", str(lines), "-o", str(path), "--json"]
     run([*asked, "--explain", "--columns", "irreducible,sufficient"])
     row = content(path)[0]
-    plan = dispatch.plan(plan_request(wall_request(HEAVY)))
+    plan = dispatch.answer_plan(plan_request(wall_request(HEAVY)))
     assert len(row["irreducible"].split("; ")) == len(plan.certificate.irreducible)
     assert plan.certificate.irreducible[0].limb in row["irreducible"]
     run(asked)

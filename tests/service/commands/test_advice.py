@@ -81,7 +81,7 @@ def test_a_stance_may_be_gone_while_advice_is_sought(stance_file, tmp_path, capf
 
 
 def test_the_plan_is_printed_before_advice_is_looked_for(stance_file, tmp_path, capfd, monkeypatch):
-    looked, told = answering.with_advice, []
+    looked, told = answering.answer_with_advice, []
 
     def looks(answer: answering.Planned) -> answering.Planned:
         told.append(capfd.readouterr())

@@ -257,7 +257,7 @@ def test_a_person_reads_torques_effort_and_whose_joint_it_is(stance_file, capfd)
 
 
 def test_numbers_however_long_are_told_whole(capsys):
-    reply = dispatch.plan(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
+    reply = dispatch.answer_plan(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
     longest = "rear_right"
     hand = next(hand for hand in reply.hands if hand.limb == longest)
     hand.wrench = [-309073.0, -333.2, 126883.4, 10.26, -16361.4, 0.04]
@@ -273,7 +273,7 @@ def test_numbers_however_long_are_told_whole(capsys):
 
 
 def test_names_however_long_leave_numbers_whole(capsys):
-    reply = dispatch.plan(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
+    reply = dispatch.answer_plan(decode_request(json.dumps(wall_request()).encode(), PlanRequest))
     for hand, side in zip(reply.hands, ("left", "right", "upper", "lower"), strict=True):
         hand.limb = f"{side}_middle_foreleg"
     first = reply.hands[0]
@@ -325,7 +325,7 @@ def test_a_stance_may_come_through_a_pipe(tmp_path, capfd):
 
 def test_torques_of_many_joints_go_on_in_the_next_line(capsys):
     request = wall_request(LIGHT) | {"want": []}
-    reply = dispatch.plan(decode_request(json.dumps(request).encode(), PlanRequest))
+    reply = dispatch.answer_plan(decode_request(json.dumps(request).encode(), PlanRequest))
     reply.joint_torque = {"arm": [-1234.5, *range(1, 15), -7.0], "tail": [0.25]}
     reply.joint_torque_limit = {"arm": [2469.0, *[300.0] * 15], "tail": [1.0]}
     print_plan(reply, Console(width=80, markup=False))

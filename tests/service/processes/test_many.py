@@ -96,7 +96,7 @@ def test_errors_are_in_their_places_and_replies_in_their_order():
 def test_each_reply_is_what_it_would_be_alone(two):
     requests = [asked(mass, str(i)) for i, mass in enumerate(MASSES)]
     for reply, request in zip(two.plan_many(requests), requests, strict=True):
-        alone = dispatch.plan(request)
+        alone = dispatch.answer_plan(request)
         assert (reply.id, reply.status, reply.verified) == (request.id, alone.status, True)
         assert reply.utilisation == pytest.approx(alone.utilisation, rel=1e-9)
 
@@ -268,7 +268,7 @@ def test_lines_are_replies_or_errors_in_order(batch_file, capfd):
     assert err == (
         "crux: line 3: not json: Input data was truncated; 1 more lines are bad input: line 5\n"
     )
-    alone = dispatch.plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
+    alone = dispatch.answer_plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
     assert replies[0]["utilisation"] == pytest.approx(alone.utilisation, rel=1e-9)
 
 

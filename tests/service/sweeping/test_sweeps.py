@@ -13,7 +13,7 @@ import pytest
 
 import service
 from hand_models.base import InvalidInputError
-from service.answering import plan
+from service.answering import answer_plan
 from service.commands.stances import read_request
 from service.requests import PlanRequest
 from service.sweeping import Design, Held, Sweep, SweepRow, held, plot_sweep
@@ -32,7 +32,7 @@ def planned(mass: float, limbs: dict[str, dict] | None = None) -> service.PlanRe
     request = wall_request(mass) | {"want": ["load_factor"], "explain": False}
     for hand in request["stance"]["hands"]:
         hand |= (limbs or {}).get(hand["limb"], {})
-    return plan(asked(request))
+    return answer_plan(asked(request))
 
 
 WALL = asked(wall_request())
