@@ -20,13 +20,13 @@ from hand_models.base import CruxError, InvalidInputError
 from service import bulk, processes, tables, wire
 from service.commands import options
 
-__all__ = ["answer_rest", "batch", "complain", "exit_status", "new_run", "writing_answers"]
+__all__ = ["answer_rest", "batch_command", "complain", "exit_status", "new_run", "writing_answers"]
 
 WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables.DONE)
 """Exit statuses, worst first: a batch has the worst of its requests'."""
 
 
-@click.command()
+@click.command("batch")
 @click.argument("requests")
 @click.option(
     "-o",
@@ -59,13 +59,13 @@ WORST_FIRST: Final = (tables.FAILED, tables.BAD_INPUT, tables.OVERLOADED, tables
 )
 @options.own_options
 @options.json_option
-def batch(
+def batch_command(
     requests: str,
     file: Path | None,
     columns: str | None,
     resume: bool,
     export: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     explain: bool | None,
     own: options.Own,
     as_json: bool,

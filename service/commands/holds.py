@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Outcome = fixed_wrist.FoundHold | InvalidInputError
     Pair = tuple[fixed_wrist.HoldTrial, fixed_wrist.FoundHold]
 
-__all__ = ["holds"]
+__all__ = ["holds_command"]
 
 SHOWN: Final = 10
 """Number of holds that are printed."""
@@ -55,7 +55,7 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 """Units in the file."""
 
 
-@click.command()
+@click.command("holds")
 @click.argument("rock", type=click.Path(path_type=Path))
 @click.option(
     "-o",
@@ -109,7 +109,7 @@ UNITS: Final = {"length": "m", "angle": "rad", "force": "N"}
 @options.hand_option
 @options.plot_option("Draw the rock there, and on it the largest pull-off at each point.")
 @options.json_option
-def holds(
+def holds_command(
     rock: Path,
     output: Path,
     spacing: float,
@@ -118,7 +118,7 @@ def holds(
     surface: str,
     seat: Literal["rest", "best"],
     robust: int,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     hand: ParameterTable | None,
     picture: Path | None,
     as_json: bool,

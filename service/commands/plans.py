@@ -15,7 +15,7 @@ from hand_models.base import InvalidInputError
 from service import answering, replies, requests, tables
 from service.commands import options, stances
 
-__all__ = ["plan"]
+__all__ = ["plan_command"]
 
 OVER: Final = ("overloaded", "infeasible")
 """Statuses of stances that do not hold."""
@@ -24,7 +24,7 @@ ADVICE_SECONDS: Final = 30.0
 """Timeout of advice that nobody asked for, if a request has no deadline [s]."""
 
 
-@click.command()
+@click.command("plan")
 @options.stance_argument
 @options.plot_option("Draw it there.")
 @click.option(
@@ -46,7 +46,7 @@ ADVICE_SECONDS: Final = 30.0
 @options.wanted_options
 @options.own_options
 @options.json_option
-def plan(
+def plan_command(
     stance: str,
     picture: Path | None,
     robust: bool,

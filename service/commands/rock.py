@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-__all__ = ["rock"]
+__all__ = ["rock_command"]
 
 OUTPUT: Final = ".ply"
 
@@ -51,7 +51,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     return numbers
 
 
-@click.command(epilog=f"FILE ends in {', '.join(scans.ENDINGS)}.")
+@click.command("rock", epilog=f"FILE ends in {', '.join(scans.ENDINGS)}.")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "-o",
@@ -134,7 +134,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
 )
 @options.plot_option("Draw the rock there, as the scanner saw it.")
 @options.json_option
-def rock(
+def rock_command(
     file: Path,
     output: Path,
     spacing: float | None,

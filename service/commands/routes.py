@@ -20,7 +20,7 @@ from service import answering, bulk, requests, tables, wire
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
 
-__all__ = ["route"]
+__all__ = ["route_command"]
 
 LINES, CSV, PARQUET = ENDINGS = (".jsonl", ".csv", ".parquet")
 LISTED: Final = " or ".join(ENDINGS)
@@ -39,7 +39,7 @@ SHOWN: Final = 100
 """Number of routes that a person is shown."""
 
 
-@click.command()
+@click.command("route")
 @options.routes_argument
 @click.option(
     "-o",
@@ -60,11 +60,11 @@ SHOWN: Final = 100
 @options.wanted_options
 @options.own_options
 @options.json_option
-def route(
+def route_command(
     routes: tuple[str, ...],
     output: Path,
     resume: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     wanted: options.Wanted,
     own: options.Own,
     as_json: bool,
@@ -179,7 +179,7 @@ def _many(
     routes: _Routes,
     file: Path,
     resume: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     wanted: options.Wanted,
     own: options.Own,
     as_json: bool,

@@ -16,7 +16,7 @@ from hand_models.base import InvalidInputError, UnsupportedError
 from service import answering, replies, requests, tables, wire
 from service.commands import options, stances
 
-__all__ = ["stream"]
+__all__ = ["stream_command"]
 
 WORST_FIRST: Final = (tables.BAD_INPUT, tables.FAILED, tables.OVERLOADED, tables.DONE)
 """Exit statuses, worst first: a stream has the worst of its lines'."""
@@ -28,7 +28,7 @@ HANDS_A_LINE: Final = 4
 """Hands whose tensions fit in one line."""
 
 
-@click.command()
+@click.command("stream")
 @options.stance_argument
 @click.option(
     "--radius",
@@ -39,7 +39,7 @@ HANDS_A_LINE: Final = 4
 )
 @options.own_options
 @options.json_option
-def stream(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
+def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
     """Give set-points for one body wrench after another: one a line in, one a line out.
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first

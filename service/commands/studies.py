@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
 
-__all__ = ["MEASURE", "NAMES", "SURFACES", "study"]
+__all__ = ["MEASURE", "NAMES", "SURFACES", "study_command"]
 
 SWEEP: Final = "sweep"
 """The one study that takes options."""
@@ -88,7 +88,7 @@ def _measurements() -> studies.Study:
     return planner.MeasurementStudy(fixed)
 
 
-@click.command(epilog=f"NAME is one of {', '.join(NAMES)}.")
+@click.command("study", epilog=f"NAME is one of {', '.join(NAMES)}.")
 @click.argument("name", shell_complete=options.beginning_so(NAMES))
 @options.folder_option("Where result.json and the pictures go.")
 @click.option(
@@ -120,7 +120,7 @@ def _measurements() -> studies.Study:
 )
 @options.hand_option
 @options.json_option
-def study(
+def study_command(
     name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **wanted: Any
 ) -> None:
     """Run an experiment of the paper again, and hold its claims against the model.

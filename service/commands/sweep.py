@@ -13,13 +13,13 @@ from service import processes, sweeping, tables
 from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
 
-__all__ = ["sweep"]
+__all__ = ["sweep_command"]
 
 TABLE: Final = "sweep.csv"
 PICTURE: Final = "sweep.png"
 
 
-@click.command()
+@click.command("sweep")
 @options.stance_argument
 @click.option(
     "--vary",
@@ -57,7 +57,7 @@ PICTURE: Final = "sweep.png"
 @options.folder_option("Where the table and the picture go.")
 @options.own_options
 @options.json_option
-def sweep(
+def sweep_command(
     stance: str,
     variations: tuple[str, ...],
     samples: int | None,
@@ -65,7 +65,7 @@ def sweep(
     over: str | None,
     tolerance: float,
     resume: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     folder: Path,
     own: options.Own,
     as_json: bool,

@@ -21,7 +21,7 @@ from hand_models.experiments import (
 from hand_models.experiments.pictures import entry_name
 from hand_models.experiments.sweep import CUTS, RAYS, STARTS
 from hand_models.parameters import ParameterTable, Quantity, hand_table
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 
 CONDITIONS = Conditions(0.3, 46.0)
 FINE = "concrete-fine"
@@ -141,7 +141,7 @@ def test_the_command_draws_a_map_and_leaves_its_numbers(tmp_path, capsys):
         "--y",
         "gripper.base_half_spacing=0.03:0.04:2",
     ]
-    assert run([*arguments, "--measure", "moment", "--measure", "volume"]) == 0
+    assert run_command_line([*arguments, "--measure", "moment", "--measure", "volume"]) == 0
     reply = json.loads(capsys.readouterr().out)
     written = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert reply["data"] == written["data"]
@@ -161,7 +161,7 @@ def test_the_command_draws_a_map_and_leaves_its_numbers(tmp_path, capsys):
 def test_the_command_tells_where_it_is_best(tmp_path, capsys):
     arguments = ["study", "sweep", "-o", str(tmp_path), "--measure", "normal"]
     arguments += ["--x", "gripper.pull_off_slope=2:4:2", "--y", "gripper.entry_friction=0.2:0.3:2"]
-    assert run(arguments) == 0
+    assert run_command_line(arguments) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert "most normal:" in out
     assert "gripper.pull_off_slope = 2 1" in out
@@ -194,7 +194,7 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
     ],
 )
 def test_what_cannot_be_swept_is_refused_in_one_line(options, expected, tmp_path, capsys):
-    assert run(["study", "sweep", "-o", str(tmp_path), *options]) == 2
+    assert run_command_line(["study", "sweep", "-o", str(tmp_path), *options]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1
     assert expected in line
@@ -213,7 +213,7 @@ def test_what_cannot_be_swept_is_refused_in_one_line(options, expected, tmp_path
     ],
 )
 def test_other_studies_refuse_the_options_of_a_sweep(option, value, tmp_path, capsys):
-    assert run(["study", "fig06", "-o", str(tmp_path / "new"), option, value]) == 2
+    assert run_command_line(["study", "fig06", "-o", str(tmp_path / "new"), option, value]) == 2
     assert capsys.readouterr().err == f"crux: {option}: only the study sweep takes it, not fig06\n"
     assert not (tmp_path / "new").exists()
 

@@ -30,7 +30,7 @@ from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.robots import RobotFile, robot_of
 from planner.solving import solve
 from service.answering import questions
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.robots import TWO_LINK, arm, limbs_toml
@@ -168,7 +168,7 @@ def test_a_plan_is_not_solved_again_for_its_picture(tmp_path, monkeypatch, capfd
         planner, "plan", lambda question: solved.append(question) or found(question)
     )
     picture = tmp_path / "plan.png"
-    assert run(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
+    assert run_command_line(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
     # once as asked, once without palms
     palms = [[hand.grasp.palm for hand in question.stance.hands] for question in solved]
