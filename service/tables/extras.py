@@ -60,17 +60,18 @@ def with_interval(value: float, spread: Quantiles | None) -> str:
 
 def spread_sentence(spread: Spread) -> str:
     """Return in how many samples a stance holds, its largest sensitivity, and what was left out."""
-    said = f"holds in {spread.holds} of {spread.draws} draws"
+    said = f"feasible in {spread.holds} of {spread.draws} samples"
     if spread.cap < 1.0:
         said += f" within a utilisation of {spread.cap:g}"
-    if spread.hangs_on and spread.draws >= CORRELATED:
-        most = spread.hangs_on[0]
-        said += f"; hangs most on {most.quantity} ({100.0 * most.share:.0f} %)"
+    if spread.sensitive_to and spread.draws >= CORRELATED:
+        most = spread.sensitive_to[0]
+        correlation = math.sqrt(most.share)
+        said += f"; most sensitive to {most.quantity} (rank correlation {correlation:.2f})"
     if spread.without:
-        said += f"; {spread.without} {'have' if spread.without > 1 else 'has'} no plan"
+        said += f"; {spread.without} without a plan"
     lost = spread.load_factors.count(None)
     if lost > spread.without:
-        said += f"; {lost} have no load factor"
+        said += f"; {lost} without a load factor"
     return said + _refused(spread.refused)
 
 

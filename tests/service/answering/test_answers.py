@@ -364,7 +364,8 @@ def test_a_plans_spread_over_draws_of_the_callers_own_travels():
         low, usual, high = reply["spread"]["load_factors"]
         assert low < usual < high
         assert usual == pytest.approx(reply["load_factor"], rel=1e-6)
-        assert reply["spread"]["hangs_on"] == [{"quantity": "rock.shear_limit", "share": 1.0}]
+        assert reply["spread"]["sensitive_to"] == [{"quantity": "rock.shear_limit", "share": 1.0}]
+        assert reply["spread"]["hangs_on"] == reply["spread"]["sensitive_to"]
 
 
 @pytest.mark.parametrize("detail", ["set_points", "hands"])

@@ -133,11 +133,12 @@ def test_a_plan_says_how_sure_it_is(pull, digits, stance_file, capfd):
     assert 0.1**digits < ends["high"] - ends["low"] < 0.1 ** (digits - 1)
     interval = f"({ends['low']:.{digits}f} to {ends['high']:.{digits}f})"
     assert f"load factor {reply['load_factor']:.{digits + 1}f} {interval}" in out
-    most = spread["hangs_on"][0]
-    assert f"holds in {spread['holds']} of {spread['draws']} draws; hangs most on " in out
-    assert f"{most['quantity']} ({100 * most['share']:.0f} %)" in out
+    most = spread["sensitive_to"][0]
+    out = " ".join(out.split())
+    assert f"feasible in {spread['holds']} of {spread['draws']} samples; most sensitive to " in out
+    assert f"{most['quantity']} (rank correlation {most['share'] ** 0.5:.2f})" in out
     run_command_line(["plan", path])
-    assert "draws" not in capfd.readouterr().out
+    assert "samples" not in capfd.readouterr().out
 
 
 def test_a_spread_over_draws_of_the_callers_own(stance_file, tmp_path, capfd):
