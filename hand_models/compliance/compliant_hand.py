@@ -101,7 +101,7 @@ class CompliantHand:
         preload: ArrayLike | None = None,
     ) -> None:
         if settled.grasp.fingernail:
-            raise UnsupportedError("a hand that clings with its nails cannot float")
+            raise UnsupportedError("a fingernail grasp requires a fixed wrist")
         hand = settled.hand
         self.settled = settled
         self.preload = _preload(preload, settled)

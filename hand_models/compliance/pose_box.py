@@ -40,7 +40,7 @@ NEAR: Final = 1e-3
 SINGULAR: Final = 1e12
 """Condition from which on a matrix of second derivatives counts as singular."""
 
-NOTHING_HOLDS: Final = "no pose of the wrist near rest holds: the preload alone breaks a limit"
+NOTHING_HOLDS: Final = "no wrist pose near rest is feasible: the preload alone exceeds a limit"
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Ar
         space = grasp.linearised(at, within=FARTHEST * units)
         found = _analytic_centre(space.A * units, space.b)
     if found is None:
-        raise SolverError("search: the middle of the linearised set was not found")
+        raise SolverError("no centre of the linearised set of wrist poses found")
     y, hessian = found
     lengths, directions = np.linalg.eigh(hessian)
     return space, y * units, units[:, None] * directions / np.sqrt(lengths)

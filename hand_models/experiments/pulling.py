@@ -156,7 +156,9 @@ def unloaded(gripper: Gripper) -> Array:
     """
     poses = pulled_off_poses(gripper, np.zeros(1))
     if not (len(poses) and gripper.evaluate(poses).holds[0]):
-        raise EmptySetError("the gripper lets go before any load: closing alone is too much")
+        raise EmptySetError(
+            "the gripper exceeds a limit before any load: the closing tension alone is too large"
+        )
     return np.asarray(poses[0])
 
 

@@ -197,7 +197,7 @@ class GripperSweep:
                     raise InvalidInputError(str(error), field=option) from None
         x, y = axes
         if x.entry == y.entry:
-            raise InvalidInputError(f"must not be that of --x, {x.entry}", field="--y")
+            raise InvalidInputError(f"must differ from --x, got {x.entry} for both", field="--y")
         found = sweep_map(table, x, y, conditions, self.measures, progress)
         if (found["state"] == NO_GRASP).all():
             # raises the reason

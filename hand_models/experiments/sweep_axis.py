@@ -133,7 +133,9 @@ class Axis:
             like = difflib.get_close_matches(entry, known)
             hint = f"; did you mean {' or '.join(like)}?" if like else ""
             listed = ", ".join(sorted(known))
-            raise InvalidInputError(f"the gripper reads no {entry!r}{hint}; known are {listed}")
+            raise InvalidInputError(
+                f"the gripper has no parameter {entry!r}{hint}; known are {listed}"
+            )
         axis = known[entry]
         bundled = table.quantity(axis.section, axis.name).value
         if not (math.isfinite(low) and math.isfinite(high) and low < high):

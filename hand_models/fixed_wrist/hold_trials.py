@@ -140,8 +140,8 @@ def grid_of_trials(
     if most is not None and count > most:
         raise LimitError(
             f"{spacing:g} m makes up to {count:,} places to try (a grid of {each_way[0]:,} by "
-            f"{each_way[1]:,} points, {angles * len(rotations)} at each), and at most {most:,} "
-            "are tried; make it wider",
+            f"{each_way[1]:,} points, {angles * len(rotations)} at each); the maximum is "
+            f"{most:,}: use a wider spacing",
             field="spacing",
         )
     # in the middle of what is left over

@@ -62,7 +62,8 @@ def approach_frame(
     across = np.cross(z, above)
     if np.linalg.norm(across) < APART:
         raise InvalidInputError(
-            f"is along up, {above.tolist()}, so that a wrist angle says nothing: give another up",
+            f"is parallel to up, {above.tolist()}, which leaves wrist_angle undefined: give "
+            "another up",
             field="approach",
         )
     y = across / np.linalg.norm(across)

@@ -82,7 +82,7 @@ def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
     unknown = sorted(set(raw) - set(ParameterSample._fields))
     if unknown:
         valid = " and ".join(ParameterSample._fields)
-        raise InvalidInputError(f"unknown; a draw has {valid}", field=unknown[0])
+        raise InvalidInputError(f"unknown; a sample has {valid}", field=unknown[0])
     tables = {}
     for name in ParameterSample._fields:
         entries = {} if raw.get(name) is None else raw[name]
@@ -208,7 +208,9 @@ def _check_entry(section: str, name: str, quantity: Quantity) -> None:
     found = PATH.fullmatch(name)
     entry, index = (name, None) if found is None else (found[1], found[2])
     if entry not in entries:
-        raise InvalidInputError("no number of hand.toml or of a tile's law", field=field)
+        raise InvalidInputError(
+            "unknown; valid are the numbers of hand.toml and of a tile's law", field=field
+        )
     usual = entries[entry]
     size = len(usual.value) if isinstance(usual.value, list) else 0
     if (index is None) != (size == 0) or int(index or 0) > max(size - 1, 0):

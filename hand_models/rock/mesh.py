@@ -142,8 +142,8 @@ class Mesh(OutlinedHold):
         if sum(met) < 0:
             raise InvalidInputError(
                 "the triangles under the palm face away from it: is the approach into the rock? "
-                "their vertices must be counterclockwise seen from outside the rock: turn every "
-                "face over, or close the hole under the palm if it looks into the rock",
+                "their vertices must be counterclockwise seen from outside the rock: flip every "
+                "face, or close the hole under the palm if it opens into the rock",
                 field="faces" if at is None else "place.approach",
             )
         super().check_place(at)

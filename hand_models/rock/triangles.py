@@ -124,7 +124,9 @@ def wound_alike(triangles: Triangles) -> Triangles:
     part = connected(np.column_stack([rows, columns]), 2 * count)
     as_is, over = part[:count], part[count:]
     if (as_is == over).any():
-        raise InvalidInputError("the surface has only one side", field="faces")
+        raise InvalidInputError(
+            "the mesh is not orientable: its surface has only one side", field="faces"
+        )
     # of the two ways to wind a part, one keeps more triangles than the other
     kept = np.bincount(as_is, minlength=2 * count)
     flip = kept[over] > kept[as_is]

@@ -61,7 +61,7 @@ def read_pcd(path: Path) -> RawScan:
     x, y, z, *turn = cloud.metadata.viewpoint
     length = math.hypot(*turn)
     if not (math.isfinite(x + y + z) and math.isfinite(length) and length > 0.0):
-        raise InvalidInputError(f"its VIEWPOINT is no pose: {cloud.metadata.viewpoint} in {path}")
+        raise InvalidInputError(f"VIEWPOINT is not a pose: {cloud.metadata.viewpoint} in {path}")
     w, *axis = (part / length for part in turn)
     return RawScan(points, scanner=Pose.from_quaternion([x, y, z], [*axis, w]))
 
@@ -73,10 +73,10 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     named = [words for words in lines if not words[0].startswith(b"#")]
     found = {words[0].upper(): words[1:] for words in named}
     if b"FIELDS" not in found or b"DATA" not in found:
-        raise InvalidInputError(f"no PCD file, its header is missing: {path}")
+        raise InvalidInputError(f"not a PCD file, its header is missing: {path}")
     if len(found) < len(named) or len(named) > HEADER_LINES:
         raise InvalidInputError(
-            f"its header has {len(named)} lines, of {HEADER_LINES} at most, each once: {path}"
+            f"the header has {len(named)} lines; the maximum is {HEADER_LINES}, each once: {path}"
         )
     try:
         sizes, counts = ([int(each) for each in found[name]] for name in (b"SIZE", b"COUNT"))
@@ -85,26 +85,26 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
         kind = found[b"DATA"][0]
     except (KeyError, IndexError, ValueError):
         raise InvalidInputError(
-            f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of its header are to be whole numbers: {path}"
+            f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of the header must be whole numbers: {path}"
         ) from None
     kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", NOWHERE)
     if len(kinds) != len(sizes) or not {*kinds} <= {b"F", b"I", b"U"}:
         raise InvalidInputError(
-            f"TYPE of its header is to be F, I or U of each field, got {_words(kinds)}: {path}",
+            f"TYPE of the header must be F, I or U for each field, got {_words(kinds)}: {path}",
             field="file",
         )
     if len(pose) != len(NOWHERE):
         raise InvalidInputError(
-            "VIEWPOINT of its header is to be seven numbers, a place and a quaternion [w, x, y, z]"
-            f", got {_words(pose)}: {path}",
+            "VIEWPOINT of the header must be seven numbers, a position and a quaternion [w, x, "
+            f"y, z], got {_words(pose)}: {path}",
             field="file",
         )
     if min(sizes + counts + rows) < 0:
-        raise InvalidInputError(f"a number of its header is below zero: {path}")
+        raise InvalidInputError(f"the header has a negative number: {path}")
     if not 0 < sum(counts) <= MOST_COLUMNS:
         raise InvalidInputError(
-            f"a point has at least one number, and {MOST_COLUMNS:,} at most, the header of {path} "
-            f"names {sum(counts):,}"
+            f"a point must have 1 to {MOST_COLUMNS:,} numbers, the header of {path} has "
+            f"{sum(counts):,}"
         )
     if width * height != points:
         raise InvalidInputError(

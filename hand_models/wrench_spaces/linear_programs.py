@@ -59,7 +59,9 @@ def linear_program(
         if found.status == EMPTY:
             return None
     if found.status == UNBOUNDED:
-        raise UnsupportedError(f"{what} has no bound: fingers that resist sideways would give one")
+        raise UnsupportedError(
+            f"{what} is unbounded: fingers with lateral reactions would bound it"
+        )
     raise SolverError(f"{what}: {found.message}")
 
 

@@ -60,7 +60,7 @@ def test_both_entries_may_be_of_one_list(table):
 def test_the_surfaces_strength_is_an_entry_where_the_gripper_reads_it(table):
     text = "gripper.shear_limit=10:30:3"
     assert Axis.parse(text, table, "sandpaper-36").unit == "N"
-    with pytest.raises(InvalidInputError, match="reads no"):
+    with pytest.raises(InvalidInputError, match="has no parameter"):
         Axis.parse(text, table, FINE)
 
 
@@ -171,8 +171,8 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["--x", "finger.pulley_radii[3]=0.001:0.005:3"], "--x: the gripper reads no"),
-        (["--y", "palm.length=0.1:0.2:3"], "--y: the gripper reads no"),
+        (["--x", "finger.pulley_radii[3]=0.001:0.005:3"], "--x: the gripper has no parameter"),
+        (["--y", "palm.length=0.1:0.2:3"], "--y: the gripper has no parameter"),
         (["--x", "finger.pulley_radii[1]"], "--x: must be SECTION.NAME"),
         (["--x", "finger.pulley_radii[1]=0.001:0.005:2.5"], "--x: must be SECTION.NAME"),
         (["--x", "finger.pulley_radii[1]=0.001:0.002:0.003:3"], "--x: must be SECTION.NAME"),
@@ -183,7 +183,7 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
         (["--x", "gripper.added_radius=0:10:3"], "HIGH must not exceed 1 m"),
         (["--x", "finger.pulley_radii[1]=1:5:3"], "HIGH must not exceed 1 m"),
         (["--x", "finger.pulley_radii[1]=0.001:0.005:1"], "N must be from 2"),
-        (["--x", "finger.pulley_radii[2]=0.001:0.005:3"], "--y: must not be that of --x"),
+        (["--x", "finger.pulley_radii[2]=0.001:0.005:3"], "--y: must differ from --x"),
         (["--measure", "weight"], "--measure: 'weight': valid are shear, normal, moment, volume"),
         (["--surface", "moon"], "surface: unknown surface 'moon'; known are"),
         (["--diameter", "-0.3"], "--diameter: must be from 0.02 to 10 m, got -0.3"),
