@@ -116,7 +116,7 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
         elif named is not None and value is None:
             _drop(question, whole, *named.groups())
         else:
-            raise InvalidInputError("advice does not change this", field=path)
+            raise InvalidInputError("advice cannot change this field", field=path)
     there = _hands(question.stance.hands, hands)
     return replace(question, stance=replace(question.stance, hands=there, **stance), **whole)
 
@@ -161,7 +161,7 @@ def _field(hand: HandOnHold, updates: Mapping[str, Any], field: str, value: Any)
         grasp = updates.get("grasp", hand.grasp)
         return "grasp", structs.replace(grasp, **{field.removeprefix("grasp."): value})
     if field not in FIELDS:
-        raise InvalidInputError("advice does not change this", field=f"stance.hands.{field}")
+        raise InvalidInputError("advice cannot change this field", field=f"stance.hands.{field}")
     name, read = FIELDS[field]
     if value is None:
         return name, "rest" if name == "seat" else None

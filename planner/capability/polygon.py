@@ -133,7 +133,7 @@ def enclose(touching: Callable[[Array], SupportPoint | None], most: int = MOST) 
 def _asked(touching: Callable[[Array], SupportPoint | None], normal: Array) -> SupportPoint:
     touch = touching(normal)
     if touch is None:
-        raise SolverError(f"a set that is not empty has no end toward {normal.tolist()}")
+        raise SolverError(f"no support point found toward {normal.tolist()}")
     return touch
 
 

@@ -159,8 +159,8 @@ def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     for limb in poses:
         if limb not in joints and limb not in solved:
             raise InvalidInputError(
-                f"missing for {limb}, which holds on; valid are all limbs with a hand, each with "
-                "angles or 'solve', or 'solve'",
+                f"missing for {limb}, which is on the rock; give angles or 'solve' for each limb "
+                "with a hand, or 'solve' for all",
                 field="stance.joints",
             )
     index = {hand.limb: i for i, hand in enumerate(stance.hands)}
@@ -168,8 +168,8 @@ def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     for limb, (off, turned) in _off(stance, joints, known).items():
         if off > OFF or turned > TURNED:
             raise InvalidInputError(
-                f"{limb} is {off:.3g} m and {turned:.3g} rad from where its joints put it; "
-                f"up to {OFF:g} m and {TURNED:g} rad are valid",
+                f"{limb} is {off:.3g} m and {turned:.3g} rad from the pose of its joint angles; "
+                f"the tolerance is {OFF:g} m and {TURNED:g} rad",
                 field=f"stance.hands[{index[limb]}].pose",
             )
     return joints

@@ -127,7 +127,7 @@ def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
     """
     _, wrist = _hand_at(stance, limb)
     if wrist is None:
-        raise InvalidInputError(f"the wrist of {limb} is fixed; floating is needed", field="limb")
+        raise InvalidInputError(f"the wrist of {limb} is fixed; must be floating", field="limb")
     return wrist
 
 

@@ -104,26 +104,23 @@ class Question:
             if wrists.get(limb) != "fixed":
                 valid = ", ".join(name for name, wrist in wrists.items() if wrist == "fixed")
                 raise InvalidInputError(
-                    f"only hands of the stance with a fixed wrist have set-points; valid: "
-                    f"{valid or 'none'}",
+                    f"requires a hand of the stance with a fixed wrist; valid: {valid or 'none'}",
                     field=f"present.{limb}",
                 )
             present[limb] = finite_vector(tensions, len(FINGERS), f"present.{limb}")
             if present[limb].min() < 0.0:
                 raise InvalidInputError(
-                    f"tensions cannot be below 0 N, got {present[limb].min():g}",
+                    f"must be at least 0 N, got {present[limb].min():g}",
                     field=f"present.{limb}",
                 )
         object.__setattr__(self, "present", present)
         if self.limits.tension_change is not None and not present:
-            raise InvalidInputError(
-                "a change from nothing; present tensions are needed", field="limits.tension_change"
-            )
+            raise InvalidInputError("requires 'present' tensions", field="limits.tension_change")
 
     def _check_draws(self) -> None:
         if "spread" not in self.want:
             if self.draws is not None:
-                raise InvalidInputError("'draws' are for 'spread': add it to want", field="draws")
+                raise InvalidInputError("requires 'spread' in want", field="draws")
             return
         if self.draws is not None:
             object.__setattr__(self, "draws", tuple(self.draws))
@@ -148,7 +145,7 @@ class Question:
             return
         if self.stance.joints is None:
             raise InvalidInputError(
-                "the stance says nothing of joints; give stance.joints, or 'solve'",
+                "requires stance.joints, angles or 'solve'",
                 field="limits.joint_torque",
             )
         if isinstance(limits.joint_torque, Mapping):
@@ -157,7 +154,7 @@ class Question:
                 count = len(robot.chains[limb].joints)
                 if isinstance(most, tuple) and len(most) != count:
                     raise InvalidInputError(
-                        f"{count} joints need {count} figures, got {len(most)}",
+                        f"must have a value for each of {count} joints, got {len(most)}",
                         field=f"limits.joint_torque.{limb}",
                     )
                 if isinstance(most, tuple) and not any(most):

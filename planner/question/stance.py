@@ -70,7 +70,7 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
 def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
     if not np.abs(wrench).max() <= HEAVIEST:
-        raise InvalidInputError(f"asks for more than {HEAVIEST:g} N or N·m", field=field)
+        raise InvalidInputError(f"must be at most {HEAVIEST:g} N or N·m", field=field)
     return wrench
 
 
@@ -147,7 +147,7 @@ class HandOnHold:
         if self.tendon_preload is not None:
             if self.wrist == "fixed":
                 raise InvalidInputError(
-                    "only a floating wrist holds a preload; valid is none, or wrist floating",
+                    "requires wrist 'floating'; remove it for a fixed wrist",
                     field="tendon_preload",
                 )
             preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
@@ -175,17 +175,15 @@ class HandOnHold:
         for name, left_out in (("seat", "the seat"), ("at", "where it is seated")):
             if given[name] and posed:
                 raise InvalidInputError(
-                    "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, "
-                    f"or {left_out}",
+                    "cannot be combined with a hold's pose: remove pose and pose_in_hand, or "
+                    f"{left_out}",
                     field=name,
                 )
         if self.at is not None:
             _possible(self.at, "at")
         if self.seat_direction is not None:
             if self.seat != "best":
-                raise InvalidInputError(
-                    "only a hand with the seat 'best' looks in a direction", field="seat_direction"
-                )
+                raise InvalidInputError("requires the seat 'best'", field="seat_direction")
             direction = finite_vector(self.seat_direction, 6, "seat_direction")
             if not direction.any():
                 raise InvalidInputError("must not be zero", field="seat_direction")
@@ -247,7 +245,8 @@ class Stance:
                     joints[limb] = SOLVE
                 else:
                     raise InvalidInputError(
-                        f"valid are angles or, of a limb that holds on, {SOLVE!r}; got {angles!r}",
+                        f"valid are angles or, of a limb with a hand in the stance, {SOLVE!r}; "
+                        f"got {angles!r}",
                         field=f"joints.{limb}",
                     )
             object.__setattr__(self, "joints", joints)

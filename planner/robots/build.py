@@ -220,7 +220,8 @@ def _mounted(
         reach = float(np.linalg.norm(mount.pose.position))
     if reach <= ON_AXIS:
         raise InvalidInputError(
-            "the limb's joints only turn the hand in its place; it must be away from them",
+            "the hand is on the axes of the limb's joints, which cannot move it; must be away "
+            "from them",
             field=f"limbs.{limb}.position",
         )
     with errors_under(f"limbs.{limb}.torque_limit"):

@@ -207,7 +207,8 @@ def coupling_of(chain: Sequence[JointElement]) -> JointCoupling:
             lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
             if lower[j] > upper[j]:
                 raise InvalidInputError(
-                    f"joint {joint.name!r} follows {driver!r}, and their limits leave no room"
+                    f"joint {joint.name!r} follows {driver!r} (mimic), and their limits have no "
+                    "common range"
                 )
     return JointCoupling(driving, matrix, offset, lower, upper)
 

@@ -269,12 +269,12 @@ def stages(route: Route) -> Iterator[RouteStage]:
             )
         if len(hands) == 1:
             raise InvalidInputError(
-                "the only hand on the rock cannot lift", field=f"moves[{number - 1}].limb"
+                "the only hand on the rock cannot be lifted", field=f"moves[{number - 1}].limb"
             )
         given = dict(move.joints) if isinstance(move.joints, Mapping) else {}
         if joints is None and given:
             raise InvalidInputError(
-                "the start stance says nothing of joints; give stance.joints, or 'solve' there",
+                "requires stance.joints in the start stance, angles or 'solve'",
                 field=f"moves[{number - 1}].joints",
             )
         known_limbs(given, route.start.robot, f"moves[{number - 1}].joints")

@@ -98,4 +98,6 @@ def _must_touch(stage: RouteStage) -> None:
     with errors_under(f"hands[{i}]"):
         settled = settle_hand(stance.hands[i], stance)
         if not (settled.holding.any() or settled.palm.engaged):
-            raise InvalidInputError(f"{stage.limb} touches nothing there", field="hold")
+            raise InvalidInputError(
+                f"{stage.limb} does not touch this hold: move it closer", field="hold"
+            )

@@ -219,7 +219,7 @@ def _overlapping(scene: Scene) -> Iterator[Finding]:
             off = np.linalg.norm(scene.places[i] - scene.places[j])
             turned = np.abs(scene.axes[i] - scene.axes[j]).max()
             if off <= SAME_PLACE and turned <= SAME_TURN:
-                raise InvalidInputError(f"{names} are in one and the same place", field=field)
+                raise InvalidInputError(f"{names} are at the same position", field=field)
             message = (
                 f"{names} overlap, their palms are {-gap:.2g} m in each other: is the same hold "
                 "given twice?"

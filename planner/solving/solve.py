@@ -90,7 +90,7 @@ def plan_on(
     if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
         answer = _second_look(prepared, checks, answer, budget)
     if isinstance(answer, Failed):
-        deadline.check("a plan was found, or proven away")
+        deadline.check("a plan was found or proven infeasible")
     factor = LoadFactor()
     if "load_factor" in question.want:
         factor = load_factor_of(prepared, answer, budget, overloaded=checks.overloaded)
@@ -263,7 +263,7 @@ def with_advice(question: Question, answer: Plan) -> Plan:
     start = time.perf_counter()
     odd = [each.field for each in answer.findings if each.kind == "unit"]
     if odd:
-        warning = f"no advice is looked for while a unit is in doubt: {', '.join(odd)}"
+        warning = f"no search for advice while a unit is in doubt: {', '.join(odd)}"
         return replace(answer, advice=(), warnings=(*answer.warnings, warning))
     found, whole = advise(question, try_stance)
     seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings

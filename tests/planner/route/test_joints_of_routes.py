@@ -129,9 +129,9 @@ def test_a_limb_may_be_given_and_the_others_found(climbed, solved):
         (0, "nobody", lambda _: "solve", "moves[0].joints.nobody", "unknown limb"),
         (1, "", lambda _: "solve", "moves[1].joints.", "unknown limb"),
         (1, "rear_left", lambda _: "guess", "moves[1].joints.rear_left", "'solve'"),
-        (0, "front_left", lambda q: 0.5 * q, "moves[0].pose", "from where its joints put it"),
-        (1, "rear_right", lambda q: 0.5 * q, "stance.hands[", "from where its joints put it"),
-        (1, "front_right", lambda q: 0.9 * q, "moves[1].pose", "from where its joints put it"),
+        (0, "front_left", lambda q: 0.5 * q, "moves[0].pose", "from the pose of its joint angles"),
+        (1, "rear_right", lambda q: 0.5 * q, "stance.hands[", "from the pose of its joint angles"),
+        (1, "front_right", lambda q: 0.9 * q, "moves[1].pose", "from the pose of its joint angles"),
     ],
 )
 def test_angles_that_cannot_be_are_told_with_their_move(
@@ -152,7 +152,7 @@ def test_a_route_without_joints_takes_none(solved):
     moves = (replace(solved.moves[0], joints={"front_left": np.zeros(7)}), solved.moves[1])
     bare = replace(solved, start=replace(solved.start, joints=None))
     assert all(stage.question.stance.joints is None for stage in stages(bare))
-    with pytest.raises(InvalidInputError, match="says nothing of joints") as caught:
+    with pytest.raises(InvalidInputError, match="joints in the start stance") as caught:
         evaluate(replace(bare, moves=moves))
     assert caught.value.field == "moves[0].joints"
 

@@ -385,7 +385,7 @@ def test_draws_that_cannot_be_are_refused_by_their_entry():
     with pytest.raises(InvalidInputError, match="must not exceed") as caught:
         ask(on_wall(), "spread", draws=(own_draw(ratio),))
     assert caught.value.field == "draws[0].surfaces.sandpaper-36.pull_off_limit"
-    with pytest.raises(InvalidInputError, match="add it to want") as caught:
+    with pytest.raises(InvalidInputError, match="requires 'spread' in want") as caught:
         ask(on_wall(), "load_factor", draws=FEW)
     assert caught.value.field == "draws"
     for count in (0, 101):
