@@ -197,7 +197,7 @@ def handle(
             request = over_default(request, hand)
         within = request.deadline if isinstance(request, Query) else None
         with deadline.within(within, started=started):
-            deadline.check("an answer was begun")
+            deadline.check("the answer was started")
             found = service.answer(request, robots, streams)
         try:
             reply, data = fitted(request, found, form)
@@ -218,5 +218,5 @@ def handle(
         raise
     except Exception as error:
         log.exception("the request at %s failed", key)
-        excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
+        excuse = CruxError(f"internal error of the service ({type(error).__name__}); see its log")
         return failed(excuse, "internal")

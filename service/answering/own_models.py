@@ -85,7 +85,9 @@ def read_draws(path: Path) -> list[Draw]:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
         given = raw.get("draws")
         if list(raw) != ["draws"] or not isinstance(given, list) or not given:
-            raise InvalidInputError("a list is needed, [[draws]], and nothing else", field="draws")
+            raise InvalidInputError(
+                "must be a list, [[draws]], with no other entries", field="draws"
+            )
         found = []
         for i, draw in enumerate(given):
             with errors_under(f"draws[{i}]"):
@@ -174,8 +176,8 @@ def with_robot(request: R, file: RobotFile | None) -> R:
     named = request.stance.robot
     if named not in (None, file.name):
         raise InvalidInputError(
-            f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; valid "
-            "is that, or no name",
+            f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; use "
+            "that name, or none",
             field="stance.robot",
         )
     stance = msgspec.structs.replace(request.stance, robot=file.name)

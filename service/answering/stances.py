@@ -348,14 +348,13 @@ def _check_costs(stance: requests.Stance) -> None:
     if planes > MOST_HALF_PLANES:
         raise LimitError(
             f"half_planes of all hands are {planes} together, those of a floating hand counted "
-            f"{FLOATING} times; at most {MOST_HALF_PLANES} are worked with",
+            f"{FLOATING} times; the maximum is {MOST_HALF_PLANES}",
             field="hands",
         )
     points = sum(_points(hand.hold, stance.rocks) for hand in stance.hands)
     if points > MOST_POINTS:
         raise LimitError(
-            f"profiles of all hands have {points} points together; at most {MOST_POINTS} are "
-            "worked with",
+            f"profiles of all hands have {points} points together; the maximum is {MOST_POINTS}",
             field="hands",
         )
 

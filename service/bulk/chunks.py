@@ -141,8 +141,8 @@ def _check_versions(there: dict[str, str | None]) -> None:
     if other:
         listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
         raise CruxError(
-            "where it is to be answered there is {}, and where it is asked {}; answers are equal "
-            "to the last digit only with the same versions on both".format(*listed)
+            "the worker has {}, and the client {}: install the same versions on both, for answers "
+            "that are equal to the last digit".format(*listed)
         )
 
 

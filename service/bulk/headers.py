@@ -46,7 +46,7 @@ class Header(msgspec.Struct):
             there = msgspec.json.decode(before, type=Header)
         except (msgspec.DecodeError, UnicodeDecodeError):
             raise InvalidInputError(
-                f"{path}: no table that a batch has written, or a sweep", field=RESUME
+                f"{path}: not a table of crux batch or crux sweep", field=RESUME
             ) from None
         known, wanted = there._compared(), self._compared()
         for name in dict.fromkeys([*known, *wanted]):
@@ -54,7 +54,7 @@ class Header(msgspec.Struct):
             if values[0] != values[1]:
                 which = "" if name in DIGESTS else f" ({values[0]!r}, now {values[1]!r})"
                 raise InvalidInputError(
-                    f"{path}: was begun with another {name}{which}; begin anew without it",
+                    f"{path}: was started with another {name}{which}; start again without --resume",
                     field=RESUME,
                 )
 

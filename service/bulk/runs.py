@@ -136,7 +136,7 @@ class Run(ABC):
             kept = stream.tell()
             last = stream.readline()
         if last and not heads and not last.startswith(REPLY[: len(last)]):
-            raise InvalidInputError(f"{file}: its end is of no reply", field=RESUME)
+            raise InvalidInputError(f"{file}: its end is not a reply", field=RESUME)
         return kept
 
 
@@ -195,7 +195,7 @@ class ReplyLines(Run):
         try:
             reply = msgspec.json.decode(line, type=_Reply)
         except (msgspec.DecodeError, UnicodeDecodeError):
-            raise InvalidInputError(f"{where}: no reply", field=RESUME) from None
+            raise InvalidInputError(f"{where}: not a reply", field=RESUME) from None
         name = identifier(question, Format.JSON)
         if reply.id != name:
             raise InvalidInputError(
@@ -204,7 +204,7 @@ class ReplyLines(Run):
                 field=RESUME,
             )
         if reply.status is None and reply.error is None:
-            raise InvalidInputError(f"{where}: no reply", field=RESUME)
+            raise InvalidInputError(f"{where}: not a reply", field=RESUME)
         return reply.outcome
 
 
@@ -254,7 +254,7 @@ class TableLines(Run):
             first = stream.read(len(HEADER))
         if not HEADER.startswith(first):
             raise InvalidInputError(
-                f"{file}: no table that a batch has written, or a sweep",
+                f"{file}: not a table of crux batch or crux sweep",
                 field=RESUME if resume else "-o",
             )
 
@@ -263,13 +263,13 @@ class TableLines(Run):
         """Refuse to go on with a table that has no lines beside it."""
         if any(Path(name.format(table)).exists() for name in OLD_MANIFESTS):
             raise InvalidInputError(
-                f"{table}: was begun by an older version, and cannot be gone on with; begin anew "
-                "without it",
+                f"{table}: was started by an older version and cannot be resumed; start again "
+                "without --resume",
                 field=RESUME,
             )
         if table.exists():
             raise InvalidInputError(
-                f"{table}: no table that a batch has written, or a sweep", field=RESUME
+                f"{table}: not a table of crux batch or crux sweep", field=RESUME
             )
 
     def row(self, payload: bytes) -> TableRow:
@@ -309,7 +309,7 @@ class TableLines(Run):
         except (msgspec.DecodeError, UnicodeDecodeError):
             whole = False
         if not whole:
-            raise InvalidInputError(f"{where}: no row of this table", field=RESUME)
+            raise InvalidInputError(f"{where}: not a row of this table", field=RESUME)
         if row.asked != _digest(question):
             raise InvalidInputError(
                 f"{where}: its rows answer other requests than those given now; "

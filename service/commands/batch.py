@@ -82,11 +82,11 @@ def batch_command(
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
     if resume and file is None:
-        raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
+        raise InvalidInputError("requires -o FILE, the output to resume", field="--resume")
     is_table = file is not None and bulk.exporter_at(file) is not None
     for given, name in ((columns is not None, "--columns"), (export, "--export")):
         if given and not is_table:
-            raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field=name)
+            raise InvalidInputError("requires a table: -o FILE.csv or FILE.parquet", field=name)
     if file is not None:
         _check_output(file, requests, resume, is_table)
         tables.write_alone(file)
@@ -246,12 +246,14 @@ def _check_output(file: Path, requests: str, resume: bool, is_table: bool) -> No
     try:
         if not is_table and file.is_dir():
             field = "--resume" if resume else "-o"
-            raise InvalidInputError(f"{file}: no file that a batch has written", field=field)
+            raise InvalidInputError(f"{file}: not an output of crux batch", field=field)
         if resume and not is_table and file.exists() and not file.is_file():
-            raise InvalidInputError(f"{file}: no file that a batch has written", field="--resume")
+            raise InvalidInputError(f"{file}: not an output of crux batch", field="--resume")
         given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
         if file.is_file() and os.path.samestat(file.stat(), given):
-            raise InvalidInputError(f"{file}: the requests are there", field="-o")
+            raise InvalidInputError(
+                f"{file}: is the file of the requests; give another output", field="-o"
+            )
     except OSError:
         # reading or writing reports it
         return

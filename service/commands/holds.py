@@ -150,8 +150,8 @@ def holds_command(
         )
     if not trials:
         raise InvalidInputError(
-            "no point of the grid is on rock that faces −z of its frame; is it turned over, or "
-            "smaller than the grid?",
+            "no grid point is on rock that faces −z of its frame; is the mesh flipped, or "
+            "smaller than the spacing?",
             field="--spacing",
         )
     # fail before the work is done

@@ -67,7 +67,7 @@ def plan_command(
     extras = [want for want, chosen in further.items() if chosen]
     request = options.with_extras(wanted.of(plain), *extras, whole=not as_json)
     if advice_folder is not None and request.detail not in (None, "full"):
-        raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
+        raise InvalidInputError("--advice requires the full reply; remove detail", field="detail")
     robots = own.robots
     brief = not as_json and tables.verbosity() < 0
     advised = "advice" in request.want
@@ -114,8 +114,8 @@ def _print(answer: answering.Planned, without_palm: replies.PlanReply | None, br
 
 def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
     """Search for advice that makes a stance hold, or hold more, and print it."""
-    better = "hold" if answer.reply.status in OVER else "be better"
-    with tables.working(f"looking for what would {better}"):
+    wanted = "feasible" if answer.reply.status in OVER else "better"
+    with tables.working(f"searching for {wanted} changes"):
         found = answering.answer_with_advice(answer)
     assert isinstance(found.reply, replies.PlanReply)  # as a person is given
     assert isinstance(answer.reply, replies.PlanReply)

@@ -47,7 +47,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     except ValueError:
         numbers = ()
     if len(numbers) != 3:
-        raise click.BadParameter(f"three numbers with commas between are needed, got {text!r}")
+        raise click.BadParameter(f"must be three numbers separated by commas, got {text!r}")
     return numbers
 
 
@@ -153,7 +153,7 @@ def rock_command(
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
     if neighbours is not None and std_ratio is None:
-        raise InvalidInputError("is of outliers, which --std-ratio drops", field="neighbours")
+        raise InvalidInputError("requires --std-ratio", field="neighbours")
     if output.exists() and file.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself", field="--output")
     with tables.progress(f"meshing {file.name}") as report:

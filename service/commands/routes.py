@@ -80,7 +80,7 @@ def route_command(
     if output.suffix.lower() in ENDINGS:
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
-                raise InvalidInputError("is for one route: needs -o DIR", field=option)
+                raise InvalidInputError("is for one route: requires -o DIR", field=option)
         return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
     if len(routes) > 1 or Path(routes[0]).is_dir():
         raise InvalidInputError(
@@ -88,9 +88,9 @@ def route_command(
         )
     for option, given in (("--resume", resume), ("--dask", parallel.dask is not None)):
         if given:
-            raise InvalidInputError(f"needs -o FILE that ends in {LISTED}", field=option)
+            raise InvalidInputError(f"requires -o FILE that ends in {LISTED}", field=option)
     if output.exists() and not output.is_dir():
-        raise InvalidInputError(f"{output}: is no folder", field="-o")
+        raise InvalidInputError(f"{output}: is not a folder", field="-o")
     request = wanted.of(own.asked(stances.read_route(routes[0])))
     return _one(request, output, parallel.workers, own, as_json)
 
@@ -190,7 +190,7 @@ def _many(
     tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == LINES and file.exists() and not file.is_file():
-        raise InvalidInputError(f"{file}: is no file", field="-o")
+        raise InvalidInputError(f"{file}: is not a file", field="-o")
     sink = new_run(
         file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )

@@ -86,7 +86,7 @@ def _declared(plan: requests.PlanRequest, radius: float) -> requests.StreamReque
     """Return the declaration of a plan request's stance."""
     if plan.objective != "max_margin":
         raise UnsupportedError(
-            f"{plan.objective} is not for streams; valid is max_margin", field="objective"
+            f"{plan.objective} is not available for streams; valid is max_margin", field="objective"
         )
     return requests.StreamRequest(
         v=1,

@@ -81,7 +81,7 @@ def sweep_command(
     a point failed or was lost.
     """
     if seed is not None and samples is None:
-        raise InvalidInputError("is of samples: give --samples, too", field="--seed")
+        raise InvalidInputError("requires --samples", field="--seed")
     request = own.asked(stances.read_request(stance))
     try:
         chosen = [
@@ -93,7 +93,7 @@ def sweep_command(
         raise InvalidInputError(error.message, field=where) from None
     given = click.get_current_context().get_parameter_source("tolerance")
     if given is ParameterSource.COMMANDLINE and design.number is None:
-        raise InvalidInputError("is of one number that varies alone", field="--tolerance")
+        raise InvalidInputError("requires exactly one varied number", field="--tolerance")
     pair = None if over is None else over.split(",")
     if pair is not None:
         with errors_under("--over"):

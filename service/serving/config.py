@@ -347,7 +347,7 @@ def _must_be_endpoint(endpoint: str, flag: str) -> None:
             problem = f"{port!r} is no port"
     if problem is not None:
         raise InvalidInputError(
-            f"{_shown(endpoint)} is no endpoint ({problem}); valid is such as {EXAMPLE}",
+            f"{_shown(endpoint)} is not an endpoint ({problem}); valid is, for example, {EXAMPLE}",
             field=flag,
         )
 

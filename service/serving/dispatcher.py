@@ -113,7 +113,7 @@ class Dispatcher:
         if not self._crew.up:
             self.stop()
             self.close()
-            raise LostError("the processes that answer do not live to be ready; the log says how")
+            raise LostError("no worker starts; see the log")
 
     def ask(self, query: zenoh.Query, key: str) -> None:
         """Take a query at a key; returns at once, whatever the thread."""
@@ -237,7 +237,7 @@ class Dispatcher:
             question = received_question(query, key, arrived, self._seconds)
         except Exception:
             log.exception("a query at %s cannot be read", key)
-            unread = CruxError("the service could not read the query; its log says why")
+            unread = CruxError("the service could not read the query; see its log")
             answer = encode_error(unread, Format.JSON, kind="internal")
             self._replies.later(Sender.UNREAD, partial(reply_to, query, key, lambda: answer))
             return
@@ -295,7 +295,7 @@ class Dispatcher:
             return
         names.gone(client)
         self._shares.gone(client)
-        gone = LostError("its client has gone, as its link or its liveliness token says")
+        gone = LostError("the client disconnected: its link or its liveliness token is gone")
         for question in self._waiting.remove(lambda each: each.place == client):
             self._replies.refuse(question, gone, "gone")
 
@@ -311,7 +311,7 @@ class Dispatcher:
             how, left = self._end_process(lane.station)
             for question in left:
                 self._shares.ended_process(question.place, time.perf_counter() - question.begun)
-                lost = LostError(f"the process that worked on it {how}; {rest}")
+                lost = LostError(f"its worker {how}; {rest}")
                 self._replies.refuse(question, lost)
             return
         if done is None:
@@ -337,7 +337,7 @@ class Dispatcher:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
         for question in self._waiting.remove(lambda each: each.deadline <= now):
-            self._replies.refuse(question, DeadlineError(question.seconds, "it was its turn"))
+            self._replies.refuse(question, DeadlineError(question.seconds, "a worker was free"))
         for lane, asked in list(self._crew.work.items()):
             if asked is None or lane not in self._crew.work:
                 continue
@@ -384,7 +384,7 @@ class Dispatcher:
         left, now = self._crew.left(), time.perf_counter()
         if (left or now < self._quiet_from) and now < self._stops_at:
             return False
-        lost = LostError("the service ended before there was an answer")
+        lost = LostError("the service stopped before the question was answered")
         for question in left:
             self._replies.refuse(question, lost)
         return True

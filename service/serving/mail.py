@@ -145,7 +145,7 @@ class Replies:
 
     def ending(self, question: PendingQuestion) -> None:
         """Refuse a question because the service is ending."""
-        self.refuse(question, BusyError("the service is ending", COME_AGAIN[-1]))
+        self.refuse(question, BusyError("the service is shutting down", COME_AGAIN[-1]))
 
     def reply(self, question: PendingQuestion, answer: Answer) -> None:
         """Reply with an answer."""

@@ -158,8 +158,8 @@ def received_question(
         if attached is not None:
             if len(attached) > ATTACHED:
                 raise LimitError(
-                    f"the query's attachment has {len(attached)} bytes; {ATTACHED} at most, send "
-                    "what is asked as its payload",
+                    f"the query's attachment has {len(attached)} bytes; the maximum is "
+                    f"{ATTACHED}: send the request as the payload",
                     field="attachment",
                 )
             secret = attached.to_bytes()

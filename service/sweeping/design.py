@@ -87,10 +87,10 @@ class Design:
             If there are too many points.
         """
         if not variations:
-            raise InvalidInputError("something must vary", field="variations")
+            raise InvalidInputError("at least one is needed", field="variations")
         count = math.prod(len(each.values) for each in variations) if samples is None else samples
         if not 1 <= count <= MOST_POINTS:
-            raise LimitError(f"{count:,} points; from 1 to {MOST_POINTS:,} are asked at once")
+            raise LimitError(f"must be 1 to {MOST_POINTS:,} points, got {count:,}")
         asked = msgspec.structs.replace(
             request,
             detail="hands",
@@ -206,7 +206,7 @@ def _check_apart(variations: Sequence[Variation], targets: Sequence[Target]) -> 
     ]
     for (first, path), (steps, again) in itertools.combinations(ends, 2):
         if all(map(operator.eq, first, steps)):
-            raise InvalidInputError(f"varies what {path} varies, too", field=again)
+            raise InvalidInputError(f"varies the same field as {path}", field=again)
 
 
 def _whole_numbers(variation: Variation, target: Target) -> Variation:

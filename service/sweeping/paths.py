@@ -111,7 +111,7 @@ class Paths:
             if all(isinstance(each.kind, (*KEYED, *LISTED, inspect.NoneType)) for each in places):
                 known = ", ".join(self._listed(steps, places, _at(self.document, steps)))
                 more = f"; give one of its entries: {known}" if known else ""
-                raise InvalidInputError(f"is no number or word{more}", field=path)
+                raise InvalidInputError(f"is not a number or a word{more}", field=path)
         steps, places = found[0]
         kinds = {type(each.kind): each.units for each in places}
         units = kinds.get(inspect.FloatType) or kinds.get(inspect.IntType) or self._own_unit(steps)
@@ -140,7 +140,7 @@ class Paths:
         words = self._words(steps)
         if not listed:
             raise InvalidInputError(
-                f"{words} has no entries in the request; give there what is to vary", field=path
+                f"{words} has no entries in the request; add the one to vary", field=path
             )
         free = any(isinstance(each.kind, inspect.DictType) for each in places)
         several = [EVERY] if free or isinstance(value, list) else []
@@ -181,7 +181,7 @@ class Paths:
         words = self._words(steps)
         if value is None and any(isinstance(kind, (*LISTED, inspect.AnyType)) for kind in kinds):
             raise InvalidInputError(
-                f"{words} has no value in the request, of which an entry could vary: give it there",
+                f"{words} has no value in the request; add one to vary its entries",
                 field=path,
             )
         found = f"is {value!r} in the request" if _meant(places, value) else "is a number or a word"

@@ -33,18 +33,19 @@ MOST: Final = 3
 
 def words_of(advice: Advice, *, holding: bool = False) -> str:
     """Return in words what one change would do; ``holding``: the stance already holds."""
-    what = "would be better" if holding else "would hold" if advice.holds else "would help"
-    return f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}"
+    what = "better" if holding else "feasible" if advice.holds else "less overloaded"
+    colon = "" if advice.sentence.startswith("if ") else ":"
+    return f"{what} (utilisation {advice.utilisation:.2f}){colon} {advice.sentence}"
 
 
 def print_advice(reply: PlanReply, out: Console) -> None:
-    """Print the advice of a plan, or that none of the changes that were tried would help."""
+    """Print the advice of a plan, or that no change that was tried lowers the utilisation."""
     holding = reply.status == "optimal"
     for advice in islice(reply.advice or (), MOST):
         out.print(words_of(advice, holding=holding))
     doubtful = any(each.kind == "unit" for each in reply.findings)
     if reply.advice == [] and "advice" not in reply.unfinished and not doubtful:
-        out.print("of all changes that were tried none would help")
+        out.print("no change that was tried lowers the utilisation")
 
 
 def with_interval(value: float, spread: Quantiles | None) -> str:

@@ -171,4 +171,4 @@ def test_a_body_space_without_a_bound_is_refused_as_such(monkeypatch: pytest.Mon
     payload = json.dumps({"v": 1, "stance": stance, "directions": [[0, 0, 1]]}).encode()
     answer = dispatch.handle("crux/robosimian/body_space", payload)
     assert answer.status == "unsupported"
-    assert "has no bound" in json.loads(answer.payload)["error"]["message"]
+    assert "is unbounded" in json.loads(answer.payload)["error"]["message"]

@@ -160,9 +160,9 @@ def test_another_version_is_not_answered():
         setting = pickle.dumps(Setting(versions=own_versions() | {name: "0.0.none"}))
         with pytest.raises(CruxError) as caught:
             answer_chunk(setting, [])
-        there, here = caught.value.message.split(", and where it is asked ")
+        there, here = caught.value.message.split(", and the client ")
         assert there.endswith(f" {name} {own_versions()[name]}")
-        assert here.startswith(f"{name} 0.0.none;")
+        assert here.startswith(f"{name} 0.0.none: ")
 
 
 @given(st.lists(st.integers(0, 9), max_size=60), st.integers(1, 3))

@@ -130,7 +130,7 @@ def test_explanations_are_in_a_table_if_they_are_asked_for(lines, tmp_path, capf
     assert run_command_line([*asked, "--columns", "sufficient"]) == BAD_INPUT
     assert "it needs --explain" in complaint(capfd)
     assert run_command_line(["batch", str(lines), "--columns", "id"]) == BAD_INPUT
-    assert "needs a table" in complaint(capfd)
+    assert "requires a table" in complaint(capfd)
 
 
 @watched
@@ -218,7 +218,7 @@ def test_a_table_does_not_write_over_what_is_none(lines, tmp_path, capfd):
     notes, folder = tmp_path / "notes.csv", tmp_path / "notes.parquet"
     notes.write_text("notes")
     assert run_command_line(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
-    assert "no table that a batch has written" in complaint(capfd)
+    assert "not a table of crux batch or crux sweep" in complaint(capfd)
     assert notes.read_text() == "notes"
     beside = notes.with_name("notes.csv.jsonl")
     for text in ("notes\n", "notes", lines.read_text()):
@@ -226,7 +226,7 @@ def test_a_table_does_not_write_over_what_is_none(lines, tmp_path, capfd):
         # the requests themselves, too
         for asked, more in ((lines, ["--resume"]), (lines, []), (beside, [])):
             assert run_command_line(["batch", str(asked), "-o", str(notes), *more]) == BAD_INPUT
-            assert "no table that a batch has written" in complaint(capfd)
+            assert "not a table of crux batch or crux sweep" in complaint(capfd)
         assert beside.read_text() == text
     folder.mkdir()
     (folder / "notes").write_text("notes")
@@ -243,7 +243,7 @@ def test_a_table_of_an_older_version_is_begun_anew(lines, tmp_path, capfd):
     path.with_name("table.csv.manifest.json").write_text("{}")
     for more in (["--resume"], ["--export"]):
         assert run_command_line(["batch", str(lines), "-o", str(path), *more]) == BAD_INPUT
-        assert "was begun by an older version" in complaint(capfd)
+        assert "was started by an older version" in complaint(capfd)
     assert path.read_text() == "index,id\n"
     assert run_command_line(["batch", str(lines), "-o", str(path)]) == BAD_INPUT
     assert len(content(path)) == COUNT
@@ -326,7 +326,7 @@ def test_a_table_that_a_full_disk_kept_from_being_written_is_exported_later(
     assert len(content(path)) == COUNT
     capfd.readouterr()
     assert run_command_line(["batch", str(lines), "--export"]) == BAD_INPUT
-    assert "--export: needs a table" in complaint(capfd)
+    assert "--export: requires a table" in complaint(capfd)
 
 
 def test_less_is_said_of_a_batch(lines, tmp_path, capfd):

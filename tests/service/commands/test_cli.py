@@ -155,7 +155,7 @@ def test_a_spread_over_draws_of_the_callers_own(stance_file, tmp_path, capfd):
     [
         ("0.0028", "2.8", "draws[0].hand.finger.pulley_radii: must be from 0 to 1 m"),
         ("rock.shear_limit = { value = 90", "ice.a = { value = 90", "draws[1].surfaces.ice: unk"),
-        ("[[draws]]", "[[sets]]", "draws: a list is needed"),
+        ("[[draws]]", "[[sets]]", "draws: must be a list"),
         ("[[draws]]", "[[draws", "at line 2"),
         (DRAWS, "draws = [3]", "draws[0]: hand or surfaces is needed"),
         (DRAWS, "draws = [{hand = 3}]", "draws[0].hand: "),

@@ -188,7 +188,7 @@ def test_colours_are_for_terminals_and_for_who_wants_them():
 @pytest.mark.skipif(sys.platform == "win32", reason="no terminals of this kind")
 def test_a_terminal_shows_that_advice_is_looked_for(stance_file):
     words = ["plan", stance_file(wall_request(HEAVY))]
-    assert "looking for what would hold" in on_a_terminal(words, "stderr", OVERLOADED)
+    assert "searching for feasible changes" in on_a_terminal(words, "stderr", OVERLOADED)
     assert on_a_terminal(["-q", *words], "stderr", OVERLOADED) == ""
 
 

@@ -205,8 +205,8 @@ def test_what_cannot_be_is_told_in_a_line(rock, tmp_path, capfd):
         ([str(rock), "-o", output, "--spacing", "nan"], "spacing: must be at least 0.001 m"),
         (
             [str(rock), "-o", output, "--spacing", "0.001"],
-            "up to 2,008,008 places to try (a grid of 501 by 501 points, 8 at each), and at most "
-            "100,000 are tried",
+            "up to 2,008,008 places to try (a grid of 501 by 501 points, 8 at each); the "
+            "maximum is 100,000",
         ),
         ([str(rock), "-o", str(tmp_path / "x" / "holds.json")], "no such folder"),
         ([str(rock), "-o", str(tmp_path / "holds.txt")], "must end in .json"),

@@ -119,9 +119,9 @@ def test_a_batch_does_not_go_on_with_the_replies_of_another_or_what_is_none(line
     output = tmp_path / "replies.jsonl"
     for content, words in (
         (b'{"v": 1, "id": "other"}\n{"v"', "answers 'other', and the request is 'r0'"),
-        (b"x\n", "line 1: no reply"),
-        (b"notes", "no reply"),
-        (b'{"vx', "no reply"),
+        (b"x\n", "line 1: not a reply"),
+        (b"notes", "not a reply"),
+        (b'{"vx', "not a reply"),
         (b"{}\n" * (COUNT + 1), f"has {COUNT + 1} replies, and there are {COUNT} requests"),
     ):
         output.write_bytes(content)
@@ -129,7 +129,7 @@ def test_a_batch_does_not_go_on_with_the_replies_of_another_or_what_is_none(line
         assert words in complaint(capfd)
         assert output.read_bytes() == content
     assert run_command_line(["batch", str(lines), "--resume"]) == BAD_INPUT
-    assert "needs the FILE of -o" in complaint(capfd)
+    assert "requires -o FILE" in complaint(capfd)
 
 
 def limited(*arguments: str, size: int) -> tuple[int, str]:
@@ -150,10 +150,13 @@ def test_a_batch_does_not_write_where_its_requests_come_from(lines, capfd):
     before = lines.read_bytes()
     for more in ([], ["--resume"]):
         assert run_command_line(["batch", str(lines), "-o", str(lines), *more]) == BAD_INPUT
-        assert "the requests are there" in complaint(capfd)
+        assert "is the file of the requests" in complaint(capfd)
     with lines.open("rb") as given:
         status, error = ended(begun("batch", "-", "-o", str(lines), stdin=given))
-    assert (status, error) == (BAD_INPUT, f"crux: -o: {lines}: the requests are there\n")
+    assert (status, error) == (
+        BAD_INPUT,
+        f"crux: -o: {lines}: is the file of the requests; give another output\n",
+    )
     assert lines.read_bytes() == before
 
 

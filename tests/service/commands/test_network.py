@@ -177,7 +177,7 @@ def test_a_configuration_stays_as_it_was():
     assert str(config) == before
 
 
-VALID = "valid is such as tcp/127.0.0.1:7447"
+VALID = "valid is, for example, tcp/127.0.0.1:7447"
 
 
 @pytest.mark.parametrize(
@@ -189,10 +189,16 @@ VALID = "valid is such as tcp/127.0.0.1:7447"
         (["--cfg", "mode"], "crux: --cfg: KEY:VALUE is needed, such as mode:'client', got 'mode'"),
         (["-c", "/nowhere.json5"], "crux: --config: /nowhere.json5: No such file or directory"),
         (["-c", "/"], "crux: --config: /: Is a directory"),
-        (["-l", "foo"], f"crux: --listen: 'foo' is no endpoint (no protocol/address); {VALID}"),
-        (["-e", "foo"], f"crux: --connect: 'foo' is no endpoint (no protocol/address); {VALID}"),
-        (["-l", "tcp/foo"], f"crux: --listen: 'tcp/foo' is no endpoint (no port); {VALID}"),
-        (["-e", "tcp/[::1]:y"], "crux: --connect: 'tcp/[::1]:y' is no endpoint ('y' is no port); "),
+        (["-l", "foo"], f"crux: --listen: 'foo' is not an endpoint (no protocol/address); {VALID}"),
+        (
+            ["-e", "foo"],
+            f"crux: --connect: 'foo' is not an endpoint (no protocol/address); {VALID}",
+        ),
+        (["-l", "tcp/foo"], f"crux: --listen: 'tcp/foo' is not an endpoint (no port); {VALID}"),
+        (
+            ["-e", "tcp/[::1]:y"],
+            "crux: --connect: 'tcp/[::1]:y' is not an endpoint ('y' is no port)",
+        ),
         (["-m", "boss"], "crux: Invalid value for '-m' / '--mode': 'boss' is not one of"),
         *(
             (["--timeout", value], f"crux: Invalid value for '--timeout': {value} is not in the")

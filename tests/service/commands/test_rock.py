@@ -97,8 +97,8 @@ def test_a_plan_is_made_on_scanned_terrain(tmp_path, stance_file, capfd):
 @pytest.mark.parametrize(
     ("text", "more", "words"),
     [
-        ("0 0 0\n1 0 0\n0 1 1\n", ["--cell", "2"], "cell: is of grids of heights, "),
-        ("0 0 0\n1e200 0 0\n0 1e200 1\n", [], "file: numbers up to 1e+200 are no lengths"),
+        ("0 0 0\n1 0 0\n0 1 1\n", ["--cell", "2"], "cell: is for grids of heights, "),
+        ("0 0 0\n1e200 0 0\n0 1e200 1\n", [], "file: coordinates up to 1e+200 are too large"),
     ],
 )
 def test_points_have_no_cells_and_are_near(text, more, words, tmp_path, capfd):
@@ -135,7 +135,7 @@ def test_rock_is_not_written_over_its_scan(tmp_path, capfd):
         (["none.pcd", "-o", "rock.ply", "--plot", "rock.txt"], "valid endings are"),
         (["none.pcd", "-o", "rock.ply", "--unit", "inch"], "'m', 'cm', 'mm'"),
         (["none.pcd", "-o", "rock.ply", "--up", "w"], "--up"),
-        (["none.pcd", "-o", "rock.ply", "--view", "0,1"], "three numbers with commas"),
+        (["none.pcd", "-o", "rock.ply", "--view", "0,1"], "three numbers separated by commas"),
         (
             ["none.pcd", "-o", "rock.ply", "--view", "0,1,0", "--viewpoint", "0,0,0"],
             "view: give a view or a viewpoint",
@@ -212,7 +212,7 @@ def test_a_printed_pose_has_the_digits_that_a_millimetre_needs(tmp_path, capfd):
     cloud, output = str(tmp_path / "wall.xyz"), ["-o", str(tmp_path / "rock.ply")]
     np.savetxt(cloud, points, fmt="%.4f")
     assert run_command_line(["rock", cloud, *output]) == BAD_INPUT
-    assert "view: the file does not say from where" in complaint(capfd)
+    assert "view: the scanner's position is unknown" in complaint(capfd)
     view = ["--view", "0,1,0"]
     out = printed([cloud, *output, *view], capfd)
     pose = json.loads(re.findall(r"pose (\{.*?\})", out)[0])
@@ -257,7 +257,7 @@ def test_stray_points_are_told_and_dropped(tmp_path, capfd):
     assert told["covered"] > 0.95
     assert told["warnings"] == []
     for more, words in (
-        (["--neighbours", "8"], "neighbours: is of outliers"),
+        (["--neighbours", "8"], "neighbours: requires --std-ratio"),
         (["--std-ratio", "0"], "std_ratio: must be finite and above zero"),
     ):
         assert run_command_line(["rock", *asked, *more]) == BAD_INPUT

@@ -123,11 +123,11 @@ def test_many_routes_need_a_file_and_one_a_folder(climbs, tmp_path, capfd):
     for asked, told in (
         (["route", BUNDLED, BUNDLED, "-o", out], "many routes need a file that ends in .jsonl"),
         (["route", str(climbs), "-o", out], "many routes need a file"),
-        (["route", BUNDLED, "-o", out, "--resume"], "--resume: needs -o FILE"),
-        (["route", BUNDLED, "-o", out, "--dask", "local"], "--dask: needs -o FILE"),
+        (["route", BUNDLED, "-o", out, "--resume"], "--resume: requires -o FILE"),
+        (["route", BUNDLED, "-o", out, "--dask", "local"], "--dask: requires -o FILE"),
         (["route", "-", BUNDLED, "-o", f"{out}.csv"], "standard input is one route"),
         (["route", str(tmp_path), "-o", f"{out}.csv"], "no file in it ends in .json"),
-        (["route", BUNDLED, "-o", str(climbs / "notes.txt")], "is no folder"),
+        (["route", BUNDLED, "-o", str(climbs / "notes.txt")], "is not a folder"),
     ):
         assert run_command_line(asked) == BAD_INPUT
         assert told in complaint(capfd)

@@ -105,4 +105,4 @@ def test_a_set_with_zero_in_it_shows_what_is_carried_alone(capsys):
 def test_a_fixed_hand_has_nothing_to_search(capsys):
     status = run_command_line(["wrench-space", STANCE, "--hand", "front_left", "--search", "5"])
     assert status == 2
-    assert "floating is needed" in capsys.readouterr().err
+    assert "must be floating" in capsys.readouterr().err

@@ -82,12 +82,12 @@ def test_what_is_printed_fits_a_terminal(arguments, words, tmp_path, capfd, monk
         (["--vary", "load.mas=1:2:3"], "--vary load.mas: load has no 'mas'; known are mass, com"),
         (["--vary", "load.mass=2:1:3"], "--vary load.mass: LOW must be below HIGH"),
         (["--vary", "load.mass=1:2:1"], "COUNT must be from 2"),
-        (["--vary", MASS, "--seed", "1"], "--seed: is of samples"),
+        (["--vary", MASS, "--seed", "1"], "--seed: requires --samples"),
         (["--vary", MASS, "--samples", "0"], "--samples"),
         (["--vary", MASS, "--tolerance", "nan"], "--tolerance"),
         (
             ["--vary", MASS, "--vary", "limits.tendon_tension=40,50", "--tolerance", "0.1"],
-            "--tolerance: is of one number that varies alone",
+            "--tolerance: requires exactly one varied number",
         ),
         (["--vary", MASS, "--over", "load.mass,x"], "--over: two different ones of load.mass"),
         ([], "--vary"),
@@ -280,14 +280,14 @@ def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(tmp_path, ca
     assert run_command_line(["sweep", "wall-300", *given, "--json"]) == DONE
     capfd.readouterr()
     assert run_command_line(["sweep", "wall-700", *given, "--resume"]) == BAD_INPUT
-    assert "was begun with another stance; begin anew without it" in complaint(capfd)
+    assert "was started with another stance; start again without --resume" in complaint(capfd)
     lines = tmp_path / "sweep.csv.jsonl"
     lines.write_text(lines.read_text().replace('"optimal",', ""))
     assert run_command_line(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
-    assert "no row of this table" in complaint(capfd)
+    assert "not a row of this table" in complaint(capfd)
     lines.unlink()
     assert run_command_line(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
-    assert "no table that a batch has written, or a sweep" in complaint(capfd)
+    assert "not a table of crux batch or crux sweep" in complaint(capfd)
     # one that never began begins
     assert (
         run_command_line(

@@ -397,7 +397,7 @@ def test_another_objective_is_refused(stance_file, monkeypatch, capfd) -> None:
         run_command_line(["stream", stance_file(wall_request() | {"objective": "min_effort"})])
         == BAD_INPUT
     )
-    assert "objective: min_effort is not for streams" in complaint(capfd)
+    assert "objective: min_effort is not available for streams" in complaint(capfd)
 
 
 def test_a_line_is_answered_before_the_next_is_there() -> None:

@@ -378,7 +378,7 @@ def test_an_attachment_counts_too():
     refused = taken_of(b"{}", "application/json", b"x" * (ATTACHED + 1))
     assert refused.fault is not None
     assert refused.fault.field == "attachment"
-    assert f"{ATTACHED + 1} bytes; {ATTACHED} at most" in refused.fault.message
+    assert f"{ATTACHED + 1} bytes; the maximum is {ATTACHED}" in refused.fault.message
     assert (refused.secret, refused.payload) == (b"", b"")
 
 
