@@ -102,18 +102,18 @@ BARRIERS: Final = {
 
 
 UNPROVEN: Final = (
-    "the floating wrists are where their hands' stiffness jumps or the search ended: the loads are "
-    "exact, but that no other pose uses less is not proven"
+    "the loads are exact, but the utilisation is not proven minimal: at these poses of the "
+    "floating wrists the stiffness jumps, or the search ended"
 )
 """Warning for a plan that its search could not prove to be the least."""
 
 
 LEAST_FACTOR: Final = (
-    "the load factor is a lower bound: beyond it no plan was found, nor proven away"
+    "the load factor is a lower bound: beyond it no plan was found, nor proven infeasible"
 )
 """Warning for a load factor whose search ended for want of a plan, not at a limit."""
 
-NO_FACTOR: Final = "no load factor was found; with floating wrists that is no proof of none"
+NO_FACTOR: Final = "no load factor found; with floating wrists there may be one all the same"
 """Warning for a search that ends without a load factor."""
 
 

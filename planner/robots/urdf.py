@@ -158,9 +158,7 @@ class Urdf:
         while trail[-1] in self.joints:
             parent = self.joints[trail[-1]].parent
             if parent in trail:
-                raise InvalidInputError(
-                    f"link {parent!r} is in a closed loop; a robot must be a tree"
-                )
+                raise InvalidInputError(f"link {parent!r} is in a loop; a robot must be a tree")
             trail.append(parent)
         return trail
 
@@ -230,7 +228,7 @@ def parse_urdf(text: str) -> Urdf:
     if len(roots) != 1:
         raise InvalidInputError(
             f"one link must be the root of all others, got {len(roots)}: "
-            f"{shorten(', '.join(roots) or 'a closed loop of joints', 200, placeholder=' …')}"
+            f"{shorten(', '.join(roots) or 'a loop of joints', 200, placeholder=' …')}"
         )
     tree = Urdf({}, by_child)
     for child in by_child:

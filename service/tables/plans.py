@@ -118,7 +118,7 @@ def print_plan(
         _print_joints(reply.joint_torque, reply.joint_torque_limit, out)
     for prices, what in ((reply.prices, "utilisation"), (reply.effort_prices, "effort")):
         if prices:
-            title = f"what one unit more of a limit would take off the {what}"
+            title = f"decrease of the {what} per unit of a limit"
             if len(prices) > MOST_PRICES:
                 title += f" ({MOST_PRICES} of {len(prices)})"
             print_rows(prices[:MOST_PRICES], PRICES, out, title)
@@ -169,15 +169,15 @@ def _print_certificate(
 
 
 def _sufficient_sentence(names: Sequence[planner.LimitName]) -> str:
-    """Return in a sentence which limits, taken away alone, would let the stance be held."""
+    """Return in a sentence which single limits, removed, would make the stance feasible."""
     if not names:
-        return "no single one of them, taken away alone, would do"
+        return "removing no single one of them would make it feasible"
     which = "this one" if len(names) == 1 else "any one of these"
     limits = ", ".join(
         f"{limb} {limit}" + (f" ({', '.join(owners)})" if owners else "")
         for (limb, limit), owners in _alike(names).items()
     )
-    return f"{which}, taken away alone, would let it be held: {limits}"
+    return f"removing {which} would make it feasible: {limits}"
 
 
 def _alike(names: Iterable[planner.LimitName]) -> dict[tuple[str, str], list[str]]:

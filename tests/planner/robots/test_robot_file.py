@@ -324,7 +324,7 @@ def test_a_ring_of_links_is_no_robot():
         joint("one", "continuous", "a", "b"),
         joint("two", "continuous", "b", "a"),
     )
-    assert refused(text=text) == "urdf: link 'b' is in a closed loop; a robot must be a tree"
+    assert refused(text=text) == "urdf: link 'b' is in a loop; a robot must be a tree"
 
 
 def test_a_robot_without_mass_is_refused():
