@@ -79,13 +79,13 @@ def spread_sentence(spread: Spread) -> str:
 def robust_sentence(robust: RobustLoadFactor) -> str:
     """Return the load factor for places of the hands near the given ones, in a sentence."""
     low, high = robust.tenth_interval
-    said = f"nine in ten above {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
-    said += f"99 in 100 above {robust.hundredth:.3f}"
-    said += f"; {robust.without} hold nothing" if robust.without else ""
+    said = f"10 % quantile {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
+    said += f"1 % quantile {robust.hundredth:.3f}"
+    said += f"; {robust.without} with a load factor of 0" if robust.without else ""
     said += _refused(robust.refused, robust.reasons)
     return (
         f"load factor with each hand up to {1e3 * robust.position:g} mm and "
-        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} draws:\n{said}"
+        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} samples:\n{said}"
     )
 
 

@@ -101,11 +101,11 @@ def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(stance_
     run_command_line(["plan", path, "--robust"])
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 128 draws:" in out
+    assert "load factor with each hand up to 2 mm and 20 mrad off its place, 128 samples:" in out
     low, high = robust["tenth_interval"]
-    told = f"nine in ten above {robust['tenth']:.3f} ({low:.3f} to {high:.3f})"
+    told = f"10 % quantile {robust['tenth']:.3f} ({low:.3f} to {high:.3f})"
     assert told in out.replace("\n", " ")
-    assert f"99 in 100 above {robust['hundredth']:.3f}" in out.replace("\n", " ")
+    assert f"1 % quantile {robust['hundredth']:.3f}" in out.replace("\n", " ")
     run_command_line(["plan", path])
     assert "off its place" not in capfd.readouterr().out
 
@@ -252,7 +252,7 @@ def test_a_person_reads_torques_effort_and_whose_joint_it_is(stance_file, capfd)
         assert f"{used:.1f}*" in row
         assert row.split()[-2:] == ["10", f"{abs(used) / 10.0:.2f}"]
     assert reply["effort_prices"]
-    prices, _, effort_prices = table.partition("would take off the effort")
+    prices, _, effort_prices = table.partition("decrease of the effort")
     assert reply["effort_prices"][0]["limb"] in effort_prices
     joints = [price["joint"] for price in reply["prices"][:8] if price["joint"]]
     assert joints
