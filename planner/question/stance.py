@@ -70,7 +70,9 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
 def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
     if not np.abs(wrench).max() <= HEAVIEST:
-        raise InvalidInputError(f"must be at most {HEAVIEST:g} N or N·m", field=field)
+        raise InvalidInputError(
+            f"must be at most {HEAVIEST:g} N or N·m, got {np.abs(wrench).max():g}", field=field
+        )
     return wrench
 
 
