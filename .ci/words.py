@@ -15,14 +15,36 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("hand_models", "planner", "service")
 
 LIMITS = {
-    "docstrings that are fragments": 10,
+    "docstrings that are fragments": 5,
     "old words in the source": 25,
     "old words in the documents": 10,
-    "module constants of one word": 1080,
-    "public names defined twice": 58,
+    "module constants of one word": 16,
+    "public names defined twice": 14,
+    "public names defined twice without a reason": 0,
+    "reasons for names that are not defined twice": 0,
     "table cells above 25 words": 0,
 }
 """The largest number of each that passes."""
+
+_ON_THE_WIRE = "the request's struct describes on the wire what the class of {} is"
+
+DEFINED_TWICE = {
+    "Cylinder": _ON_THE_WIRE.format("hand_models"),
+    "Edge": _ON_THE_WIRE.format("hand_models"),
+    "Ellipsoid": _ON_THE_WIRE.format("hand_models"),
+    "Mesh": _ON_THE_WIRE.format("hand_models"),
+    "Move": _ON_THE_WIRE.format("planner"),
+    "Plane": _ON_THE_WIRE.format("hand_models"),
+    "Pose": _ON_THE_WIRE.format("hand_models"),
+    "Profile": _ON_THE_WIRE.format("hand_models"),
+    "Sphere": _ON_THE_WIRE.format("hand_models"),
+    "Stance": _ON_THE_WIRE.format("planner"),
+    "Surface": _ON_THE_WIRE.format("hand_models"),
+    "evaluate": "planner exports that of a route, the documents show that of service.bulk for many",
+    "plot": "every study has it",
+    "run": "every study has it",
+}
+"""Why a public name may be defined twice."""
 
 FRAGMENT = re.compile(
     r"(Of|As|By|What|Whose|How|So|Which|Where|Whether|Than|Besides?|Beyond|From|To|In|On|At|With|Without)\b"
@@ -69,9 +91,13 @@ def found() -> dict[str, list[str]]:
             for name in _constants(node):
                 if "_" not in name.strip("_"):
                     places["module constants of one word"].append(f"{path}:{node.lineno} {name}")
-    for name, where in sorted(defined.items()):
-        if len(where) > 1:
-            places["public names defined twice"].append(f"{name}: {', '.join(where)}")
+    twice = {name: where for name, where in sorted(defined.items()) if len(where) > 1}
+    for name, where in twice.items():
+        line = f"{name}: {', '.join(where)}"
+        places["public names defined twice"].append(line)
+        if name not in DEFINED_TWICE:
+            places["public names defined twice without a reason"].append(line)
+    places["reasons for names that are not defined twice"] += DEFINED_TWICE.keys() - twice.keys()
     for path, text in documents():
         places["old words in the documents"] += _old_words(path, text)
         places["table cells above 25 words"] += [

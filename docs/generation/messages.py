@@ -12,7 +12,7 @@ import msgspec
 
 from generation.tables import table
 from hand_models.parameters import Quantity
-from service.wire.json_schema import MESSAGE_KINDS, schema
+from service.wire.json_schema import MESSAGE_KINDS, part_name, schema
 
 __all__ = ["anchor", "message_page"]
 
@@ -65,14 +65,14 @@ def message_page() -> str:
 def _words() -> Iterator[tuple[str, str]]:
     """Yield what the docstring of each part says beyond its first sentence."""
     seen = msgspec.inspect.multi_type_info((*MESSAGE_KINDS, Quantity))
-    structs: dict[str, list[type]] = {}
+    structs: set[type] = set()
     stack: list[Any] = list(seen)
     while stack:
         info = stack.pop()
         if isinstance(info, msgspec.inspect.StructType):
-            if info.cls in structs.get(info.cls.__name__, []):
+            if info.cls in structs:
                 continue
-            structs.setdefault(info.cls.__name__, []).append(info.cls)
+            structs.add(info.cls)
             stack += [field.type for field in info.fields]
         stack += [
             part
@@ -80,14 +80,11 @@ def _words() -> Iterator[tuple[str, str]]:
             for value in [getattr(info, name, ())]
             for part in (value if isinstance(value, tuple) else [value])
         ]
-    for name, kinds in structs.items():
-        for kind in kinds:
-            rest = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[2]
-            # of two alike, the reply's is told apart
-            apart = len(kinds) > 1 and kind.__module__.startswith("service.replies.")
-            label = f"{name}Reply" if apart else name
-            plain = rest.partition("\nAttributes\n")[0]
-            yield label, "" if rest.startswith("Attributes") else plain.replace("``", "`")
+    for kind in structs:
+        rest = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[2]
+        plain = rest.partition("\nAttributes\n")[0]
+        words = "" if rest.startswith("Attributes") else plain.replace("``", "`")
+        yield part_name(kind.__name__), words
 
 
 def _section(name: str, part: Schema, words: str) -> str:

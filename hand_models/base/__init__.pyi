@@ -19,8 +19,8 @@ from .errors import (
     SolverError as SolverError,
     UnsupportedError as UnsupportedError,
     check_positive as check_positive,
+    errors_under as errors_under,
     in_file as in_file,
-    within as within,
 )
 from .files import reading_file as reading_file, whole_file as whole_file
 from .frames import (

@@ -17,8 +17,8 @@ __all__ = [
     "SolverError",
     "UnsupportedError",
     "check_positive",
+    "errors_under",
     "in_file",
-    "within",
 ]
 
 
@@ -107,7 +107,7 @@ def check_positive(value: float, unit: str, field: str, most: float = sys.float_
 
 
 @contextmanager
-def within(path: str) -> Iterator[None]:
+def errors_under(path: str) -> Iterator[None]:
     """Put a path before the field of an error."""
     try:
         yield

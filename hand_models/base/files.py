@@ -28,7 +28,7 @@ def reading_file(path: Path) -> Iterator[None]:
         error.field = error.field or "file"
         raise
     except UnicodeDecodeError:
-        raise InvalidInputError(f"no text: {path}", field="file") from None
+        raise InvalidInputError(f"not a text file: {path}", field="file") from None
     except OSError as error:
         raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
     except Exception as error:

@@ -61,7 +61,7 @@ class FingerAtRest(NamedTuple):
 
     @property
     def base_tile(self) -> bool:
-        """Whether a tile on its base comes first on the tendon."""
+        """True if a tile on its base comes first on the tendon."""
         return len(self.shears) > len(PHALANGES)
 
     @property

@@ -102,7 +102,7 @@ class CompliantHand:
         scheme: MotorScheme = "held",
     ) -> None:
         if settled.grasp.fingernail:
-            raise UnsupportedError("a hand that clings with its nails cannot float")
+            raise UnsupportedError("a fingernail grasp requires a fixed wrist")
         hand = settled.hand
         self.settled = settled
         self.preload = _preload(preload, settled)

@@ -82,7 +82,7 @@ def farthest(
             break
     else:
         raise EmptySetError(
-            "no pose of the wrist holds near the way to this wrench: limits are exceeded by "
+            "no feasible wrist pose found toward this wrench: limits are exceeded by "
             f"{100.0 * excess:.2g} %"
         )
     binding = float(found.utilisation[0]) >= 1.0 - kept

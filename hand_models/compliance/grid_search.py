@@ -114,7 +114,7 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     if progress is not None:
         progress(total, total)
     if not held:
-        raise EmptySetError(f"none of {total} poses of the wrist holds")
+        raise EmptySetError(f"none of {total} wrist poses is feasible")
     return _pushed(grasp, box, outermost, total, held)
 
 

@@ -107,14 +107,15 @@ class Gripper(CompliantGrasp):
         square = seated**2 + away**2 - spread**2
         if square <= 0.0:
             raise InvalidInputError(
-                f"the bases are {2e3 * spread:g} mm apart, too far for this surface",
+                f"the bases are {2e3 * spread:g} mm apart, too far to reach this surface",
                 field="gripper.base_half_spacing",
             )
         self.section = Disc(complex(-spread, math.sqrt(square)), radius)
         finger = settle_finger(model, self.section, (0.0, 0.0))
         if len(finger.bearing) != len(PHALANGES) or not all(finger.touching):
             raise InvalidInputError(
-                f"the fingers do not lie on a surface of {1e3 * diameter:g} mm", field="diameter"
+                f"the fingers do not touch a surface with a diameter of {1e3 * diameter:g} mm",
+                field="diameter",
             )
         tendon = FingerTendon.from_table(table)
         own = FingerAtRest(

@@ -115,7 +115,7 @@ def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Ar
         space = grasp.linearised(at, within=20.0 * units)
         found = _analytic_centre(space.A * units, space.b)
     if found is None:
-        raise SolverError("search: the middle of the linearised set was not found")
+        raise SolverError("no centre of the linearised set of wrist poses found")
     y, hessian = found
     lengths, directions = np.linalg.eigh(hessian)
     return space, y * units, units[:, None] * directions / np.sqrt(lengths)
@@ -175,4 +175,4 @@ def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
 
 
 def _nothing_holds() -> EmptySetError:
-    return EmptySetError("no pose of the wrist near rest holds: the preload alone breaks a limit")
+    return EmptySetError("no wrist pose near rest is feasible: the preload alone exceeds a limit")

@@ -39,7 +39,7 @@ from .study_result import (
     track as track,
 )
 from .sweep import (
-    Sweep as Sweep,
+    GripperSweep as GripperSweep,
     radius_axes as radius_axes,
     sweep_cell as sweep_cell,
     sweep_map as sweep_map,

@@ -147,7 +147,7 @@ def limit(points: Array, measure: Measure) -> Limit:
         method="highs",
     )
     if result.status == 2:
-        raise EmptySetError(f"no wrench of the hull to measure its {measure} by")
+        raise EmptySetError(f"the wrench hull is empty: {measure} cannot be measured")
     if result.status != 0 or result.x is None or result.fun is None:
         raise SolverError(f"limit: {result.message}")
     corners = np.flatnonzero(result.x > 0.0)

@@ -45,7 +45,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class PullingSettings:
-    """How finely a gripper's poses are searched and balanced."""
+    """Resolution with which a gripper's poses are searched and balanced."""
 
     poses_per_axis: int = 60
     """Poses of the wrist along each axis of a search."""
@@ -151,7 +151,9 @@ def unloaded(gripper: Gripper) -> Array:
     """
     poses = pulled_off_poses(gripper, np.zeros(1))
     if not (len(poses) and gripper.evaluate(poses).holds[0]):
-        raise EmptySetError("the gripper lets go before any load: closing alone is too much")
+        raise EmptySetError(
+            "the gripper exceeds a limit before any load: the closing tension alone is too large"
+        )
     return np.asarray(poses[0])
 
 

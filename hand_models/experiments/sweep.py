@@ -28,7 +28,7 @@ from hand_models.experiments.sweep_axis import Axis, Conditions
 from hand_models.experiments.wrench_hull import clipped_vertices, volume
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = ["Sweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
+__all__ = ["GripperSweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_map"]
 
 
 def sweep_cell(
@@ -132,7 +132,7 @@ def radius_axes(table: ParameterTable, points: int = 15) -> tuple[Axis, Axis]:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class GripperSweep:
     """A map that a caller asks for, as a study.
 
     Attributes
@@ -188,7 +188,7 @@ class Sweep:
                     raise InvalidInputError(str(error), field=option) from None
         x, y = axes
         if x.entry == y.entry:
-            raise InvalidInputError(f"must not be that of --x, {x.entry}", field="--y")
+            raise InvalidInputError(f"must differ from --x, got {x.entry} for both", field="--y")
         found = sweep_map(table, x, y, conditions, self.measures, progress)
         if (found["state"] == "no grasp").all():
             # raises the reason
@@ -213,7 +213,7 @@ class Sweep:
         return {"sweep": figure}
 
 
-run, plot = Sweep().run, Sweep().plot
+run, plot = GripperSweep().run, GripperSweep().plot
 """Run and plot the study without options: the axes and the conditions of Fig. 16."""
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hand_models.base import InvalidInputError, within
+from hand_models.base import InvalidInputError, errors_under
 from hand_models.compliance import Gripper, pulled_off
 from hand_models.parameters import (
     LARGEST_BY_UNIT,
@@ -57,7 +57,7 @@ class Conditions:
         surface = None
         # what the paper's experiments publish of sandpaper replaces the preset's numbers
         if self.surface != "sandpaper-36":
-            with within("surface"):
+            with errors_under("surface"):
                 surface = pulled_off(Surface.named(self.surface), table)
         return Gripper(self.diameter, self.tension, surface, table, most_pressing)
 
@@ -120,7 +120,9 @@ class Axis:
             like = difflib.get_close_matches(entry, known)
             hint = f"; did you mean {' or '.join(like)}?" if like else ""
             listed = ", ".join(sorted(known))
-            raise InvalidInputError(f"the gripper reads no {entry!r}{hint}; known are {listed}")
+            raise InvalidInputError(
+                f"the gripper has no parameter {entry!r}{hint}; known are {listed}"
+            )
         axis = known[entry]
         bundled = table.quantity(axis.section, axis.name).value
         if not (math.isfinite(low) and math.isfinite(high) and low < high):

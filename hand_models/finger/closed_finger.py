@@ -22,7 +22,7 @@ from hand_models.finger.path_state import (
     Codes,
     Drive,
     OpenFinger,
-    State,
+    PathState,
     held_share,
     take,
 )
@@ -173,7 +173,7 @@ def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
 def _closed(
     model: FingerModel,
     closings: Sequence[OpenFinger],
-    state: State,
+    state: PathState,
     around: Around,
     rests: Flags,
 ) -> Iterator[ClosedFinger | Refused]:

@@ -39,7 +39,7 @@ from hand_models.finger.path_state import (
     JOINT_COUNT,
     Around,
     Drive,
-    State,
+    PathState,
     choose,
     held_share,
     put,
@@ -55,7 +55,7 @@ __all__ = ["follow"]
 
 def follow(
     rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array
-) -> tuple[State, Around, Flags]:
+) -> tuple[PathState, Around, Flags]:
     """Follow the paths of fingers that close, to the closing tension.
 
     Parameters
@@ -73,7 +73,7 @@ def follow(
     ndarray of bool, shape (n,)
         Which of them have come to rest.
     """
-    end, beside = state, around = State.at(q), Around.of(rock, shape, drive, q)
+    end, beside = state, around = PathState.at(q), Around.of(rock, shape, drive, q)
     resting, going = np.zeros(len(q), dtype=bool), np.arange(len(q))
     slow = np.zeros(len(q), dtype=np.intp)
     for step in range(SETTINGS.most_increments):
@@ -97,8 +97,8 @@ def follow(
 
 
 def _increment(
-    shape: PhalanxShape, drive: Drive, state: State, around: Around, balanced: float
-) -> tuple[State, Flags]:
+    shape: PhalanxShape, drive: Drive, state: PathState, around: Around, balanced: float
+) -> tuple[PathState, Flags]:
     """Return where fingers come to next, and which of them are at their ends."""
     code = CONTACT_CODES
     stride, slack = state.stride, shape.closes
@@ -164,7 +164,7 @@ def _increment(
     s = state.s + more
     first = (mode == code.on) & np.isnan(state.touches)
     touches = np.where(first, state.s[:, None], state.touches)
-    after = State(
+    after = PathState(
         q=state.q + np.where(rests[:, None], 0.0, step),
         s=np.where(np.abs(target - s) < SETTINGS.rounding, target, s),
         mode=mode,
@@ -185,8 +185,13 @@ def _increment(
 
 
 def _judged(
-    shape: PhalanxShape, drive: Drive, state: State, around: Around, after: State, there: Around
-) -> tuple[State, Around]:
+    shape: PhalanxShape,
+    drive: Drive,
+    state: PathState,
+    around: Around,
+    after: PathState,
+    there: Around,
+) -> tuple[PathState, Around]:
     """Return fingers after an increment, or before it where its linearisation does not hold."""
     forces = forces_on(drive, after, there)
     left = forces.torque - times(there.b, after.normals)

@@ -20,7 +20,7 @@ from hand_models.finger.path_state import (
     Around,
     Codes,
     Drive,
-    State,
+    PathState,
     held_share,
     largest,
     put,
@@ -53,7 +53,7 @@ class Linearised(NamedTuple):
     ----------
     mode, stop, spines : ndarray of int, shape (n, 3)
     off : ndarray, shape (n, 3)
-        As of `State`.
+        As of `PathState`.
     settled : ndarray of bool, shape (n,)
         Whether nothing of that is to be switched any more.
     active, caught : ndarray of bool, shape (n, 3)
@@ -92,14 +92,14 @@ class Linearised(NamedTuple):
 
 
 def contact_states(
-    drive: Drive, state: State, around: Around, least: Array, length: float, slack: float
+    drive: Drive, state: PathState, around: Around, least: Array, length: float, slack: float
 ) -> Linearised:
     """Return the contact states in which fingers go on.
 
     Parameters
     ----------
     drive : Drive
-    state : State
+    state : PathState
         Where they are, and with what contacts to begin.
     around : Around
     least : ndarray, shape (n, 3)
@@ -133,7 +133,7 @@ def contact_states(
     return found
 
 
-def _code(state: State | Linearised, around: Around) -> Indices:
+def _code(state: PathState | Linearised, around: Around) -> Indices:
     """Return a number for each contact state."""
     holds = around.share > state.off
     digits = np.concatenate([state.mode, state.stop + 1, state.spines, holds], axis=1)
@@ -141,7 +141,7 @@ def _code(state: State | Linearised, around: Around) -> Indices:
 
 
 def _tried(
-    drive: Drive, state: State, around: Around, least: Array, length: float, slack: float
+    drive: Drive, state: PathState, around: Around, least: Array, length: float, slack: float
 ) -> Linearised:
     """Return what becomes of fingers in their contact states, and these after the next switch."""
     mode, stop, spines, off = state.mode, state.stop, state.spines, state.off
@@ -213,7 +213,7 @@ def _tried(
     )
 
 
-def forces_on(drive: Drive, state: State, around: Around) -> Forces:
+def forces_on(drive: Drive, state: PathState, around: Around) -> Forces:
     """Return the torques of springs, tendons and drag in their contact states."""
     mode, f = state.mode, np.minimum(state.s, drive.closing)[:, None]
     share = held_share(state, around)
@@ -247,7 +247,7 @@ def forces_on(drive: Drive, state: State, around: Around) -> Forces:
 
 def _solve(
     drive: Drive,
-    state: State,
+    state: PathState,
     around: Around,
     forces: Forces,
     damped: Array,

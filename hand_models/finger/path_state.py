@@ -22,7 +22,7 @@ __all__ = [
     "Codes",
     "Drive",
     "OpenFinger",
-    "State",
+    "PathState",
     "choose",
     "held_share",
     "largest",
@@ -125,7 +125,7 @@ class Drive(NamedTuple):
 
     @property
     def end(self) -> Array:
-        """Place of the ends of the fingers' paths along them; see `State` [N]."""
+        """Place of the ends of the fingers' paths along them; see `PathState` [N]."""
         return (1.0 + SETTINGS.catching_part) * self.closing
 
 
@@ -178,7 +178,7 @@ class Around(NamedTuple):
         return cls(gap, share, a, b, d_gap, d_share, d_a, d_b, place, push)
 
 
-class State(NamedTuple):
+class PathState(NamedTuple):
     """Fingers on their paths, a row each.
 
     Attributes
@@ -225,7 +225,7 @@ class State(NamedTuple):
     left: Array
 
     @classmethod
-    def at(cls, q: Array) -> State:
+    def at(cls, q: Array) -> PathState:
         """Return fingers turned by q that begin to close."""
         n = len(q)
         return cls(
@@ -246,7 +246,7 @@ class State(NamedTuple):
         )
 
 
-def held_share(state: State, around: Around) -> Array:
+def held_share(state: PathState, around: Around) -> Array:
     """Return the share of each tile's spines that hold on the rock, φ less ψ, shape (n, 3)."""
     return engaged_share(1.0 - around.share + state.off, 1.0)
 

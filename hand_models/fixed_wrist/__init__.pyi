@@ -2,7 +2,7 @@ from .hold_trials import (
     AT_BORDER as AT_BORDER,
     TRIAL_WAYS as TRIAL_WAYS,
     FoundHold as FoundHold,
-    Trial as Trial,
+    HoldTrial as HoldTrial,
     grid_of_trials as grid_of_trials,
     try_holds as try_holds,
 )

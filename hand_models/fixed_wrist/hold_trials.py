@@ -26,7 +26,7 @@ from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["AT_BORDER", "TRIAL_WAYS", "FoundHold", "Trial", "grid_of_trials", "try_holds"]
+__all__ = ["AT_BORDER", "TRIAL_WAYS", "FoundHold", "HoldTrial", "grid_of_trials", "try_holds"]
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
 """Why a hand is not asked for there."""
@@ -35,7 +35,7 @@ TRIAL_WAYS: Final = {"-fz": 2, "-fx": 0, "+fx": 0, "-fy": 1, "+fy": 1}
 """Wrenches on the rock, in H: the pull-off, and shear to all sides; and their axes."""
 
 
-class Trial(NamedTuple):
+class HoldTrial(NamedTuple):
     """A hand that may be at a point of a rock; all in the rock's frame.
 
     Attributes
@@ -90,7 +90,7 @@ def grid_of_trials(
     radius: float,
     most: int | None = None,
     report: Progress | None = None,
-) -> list[Trial]:
+) -> list[HoldTrial]:
     """Return places on a grid across z of a rock's frame.
 
     Parameters
@@ -130,8 +130,8 @@ def grid_of_trials(
     if most is not None and count > most:
         raise LimitError(
             f"{spacing:g} m makes up to {count:,} places to try (a grid of {each_way[0]:,} by "
-            f"{each_way[1]:,} points, {angles * len(rotations)} at each), and at most {most:,} "
-            "are tried; make it wider",
+            f"{each_way[1]:,} points, {angles * len(rotations)} at each); the maximum is "
+            f"{most:,}: use a wider spacing",
             field="spacing",
         )
     # in the middle of what is left over
@@ -139,7 +139,7 @@ def grid_of_trials(
         a + 0.5 * ((b - a) % spacing) + spacing * np.arange(number)
         for a, b, number in zip(low[:2], high[:2], each_way, strict=True)
     ]
-    found: list[Trial] = []
+    found: list[HoldTrial] = []
     into = (0.0, 0.0, 1.0)  # z of a rock's frame
     points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2).tolist()
     for number, (x, y) in enumerate(points):
@@ -159,7 +159,7 @@ def grid_of_trials(
             size = math.hypot(slope[0], slope[1], 1.0)
             toward = -float(slope[0]) / size, -float(slope[1]) / size, 1.0 / size
         found += [
-            Trial(point, toward, math.tau * k / angles, rotation)
+            HoldTrial(point, toward, math.tau * k / angles, rotation)
             for k in range(angles)
             for rotation in rotations
         ]
@@ -181,7 +181,7 @@ def try_holds(
     hand: SpinyHand,
     rock: Mesh,
     surface: Surface,
-    trials: Sequence[Trial],
+    trials: Sequence[HoldTrial],
     seat: str = "rest",
     *,
     robust: bool = False,
@@ -193,7 +193,7 @@ def try_holds(
     hand : SpinyHand
     rock : Mesh
     surface : Surface
-    trials : sequence of Trial
+    trials : sequence of HoldTrial
     seat : {'rest', 'best'}, optional
     robust : bool, optional
         Whether also what is left of it over a scatter of each place.

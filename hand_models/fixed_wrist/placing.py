@@ -59,7 +59,8 @@ def approach_frame(
     across = np.cross(z, above)
     if np.linalg.norm(across) < 1e-6:  # sine of the angle between them
         raise InvalidInputError(
-            f"is along up, {above.tolist()}, so that a wrist angle says nothing: give another up",
+            f"is parallel to up, {above.tolist()}, which leaves wrist_angle undefined: give "
+            "another up",
             field="approach",
         )
     y = across / np.linalg.norm(across)

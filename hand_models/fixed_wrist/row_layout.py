@@ -22,7 +22,7 @@ from hand_models.hand import (
     NAIL,
     NAIL_SHEAR,
     SettledHand,
-    Tile,
+    SettledTile,
 )
 from hand_models.tile import Surface, inner_half_planes
 from hand_models.wrench_spaces import Row
@@ -131,7 +131,7 @@ def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
 
 @lru_cache(maxsize=512)  # layouts of some 30 kB each
 def row_layout(
-    tiles: tuple[Tile, ...],
+    tiles: tuple[SettledTile, ...],
     lateral: bool,
     pieces: tuple[str, ...],
     stops: tuple[tuple[int, int], ...],
@@ -142,7 +142,7 @@ def row_layout(
 
     Parameters
     ----------
-    tiles : tuple of Tile
+    tiles : tuple of SettledTile
     lateral : bool
         Whether fingers with a tile on rock resist sideways.
     pieces : tuple of str

@@ -95,7 +95,8 @@ def best_seats(
     for each in placements:
         if each.hold_in_hand is not None:
             raise InvalidInputError(
-                "a hand with a pose is not seated: leave out the pose, or ask for the seat 'rest'",
+                "'best' cannot be combined with a hold's pose: remove the pose, or use the seat "
+                "'rest'",
                 field="seat",
             )
     keys = [(PlacementKey(each), *d.tolist()) for each in placements]

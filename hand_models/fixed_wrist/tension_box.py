@@ -84,7 +84,7 @@ def parallelepiped(settled: SettledHand) -> WrenchSpace:
     for limit in tension_limits(settled):
         if limit.tension <= 0.0:
             raise EmptySetError(
-                f"the {limit.phalanx} tile of {limit.finger} lets go at any tension"
+                f"the {limit.phalanx} tile of {limit.finger} exceeds its limit at every tension"
             )
         by_tile = limit.tension < settled.hand.maximum_tension
         name = "f_t_max" if by_tile else "tendon_tension"

@@ -219,7 +219,7 @@ def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> I
     name = FINGERS[finger]
     if not refused.depth > 0.0:
         return InvalidInputError(
-            f"{name} comes to no rest on this rock: move or turn the hand a little",
+            f"no equilibrium found for {name} on this rock: move or rotate the hand slightly",
             field="hold",
         )
     how = "even with its joints fully open"

@@ -21,7 +21,7 @@ from hand_models.rock import Hold
 from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
-__all__ = ["HandPostures", "Palm", "SettledHand", "Tile"]
+__all__ = ["HandPostures", "SettledHand", "SettledPalm", "SettledTile"]
 
 
 class HandPostures(NamedTuple):
@@ -74,7 +74,7 @@ class HandPostures(NamedTuple):
         )
 
 
-class Tile(NamedTuple):
+class SettledTile(NamedTuple):
     """One finger tile's place among the hand's rows and columns.
 
     Attributes
@@ -91,7 +91,7 @@ class Tile(NamedTuple):
     contact: str
 
 
-class Palm(NamedTuple):
+class SettledPalm(NamedTuple):
     """The palm on its rock.
 
     Attributes
@@ -150,7 +150,7 @@ class SettledHand:
     seating : Seating
     postures : HandPostures
         Of the fingers, in the order of `FINGERS`.
-    tiles : tuple of Tile
+    tiles : tuple of SettledTile
         The 14 finger tiles, finger by finger, from the base outward; after each finger's, where the
         hand clings, its nail.
     finger_of : ndarray of int, shape (n,)
@@ -175,7 +175,7 @@ class SettledHand:
         H and h of `Fingernail.rows` of each nail that hooks, in the order of the tiles.
     stops : tuple of (int, int, ndarray)
         Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
-    palm : Palm
+    palm : SettledPalm
     sets : BoundedStore of float to WrenchSpace
         What `fixed_wrist.wrench_spaces` found for a largest tension [N], the last few.
     """
@@ -187,7 +187,7 @@ class SettledHand:
     closing_tension: float
     seating: Seating
     postures: HandPostures
-    tiles: tuple[Tile, ...]
+    tiles: tuple[SettledTile, ...]
     finger_of: Indices
     positions: Array
     axes: Array
@@ -197,7 +197,7 @@ class SettledHand:
     nail_normals: Array
     nail_rows: tuple[tuple[Array, Array], ...]
     stops: tuple[tuple[int, int, Array], ...]
-    palm: Palm
+    palm: SettledPalm
     sets: BoundedStore[float, WrenchSpace] = field(
         default_factory=lambda: BoundedStore("sets of hands", most=4), init=False, repr=False
     )

@@ -186,7 +186,7 @@ def _too_slack(
         yield (
             i,
             InvalidInputError(
-                f"must be larger: at {tensions[i]:g} N no finger comes to the rock",
+                f"must be larger: at {tensions[i]:g} N no finger touches the rock",
                 field="grasp.closing_tension",
             ),
         )

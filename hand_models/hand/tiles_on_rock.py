@@ -18,7 +18,7 @@ from hand_models.hand.finger_frames import OUTER_FINGERS, STACK_ROWS, TILE_COLUM
 from hand_models.hand.hooked_nails import Nails
 from hand_models.hand.names import CONTACT_NAMES, FINGERS, NAIL
 from hand_models.hand.placement import PlacedHands
-from hand_models.hand.settled_hand import Palm, Tile
+from hand_models.hand.settled_hand import SettledPalm, SettledTile
 from hand_models.tile import engaged_share
 
 __all__ = ["HandTiles", "hand_tiles", "palms_on_rock", "tiles_on_rock"]
@@ -51,7 +51,7 @@ def _order(*, nails: bool) -> tuple[Indices, Indices]:
 class HandTiles(NamedTuple):
     """The tiles of one hand; attributes as of `SettledHand`."""
 
-    tiles: tuple[Tile, ...]
+    tiles: tuple[SettledTile, ...]
     finger_of: Indices
     positions: Array
     axes: Array
@@ -133,16 +133,16 @@ def _each_hand(numbers: Array, *, nails: bool) -> list[HandTiles]:
 
 
 @lru_cache(maxsize=4096)
-def _named(kinds: bytes, nails: bool) -> tuple[Tile, ...]:
+def _named(kinds: bytes, nails: bool) -> tuple[SettledTile, ...]:
     """Return tiles from the codes of their contacts."""
     names = [TILE_NAMES[i] for i in _order(nails=nails)[0].tolist()]
     return tuple(
-        Tile(finger, part, CONTACT_NAMES[kind])
+        SettledTile(finger, part, CONTACT_NAMES[kind])
         for (finger, part), kind in zip(names, kinds, strict=True)
     )
 
 
-def palms_on_rock(placed: PlacedHands) -> list[Palm]:
+def palms_on_rock(placed: PlacedHands) -> list[SettledPalm]:
     """Return the palm of each hand; a tile is engaged with rock within the spines' travel."""
     hand = placed.hand
     gaps = np.array(placed.gaps)[:, STACK_ROWS.base_count :]
@@ -157,7 +157,7 @@ def palms_on_rock(placed: PlacedHands) -> list[Palm]:
         if not placement.grasp.palm:
             engaged = ()
         parts = tuple([share[i] for i in engaged])
-        palm = Palm(own, engaged, parts, centre, 0.0, 0.0)
+        palm = SettledPalm(own, engaged, parts, centre, 0.0, 0.0)
         if engaged:
             weights = np.array(parts) / sum(parts)
             centre[:2] = weights @ hand.palm_tiles[list(engaged), :2]

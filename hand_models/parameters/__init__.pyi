@@ -1,5 +1,5 @@
 from .draws import (
-    Draw as Draw,
+    ParameterSample as ParameterSample,
     bundled_draws as bundled_draws,
     draws_of as draws_of,
     even_quantiles as even_quantiles,

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from msgspec import structs
 
-from hand_models.base import Array, InvalidInputError, stored, within
+from hand_models.base import Array, InvalidInputError, errors_under, stored
 from hand_models.parameters.own import own_hand, own_surfaces
 from hand_models.parameters.tables import (
     ParameterTable,
@@ -32,7 +32,7 @@ from hand_models.parameters.tables import (
     surface_table,
 )
 
-__all__ = ["Draw", "bundled_draws", "draws_of", "even_quantiles", "own_draw"]
+__all__ = ["ParameterSample", "bundled_draws", "draws_of", "even_quantiles", "own_draw"]
 
 FITTED_SURFACE: Final = "sandpaper-36"
 """The surface on which a set's tile was fitted; the strength on it is the set's own."""
@@ -41,7 +41,7 @@ ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
 """An entry, or one number of an entry that is a list."""
 
 
-class Draw(NamedTuple):
+class ParameterSample(NamedTuple):
     """One set of numbers that hand and rock may have: the entries that it changes.
 
     Attributes
@@ -56,7 +56,7 @@ class Draw(NamedTuple):
     surfaces: ParameterTable
 
 
-def own_draw(raw: Mapping[str, Any]) -> Draw:
+def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
     """Return a draw of the caller's own.
 
     Parameters
@@ -70,34 +70,34 @@ def own_draw(raw: Mapping[str, Any]) -> Draw:
     InvalidInputError
         If it is none; the field is the entry's path.
     """
-    unknown = sorted(set(raw) - set(Draw._fields))
+    unknown = sorted(set(raw) - set(ParameterSample._fields))
     if unknown:
-        valid = " and ".join(Draw._fields)
-        raise InvalidInputError(f"unknown; a draw has {valid}", field=unknown[0])
+        valid = " and ".join(ParameterSample._fields)
+        raise InvalidInputError(f"unknown; a sample has {valid}", field=unknown[0])
     tables = {}
-    for name in Draw._fields:
+    for name in ParameterSample._fields:
         entries = {} if raw.get(name) is None else raw[name]
         if not isinstance(entries, Mapping):
             raise InvalidInputError("sections of entries are needed", field=name)
-        with within(name):
+        with errors_under(name):
             tables[name] = ParameterTable.of(entries)
-    draw = Draw(**tables)
+    draw = ParameterSample(**tables)
     _check(draw, None)
     if not (list(draw.hand) or list(draw.surfaces)):
         raise InvalidInputError("is empty; at least one entry of hand or surfaces is needed")
     return draw
 
 
-def _check(draw: Draw, hand: ParameterTable | None) -> None:
+def _check(draw: ParameterSample, hand: ParameterTable | None) -> None:
     """Refuse a draw with entries that are unknown, or of numbers that they cannot have."""
-    with within("hand"):
+    with errors_under("hand"):
         own_hand(draw.hand, hand)
-    with within("surfaces"):
+    with errors_under("surfaces"):
         own_surfaces(draw.surfaces)
 
 
 @stored("draws", 8)
-def bundled_draws(hand: ParameterTable | None = None) -> tuple[Draw, ...]:
+def bundled_draws(hand: ParameterTable | None = None) -> tuple[ParameterSample, ...]:
     """Return the draws of ``draws.toml``, one for each of its sets.
 
     Parameters
@@ -109,7 +109,9 @@ def bundled_draws(hand: ParameterTable | None = None) -> tuple[Draw, ...]:
     return draws_of(draw_table(), hand)
 
 
-def draws_of(sets: ParameterTable, hand: ParameterTable | None = None) -> tuple[Draw, ...]:
+def draws_of(
+    sets: ParameterTable, hand: ParameterTable | None = None
+) -> tuple[ParameterSample, ...]:
     """Return the draws that a table of sets and ranges makes.
 
     Parameters
@@ -132,8 +134,8 @@ def draws_of(sets: ParameterTable, hand: ParameterTable | None = None) -> tuple[
     draws = []
     for k in range(count):
         strengths = _strengths(sets, k, quantiles[k, :-1])
-        draw = Draw(_hand_of(sets, k, hand, known, float(quantiles[k, -1])), strengths)
-        with within(f"[{k}]"):
+        draw = ParameterSample(_hand_of(sets, k, hand, known, float(quantiles[k, -1])), strengths)
+        with errors_under(f"[{k}]"):
             _check(draw, hand)
         draws.append(draw)
     return tuple(draws)
@@ -199,7 +201,9 @@ def _check_entry(section: str, name: str, quantity: Quantity) -> None:
     found = ENTRY_PATH.fullmatch(name)
     entry, index = (name, None) if found is None else (found[1], found[2])
     if entry not in entries:
-        raise InvalidInputError("no number of hand.toml or of a tile's law", field=field)
+        raise InvalidInputError(
+            "unknown; valid are the numbers of hand.toml and of a tile's law", field=field
+        )
     usual = entries[entry]
     size = len(usual.value) if isinstance(usual.value, list) else 0
     if (index is None) != (size == 0) or int(index or 0) > max(size - 1, 0):

@@ -23,7 +23,7 @@ from hand_models.rock.smoothing import OutlinedHold
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import (
     TriangleCells,
-    borders,
+    border_edges,
     bridge,
     cut,
     weld,
@@ -93,7 +93,7 @@ class Mesh(OutlinedHold):
 
     @cached_property
     def border(self) -> Array:
-        return borders(self.triangles, self._scale.bridged_gap)
+        return border_edges(self.triangles, self._scale.bridged_gap)
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:
@@ -136,8 +136,8 @@ class Mesh(OutlinedHold):
         if sum(met) < 0:
             raise InvalidInputError(
                 "the triangles under the palm face away from it: is the approach into the rock? "
-                "their vertices must be counterclockwise seen from outside the rock: turn every "
-                "face over, or close the hole under the palm if it looks into the rock",
+                "their vertices must be counterclockwise seen from outside the rock: flip every "
+                "face, or close the hole under the palm if it opens into the rock",
                 field="faces" if at is None else "place.approach",
             )
         super().check_place(at)

@@ -169,8 +169,9 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
     across, scale = float(np.ptp(outline, axis=0).max()), Scale.of()
     if length * 2.0 * scale.reach > scale.longest * across:
         raise InvalidInputError(
-            f"{length:.3g} m long but {across:.3g} m across; at most "
-            f"{0.5 * scale.longest / scale.reach:g} times that is possible",
+            f"{length:.3g} m long and {across:.3g} m across; the maximum is "
+            f"{0.5 * scale.longest / scale.reach:g} times as long as across: remove noise and "
+            "spikes",
             field=field,
         )
     crossing = _crossing(outline)

@@ -205,8 +205,8 @@ def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     length = sum(float(np.hypot(*np.diff(run, axis=0).T).sum()) for run in runs)
     if length > scale.longest:
         raise InvalidInputError(
-            f"its outline is {length:.3g} m long within {scale.reach:g} m of a finger's base; "
-            f"at most {scale.longest:g} m is possible: take noise and spikes out",
+            f"its outline is {length:.3g} m long within {scale.reach:g} m of a finger's base; the "
+            f"maximum is {scale.longest:g} m: remove noise and spikes",
             field="hold",
         )
     return runs

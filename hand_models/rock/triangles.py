@@ -17,7 +17,7 @@ from hand_models.rock.surface import Triangles
 
 __all__ = [
     "TriangleCells",
-    "borders",
+    "border_edges",
     "bridge",
     "connected",
     "cut",
@@ -116,7 +116,9 @@ def wound_alike(triangles: Triangles) -> Triangles:
     part = connected(np.column_stack([rows, columns]), 2 * count)
     as_is, over = part[:count], part[count:]
     if (as_is == over).any():
-        raise InvalidInputError("the surface has only one side", field="faces")
+        raise InvalidInputError(
+            "the mesh is not orientable: its surface has only one side", field="faces"
+        )
     # of the two ways to wind a part, one keeps more triangles than the other
     kept = np.bincount(as_is, minlength=2 * count)
     flip = kept[over] > kept[as_is]
@@ -169,7 +171,7 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
     return Triangles(np.where(spike[:, None], mean, vertices), faces)
 
 
-def borders(triangles: Triangles, gap: float) -> Array:
+def border_edges(triangles: Triangles, gap: float) -> Array:
     """Return the ends of every edge that only one triangle has, shape (n, 2, 3) [m].
 
     Left out are borders of holes that are no wider than ``gap`` along any axis [m].

@@ -63,7 +63,7 @@ def _text(path: Path) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16")
     if b"\0" in content:
-        raise InvalidInputError(f"no text: {path}")
+        raise InvalidInputError(f"not a text file: {path}")
     return content.decode("utf-8-sig", "replace")
 
 
@@ -81,7 +81,7 @@ def _style(lines: Sequence[str], path: Path) -> _Style:
     best = max(fits)
     if not best:
         raise InvalidInputError(
-            f"no three numbers in a line, parted by commas, semicolons or blanks: {path}"
+            f"no line has three numbers separated by commas, semicolons or spaces: {path}"
         )
     return styles[fits.index(best)]
 
@@ -140,14 +140,14 @@ def _meant(names: Sequence[str], width: int, path: Path) -> list[int]:
     degrees = [name for name in names if name in angles]
     if degrees:
         raise InvalidInputError(
-            f"column {degrees[0]} is in degrees, which are no lengths: project it to metres (UTM "
-            f"or the national grid) first: {path}"
+            f"column {degrees[0]} is in degrees, not in a unit of length: project it to metres "
+            f"(UTM or the national grid) first: {path}"
         )
     if len(names) == len(AXIS_NAMES) == width:
         return [0, 1, 2]
     raise InvalidInputError(
-        f"which columns are x, y and z does not follow from their names, {', '.join(names[:9])}: "
-        f"name them so in the first line of {path}"
+        f"no columns are named x, y and z, got {', '.join(names[:9])}: name them so in the first "
+        f"line of {path}"
     )
 
 
@@ -157,16 +157,16 @@ def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) 
     whole = all(cell.removeprefix("-").isdecimal() for cells in some for cell in cells)
     if style.mark == "," and width == 2 * len(AXIS_NAMES) and whole:
         raise InvalidInputError(
-            "commas are between the columns and in the numbers, which cannot be told apart: write "
-            f"points in the numbers, or semicolons between the columns: {path}"
+            "commas separate the columns and are in the numbers, which is ambiguous: use decimal "
+            f"points, or semicolons between the columns: {path}"
         )
     begin = [cells[0] for cells in some]
     if width > len(AXIS_NAMES) and len(some) > 2 and all(cell.isdecimal() for cell in begin):
         numbers = [int(cell) for cell in begin]
         if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
             raise InvalidInputError(
-                "the first column counts the points, it is not x: name the columns in the first "
-                f"line of {path}"
+                "the first column is the index of the point, not x: name the columns in the "
+                f"first line of {path}"
             )
 
 
@@ -200,5 +200,5 @@ def _read(
         try:
             found[i] = [_number(cells[column], style) for column in columns]
         except ValueError as error:
-            raise InvalidInputError(f"{where} is no point, {error}: {path}") from None
+            raise InvalidInputError(f"{where} is not a point, {error}: {path}") from None
     return found

@@ -39,7 +39,7 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
     with path.open("rb") as file:
         # an .npy begins with the first, an .npz with the second
         if not file.read(6).startswith((b"\x93NUMPY", b"PK")):
-            raise InvalidInputError(f"no NumPy file: {path}")
+            raise InvalidInputError(f"not a NumPy file: {path}")
     arrays = _arrays(path)
     flat = [name for name, array in arrays.items() if array.ndim == 2]
     usual = ("elevation", "heights", "height", "z", "dem")
@@ -52,7 +52,8 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
     heights = arrays[flat[0] if len(flat) == 1 else named[0]]
     if heights.shape[1] == 3 < heights.shape[0]:
         raise InvalidInputError(
-            f"three columns are points, no grid of heights: {path}; write them as .xyz"
+            f"an array of three columns holds points, not a grid of heights: {path}; save it as "
+            ".xyz"
         )
     return _grid(heights, _sides(cell, _numpy_cell(arrays)))
 
@@ -67,7 +68,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         for info in archive.infolist():
             # a compressed byte stands for 1032 at most, but for more in an array of 1024 or less
             if info.file_size > 1032 * info.compress_size + 1024:
-                raise InvalidInputError(f"{info.filename} in {path} is broken")
+                raise InvalidInputError(f"{info.filename} in {path} is corrupt")
             with archive.open(info) as file:
                 content = io.BytesIO(file.read(info.file_size))
             version = np.lib.format.read_magic(content)
@@ -102,13 +103,13 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
         image = Image.open(path, formats=["TIFF"])
     except UnidentifiedImageError:
         raise InvalidInputError(
-            f"no TIFF file, or of numbers other than integers and 32-bit floats: {path}; 64-bit "
-            "floats are to be made 32-bit ones, as by gdal_translate -ot Float32"
+            f"not a TIFF file of integers or 32-bit floats: {path}; convert 64-bit floats with "
+            "gdal_translate -ot Float32"
         ) from None
     # heights that a byte of the file may stand for: of LZW at most 1,400
     if math.prod(image.size) > 1500 * path.stat().st_size:
         raise InvalidInputError(
-            f"{image.size[0]} by {image.size[1]} heights are more than {path} can have: cut short?"
+            f"{path} is too small for {image.size[0]} by {image.size[1]} heights: is it cut short?"
         )
     with image:
         tags = {tag: image.getexif().get(tag) for tag in GeoTag}
@@ -176,8 +177,7 @@ def _sides(cell: float | None, own: Cell | None) -> Cell:
     sides = own if cell is None else (cell, cell)
     if sides is None:
         raise InvalidInputError(
-            "the file does not give the distance between neighbours of its grid in a unit of "
-            "length; give it",
+            "must be given: the file has no cell size in a unit of length",
             field="cell",
         )
     if not all(math.isfinite(side) and side > 0.0 for side in sides):

@@ -67,7 +67,8 @@ def mesh_scan(
     if scan.faces is not None:
         if spacing is not None:
             raise InvalidInputError(
-                "is of points, and the file has triangles, which are kept", field="spacing"
+                "is for points, and the file has triangles, which are kept: remove it",
+                field="spacing",
             )
         rock = keep_triangles(scan, hole)
         report(steps, steps)
@@ -237,7 +238,8 @@ def _check_spread(points: Array) -> None:
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(across.T @ across), 0.0))
     if spread[0] <= math.sqrt(1e-9) * spread[1]:  # width of their length
         raise InvalidInputError(
-            "seen along the view, the points lie on one line: they are no surface", field="file"
+            "the points lie on one line across the view, not on a surface: give another view",
+            field="file",
         )
 
 

@@ -50,7 +50,7 @@ def read_pcd(path: Path) -> RawScan:
     x, y, z, *turn = cloud.metadata.viewpoint
     length = math.hypot(*turn)
     if not (math.isfinite(x + y + z) and math.isfinite(length) and length > 0.0):
-        raise InvalidInputError(f"its VIEWPOINT is no pose: {cloud.metadata.viewpoint} in {path}")
+        raise InvalidInputError(f"VIEWPOINT is not a pose: {cloud.metadata.viewpoint} in {path}")
     w, *axis = (part / length for part in turn)
     return RawScan(points, scanner=Pose.from_quaternion([x, y, z], [*axis, w]))
 
@@ -62,11 +62,11 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     named = [words for words in lines if not words[0].startswith(b"#")]
     found = {words[0].upper(): words[1:] for words in named}
     if b"FIELDS" not in found or b"DATA" not in found:
-        raise InvalidInputError(f"no PCD file, its header is missing: {path}")
+        raise InvalidInputError(f"not a PCD file, its header is missing: {path}")
     # pypcd4 looks no farther than ten lines, comments apart
     if len(found) < len(named) or len(named) > 10:
         raise InvalidInputError(
-            f"its header has {len(named)} lines, of 10 at most, each once: {path}"
+            f"the header has {len(named)} lines; the maximum is 10, each once: {path}"
         )
     try:
         sizes, counts = ([int(each) for each in found[name]] for name in (b"SIZE", b"COUNT"))
@@ -75,27 +75,26 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
         kind = found[b"DATA"][0]
     except (KeyError, IndexError, ValueError):
         raise InvalidInputError(
-            f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of its header are to be whole numbers: {path}"
+            f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of the header must be whole numbers: {path}"
         ) from None
     kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", UNKNOWN_VIEWPOINT)
     if len(kinds) != len(sizes) or not {*kinds} <= {b"F", b"I", b"U"}:
         raise InvalidInputError(
-            f"TYPE of its header is to be F, I or U of each field, got {_words(kinds)}: {path}",
+            f"TYPE of the header must be F, I or U for each field, got {_words(kinds)}: {path}",
             field="file",
         )
     if len(pose) != len(UNKNOWN_VIEWPOINT):
         raise InvalidInputError(
-            "VIEWPOINT of its header is to be seven numbers, a place and a quaternion [w, x, y, z]"
-            f", got {_words(pose)}: {path}",
+            "VIEWPOINT of the header must be seven numbers, a position and a quaternion [w, x, "
+            f"y, z], got {_words(pose)}: {path}",
             field="file",
         )
     if min(sizes + counts + rows) < 0:
-        raise InvalidInputError(f"a number of its header is below zero: {path}")
+        raise InvalidInputError(f"the header has a negative number: {path}")
     # the longest descriptors in use have some 2,000 numbers
     if not 0 < sum(counts) <= 10_000:
         raise InvalidInputError(
-            f"a point has at least one number, and 10,000 at most, the header of {path} "
-            f"names {sum(counts):,}"
+            f"a point must have 1 to 10,000 numbers, the header of {path} has {sum(counts):,}"
         )
     if width * height != points:
         raise InvalidInputError(

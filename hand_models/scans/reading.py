@@ -165,8 +165,8 @@ def _check_numbers(points: Array, read: int, path: Path) -> None:
     largest = float(np.abs(points).max())
     if largest > 1e12:  # what is beyond that is lost in rounding
         raise InvalidInputError(
-            f"numbers up to {largest:.3g} are no lengths; where they stand for points that were "
-            "not measured, write nan",
+            f"coordinates up to {largest:.3g} are too large; write nan for points that were not "
+            "measured",
             field="file",
         )
 
@@ -246,7 +246,9 @@ def _raw(path: Path, cell: float | None) -> RawScan:
                     return read_esri(path, cell)
                 read = read_columns
         if cell is not None:
-            raise InvalidInputError(f"is of grids of heights, {path} has points", field="cell")
+            raise InvalidInputError(
+                f"is for grids of heights, {path} has points: remove it", field="cell"
+            )
         return read(path)
 
 
@@ -264,12 +266,12 @@ def _scale(points: Array, unit: Unit, width: float | None) -> float:
         raise InvalidInputError(f"must be finite and above zero, got {width:g}", field="width")
     longest = float(np.ptp(points, axis=0).max())
     if longest == 0.0:
-        raise InvalidInputError("all points are at one place", field="file")
+        raise InvalidInputError("all points are equal", field="file")
     return width / longest
 
 
 def _unit_vector(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise InvalidInputError("a direction of length zero", field="view")
+        raise InvalidInputError("must not be zero", field="view")
     return np.asarray(vector / length)

@@ -132,7 +132,9 @@ def drop_outliers(scan: Scan, std_ratio: float, *, neighbours: int | None = None
             field="neighbours",
         )
     if scan.faces is not None:
-        raise InvalidInputError("is of points, and the file has triangles", field="std_ratio")
+        raise InvalidInputError(
+            "is for points, and the file has triangles: remove it", field="std_ratio"
+        )
     away = scipy.spatial.cKDTree(scan.points).query(scan.points, k=neighbours + 1)[0]
     mean = np.asarray(away)[:, 1:].mean(axis=1)
     kept = mean <= mean.mean() + std_ratio * mean.std()

@@ -159,8 +159,8 @@ class Scan:
             return np.asarray(-normal * np.sign(normal[2]))
         whose = "the file's origin, as it names none" if self.assumed else "the scanner's place"
         raise InvalidInputError(
-            "from which side the rock was seen does not follow from the points, as the viewpoint "
-            f"({whose}) is among them; give --view or --viewpoint",
+            f"the viewing direction is ambiguous: the viewpoint ({whose}) is among the points; "
+            "give --view or --viewpoint",
             field="view",
         )
 
@@ -181,10 +181,9 @@ class Scan:
         away = float(np.linalg.norm(middle - self.viewpoint))
         if away > scan_table().scalar("scan", "farthest_scanner") * size:
             raise InvalidInputError(
-                "the file does not say from where the rock was seen, and its origin, "
-                f"{away:,.0f} m from rock of {size:.3g} m, is no scanner's place (map "
-                "coordinates?): give --view X,Y,Z, the direction in which the scanner looked, or "
-                "--viewpoint",
+                "the scanner's position is unknown: the file does not give it, and its origin is "
+                f"{away:,.0f} m from rock of {size:.3g} m (map coordinates?): give --view X,Y,Z, "
+                "the direction in which the scanner looked, or --viewpoint",
                 field="view",
             )
 

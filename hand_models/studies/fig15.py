@@ -144,7 +144,7 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     slack = 0.02
     both = strong.holds & weak.holds
     if not both.any():
-        raise InvalidInputError("closes at none of the tensions without failing", field="hand")
+        raise InvalidInputError("exceeds a limit at every closing tension", field="hand")
     for curve in (strong, weak):
         best, moderate = curve.best("volume"), curve.last // 2
         widened = curve["volume"][moderate] / curve["volume"][0]

@@ -10,7 +10,7 @@ __all__ = ["STUDY_SETTINGS", "StudySettings"]
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """How finely the studies search, and what of the paper they take in several places."""
+    """Resolution of the studies' searches, and numbers of the paper that several of them take."""
 
     calibrate_starts: int = 3
     """Starts of the search, the recorded set among them."""

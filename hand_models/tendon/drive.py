@@ -97,8 +97,8 @@ class TendonDrive:
             )
         if not 0.0 <= drive.no_load_current < drive.maximum_current:
             raise InvalidInputError(
-                f"must be in [0, {drive.maximum_current:g}) A, below what motor and driver bear, "
-                f"got {drive.no_load_current:g}",
+                f"must be in [0, {drive.maximum_current:g}) A, below the limit of motor and "
+                f"driver, got {drive.no_load_current:g}",
                 field="motor.no_load_current",
             )
         return drive

@@ -55,7 +55,9 @@ def linear_program(
         if found.status == 2:
             return None
     if found.status == 3:
-        raise UnsupportedError(f"{what} has no bound: fingers that resist sideways would give one")
+        raise UnsupportedError(
+            f"{what} is unbounded: fingers with lateral reactions would bound it"
+        )
     raise SolverError(f"{what}: {found.message}")
 
 

@@ -208,7 +208,8 @@ class WrenchSpace:
     def _empty(self, columns: Indices | None = None) -> EmptySetError:
         names = "" if columns is None else " of " + ", ".join(self.columns[i] for i in columns)
         return EmptySetError(
-            f"no wrench is left at utilisation 1: the limits{names} contradict the hard rows"
+            f"the wrench space is empty at utilisation 1: the limits{names} contradict the hard "
+            "rows"
         )
 
     @property
@@ -229,7 +230,9 @@ class WrenchSpace:
         within = not len(cuts) or self._obeys(self._sum.extreme(-slopes[cuts].sum(axis=0)))
         if not within and self._farthest(np.zeros(6)) is None:
             row = self.rows[len(self.s) - len(self.D) + cuts[0]]
-            raise EmptySetError(f"no wrench is left at utilisation 1: all exceed {row.limit}")
+            raise EmptySetError(
+                f"the wrench space is empty at utilisation 1: every wrench exceeds {row.limit}"
+            )
         return cuts
 
     def _obeys(self, y: Array) -> bool:
@@ -282,8 +285,7 @@ class WrenchSpace:
         """
         if not self.listed:
             raise LimitError(
-                f"{self._most_rows} rows of loads that are coupled are too many (at most "
-                f"{SETTINGS.most_rows})"
+                f"{self._most_rows} coupled rows are too many (at most {SETTINGS.most_rows})"
             )
         sizes = self._sum.sizes
         return sizes._replace(half_spaces=max(sizes)) if len(self._cuts) else sizes

@@ -10,7 +10,7 @@ from planner.advice.combinations import CombinationSearch
 from planner.advice.hands import closings, grasps, lettings, placed, turn_motions, way_motions
 from planner.advice.new_holds import try_new_holds
 from planner.advice.strength import lighter, stronger
-from planner.advice.trials import Attempt, Trial, Trials, Tried
+from planner.advice.trials import Attempt, StanceTrial, Trials, Tried
 from planner.deadline import DeadlineError
 from planner.programs import CAP_SLACK
 from planner.question import Question
@@ -128,7 +128,7 @@ def _ranked(trials: Trials) -> list[Tried]:
     return found
 
 
-def _advice(trials: Trials, change: Change, trial: Trial) -> Advice:
+def _advice(trials: Trials, change: Change, trial: StanceTrial) -> Advice:
     """Return a change and its trial as an advice."""
     holds, factor = trials.holds(trial.utilisation), trial.load_factor()
     return Advice(

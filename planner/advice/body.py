@@ -26,7 +26,7 @@ import scipy
 from hand_models.base import Array, Pose, turns_about
 from planner import programs
 from planner.advice.changes import SETTINGS, Change, pose_message
-from planner.advice.trials import Trial, Trials, direction
+from planner.advice.trials import StanceTrial, Trials, direction
 from planner.prepare import PreparedStance
 from planner.programs import WRENCH_UNIT
 from planner.result import Distance
@@ -41,7 +41,7 @@ def can_move(prepared: PreparedStance) -> bool:
     return question.body_wrench is None and float(np.abs(prepared.wrench[:3]).max()) > 0.0
 
 
-def slope(trial: Trial) -> Array:
+def slope(trial: StanceTrial) -> Array:
     """Return how the least utilisation grows with a shift of the body, in B's axes (3,) [1/m]."""
     lacking = direction(trial)
     assert lacking is not None
@@ -165,7 +165,7 @@ class BodySearch:
         wrench[3:] += np.cross(shift, wrench[:3])
         self._keep(shift, self.trials.turned(wrench))
 
-    def _keep(self, shift: Array, trial: Trial) -> None:
+    def _keep(self, shift: Array, trial: StanceTrial) -> None:
         outcome = trial.outcome
         if outcome.solved and math.isfinite(trial.utilisation):
             self._known.append((shift, trial.utilisation))

@@ -33,7 +33,7 @@ HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
 
 @dataclass(frozen=True, slots=True)
 class AdviceSettings:
-    """What is tried for advice, and how large a change is that counts as one of size 1."""
+    """Changes that are tried for advice, and the size of each that counts as 1."""
 
     plans: int = 100  # for the advice about a question, at most
     worse_tolerance: float = 1e-3  # [m], or without a unit: by how much what is odd may grow
@@ -162,7 +162,7 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
         elif named is not None and value is None:
             _drop(question, whole, *named.groups())
         else:
-            raise InvalidInputError("advice does not change this", field=path)
+            raise InvalidInputError("advice cannot change this field", field=path)
     there = _hands(question.stance.hands, hands)
     return replace(question, stance=replace(question.stance, hands=there, **stance), **whole)
 
@@ -207,7 +207,7 @@ def _field(hand: HandOnHold, updates: Mapping[str, Any], field: str, value: Any)
         grasp = updates.get("grasp", hand.grasp)
         return "grasp", structs.replace(grasp, **{field.removeprefix("grasp."): value})
     if field not in HAND_FIELD_READERS:
-        raise InvalidInputError("advice does not change this", field=f"stance.hands.{field}")
+        raise InvalidInputError("advice cannot change this field", field=f"stance.hands.{field}")
     name, read = HAND_FIELD_READERS[field]
     if value is None:
         return name, "rest" if name == "seat" else None

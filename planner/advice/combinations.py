@@ -29,7 +29,7 @@ from planner.advice.body import BodySearch, can_move
 from planner.advice.changes import SETTINGS, Change, changed, combined
 from planner.advice.hands import lettings, variants
 from planner.advice.new_holds import every_hold
-from planner.advice.trials import Trial, Trials, direction
+from planner.advice.trials import StanceTrial, Trials, direction
 from planner.prepare import settle_each
 from planner.programs import Support
 from planner.question import HandOnHold
@@ -218,7 +218,7 @@ class CombinationSearch:
         worth = _worth(given[:, None] + self.gives[:, slot], self.sizes[slot], smallest)
         return slot[np.argsort(-worth, kind="stable")[:few]]
 
-    def learn(self, trial: Trial, shift: int) -> None:
+    def learn(self, trial: StanceTrial, shift: int) -> None:
         """Keep the direction in which most is missing by a plan's multipliers, if there is one."""
         found = direction(trial)
         needs = 0.0 if found is None else float(found @ trial.prepared.wrench)

@@ -40,7 +40,7 @@ def lettings(question: Question) -> Iterator[Change]:
             changes[f"present.{hand.limb}"] = None
         if hand.limb in question.limits.per_hand:
             changes[f"limits.per_hand.{hand.limb}"] = None
-        yield Change("let_go", (hand.limb,), f"let {hand.limb} go", changes, SETTINGS.hand_size)
+        yield Change("let_go", (hand.limb,), f"release {hand.limb}", changes, SETTINGS.hand_size)
 
 
 def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
@@ -54,7 +54,7 @@ def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
         yield from each
         whole = combined(each) if len(each) > 1 else None
         if whole is not None:
-            words = f"take {', '.join(whole.limbs)} with {fingers(turn)}"
+            words = f"grasp with {fingers(turn)} at {', '.join(whole.limbs)}"
             yield whole._replace(kind="grasp", words=words)
 
 
@@ -79,7 +79,7 @@ def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
             yield Change(
                 "place",
                 turned.limbs,
-                f"{turned.words} and take it with {fingers(turn)}",
+                f"{turned.words} and grasp with {fingers(turn)}",
                 {**turned.changes, hand_path(index, "grasp.outer_rotation"): turn},
                 turned.size + abs(turn - hand.grasp.outer_rotation) / SETTINGS.outer_turn_unit,
             )
@@ -108,7 +108,7 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
     grasp: Grasp = structs.replace(hand.grasp, outer_rotation=turn)
     size = abs(turn - hand.grasp.outer_rotation) / SETTINGS.outer_turn_unit
     changes: dict[str, Any] = {hand_path(index, "grasp.outer_rotation"): turn}
-    words = f"take the hold of {hand.limb} with {fingers(turn)}"
+    words = f"grasp with {fingers(turn)} at {hand.limb}"
     if hand.placed_hold() is None:
         (there,) = settle_each(stance.robot.hand, [replace(hand, grasp=grasp)])
         if isinstance(there, InvalidInputError):
@@ -116,7 +116,7 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
         pose = rock @ there.seating.pose.inverse()
         way = float(np.linalg.norm(pose.position - hand.pose.position))
         if way > 1e-3:  # [m]; less is not worth a word
-            words += f", {1e3 * way:.0f} mm from where it is"
+            words += f", moved by {1e3 * way:.0f} mm"
         size += way / SETTINGS.way_unit
         moved = _moved(prepared, index, pose, seated=hand.at is None)
         if moved is None:
@@ -140,7 +140,7 @@ def placed(prepared: PreparedStance, index: int, motions: Sequence[_Motion]) -> 
             )
         if turn:
             whom = "it" if words else hand.limb
-            words.append(f"turn {whom} by {math.degrees(turn):.0f}° about z of its H")
+            words.append(f"rotate {whom} by {math.degrees(turn):.0f}° about z of its H")
         size = math.hypot(x, y) / SETTINGS.way_unit + abs(turn) / SETTINGS.turn_unit
         yield Change("place", (hand.limb,), " and ".join(words), changes, size)
 

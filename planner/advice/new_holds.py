@@ -136,12 +136,13 @@ class NewHold:
     def _words(self, like: str, hold: _Hold) -> str:
         at = ", ".join(f"{value:z.3f}" for value in hold.place)
         degrees = round(math.degrees(math.remainder(hold.turn, 2.0 * math.pi)))
-        turned = f"{degrees}° about its palm's z from {like}" if degrees else f"as {like} is"
+        turned = f"oriented like {like}"
+        if degrees:
+            turned += f" rotated by {degrees}° about z of its H"
         if hold.grasp is not None:
             turned += f", with {fingers(hold.grasp)}"
         return (
-            f"put {self.limb} at [{at}] m in W, turned {turned}, on condition that there is rock "
-            f"as under {like}"
+            f"place {self.limb} at [{at}] m in W, {turned}, if there is rock like that under {like}"
         )
 
 

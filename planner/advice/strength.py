@@ -59,7 +59,8 @@ def _strengthened(trials: Trials, which: Sequence[int], factor: float) -> Change
     }
     limbs = tuple(hand.limb for hand in hands)
     whose = "all hands" if len(which) == len(trials.question.stance.hands) else limbs[0]
-    words = f"have rock {factor:.2f} times as strong under {whose}"
+    more = 100.0 * (factor - 1.0)
+    words = f"if the rock under {whose} were {more:.{0 if more >= 1.0 else 1}f} % stronger"
     return Change(
         "strength", limbs, words, changes, len(which) * math.log(factor) / SETTINGS.strength_unit
     )
@@ -93,7 +94,7 @@ def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
         if share < 1e-2:  # less of the mass is not reported
             break
         changes: dict[str, Any] = {"load.mass": share * mass}
-        words = f"let the body weigh {share * mass:.1f} kg, not {mass:.1f} kg"
+        words = f"if the body weighed {share * mass:.1f} kg instead of {mass:.1f} kg"
         size = -math.log(share) / SETTINGS.strength_unit
         tried = trials.of([Change("mass", (), words, changes, size)])
         if tried and trials.holds(tried[0].utilisation):

@@ -22,14 +22,14 @@ from planner.scene import body_clearance, scene_of
 
 __all__ = [
     "Attempt",
-    "Trial",
+    "StanceTrial",
     "Trials",
     "Tried",
     "direction",
 ]
 
 
-class Trial(NamedTuple):
+class StanceTrial(NamedTuple):
     """Result of a stance that was tried.
 
     Attributes
@@ -60,7 +60,7 @@ class Attempt(Protocol):
         prepared: PreparedStance,
         idle: Sequence[LimitUse] | None = None,
         near: Any | None = None,
-    ) -> Trial:
+    ) -> StanceTrial:
         """Return the result of a stance."""
 
 
@@ -69,7 +69,7 @@ class Tried(NamedTuple):
 
     change: Change
     question: Question
-    trial: Trial
+    trial: StanceTrial
 
     @property
     def utilisation(self) -> float:
@@ -92,7 +92,7 @@ class Trials:
     Attributes
     ----------
     question : Question
-    base : Trial
+    base : StanceTrial
         The question as it is.
     left : int
         Plans that may still be made.
@@ -134,7 +134,7 @@ class Trials:
             self._tried(change, question)
         return self.found[before:]
 
-    def one(self, change: Change) -> Trial | None:
+    def one(self, change: Change) -> StanceTrial | None:
         """Try a change; return what came of it, with a plan or without; None if it cannot be."""
         for each, question in self._asked([change]):
             return self._tried(each, question)
@@ -144,7 +144,7 @@ class Trials:
         """Return whether a change gives a stance that can be planned; no plan is made."""
         return any(self._prepared(question) for _, question in self._asked([change]))
 
-    def _tried(self, change: Change, question: Question) -> Trial | None:
+    def _tried(self, change: Change, question: Question) -> StanceTrial | None:
         prepared = self._prepared(question)
         if prepared is None:
             return None
@@ -168,11 +168,11 @@ class Trials:
         )
         return None if worse else prepared
 
-    def turned(self, wrench: Array) -> Trial:
+    def turned(self, wrench: Array) -> StanceTrial:
         """Try the hands as they are for another body wrench, shape (6,) [N, N·m], in B."""
         return self._try(self.base.prepared.turned(wrench))
 
-    def again(self, question: Question, objective: Objective | OwnObjective) -> Trial:
+    def again(self, question: Question, objective: Objective | OwnObjective) -> StanceTrial:
         """Plan what was tried for another objective."""
         return self._try(prepare_stance(replace(question, objective=objective)))
 
@@ -189,7 +189,7 @@ class Trials:
         if hands:
             settle_each(self.question.stance.robot.hand, hands)
 
-    def _try(self, prepared: PreparedStance) -> Trial:
+    def _try(self, prepared: PreparedStance) -> StanceTrial:
         deadline.check(SETTINGS.late)
         self.left -= 1
         trial = self._attempt(prepared)
@@ -197,7 +197,7 @@ class Trials:
         return trial
 
 
-def direction(trial: Trial) -> Array | None:
+def direction(trial: StanceTrial) -> Array | None:
     """Return the body wrenches' direction in which a stance lacks most, shape (6,), if known."""
     outcome, data = trial.outcome, trial.data
     if outcome.solved and outcome.balance_dual is not None:

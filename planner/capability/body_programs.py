@@ -227,7 +227,7 @@ def _solved(
             raise _unsolved(found.outcome)
         return None
     if _error(data, found, B, cap, K) > CAP_SLACK * max(1.0, float(np.abs(found.t).max())):
-        raise SolverError("body space: the solver's answer does not pass the checks")
+        raise SolverError("body space: the solution exceeds its tolerances")
     return found._replace(t=found.t / unit)
 
 
@@ -314,7 +314,7 @@ def _unsolved(outcome: Outcome) -> CruxError:
     deadline.check(MISSING_RESULT)
     if outcome.status in ("unbounded", "unbounded_inaccurate"):
         return UnsupportedError(
-            "what the hands hold has no bound some way: sets of floating wrists, taken about this "
-            "body wrench, do not hold them everywhere; ask about one that can nearly be held"
+            "the body space is unbounded: wrench spaces of floating wrists are linearised about "
+            "this body wrench, too far from a feasible one; give one closer to feasible"
         )
-    return SolverError(f"body space: the solver gave no usable answer ({outcome.status})")
+    return SolverError(f"body space: the solver found no solution ({outcome.status})")

@@ -222,13 +222,14 @@ class BodySpace(BodyPrograms):
         motion = self.motion
         if motion is None:
             raise InvalidInputError(
-                "a given body wrench does not determine the mass; give load", field="body_wrench"
+                "does not determine the mass, which accelerations require; give load instead",
+                field="body_wrench",
             )
         k = motion.wrench.shape[1]
         if len(direction) not in (3, k):
             raise InvalidInputError(
                 f"{' or '.join(str(n) for n in sorted({3, k}))} components are needed, got "
-                f"{len(direction)}; angular ones need joints, and no com of a load",
+                f"{len(direction)}; angular ones require joints, and a load without com",
                 field="direction",
             )
         size_of(direction)

@@ -25,7 +25,7 @@ from hand_models.base import Array, EmptySetError, InvalidInputError, Progress
 from hand_models.compliance import Gripper, gripper_table
 from hand_models.experiments import StudyResult, panels, pull, pulled_off_poses, track
 from hand_models.parameters import (
-    Draw,
+    ParameterSample,
     ParameterTable,
     bundled_draws,
     experiment_table,
@@ -41,12 +41,12 @@ from planner.solving import plan
 __all__ = ["MeasurementStudy", "measured", "widths"]
 
 
-def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
+def measured(draw: ParameterSample, hand: ParameterTable) -> dict[str, Array]:
     """Return what each measurement gives on the hand of a draw, exactly, by its name.
 
     Parameters
     ----------
-    draw : Draw
+    draw : ParameterSample
     hand : ParameterTable
         All numbers of the hand that the draw changes.
 
@@ -75,7 +75,7 @@ def measured(draw: Draw, hand: ParameterTable) -> dict[str, Array]:
     }
 
 
-def _on_gripper(draw: Draw, hand: ParameterTable, tile: Surface) -> dict[str, Array]:
+def _on_gripper(draw: ParameterSample, hand: ParameterTable, tile: Surface) -> dict[str, Array]:
     """Return what the paper's gripper gives with a draw's fingers: its seat is the rig's own."""
     kept = {
         section: {name: each for name, each in entries.items() if name != "seated_contact"}
@@ -158,7 +158,7 @@ class MeasurementStudy:
         values: list[dict[str, Array]] = []
         factors: dict[str, Array] = {}
         robot = robosimian(hand)
-        jobs: list[str | Draw] = [*self.stances, *draws]
+        jobs: list[str | ParameterSample] = [*self.stances, *draws]
         for job in track(progress, jobs):
             if isinstance(job, str):
                 asked = self.stances[job]

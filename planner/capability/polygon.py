@@ -25,7 +25,7 @@ __all__ = ["POLYGON_SETTINGS", "Polygon", "SupportPoint", "enclose"]
 
 @dataclass(frozen=True, slots=True)
 class PolygonSettings:
-    """How many directions are asked for, and how near."""
+    """Number of directions of a polygon, and its accuracy."""
 
     most_directions: int = 160
     least_turn: float = 1e-7
@@ -136,7 +136,7 @@ def enclose(
 def _asked(touching: Callable[[Array], SupportPoint | None], normal: Array) -> SupportPoint:
     touch = touching(normal)
     if touch is None:
-        raise SolverError(f"a set that is not empty has no end toward {normal.tolist()}")
+        raise SolverError(f"no support point found toward {normal.tolist()}")
     return touch
 
 

@@ -89,7 +89,7 @@ class DeadlineError(CruxError):
 
     def __init__(self, seconds: float, missing: str) -> None:
         super().__init__(
-            f"{seconds:g} s were over before {missing}; allow longer", field="deadline"
+            f"{seconds:g} s expired before {missing}; give a longer deadline", field="deadline"
         )
         self.seconds = seconds
         self.missing = missing
@@ -167,7 +167,7 @@ def late(name: Unfinished) -> tuple[Unfinished, ...]:
 def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:
     """Say what came too late for a deadline [s], and what the answer is therefore."""
     missing = ", before ".join(UNFINISHED_RESULTS[name] for name in names)
-    sentence = f"the deadline of {seconds:g} s came before {missing}"
+    sentence = f"the deadline of {seconds:g} s expired before {missing}"
     if "least_effort" in names:
         sentence += "; the plan is one of less utilisation and more effort"
     return sentence

@@ -4,7 +4,7 @@ from .active_limits import (
     LimitUse as LimitUse,
     joint_name as joint_name,
     limit_name as limit_name,
-    unit_of as unit_of,
+    limit_unit as limit_unit,
 )
 from .certificate import (
     certify as certify,

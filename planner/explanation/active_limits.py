@@ -24,13 +24,13 @@ __all__ = [
     "close_to",
     "joint_name",
     "limit_name",
-    "unit_of",
+    "limit_unit",
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class ExplanationTolerances:
-    """From where on numbers of a plan, or of a proof that there is none, mean something."""
+    """Least size of numbers of a plan, or of an infeasibility certificate, that mean something."""
 
     binding_multiplier: float = 1e-6  # of a limit that binds, at least
     ranking_digits: int = 5  # decimals of multipliers; where alike, rows' order counts
@@ -48,7 +48,7 @@ class ExplanationTolerances:
 TOLERANCES: Final = ExplanationTolerances()
 
 
-def unit_of(limit: str) -> str:
+def limit_unit(limit: str) -> str:
     """Return the unit of a limit's capacity."""
     units = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
     return units.get(limit, "N")
@@ -131,7 +131,7 @@ class ActiveLimits:
         dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
         each = self._weights * utilisation / self._capacities
         price = np.bincount(self._of_row, each, len(names)).tolist()
-        return tuple(Price.of(names[i], price[i], unit_of(names[i].limit)) for i in dear)
+        return tuple(Price.of(names[i], price[i], limit_unit(names[i].limit)) for i in dear)
 
     def limiting(
         self, used: Array, utilisation: float, idle: Sequence[LimitUse]

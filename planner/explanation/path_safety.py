@@ -106,7 +106,7 @@ def tension_path(
     if not reached.outcome.solved:
         return None
     part = float(reached.t[0]) / size
-    if not programs.holds(
+    if not programs.loads_are_feasible(
         start.turned(start.wrench + part * way), reached.outcome.loads, most + CAP_SLACK
     ):
         return None
@@ -184,6 +184,9 @@ def _pinned(
 def _least(data: StanceData, still: float) -> float | None:
     """Return the least utilisation; ``still`` is what hands use that are left out."""
     outcome = programs.margin(data)
-    if not (outcome.solved and programs.holds(data, outcome.loads, outcome.value + CAP_SLACK)):
+    if not (
+        outcome.solved
+        and programs.loads_are_feasible(data, outcome.loads, outcome.value + CAP_SLACK)
+    ):
         return None
     return max(outcome.value, still)

@@ -27,7 +27,7 @@ __all__ = [
 
 
 class _Words(NamedTuple):
-    """What is said of a limit, or of a hard row, a cap or a given wrench.
+    """Words for a limit, or for a hard row, a cap or a given wrench.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ LIMIT_WORDS: Final = {
     "palm_shear_reversed": _Words(barrier="cannot drag the rock along +x of the hand"),
     "palm_pressing_reversed": _Words(barrier="cannot pull"),
     TENSION_CHANGE: _Words(barrier="may not change that much"),
-    PASSIVE_JOINT: _Words(barrier="has no motor and bears no torque"),
+    PASSIVE_JOINT: _Words(barrier="has no motor and bears be torque"),
 }
 
 

@@ -25,7 +25,7 @@ __all__ = ["LEAST_USE", "SETTINGS", "FloatingSettings", "Goal", "LeastUse", "ben
 
 @dataclass(frozen=True, slots=True)
 class FloatingSettings:
-    """How far searches for the wrists of floating hands go."""
+    """Sizes and tolerances of searches for wrists that give way."""
 
     programs: int = 320
     """For a question, at most, so that four floating hands take some ten seconds. Then the best

@@ -22,10 +22,10 @@ from mpl_toolkits.mplot3d import proj3d
 from hand_models.base import Array, whole_file
 from planner.pictures.plan_scene import (
     WORLD_UP,
-    Scene,
+    DrawnScene,
     ViewDirections,
+    drawn_scene,
     joint_utilisations,
-    scene_of,
     view_directions,
 )
 from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_spread, draw_tiles
@@ -54,7 +54,7 @@ def plot_plan(plan: Plan, question: Question, path: Path) -> None:
 
 def draw_plan(plan: Plan, question: Question) -> Figure:
     """Draw a plan; arguments as of `plot_plan`."""
-    scene, seen = scene_of(plan, question), view_directions(question.stance)
+    scene, seen = drawn_scene(plan, question), view_directions(question.stance)
     rows = sum(len(hand.fingers) for hand in plan.hands or ())
     joints = joint_utilisations(plan, question.stance)
     # edges of the panels, over the picture's height
@@ -111,7 +111,7 @@ def _write_title(figure: Figure, plan: Plan) -> None:
 # Views ------------------------------------------------------------------------------------------
 
 
-def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) -> None:
+def _draw_space(figure: Figure, place: Any, scene: DrawnScene, seen: ViewDirections) -> None:
     """Draw the scene in the axes of W, from behind the robot."""
     axes: Any = figure.add_subplot(place, projection="3d", computed_zorder=False)
     axes.set_proj_type("ortho")
@@ -148,7 +148,7 @@ def _draw_space(figure: Figure, place: Any, scene: Scene, seen: ViewDirections) 
     axes.set(xlabel="x of W [m]", ylabel="y of W [m]", zlabel="z of W [m]")
 
 
-def _draw_sides(facing: Any, side: Any, scene: Scene, seen: ViewDirections) -> None:
+def _draw_sides(facing: Any, side: Any, scene: DrawnScene, seen: ViewDirections) -> None:
     """Draw the scene facing the rock, and from the side."""
     ahead = "toward the rock" if seen.toward else "ahead"
     _draw_side(side, scene, seen.ahead, WORLD_UP, (ahead, "up"), "the side")
@@ -163,7 +163,7 @@ def _draw_sides(facing: Any, side: Any, scene: Scene, seen: ViewDirections) -> N
 
 
 def _draw_side(
-    axes: Any, scene: Scene, right: Array, up: Array, words: tuple[str, str], seen_from: str
+    axes: Any, scene: DrawnScene, right: Array, up: Array, words: tuple[str, str], seen_from: str
 ) -> None:
     plane = np.column_stack([right, up])
 

@@ -24,13 +24,13 @@ __all__ = [
     "WORLD_UP",
     "Arrow",
     "Dots",
+    "DrawnScene",
+    "DrawnSurface",
     "Label",
     "Line",
-    "Scene",
-    "Surface",
     "ViewDirections",
+    "drawn_scene",
     "joint_utilisations",
-    "scene_of",
     "view_directions",
 ]
 
@@ -38,7 +38,7 @@ WORLD_UP: Final = np.array([0.0, 0.0, 1.0])
 """Upward direction in W; and z of a hand."""
 
 
-class Surface(NamedTuple):
+class DrawnSurface(NamedTuple):
     """Triangles of one thing.
 
     Attributes
@@ -119,7 +119,7 @@ class Label(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class DrawnScene:
     """All that there is to see of a plan.
 
     Attributes
@@ -131,7 +131,7 @@ class Scene:
     """
 
     origin: Array
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[DrawnSurface, ...]
     lines: tuple[Line, ...]
     dots: tuple[Dots, ...]
     arrows: tuple[Arrow, ...]
@@ -190,7 +190,7 @@ def view_directions(stance: Stance) -> ViewDirections:
     return ViewDirections(ahead, into, chosen == 0, bool(abs(into @ WORLD_UP) >= 0.9))
 
 
-def scene_of(plan: Plan, question: Question) -> Scene:
+def drawn_scene(plan: Plan, question: Question) -> DrawnScene:
     """Return what there is to see of a plan for a question."""
     stance = question.stance
     settled = [settle_hand(hand, stance) for hand in stance.hands]
@@ -203,8 +203,8 @@ def scene_of(plan: Plan, question: Question) -> Scene:
         palm = into_world([(x, y, 0.0), (x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0)])
         apart = np.arange(3 * len(rock)).reshape(-1, 3)
         surfaces += [
-            Surface("rock", hand.limb, rock.reshape(-1, 3), apart),
-            Surface("palm", hand.limb, palm, np.array([(0, 1, 2), (0, 2, 3)])),
+            DrawnSurface("rock", hand.limb, rock.reshape(-1, 3), apart),
+            DrawnSurface("palm", hand.limb, palm, np.array([(0, 1, 2), (0, 2, 3)])),
         ]
         frames = kind.frames(known.grasp.outer_rotation)
         lines += [
@@ -232,7 +232,7 @@ def scene_of(plan: Plan, question: Question) -> Scene:
             size = f"{np.linalg.norm(force):.0f} N"
             arrows.append(Arrow("force", hand.pose.position, force, size, planned.utilisation))
     load, origin = _load(plan, question), stance.body.position
-    return Scene(
+    return DrawnScene(
         origin=origin,
         surfaces=tuple(surfaces),
         lines=tuple(lines),
@@ -276,7 +276,7 @@ def _rocks(hands: Sequence[HandOnHold], settled: Sequence[SettledHand]) -> list[
     return rocks
 
 
-def _body(plan: Plan, stance: Stance) -> list[Surface]:
+def _body(plan: Plan, stance: Stance) -> list[DrawnSurface]:
     """Return the capsules of what no joint moves, and of links where the joints are known.
 
     Of a robot whose file has no capsules of its body, all triangles of B and the first joints.
@@ -289,7 +289,7 @@ def _body(plan: Plan, stance: Stance) -> list[Surface]:
         kinds += ["link"] * (len(ends) - len(kinds))
     placed = stance.body.apply(ends.reshape(-1, 3)).reshape(-1, 2, 3)
     found = [
-        Surface(kind, "", *_capsule(start, end, radius))
+        DrawnSurface(kind, "", *_capsule(start, end, radius))
         for kind, (start, end), radius in zip(kinds, placed, radii.tolist(), strict=True)
     ]
     if "body" not in kinds:
@@ -298,7 +298,7 @@ def _body(plan: Plan, stance: Stance) -> list[Surface]:
             chains = [robot.link_chain(plan.joints, limb) for limb in robot.limbs]
             corners += [stance.body.apply(chain[0]) for chain in chains]
         between = np.array([*combinations(range(len(corners)), 3)], dtype=np.intp).reshape(-1, 3)
-        found.append(Surface("body", "", np.array(corners), between))
+        found.append(DrawnSurface("body", "", np.array(corners), between))
     return found
 
 

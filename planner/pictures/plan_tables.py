@@ -197,13 +197,13 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     axes.axvline(1.0, color="tab:red", linestyle="--", label="needed")
     if nominal is not None:
         axes.axvline(nominal, color="black", label="nominal")
-    said = f"holds in {spread.holds} of {spread.draws} draws"
+    said = f"feasible in {spread.holds} of {spread.draws} samples"
     if spread.cap < 1.0:
         said += f" within {spread.cap:g}"
-    if spread.hangs_on:
-        said += f"; hangs most on {spread.hangs_on[0].quantity}"
+    if spread.sensitive_to:
+        said += f"; most sensitive to {spread.sensitive_to[0].quantity}"
     axes.set_title(said, fontsize=9)
-    axes.set(xlabel="load factor [1]", ylabel="draws")
+    axes.set(xlabel="load factor [1]", ylabel="samples")
     axes.margins(x=0.04)
     axes.set_ylim(top=1.6 * axes.get_ylim()[1])
     axes.yaxis.get_major_locator().set_params(integer=True)

@@ -15,7 +15,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from hand_models.base import Array
-from planner.pictures.plan_scene import Scene
+from planner.pictures.plan_scene import DrawnScene
 from planner.pictures.settings import PICTURE_SETTINGS
 
 __all__ = ["UTILISATION_COLOURS", "UTILISATION_NORM", "View", "draw_scene", "silhouette"]
@@ -198,7 +198,7 @@ class View:
         return np.concatenate(found) if found else np.zeros((0, 2))
 
 
-def draw_scene(view: View, scene: Scene) -> None:
+def draw_scene(view: View, scene: DrawnScene) -> None:
     """Draw rock, hands, limbs, forces and names."""
     view.rock(np.concatenate([s.triangles for s in scene.surfaces if s.kind == "rock"]))
     for kind in ("palm", "link", "body"):
@@ -246,7 +246,7 @@ def silhouette(vertices: Array, look: Array) -> Array:
         return np.asarray(vertices[[along.argmin(), along.argmax()]])
 
 
-def _write_names(view: View, scene: Scene) -> None:
+def _write_names(view: View, scene: DrawnScene) -> None:
     """Write the limbs' names beside their hands, away from the body, and that of B."""
     middle = view.flat(scene.origin[None])[0]
     names = [label for label in scene.labels if label.kind == "limb"]
@@ -260,7 +260,7 @@ def _write_names(view: View, scene: Scene) -> None:
             view.note(label.text, middle, (-8.0, 6.0), bbox=None)
 
 
-def _draw_arrows(view: View, scene: Scene) -> None:
+def _draw_arrows(view: View, scene: DrawnScene) -> None:
     """Draw forces of hands in the colours of their utilisation, and the load."""
     steps: dict[tuple[float, ...], Array] = {}
     tips, texts = [], []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
-from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
+from hand_models.hand import FINGERS, NAIL, SettledHand, SettledTile
 
 __all__ = [
     "CONTACT_CODES",
@@ -143,7 +143,7 @@ class ContactPattern(NamedTuple):
     holding: tuple[int, ...]
 
 
-def contact_pattern_of(hands: tuple[tuple[Tile, ...], ...]) -> ContactPattern:
+def contact_pattern_of(hands: tuple[tuple[SettledTile, ...], ...]) -> ContactPattern:
     """Return the contact states of hands with these tiles."""
     places = tile_index_of(tuple(map(len, hands)))
     contacts = np.array([CONTACT_CODES[tile.contact] for hand in hands for tile in hand])

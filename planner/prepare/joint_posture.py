@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy
 
-from hand_models.base import Array, InvalidInputError, Pose, within, wrench_transport
+from hand_models.base import Array, InvalidInputError, Pose, errors_under, wrench_transport
 from planner.prepare.stance_constraints import TOLERANCES, JointLoads
 from planner.question import Question, Stance, Weights
 from planner.robots import UnreachableError, carriers, held_up, solve_limbs
@@ -89,7 +89,7 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
         limb: np.asarray(angles.get(limb, chain.rest), dtype=float)
         for limb, chain in robot.chains.items()
     }
-    with within("load"):
+    with errors_under("load"):
         linear, angular = load.motion(stance)
         frames = carriers(robot, whole, load.payloads)
     statics = robot.statics(whole, -linear, np.concatenate([np.zeros(3), angular]))
@@ -145,13 +145,13 @@ def torque_limits(question: Question) -> dict[str, Array]:
 def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     """Return given angles, which must be possible and where the hands' poses are."""
     joints, solved = stance.given_joints, stance.solved_limbs
-    with within("stance.joints"):
+    with errors_under("stance.joints"):
         stance.robot.checked_angles(joints)
     for limb in poses:
         if limb not in joints and limb not in solved:
             raise InvalidInputError(
-                f"missing for {limb}, which holds on; valid are all limbs with a hand, each with "
-                "angles or 'solve', or 'solve'",
+                f"missing for {limb}, which is on the rock; give angles or 'solve' for each limb "
+                "with a hand, or 'solve' for all",
                 field="stance.joints",
             )
     index = {hand.limb: i for i, hand in enumerate(stance.hands)}
@@ -159,8 +159,8 @@ def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     for limb, (off, turned) in _off(stance, joints, known).items():
         if off > TOLERANCES.hand_offset or turned > TOLERANCES.hand_turn:
             raise InvalidInputError(
-                f"{limb} is {off:.3g} m and {turned:.3g} rad from where its joints put it; "
-                f"up to {TOLERANCES.hand_offset:g} m and {TOLERANCES.hand_turn:g} rad are valid",
+                f"{limb} is {off:.3g} m and {turned:.3g} rad from the pose of its joint angles; "
+                f"the tolerance is {TOLERANCES.hand_offset:g} m and {TOLERANCES.hand_turn:g} rad",
                 field=f"stance.hands[{index[limb]}].pose",
             )
     return joints

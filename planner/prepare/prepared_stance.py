@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, BoundedStore, InvalidInputError, within, wrench_transports
+from hand_models.base import Array, BoundedStore, InvalidInputError, errors_under, wrench_transports
 from hand_models.compliance import FloatingWrist
 from hand_models.fixed_wrist import wrench_spaces
 from hand_models.hand import SettledHand
@@ -124,7 +124,7 @@ def prepare_stance(question: Question) -> PreparedStance:
     """
     checked_question(question)
     where = posture(question)
-    with within("load"):
+    with errors_under("load"):
         wrench = question.needed_wrench(None if where is None else where.weights)
     return PreparedStance(question, where, *assemble(question, where, wrench), wrench)
 

@@ -136,7 +136,7 @@ def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
     _, wrist = _hand_at(stance, limb)
     if wrist is None or wrist.driven:
         mode = "fixed" if wrist is None else "compliant"
-        raise InvalidInputError(f"the wrist of {limb} is {mode}; floating is needed", field="limb")
+        raise InvalidInputError(f"the wrist of {limb} is {mode}; must be floating", field="limb")
     return wrist
 
 

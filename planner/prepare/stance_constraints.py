@@ -62,7 +62,7 @@ CHANGE_ROWS: Final = tuple(
 
 @dataclass(frozen=True, slots=True)
 class PrepareTolerances:
-    """From where on a number of a stance means something."""
+    """Least size of numbers of a stance that mean something."""
 
     hand_offset: float = 0.01  # [m] of a hand's pose from where its joints put it
     hand_turn: float = 0.05  # [rad] of its axes from those that its joints give

@@ -41,7 +41,7 @@ Make = Callable[[], Callable[[Input], Output]]
 
 @dataclass(frozen=True, slots=True)
 class ProcessSettings:
-    """What processes and those that start them agree on."""
+    """Numbers that processes share with those that start them."""
 
     signals: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM)
     thread_variables: tuple[str, ...] = (

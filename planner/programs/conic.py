@@ -30,10 +30,10 @@ __all__ = [
     "WAITING_SOLVERS",
     "Columns",
     "ConicProgram",
+    "ConicSolution",
+    "ConicSolver",
     "Outcome",
     "Reached",
-    "Solution",
-    "Solver",
     "Solvers",
 ]
 
@@ -126,7 +126,7 @@ class ConicProgram(NamedTuple):
     second_order: int = 0
 
 
-class Solution(NamedTuple):
+class ConicSolution(NamedTuple):
     """Solution of a conic program, or the proof that there is none.
 
     Attributes
@@ -149,7 +149,7 @@ class Solution(NamedTuple):
     multipliers: Array | None = None
 
 
-class Solver:
+class ConicSolver:
     """A solver set up for a pattern of data, with the numbers it was given last.
 
     Parameters
@@ -195,7 +195,7 @@ class Solver:
             self._solver.update(**{name: value.tolist() for name, value in changed.items()})
             self._numbers = numbers
 
-    def solve(self) -> Solution:
+    def solve(self) -> ConicSolution:
         """Solve the program taken last."""
         if deadline.left() is None:
             return _read(self._solver.solve())
@@ -254,7 +254,7 @@ class Solvers:
     def __init__(self, most: int) -> None:
         self._most = most
         self._lock = threading.Lock()
-        self._idle: list[Solver] = []
+        self._idle: list[ConicSolver] = []
         self._hits = self._misses = 0
         enlist(self)
 
@@ -269,11 +269,11 @@ class Solvers:
             self._idle.clear()
             self._hits = self._misses = 0
 
-    def solve(self, program: ConicProgram, settings: Mapping[str, Any]) -> Solution:
-        """Solve a program; parameters as for `Solver`."""
+    def solve(self, program: ConicProgram, settings: Mapping[str, Any]) -> ConicSolution:
+        """Solve a program; parameters as for `ConicSolver`."""
         solver = self._take(Pattern.of(program), settings)
         if solver is None:
-            solver = Solver(program, settings)
+            solver = ConicSolver(program, settings)
         else:
             solver.update(program)
         solution = solver.solve()
@@ -284,7 +284,7 @@ class Solvers:
                 del self._idle[: -self._most]
         return solution
 
-    def _take(self, pattern: Pattern, settings: Mapping[str, Any]) -> Solver | None:
+    def _take(self, pattern: Pattern, settings: Mapping[str, Any]) -> ConicSolver | None:
         """Take the solver of a pattern that was used last, if one waits."""
         with self._lock:
             for i in reversed(range(len(self._idle))):
@@ -336,12 +336,12 @@ def _numbers(program: ConicProgram) -> dict[str, Array]:
     return {"P": program.P, "q": program.q, "A": A, "b": program.b}
 
 
-def _read(raw: Any) -> Solution:
+def _read(raw: Any) -> ConicSolution:
     status = CLARABEL_STATUSES.get(str(raw.status), SOLVER_ERROR)
     if status in SOLVED_STATUSES:
-        return Solution(status, raw.iterations, raw.obj_val, np.array(raw.x), np.array(raw.z))
+        return ConicSolution(status, raw.iterations, raw.obj_val, np.array(raw.x), np.array(raw.z))
     proof = np.array(raw.z) if status in INFEASIBLE_STATUSES else None
-    return Solution(status, raw.iterations, multipliers=proof)
+    return ConicSolution(status, raw.iterations, multipliers=proof)
 
 
 @dataclass(frozen=True, eq=False)

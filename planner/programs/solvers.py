@@ -27,10 +27,10 @@ __all__ = [
     "curved",
     "effort",
     "elastic",
-    "holds",
     "least_tensions",
     "less_tension",
     "load_factor",
+    "loads_are_feasible",
     "margin",
     "nearest",
     "nearest_body",
@@ -193,7 +193,7 @@ def nearest_body(data: StanceData) -> Outcome:
     return Nearest(data, len(data.wrench) - 6).solve()
 
 
-def holds(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
+def loads_are_feasible(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
     """Return whether loads y balance, and keep hard rows and limits at a cap, by `CAP_SLACK`."""
     error = np.abs(body_wrench(data, loads) - data.wrench).max()
     balances = bool(error <= CAP_SLACK * max(1.0, float(np.abs(data.wrench).max())))

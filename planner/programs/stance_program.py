@@ -26,8 +26,8 @@ from planner.programs.conic import (
     WAITING_SOLVERS,
     Columns,
     ConicProgram,
+    ConicSolver,
     Outcome,
-    Solver,
 )
 from planner.programs.stance_data import StanceData, parted
 
@@ -191,7 +191,7 @@ class StanceProgram(ABC):
         for settings in self.settings[1:]:
             if found.status in ends or deadline.expired():
                 break
-            found = Solver(program, settings).solve()
+            found = ConicSolver(program, settings).solve()
         ended = found.status in ends or deadline.expired()
         if not ended and all(
             np.isfinite(part).all()

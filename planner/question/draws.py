@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, stored, within
+from hand_models.base import Array, errors_under, stored
 from hand_models.hand import HandModel
 from hand_models.parameters import (
-    Draw,
+    ParameterSample,
     ParameterTable,
     bundled_draws,
     own_hand,
@@ -49,14 +49,16 @@ class DrawnHand(NamedTuple):
 
 
 @stored("hands of draws", 8)  # those used last
-def drawn_hands(hand: HandModel, draws: tuple[Draw, ...] | None = None) -> tuple[DrawnHand, ...]:
+def drawn_hands(
+    hand: HandModel, draws: tuple[ParameterSample, ...] | None = None
+) -> tuple[DrawnHand, ...]:
     """Return what draws make of a hand.
 
     Parameters
     ----------
     hand : HandModel
         Of the stance: what a draw leaves open is as with this one.
-    draws : tuple of Draw, optional
+    draws : tuple of ParameterSample, optional
         The bundled ones by default.
 
     Raises
@@ -68,20 +70,20 @@ def drawn_hands(hand: HandModel, draws: tuple[Draw, ...] | None = None) -> tuple
         draws = bundled_draws(hand.table)
     found = []
     for i, draw in enumerate(draws):
-        with within(f"[{i}]"):
-            with within("hand"):
+        with errors_under(f"[{i}]"):
+            with errors_under("hand"):
                 model = HandModel(own_hand(draw.hand, hand.table))
-            with within("surfaces"):
+            with errors_under("surfaces"):
                 surfaces = own_surfaces(draw.surfaces)
                 for name in surface_names():
-                    with within(name):
+                    with errors_under(name):
                         Surface.named(name, surfaces)
         found.append(DrawnHand(model, surfaces))
     return tuple(found)
 
 
 def drawn_quantities(
-    hand: HandModel, draws: tuple[Draw, ...] | None, surfaces: frozenset[str | None]
+    hand: HandModel, draws: tuple[ParameterSample, ...] | None, surfaces: frozenset[str | None]
 ) -> dict[str, Array]:
     """Return the numbers in which draws differ, shape (draws,) each, by their names.
 

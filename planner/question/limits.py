@@ -95,13 +95,12 @@ class ForceCap(Strict, frozen=True):
         for i, (low, high) in enumerate(most):
             if not low <= 0.0 <= high or low == high:
                 raise InvalidFieldError(
-                    f"a range from below to above zero is needed, one end of which may be zero; "
-                    f"got {low:g} to {high:g} N",
+                    f"must be a range that contains 0, got {low:g} to {high:g} N",
                     field=f"largest_force[{i}]",
                 )
             if any(0.0 < abs(end) < LEAST_LIMIT for end in (low, high)):
                 raise InvalidFieldError(
-                    f"an end is zero or at least {LEAST_LIMIT:g} N, got {low:g} to {high:g} N",
+                    f"each end must be 0 or at least {LEAST_LIMIT:g} N, got {low:g} to {high:g} N",
                     field=f"largest_force[{i}]",
                 )
 

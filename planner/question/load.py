@@ -17,7 +17,7 @@ from hand_models.base import (
     Position,
     Strict,
     check_positive,
-    within,
+    errors_under,
 )
 from planner.robots import Payload
 
@@ -82,7 +82,7 @@ class Load(Strict, frozen=True):
     acceleration: Acceleration = (0.0, 0.0, 0.0)
     angular_acceleration: Annotated[
         tuple[AccelerationEntry, AccelerationEntry, AccelerationEntry],
-        Meta(description="in W [rad/s²]; needs the stance's joints, and no com"),
+        Meta(description="in W [rad/s²]; requires stance.joints, and a load without com"),
     ] = (0.0, 0.0, 0.0)
     payloads: Annotated[
         tuple[Payload, ...],
@@ -126,7 +126,7 @@ class Load(Strict, frozen=True):
         linear, angular = self.motion(stance)
         if angular.any() and (weights is None or given is not None):
             raise InvalidInputError(
-                "needs the stance's joints, and no com", field="angular_acceleration"
+                "requires stance.joints, and a load without com", field="angular_acceleration"
             )
         if given is not None or weights is None:
             found = held_up(mass, stance.robot.com if given is None else given, linear, angular)
@@ -165,7 +165,7 @@ class Load(Strict, frozen=True):
         hands = {hand.limb: hand.pose for hand in stance.hands}
         body, places = stance.body.inverse(), []
         for i, payload in enumerate(self.payloads):
-            with within(f"payloads[{i}]"):
+            with errors_under(f"payloads[{i}]"):
                 check_carrier(stance.robot, payload)
                 if payload.link == stance.robot.description.body:
                     places.append(np.array(payload.com))
@@ -173,9 +173,8 @@ class Load(Strict, frozen=True):
                     places.append((body @ hands[payload.limb]).apply(np.array(payload.com)))
                 else:
                     raise InvalidInputError(
-                        f"where it is depends on joints that the stance does not give: add "
-                        f"stance.joints, or put it on {stance.robot.description.body!r} or a "
-                        "hand of the stance",
+                        "its position depends on joint angles: add stance.joints, or attach it "
+                        f"to {stance.robot.description.body!r} or a hand of the stance",
                         field="link" if payload.limb is None else "limb",
                     )
         return np.array(places).reshape(-1, 3)

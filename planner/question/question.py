@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Final, Protocol, get_args
 
-from hand_models.base import Array, InvalidInputError, check_positive, finite_vector, within
+from hand_models.base import Array, InvalidInputError, check_positive, errors_under, finite_vector
 from hand_models.hand import FINGERS
-from hand_models.parameters import Draw
+from hand_models.parameters import ParameterSample
 from planner.question.draws import drawn_hands
 from planner.question.limits import (
     BodyRange,
@@ -55,7 +55,7 @@ class Question:
         Tensions of tendons now, by limb [N].
     deadline : float, optional
         How long the answer may take [s]; as long as it takes by default.
-    draws : tuple of Draw, optional
+    draws : tuple of ParameterSample, optional
         Samples of the ``spread``; those of ``draws.toml`` by default.
     explain : bool
         Whether it is proven and reported what keeps an overloaded or infeasible stance from a plan.
@@ -72,7 +72,7 @@ class Question:
     objective: Objective | OwnObjective = "max_margin"
     present: Mapping[str, Array] = field(default_factory=dict)
     deadline: float | None = None
-    draws: tuple[Draw, ...] | None = None
+    draws: tuple[ParameterSample, ...] | None = None
     explain: bool = True
     body_range: BodyRange = field(default_factory=BodyRange)
 
@@ -103,26 +103,23 @@ class Question:
             if wrists.get(limb) != "fixed":
                 valid = ", ".join(name for name, wrist in wrists.items() if wrist == "fixed")
                 raise InvalidInputError(
-                    f"only hands of the stance with a fixed wrist have set-points; valid: "
-                    f"{valid or 'none'}",
+                    f"requires a hand of the stance with a fixed wrist; valid: {valid or 'none'}",
                     field=f"present.{limb}",
                 )
             present[limb] = finite_vector(tensions, len(FINGERS), f"present.{limb}")
             if present[limb].min() < 0.0:
                 raise InvalidInputError(
-                    f"tensions cannot be below 0 N, got {present[limb].min():g}",
+                    f"must be at least 0 N, got {present[limb].min():g}",
                     field=f"present.{limb}",
                 )
         object.__setattr__(self, "present", present)
         if self.limits.tension_change is not None and not present:
-            raise InvalidInputError(
-                "a change from nothing; present tensions are needed", field="limits.tension_change"
-            )
+            raise InvalidInputError("requires 'present' tensions", field="limits.tension_change")
 
     def _check_draws(self) -> None:
         if "spread" not in self.want:
             if self.draws is not None:
-                raise InvalidInputError("'draws' are for 'spread': add it to want", field="draws")
+                raise InvalidInputError("requires 'spread' in want", field="draws")
             return
         if self.draws is not None:
             object.__setattr__(self, "draws", tuple(self.draws))
@@ -130,7 +127,7 @@ class Question:
                 raise InvalidInputError(
                     f"from 1 to {MOST_DRAWS} draws are needed, got {len(self.draws)}", field="draws"
                 )
-        with within("draws"):
+        with errors_under("draws"):
             drawn_hands(self.stance.robot.hand, self.draws)
 
     def _check_limits(self) -> None:
@@ -147,7 +144,7 @@ class Question:
             return
         if self.stance.joints is None:
             raise InvalidInputError(
-                "the stance says nothing of joints; give stance.joints, or 'solve'",
+                "requires stance.joints, angles or 'solve'",
                 field="limits.joint_torque",
             )
         if isinstance(limits.joint_torque, Mapping):
@@ -156,7 +153,7 @@ class Question:
                 count = len(robot.chains[limb].joints)
                 if isinstance(most, tuple) and len(most) != count:
                     raise InvalidInputError(
-                        f"{count} joints need {count} figures, got {len(most)}",
+                        f"must have a value for each of {count} joints, got {len(most)}",
                         field=f"limits.joint_torque.{limb}",
                     )
                 if isinstance(most, tuple) and not any(most):

@@ -53,7 +53,9 @@ def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     """Return a body wrench; refuse one that is absurdly large."""
     most = 1e12  # [N, N·m] larger, the unit is wrong
     if not np.abs(wrench).max() <= most:
-        raise InvalidInputError(f"asks for more than {most:g} N or N·m", field=field)
+        raise InvalidInputError(
+            f"must be at most {most:g} N or N·m, got {np.abs(wrench).max():g}", field=field
+        )
     return wrench
 
 
@@ -139,7 +141,7 @@ class HandOnHold:
         if self.tendon_preload is not None:
             if self.wrist != "floating":
                 raise InvalidInputError(
-                    "only a floating wrist holds a preload; valid is none, or wrist floating",
+                    "requires wrist 'floating'; remove it for a fixed wrist",
                     field="tendon_preload",
                 )
             preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
@@ -167,17 +169,15 @@ class HandOnHold:
         for name, left_out in (("seat", "the seat"), ("at", "where it is seated")):
             if given[name] and posed:
                 raise InvalidInputError(
-                    "a hand whose hold has a pose is not seated: leave out pose and pose_in_hand, "
-                    f"or {left_out}",
+                    "cannot be combined with a hold's pose: remove pose and pose_in_hand, or "
+                    f"{left_out}",
                     field=name,
                 )
         if self.at is not None:
             _possible(self.at, "at")
         if self.seat_direction is not None:
             if self.seat != "best":
-                raise InvalidInputError(
-                    "only a hand with the seat 'best' looks in a direction", field="seat_direction"
-                )
+                raise InvalidInputError("requires the seat 'best'", field="seat_direction")
             direction = finite_vector(self.seat_direction, 6, "seat_direction")
             if not direction.any():
                 raise InvalidInputError("must not be zero", field="seat_direction")
@@ -242,7 +242,8 @@ class Stance:
                     joints[limb] = "solve"
                 else:
                     raise InvalidInputError(
-                        f"valid are angles or, of a limb that holds on, 'solve'; got {angles!r}",
+                        f"valid are angles or, of a limb with a hand in the stance, 'solve'; "
+                        f"got {angles!r}",
                         field=f"joints.{limb}",
                     )
             object.__setattr__(self, "joints", joints)

@@ -38,7 +38,7 @@ class Advice(Struct, frozen=True):
     limbs : list of str
         Whose hands it is about; none for the body.
     sentence : str
-        What to do, in the words of the question.
+        What to do, in the words of the question; for ``strength`` and ``mass`` a condition.
     changes : dict of str to any
         Fields of the plan request by their paths, and their new values. Null takes a field away,
         and a hand. A hand whose value is the path of another one is new, and a copy of that one

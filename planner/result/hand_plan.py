@@ -15,7 +15,7 @@ from msgspec import UNSET
 
 from hand_models.base import Array
 from hand_models.compliance import PalmMode
-from hand_models.hand import FINGERS, NAIL, Seating, Tile as NamedTile
+from hand_models.hand import FINGERS, NAIL, Seating, SettledTile
 from hand_models.tile import HalfPlane
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, concatenated
@@ -80,7 +80,7 @@ class HandPlan:
         Share of each tile's spines that are on the rock, and part of a whole tile's strength that
         limits its load, as of `SettledHand`.
     tile_utilisations : ndarray, shape (n,)
-    tiles : tuple of Tile
+    tiles : tuple of SettledTile
         Their names and contacts.
     half_planes : tuple of HalfPlane
         Limits of each whole tile that is no nail.
@@ -112,7 +112,7 @@ class HandPlan:
     engagement: Array
     limit_shares: Array
     tile_utilisations: Array
-    tiles: tuple[NamedTile, ...]
+    tiles: tuple[SettledTile, ...]
     half_planes: tuple[HalfPlane, ...]
     palm: Palm[Array]
     utilisation: float
@@ -182,7 +182,7 @@ class PlanArrays(NamedTuple):
     palm_utilisations : ndarray, shape (H,)
     wrenches : ndarray, shape (H, 6)
     utilisations : ndarray, shape (H,)
-    tiles : tuple of tuple of Tile
+    tiles : tuple of tuple of SettledTile
     half_planes : tuple of tuple of HalfPlane
         Of each hand's whole tiles.
     engaged : tuple of sequence of int
@@ -202,7 +202,7 @@ class PlanArrays(NamedTuple):
     palm_utilisations: Array
     wrenches: Array
     utilisations: Array
-    tiles: tuple[tuple[NamedTile, ...], ...]
+    tiles: tuple[tuple[SettledTile, ...], ...]
     half_planes: tuple[tuple[HalfPlane, ...], ...]
     engaged: tuple[Sequence[int], ...]
     wrists: tuple[WristPlan | None, ...]

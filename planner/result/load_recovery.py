@@ -17,7 +17,7 @@ from hand_models.base import Array, Indices
 from hand_models.compliance import FloatingWrist
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, layout_of
-from hand_models.hand import FINGERS, NAIL, SettledHand, Tile
+from hand_models.hand import FINGERS, NAIL, SettledHand, SettledTile
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.prepare import (
@@ -93,7 +93,7 @@ class _LoadLayout(NamedTuple):
 
 @lru_cache(maxsize=KEPT_NAMES)
 def _layout_of(
-    tiles: tuple[tuple[Tile, ...], ...],
+    tiles: tuple[tuple[SettledTile, ...], ...],
     columns: tuple[tuple[str, ...], ...],
     names: tuple[tuple[Row, ...], ...],
     limits: tuple[int, ...],
@@ -102,7 +102,7 @@ def _layout_of(
 
     Parameters
     ----------
-    tiles : tuple of tuple of Tile
+    tiles : tuple of tuple of SettledTile
         By hand, and so are the others.
     columns : tuple of tuple of str
     names : tuple of tuple of Row

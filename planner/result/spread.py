@@ -16,7 +16,7 @@ __all__ = ["SPREAD_SETTINGS", "DrawnPlan", "Influence", "Quantiles", "Spread", "
 
 @dataclass(frozen=True, slots=True)
 class SpreadSettings:
-    """From where on draws say something."""
+    """Numbers of samples from which statistics are given."""
 
     many_draws: int = 20  # of which 5 % are one; of fewer the extremes are reported
     least_variation: float = 1e-4  # of numbers, over the largest: less is the solver's error
@@ -98,6 +98,10 @@ class Spread(Struct, frozen=True):
     load_factor : Quantiles or None
         Over all draws; one without a plan counts as 0. None where no draw has one.
     hangs_on : list of Influence
+        Deprecated: the same as ``sensitive_to``.
+    utilisations, load_factors : list of float or None
+        Of each draw, in order.
+    sensitive_to : list of Influence
         The drawn quantities with which most of the load factor's variation goes, the first three,
         the largest share first. A share is the squared rank correlation
 
@@ -107,8 +111,6 @@ class Spread(Struct, frozen=True):
         their means; equal numbers have their mean rank. Quantities that vary together in the draws
         share what they explain, so that shares do not add up to 1. Empty where the load factor does
         not vary by more than 1e-4 of itself, or fewer than three draws have one.
-    utilisations, load_factors : list of float or None
-        Of each draw, in order.
     """
 
     draws: int
@@ -121,6 +123,7 @@ class Spread(Struct, frozen=True):
     hangs_on: list[Influence]
     utilisations: list[float | None]
     load_factors: list[float | None]
+    sensitive_to: list[Influence] = []
 
     @classmethod
     def of(
@@ -143,6 +146,7 @@ class Spread(Struct, frozen=True):
         """
         used, factors = [p.utilisation for p in plans], [p.load_factor for p in plans]
         some = any(factor is not None for factor in factors)
+        influences = _influences(factors, drawn)
         carried = [
             0.0 if u is None and factor is None else factor
             for u, factor in zip(used, factors, strict=True)
@@ -155,9 +159,10 @@ class Spread(Struct, frozen=True):
             refused=dict(refused),
             utilisation=Quantiles.of(used),
             load_factor=Quantiles.of(carried) if some else None,
-            hangs_on=_influences(factors, drawn),
+            hangs_on=influences,
             utilisations=used,
             load_factors=factors,
+            sensitive_to=influences,
         )
 
 

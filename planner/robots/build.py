@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError, Pose, within
+from hand_models.base import Array, Indices, InvalidInputError, Pose, errors_under
 from planner.robots.limb_joints import JointCoupling, coupling_of, limb_joints, locked_joints
 from planner.robots.robot_file import Mount, RobotDescription
 from planner.robots.tolerances import TOLERANCES
@@ -139,7 +139,7 @@ def build_model(
         If Pinocchio cannot read it, a link is not in it, or a limb is no chain of joints of its
         own.
     """
-    with within("body"):
+    with errors_under("body"):
         tree.require(described.body)
     if not any(link.mass > 0.0 for link in tree.links.values()):
         raise InvalidInputError("no link has a mass; at least one must", field="urdf")
@@ -205,17 +205,18 @@ def _mounted(
     # limbs share no joints and the others are locked, so a limb's joints follow each other
     columns = slice(joints[0].idx_v, joints[-1].idx_v + 1)
     link = model.frames[model.getFrameId(mount.link, pin.FrameType.BODY)]
-    with within(f"limbs.{limb}.link"):
+    with errors_under(f"limbs.{limb}.link"):
         coupled = coupling_of(elements)
     shoulder, reach = _bound(model, elements, ids, columns.start, pose_of(link.placement))
     if reach <= TOLERANCES.axis_distance:
         reach = float(np.linalg.norm(mount.pose.position))
     if reach <= TOLERANCES.axis_distance:
         raise InvalidInputError(
-            "the limb's joints only turn the hand in its place; it must be away from them",
+            "the hand is on the axes of the limb's joints, which cannot move it; must be away "
+            "from them",
             field=f"limbs.{limb}.position",
         )
-    with within(f"limbs.{limb}.torque_limit"):
+    with errors_under(f"limbs.{limb}.torque_limit"):
         limits = _torque_limits(mount, coupled)
     place = link.placement * pin.SE3(mount.pose.rotation, mount.pose.position)
     hand = pin.Inertia(hand_mass, np.array(mount.hand_com), np.zeros((3, 3)))

@@ -94,7 +94,7 @@ def solve_limbs(
     found = {limb: angles[i, : batch.joints[i]] for i, limb in enumerate(poses)}
     missing, turned, approached = {}, {}, {}
     for i in np.flatnonzero(~solved).tolist():
-        deadline.check("it was known how far a hand is out of reach")
+        deadline.check("the distance of a hand out of reach was found")
         limb = batch.limbs[i]
         alone, starts = starts_beside(batch, i, found[limb])
         nearest = None if near is None else angles_near(alone, starts, near)

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError, within
+from hand_models.base import Array, InvalidInputError, errors_under
 from planner.robots.robot_file import RobotDescription, section_table
 from planner.robots.urdf import JointElement, Urdf
 
@@ -71,7 +71,7 @@ def limb_joints(
     most = 64  # no request names more
     for limb, mount in described.mounts.items():
         field = f"limbs.{limb}.link"
-        with within(field):
+        with errors_under(field):
             chains[limb] = tree.chain(body, mount.link, locked)
         if not chains[limb]:
             stuck = [each.name for each in tree.chain(body, mount.link, ()) if _stuck(each)]
@@ -86,7 +86,7 @@ def limb_joints(
             )
     _require_own(chains, described.locked)
     for limb, chain in chains.items():
-        with within(f"limbs.{limb}.link"):
+        with errors_under(f"limbs.{limb}.link"):
             between = f"between {body!r} and {described.mounts[limb].link!r}"
             _require_moved(chain, between, described.locked)
     return chains
@@ -198,7 +198,8 @@ def coupling_of(chain: Sequence[JointElement]) -> JointCoupling:
             lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
             if lower[j] > upper[j]:
                 raise InvalidInputError(
-                    f"joint {joint.name!r} follows {driver!r}, and their limits leave no room"
+                    f"joint {joint.name!r} follows {driver!r} (mimic), and their limits have no "
+                    "common range"
                 )
     return JointCoupling(driving, matrix, offset, lower, upper)
 

@@ -52,7 +52,7 @@ def starts_beside(batch: LimbBatch, i: int, best: Array) -> tuple[LimbBatch, Seq
     limb = batch.part(np.array([i]))
     angles = postures_near(batch, i, 128)[:, None]
     for _ in range(8):  # steps nearer to the pose
-        deadline.check("it was known how near a hand comes to its pose")
+        deadline.check("the reachable pose closest to a hand's was found")
         angles = damped_step(limb, angles, *limb.errors(angles))
     errors = (limb.errors(angles)[0] ** 2).sum(axis=(1, 2))
     # the nearest are followed to the end
@@ -152,7 +152,7 @@ def _followed(
     limits: Sequence[scipy.optimize.NonlinearConstraint] = (),
 ) -> _Approach:
     """Return where a start leads, by the weighed sum of squares, within limits."""
-    deadline.check("it was known how near a hand comes to its pose")
+    deadline.check("the reachable pose closest to a hand's was found")
     low, high = limb.lower[0], limb.upper[0]
 
     def measured(angles: Array) -> tuple[float, Array]:

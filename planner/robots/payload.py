@@ -19,7 +19,7 @@ from hand_models.base import (
     Position,
     Strict,
     check_positive,
-    within,
+    errors_under,
 )
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def carriers(
     model, data, found, from_root = robot.model, robot.data, [], robot.root.inverse()
     pin.computeJointJacobians(model, data, robot.configuration(angles))
     for i, payload in enumerate(payloads):
-        with within(f"payloads[{i}]"):
+        with errors_under(f"payloads[{i}]"):
             check_carrier(robot, payload)
         if payload.limb is not None:
             frame = robot.chains[payload.limb].frame

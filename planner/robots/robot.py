@@ -18,10 +18,10 @@ from hand_models.base import (
     Array,
     InvalidInputError,
     Pose,
+    errors_under,
     finite_vector,
     in_file,
     stored,
-    within,
     wrench_transport,
 )
 from hand_models.hand import SpinyHand, spiny_hand
@@ -108,7 +108,7 @@ class Robot:
 
     def __init__(self, description: RobotDescription, urdf: str, hand: SpinyHand) -> None:
         self.description, self.urdf, self.hand = description, urdf, hand
-        with within("urdf"):
+        with errors_under("urdf"):
             self.tree = parse_urdf(urdf)
         self.model, self.root, self.chains, self.locked = build_model(
             self.tree, urdf, description, hand.mass

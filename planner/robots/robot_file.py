@@ -20,7 +20,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-from hand_models.base import InvalidInputError, Pose, in_file, within
+from hand_models.base import InvalidInputError, Pose, errors_under, in_file
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 from planner.robots.tolerances import TOLERANCES
 
@@ -305,7 +305,7 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
         _triple(table, section, "position"),
         table.vector(section, "orientation"),
     )
-    with within(section):
+    with errors_under(section):
         pose = Pose.from_quaternion(position, orientation)
     given = "hand_com" in table.sections[section]
     hand_com = _triple(table, section, "hand_com") if given else (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""How large and how exact numbers of robots are taken to be."""
+"""Sizes and accuracies of robots' numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["TOLERANCES", "RobotTolerances"]
 
 @dataclass(frozen=True, slots=True)
 class RobotTolerances:
-    """What files of robots may say, beyond which the unit is wrong; and when a pose is solved."""
+    """Largest numbers in robots' files, beyond which the unit is wrong; accuracy of solved poses."""
 
     frame_distance: float = 100.0  # [m] from a frame to its parent's
     angle: float = 100.0  # [rad] of a URDF

@@ -120,7 +120,7 @@ class Urdf:
         while trail[-1] in self.joints:
             parent = self.joints[trail[-1]].parent
             if parent in trail:
-                raise InvalidInputError(f"link {parent!r} is in a ring; a robot must be a tree")
+                raise InvalidInputError(f"link {parent!r} is in a loop; a robot must be a tree")
             trail.append(parent)
         return trail
 
@@ -142,8 +142,8 @@ class Urdf:
         trail = self.trail(link)
         if body not in trail:
             raise InvalidInputError(
-                f"link {link!r} does not hang on the body {body!r}; every limb must be a chain "
-                f"of joints from the body to its link; all hang on body = {trail[-1]!r}"
+                f"link {link!r} is not connected to the body {body!r}; every limb must be a chain "
+                f"of joints from the body to its link; all are connected to body = {trail[-1]!r}"
             )
         joints = [self.joints[at] for at in trail[: trail.index(body)]]
         moving = (joint for joint in reversed(joints) if joint.type != "fixed")
@@ -190,7 +190,7 @@ def parse_urdf(text: str) -> Urdf:
     if len(roots) != 1:
         raise InvalidInputError(
             f"one link must be the root of all others, got {len(roots)}: "
-            f"{shorten(', '.join(roots) or 'a ring of joints', 200, placeholder=' …')}"
+            f"{shorten(', '.join(roots) or 'a loop of joints', 200, placeholder=' …')}"
         )
     tree = Urdf({}, by_child)
     for child in by_child:

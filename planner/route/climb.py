@@ -16,7 +16,7 @@ from typing import Literal
 from msgspec import structs
 
 from hand_models.base import Array, InvalidInputError, Pose
-from hand_models.parameters import Draw
+from hand_models.parameters import ParameterSample
 from planner.question import (
     HandOnHold,
     Limits,
@@ -77,7 +77,7 @@ class Route:
         As of every stage's question.
     want : frozenset of str
         Extras of every stage's question, beside its load factor.
-    draws : tuple of Draw, optional
+    draws : tuple of ParameterSample, optional
         As of every stage's question.
     """
 
@@ -89,7 +89,7 @@ class Route:
     objective: Objective = "max_margin"
     explain: bool = True
     want: frozenset[Want] = frozenset()
-    draws: tuple[Draw, ...] | None = None
+    draws: tuple[ParameterSample, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,12 +260,12 @@ def stages(route: Route) -> Iterator[RouteStage]:
             )
         if len(hands) == 1:
             raise InvalidInputError(
-                "the only hand on the rock cannot lift", field=f"moves[{number - 1}].limb"
+                "the only hand on the rock cannot be lifted", field=f"moves[{number - 1}].limb"
             )
         given = dict(move.joints) if isinstance(move.joints, Mapping) else {}
         if joints is None and given:
             raise InvalidInputError(
-                "the start stance says nothing of joints; give stance.joints, or 'solve' there",
+                "requires stance.joints in the start stance, angles or 'solve'",
                 field=f"moves[{number - 1}].joints",
             )
         known_limbs(given, route.start.robot, f"moves[{number - 1}].joints")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 
-from hand_models.base import CruxError, InvalidInputError, within
+from hand_models.base import CruxError, InvalidInputError, errors_under
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
 from planner.result import Plan
@@ -92,7 +92,9 @@ def _must_touch(stage: RouteStage) -> None:
     """Refuse a move that ends in the air."""
     stance = stage.question.stance
     i = next(i for i, hand in enumerate(stance.hands) if hand.limb == stage.limb)
-    with within(f"hands[{i}]"):
+    with errors_under(f"hands[{i}]"):
         settled = settle_hand(stance.hands[i], stance)
         if not (settled.holding.any() or settled.palm.engaged):
-            raise InvalidInputError(f"{stage.limb} touches nothing there", field="hold")
+            raise InvalidInputError(
+                f"{stage.limb} does not touch this hold: move it closer", field="hold"
+            )

@@ -33,8 +33,8 @@ from planner.programs import StanceData
 
 __all__ = [
     "TOLERANCES",
+    "ActiveFace",
     "ApartError",
-    "Face",
     "Mask",
     "Optimum",
     "Point",
@@ -48,7 +48,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class SolvingTolerances:
-    """Of a plan's optimum."""
+    """Tolerances of a plan's optimum."""
 
     row: float = 1e-9  # scaled, of one that holds
     multiplier: float = 1e-14
@@ -100,7 +100,7 @@ class ApartError(Exception):
     """Active rows do not meet."""
 
 
-class Face:
+class ActiveFace:
     """The points where some rows are active, ready for Newton's steps.
 
     Parameters
@@ -195,14 +195,14 @@ class Optimum(NamedTuple):
     """An optimum, and the face that it is the least point of."""
 
     point: Point
-    face: Face
+    face: ActiveFace
 
 
 def optimum(
     rows: Rows,
     Q: Array,
     start: Point,
-    first: Mask | Face,
+    first: Mask | ActiveFace,
     rounds: int,
     weight: float = 1.0,
     *,
@@ -216,7 +216,7 @@ def optimum(
     Q : ndarray, shape (M,)
     start : Point
         About feasible, unless its active rows are those of the optimum.
-    first : ndarray of bool or Face
+    first : ndarray of bool or ActiveFace
         The rows that are active at first.
     rounds : int
         Sets of active rows that are tried at most.
@@ -230,12 +230,12 @@ def optimum(
     ApartError
         If active rows do not meet.
     """
-    face = first if isinstance(first, Face) else None
-    active = first.active.copy() if isinstance(first, Face) else first.copy()
+    face = first if isinstance(first, ActiveFace) else None
+    active = first.active.copy() if isinstance(first, ActiveFace) else first.copy()
     z, u, multipliers = start.z, start.u, np.where(active, start.multipliers, 0.0)
     for taken in range(rounds):
         if face is None:
-            face = Face(rows, Q, active)
+            face = ActiveFace(rows, Q, active)
         found = face.least(Point(z, u, multipliers), weight, fixed=fixed)
         after = rows.room(found.z, found.u)
         after[active] = 0.0

@@ -22,11 +22,11 @@ from planner.explanation import (
     far_wrists,
     idle_preloads,
     limit_sentence,
+    limit_unit,
     overload_sentence,
     shortfall_sentence,
     strained_preloads,
     tension_path,
-    unit_of,
     unsafe_sentence,
 )
 from planner.prepare import PreparedStance
@@ -237,8 +237,8 @@ def _wrist_warnings(prepared: PreparedStance, answer: Answer) -> Iterator[str]:
             yield from far_wrists(answer.by_hand())
     if not answer.solution.proven:
         yield (
-            "the floating wrists are where their hands' stiffness jumps or the search ended: the "
-            "loads are exact, but that no other pose uses less is not proven"
+            "the loads are exact, but the utilisation is not proven minimal: at these poses of the "
+            "wrists the stiffness jumps, or the search ended"
         )
 
 
@@ -246,9 +246,11 @@ def _factor_warnings(prepared: PreparedStance, factor: LoadFactor) -> Iterator[s
     """Yield what a caller should know of the load factor."""
     if "load_factor" in prepared.question.want:
         if prepared.hands.floating and factor.status == "none":
-            yield "no load factor was found; with floating wrists that is no proof of none"
+            yield "no load factor found; with floating wrists there may be one all the same"
         if factor.least:
-            yield ("the load factor is a lower bound: beyond it no plan was found, nor proven away")
+            yield (
+                "the load factor is a lower bound: beyond it no plan was found, nor proven infeasible"
+            )
 
 
 def _residual(prepared: PreparedStance, found: Verified) -> Array:
@@ -293,5 +295,5 @@ def _prices(binding: ActiveLimits, found: Verified, idle: Sequence[LimitUse]) ->
     if most is not None and most.utilisation > found.utilisation + CAP_SLACK:
         # a limb without a hand bears the most: nothing else counts
         price = most.utilisation / most.capacity
-        return (Price.of(most.name, price, unit_of(most.name.limit)),)
+        return (Price.of(most.name, price, limit_unit(most.name.limit)),)
     return binding.prices(found.solution.least.value)

@@ -217,5 +217,5 @@ def most_of_fixed(hands: HandSets, data: StanceData) -> float | None:
     result = programs.load_factor(data)
     if not result.solved:
         return None
-    held = programs.holds(data.turned(hands.goal(result.value)), result.loads, 1.0)
+    held = programs.loads_are_feasible(data.turned(hands.goal(result.value)), result.loads, 1.0)
     return max(result.value, 0.0) if held else None

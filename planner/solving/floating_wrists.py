@@ -102,9 +102,9 @@ class FloatingSolution(Solution):
         return LoadFactor(most.factor, least=not most.sure)
 
     def no_answer(self, prepared: PreparedStance) -> str:
-        reason = "no pose of the wrists was found that balances the body"
+        reason = "no equilibrium found for the wrists"
         if wrench_is_given(prepared):
-            reason += " with the wrenches that they are given; that is no proof of none"
+            reason += " with their given wrenches, which does not prove that there is none"
         idle = idle_preloads(prepared)
         return f"{reason}; {idle[0]}" if idle else reason
 

@@ -105,7 +105,8 @@ class CappedObjective(Objective):
             If there is no such search, as by default.
         """
         raise UnsupportedError(
-            f"{self.name} is not for floating wrists; valid is max_margin", field="objective"
+            f"{self.name} requires fixed wrists; with floating wrists only max_margin is valid",
+            field="objective",
         )
 
     def problems(self, arrays: PlanArrays, value: float) -> list[str]:

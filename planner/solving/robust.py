@@ -45,7 +45,7 @@ __all__ = ["find_robust_load_factor"]
 
 @dataclass(frozen=True, slots=True)
 class RobustSettings:
-    """Which samples are planned."""
+    """Number and seed of the samples that are planned."""
 
     seed: int = 0  # of the places and of their combinations
     rounds: int = 16

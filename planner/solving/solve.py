@@ -11,7 +11,7 @@ import numpy as np
 
 from hand_models.base import Array, finite_vector
 from planner import deadline, programs
-from planner.advice import Trial, advise
+from planner.advice import StanceTrial, advise
 from planner.deadline import Budget, late_sentence
 from planner.explanation import LimitUse, certify
 from planner.floating import SETTINGS
@@ -83,7 +83,7 @@ def plan_on(
     if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
         answer = _second_look(prepared, checks, answer, budget)
     if isinstance(answer, Failed):
-        deadline.check("a plan was found, or proven away")
+        deadline.check("a plan was found or proven infeasible")
     factor = LoadFactor()
     if "load_factor" in question.want:
         factor = load_factor_of(prepared, answer, budget, overloaded=checks.overloaded)
@@ -179,7 +179,7 @@ def try_stance(
     prepared: PreparedStance,
     idle: Sequence[LimitUse] | None = None,
     near: Solution | None = None,
-) -> Trial:
+) -> StanceTrial:
     """Return the verified plan of a stance, of which no store keeps anything.
 
     Parameters
@@ -198,7 +198,7 @@ def try_stance(
     overloaded = checks.overloaded
     factor = partial(load_factor_of, prepared, answer, budget, overloaded=overloaded)
     solution, whole = answer.solution, answer.whole
-    return Trial(prepared, solution.sets.data, solution.least, whole, factor)
+    return StanceTrial(prepared, solution.sets.data, solution.least, whole, factor)
 
 
 class KnownStance:
@@ -258,7 +258,7 @@ def with_advice(question: Question, answer: Plan) -> Plan:
     start = time.perf_counter()
     odd = [each.field for each in answer.findings if each.kind == "unit"]
     if odd:
-        warning = f"no advice is looked for while a unit is in doubt: {', '.join(odd)}"
+        warning = f"no search for advice while a unit is in doubt: {', '.join(odd)}"
         return replace(answer, advice=(), warnings=(*answer.warnings, warning))
     found, whole = advise(question, try_stance)
     seconds, unfinished, warnings = deadline.seconds(), answer.unfinished, answer.warnings

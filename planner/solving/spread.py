@@ -48,14 +48,14 @@ def find_spread(
     refused: Counter[str] = Counter()
     try:
         for each in drawn_hands(*drawn):
-            deadline.check("all draws were planned")
+            deadline.check("all samples were planned")
             outcomes = _settled(prepared, each)
             there = [hand for hand in outcomes if isinstance(hand, SettledHand)]
             pairs = zip(prepared.limbs, outcomes, strict=True)
             refused.update(limb for limb, hand in pairs if not isinstance(hand, SettledHand))
             whole = len(there) == len(outcomes)
             plans.append(_planned(prepared, there, idle, usual, attempt) if whole else DrawnPlan())
-        deadline.check("all draws were planned")
+        deadline.check("all samples were planned")
     except DeadlineError:
         return None
     surfaces = frozenset(hand.surface.name for hand in question.stance.hands)

@@ -178,16 +178,18 @@ def _refuse(question: Question) -> None:
     for i, hand in enumerate(question.stance.hands):
         if hand.wrist != "fixed":
             raise UnsupportedError(
-                f"{hand.wrist} is not for streams, whose plans are mixed; valid is fixed",
+                f"{hand.wrist} is not available for streams, which interpolate plans; valid is "
+                "fixed",
                 field=f"stance.hands[{i}].wrist",
             )
     objective = objective_of(question)
     if not isinstance(objective, MaxMargin):
         raise UnsupportedError(
-            f"{objective.name} is not for streams; valid is {MaxMargin.name}", field="objective"
+            f"{objective.name} is not available for streams; valid is {MaxMargin.name}",
+            field="objective",
         )
     if question.limits.tension_change is not None:
         raise UnsupportedError(
-            "not for streams, whose tensions change with the wrench; leave it out",
+            "not available for streams, whose tensions change with the wrench: remove it",
             field="limits.tension_change",
         )

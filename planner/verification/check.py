@@ -7,8 +7,8 @@ Eq. 21 itself and the plan's half-planes (`tiles`), and the structure's publishe
 is added up about the body's origin. What is different where a wrist floats is in `floating`, what
 joints and callers ask in `limbs`.
 
-Each of these is one kind of `Limits` and recomputes its residuals from a plan's numbers, of all
-hands at once, in arrays.
+Each of these is one kind of `ResidualLimits` and recomputes its residuals from a plan's numbers, of
+all hands at once, in arrays.
 Where numbers are not near enough to be right whatever their size, it is worked out by how much
 each is off, and how much it may be.
 """
@@ -33,7 +33,7 @@ from planner.verification.limbs import AskedLimits, JointUse, check_limbs, recom
 from planner.verification.residuals import (
     FINGER_COUNT,
     TOLERANCES,
-    Names,
+    PartNames,
     Recomputed,
     Residual,
     allowed_errors,
@@ -59,14 +59,14 @@ class SettledLimits:
 
     Attributes
     ----------
-    names : Names
+    names : PartNames
     tiles : TileLimits
-    limits : tuple of Limits
+    limits : tuple of ResidualLimits
         But for nails, whose residuals come with what is recomputed of them.
     """
 
     def __init__(self, known: HandBatch, places: Sequence[HandOnHold], strength: float) -> None:
-        self.names = names = Names(tuple([place.limb for place in places]), known)
+        self.names = names = PartNames(tuple([place.limb for place in places]), known)
         self.wound = {
             h: known.hands[h].closing_tension
             if place.tendon_preload is None
@@ -243,7 +243,7 @@ class Check:
         return residuals, again, used
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
-        """Recompute what is not affine in the loads, see `Limits.recompute_curved`."""
+        """Recompute what is not affine in the loads, see `ResidualLimits.recompute_curved`."""
         of_all = [limits.recompute_curved(arrays, loads, wrenches) for limits in self._limits]
         return [residual for residuals in of_all for residual in residuals]
 

@@ -15,11 +15,11 @@ from planner.prepare import CONTACT_CODES
 from planner.result import PlanArrays
 from planner.verification.residuals import (
     FINGER_COUNT,
-    Limits,
-    Names,
+    PartNames,
     Recomputed,
     RecomputedNails,
     Residual,
+    ResidualLimits,
     claim,
 )
 
@@ -40,12 +40,12 @@ class _Row(IntEnum):
     TIP = 9
 
 
-class DriveLimits(Limits):
+class DriveLimits(ResidualLimits):
     """Limits of tendons, motors and fingers, and the angles of their winches.
 
     Parameters
     ----------
-    names : Names
+    names : PartNames
     left : ndarray, shape (T,)
         Part of a tendon's tension that is left at each tile.
     strength : float
@@ -54,7 +54,7 @@ class DriveLimits(Limits):
         Fingers whose nails hook.
     """
 
-    def __init__(self, names: Names, left: Array, strength: float, hooked: Indices) -> None:
+    def __init__(self, names: PartNames, left: Array, strength: float, hooked: Indices) -> None:
         known = names.known
         hands, index, body = known.hands, known.places, known.hands[0].hand
         self._names, self._places, self._body, self._hooked = names, index, body, hooked
@@ -123,7 +123,7 @@ class NailLimits:
 
     Parameters
     ----------
-    names : Names
+    names : PartNames
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class NailLimits:
         Which of the tiles they are, and whose, counted through all hands.
     """
 
-    def __init__(self, names: Names) -> None:
+    def __init__(self, names: PartNames) -> None:
         known, self._names = names.known, names
         self.tiles = np.flatnonzero(known.touch.contacts == CONTACT_CODES[NAIL])
         self.fingers = known.places.finger[self.tiles]

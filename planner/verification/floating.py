@@ -23,8 +23,8 @@ from hand_models.tendon import FingerTendon, TendonState, share_load
 from planner.prepare import HandBatch
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
-from planner.verification.residuals import FINGER_COUNT, Names, allowed_errors
-from planner.verification.rolling_contacts import Face, slip_of
+from planner.verification.residuals import FINGER_COUNT, PartNames, allowed_errors
+from planner.verification.rolling_contacts import TileFace, slip_of
 
 __all__ = ["recompute_floating"]
 
@@ -40,7 +40,7 @@ def moved(place: Array, wrist: WristPlan) -> Array:
 
 
 def recompute_floating(
-    found: list[str], names: Names, balance: JointBalance, arrays: PlanArrays, wound: Array
+    found: list[str], names: PartNames, balance: JointBalance, arrays: PlanArrays, wound: Array
 ) -> tuple[Array, Array, Array]:
     """Return what fingers of hands do of which some float; check where those and palms are.
 
@@ -48,7 +48,7 @@ def recompute_floating(
     ----------
     found : list of str
         What is wrong so far; what cannot be is appended.
-    names : Names
+    names : PartNames
     balance : JointBalance
     arrays : PlanArrays
     wound : ndarray, shape (F,)
@@ -113,7 +113,7 @@ def _move(
         drag, place = arrays.axes[tile, 0], arrays.points[tile] - frame.joint
         way = np.array([-drag @ frame.along, -drag[2]])
         point = np.array([place @ frame.along, place[2]])
-        face = Face.of(contact, model, float(depths[j]))
+        face = TileFace.of(contact, model, float(depths[j]))
         arm = point - joint
         rise = way[0] * arm[1] - way[1] * arm[0]
         if not abs(rise - face.height) <= 1e-9:  # [m] rounding

@@ -11,7 +11,14 @@ from hand_models.base import Array
 from hand_models.hand import HELD_DIRECTIONS
 from planner.result import PlanArrays
 from planner.verification.joint_balance import wrenches_of
-from planner.verification.residuals import TOLERANCES, Limits, Names, Recomputed, Residual, claim
+from planner.verification.residuals import (
+    TOLERANCES,
+    PartNames,
+    Recomputed,
+    Residual,
+    ResidualLimits,
+    claim,
+)
 
 __all__ = ["HandLimits", "check_contacts"]
 
@@ -22,15 +29,15 @@ PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Signs of a palm's shear along x and pressing along z."""
 
 
-class HandLimits(Limits):
+class HandLimits(ResidualLimits):
     """Limits of palms and whole hands, and their wrenches as sums of forces.
 
     Parameters
     ----------
-    names : Names
+    names : PartNames
     """
 
-    def __init__(self, names: Names) -> None:
+    def __init__(self, names: PartNames) -> None:
         known = names.known
         self._names, self._known = names, known
         self._each = np.arange(len(known.hands))
@@ -73,7 +80,7 @@ class HandLimits(Limits):
         return [Residual("least", left, self._each, limb, text, (size,), affine=False)]
 
 
-def check_contacts(names: Names, arrays: PlanArrays) -> Iterator[str]:
+def check_contacts(names: PartNames, arrays: PlanArrays) -> Iterator[str]:
     """Yield what carries a load that cannot, and contacts that are not as the plan says."""
     known, limbs, palms = names.known, names.limbs, arrays.palms
     for own, planned in ((known.points, arrays.points), (known.axes, arrays.axes)):

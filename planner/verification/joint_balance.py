@@ -27,7 +27,13 @@ from hand_models.base import SKEW_MATRICES, Array
 from hand_models.finger import JOINT_STOPS, PHALANGES
 from hand_models.hand import HandModel
 from planner.prepare import CONTACT_CODES, TileIndex
-from planner.verification.residuals import FINGER_COUNT, Limits, Names, Recomputed, Residual
+from planner.verification.residuals import (
+    FINGER_COUNT,
+    PartNames,
+    Recomputed,
+    Residual,
+    ResidualLimits,
+)
 
 __all__ = ["Fingers", "JointBalance", "tendons_of", "wrenches_of"]
 
@@ -95,12 +101,12 @@ class Fingers(NamedTuple):
     axes: Array
 
 
-class JointBalance(Limits):
+class JointBalance(ResidualLimits):
     """The balance of the fingers of settled hands, and what their tendons and stops cannot do.
 
     Parameters
     ----------
-    names : Names
+    names : PartNames
     floating : collection of int
         Hands whose wrists float, whose tendons may be slackened.
 
@@ -114,7 +120,7 @@ class JointBalance(Limits):
         Joints that stand at a limit, of fingers that touch rock.
     """
 
-    def __init__(self, names: Names, floating: Collection[int] = ()) -> None:
+    def __init__(self, names: PartNames, floating: Collection[int] = ()) -> None:
         known = names.known
         hands, places, touch = known.hands, known.places, known.touch
         self._names, self._known, body = names, known, hands[0].hand

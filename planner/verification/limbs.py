@@ -17,7 +17,13 @@ from planner.prepare import FORCE_DIRECTIONS, Posture
 from planner.question import ForceCap, Question
 from planner.result import PlanArrays
 from planner.robots import LimbTorques, LinkTree
-from planner.verification.residuals import FINGER_COUNT, Limits, Names, Recomputed, Residual
+from planner.verification.residuals import (
+    FINGER_COUNT,
+    PartNames,
+    Recomputed,
+    Residual,
+    ResidualLimits,
+)
 from planner.verification.tiles import TileLimits
 
 __all__ = ["AskedLimits", "JointUse", "check_limbs", "recompute_joints"]
@@ -205,17 +211,17 @@ def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
     return _Cap(hand, turn[axis] / ends[axis, end][:, None], none, axes, ball=False)
 
 
-class AskedLimits(Limits):
+class AskedLimits(ResidualLimits):
     """Limits that a question puts on hands: caps, given wrenches, small changes of tensions.
 
     Parameters
     ----------
     question : Question
-    names : Names
+    names : PartNames
     tiles : TileLimits
     """
 
-    def __init__(self, question: Question, names: Names, tiles: TileLimits) -> None:
+    def __init__(self, question: Question, names: PartNames, tiles: TileLimits) -> None:
         hands, limits, present = question.stance.hands, question.limits, question.present
         self._names = names
         self._caps = [

@@ -1,8 +1,8 @@
 """Residuals of limits and laws in a plan's numbers, and whether they are more than rounding.
 
-Every kind of limit (`Limits`) recomputes its residuals from the numbers of a plan, and nothing else
-says what the limit is: the check of a plan judges these, and the check of a stream tabulates those
-that are affine in the loads.
+Every kind of limit (`ResidualLimits`) recomputes its residuals from the numbers of a plan, and
+nothing else says what the limit is: the check of a plan judges these, and the check of a stream
+tabulates those that are affine in the loads.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from planner.result import PlanArrays
 __all__ = [
     "FINGER_COUNT",
     "TOLERANCES",
-    "Limits",
-    "Names",
+    "PartNames",
     "Recomputed",
     "RecomputedNails",
     "Residual",
+    "ResidualLimits",
     "VerificationTolerances",
     "allowed_errors",
     "claim",
@@ -38,7 +38,7 @@ FINGER_COUNT: Final = len(FINGERS)
 
 @dataclass(frozen=True, slots=True)
 class VerificationTolerances:
-    """How far a plan's numbers may be from what is recomputed of them."""
+    """Largest errors of a plan's numbers against what is recomputed of them."""
 
     load: float = 1e-6  # of a tile, relative to the largest load of its hand
     utilisation: float = 1e-6
@@ -143,7 +143,7 @@ class Residual(NamedTuple):
             yield self.name(row) + self.text.format(*numbers)
 
 
-class Limits(ABC):
+class ResidualLimits(ABC):
     """One kind of limits of the hands of a stance."""
 
     @abstractmethod
@@ -195,7 +195,7 @@ def allowed_errors(known: HandBatch, arrays: PlanArrays) -> Array:
     return np.asarray(TOLERANCES.load * np.fmax(largest, 1.0))
 
 
-class Names(NamedTuple):
+class PartNames(NamedTuple):
     """Names of what hands have: ``front_left: proximal tile of inner_right``."""
 
     limbs: tuple[str, ...]

@@ -16,10 +16,10 @@ from hand_models.base import Array
 from hand_models.finger import Contact, FingerModel
 from hand_models.sections import Section
 
-__all__ = ["Face", "slip_of"]
+__all__ = ["TileFace", "slip_of"]
 
 
-class Face(NamedTuple):
+class TileFace(NamedTuple):
     """A tile's face in its phalanx's axes, turned by the contact's tilt.
 
     Attributes
@@ -45,7 +45,7 @@ class Face(NamedTuple):
     lies: bool
 
     @classmethod
-    def of(cls, contact: Contact, model: FingerModel, depth: float) -> Face:
+    def of(cls, contact: Contact, model: FingerModel, depth: float) -> TileFace:
         way = contact.angle + contact.tilt
         arm = complex(contact.along, model.tile_height + contact.rise)
         arm *= cmath.rect(1.0, -contact.tilt)
@@ -66,7 +66,7 @@ class Face(NamedTuple):
 
 
 def slip_of(
-    section: Section, face: Face, points: tuple[Array, Array], after: tuple[float, Array]
+    section: Section, face: TileFace, points: tuple[Array, Array], after: tuple[float, Array]
 ) -> tuple[float | None, float]:
     """Return how far a tile slipped, and how far off the place is where it is said to bear [m].
 

@@ -14,7 +14,14 @@ from hand_models.base import Array, Indices
 from hand_models.tile import HalfPlane, Surface
 from planner.prepare import HandBatch
 from planner.result import PlanArrays
-from planner.verification.residuals import TOLERANCES, Limits, Names, Recomputed, Residual, claim
+from planner.verification.residuals import (
+    TOLERANCES,
+    PartNames,
+    Recomputed,
+    Residual,
+    ResidualLimits,
+    claim,
+)
 
 __all__ = ["LimitCurves", "TileLimits"]
 
@@ -100,17 +107,17 @@ def limiting_shares(known: HandBatch) -> Array:
     return np.where(share < least, 0.5 * least * (1.0 + (share / least) ** 2), share)
 
 
-class TileLimits(Limits):
+class TileLimits(ResidualLimits):
     """Limits of tiles: friction, the law's surface, and what a plan's half-planes say is used.
 
     Parameters
     ----------
-    names : Names
+    names : PartNames
     nails : ndarray of int, shape (k,)
         Nails that hook, counted among the tiles.
     """
 
-    def __init__(self, names: Names, nails: Indices) -> None:
+    def __init__(self, names: PartNames, nails: Indices) -> None:
         known = names.known
         surfaces, self._of = [hand.surface for hand in known.hands], known.places.hand
         self._names, self._known, self._nails = names, known, nails

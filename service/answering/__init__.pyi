@@ -3,12 +3,12 @@ from .answers import Planned as Planned
 from .body_space import explore as explore
 from .dispatch import (
     SERVICES_BY_NAME as SERVICES_BY_NAME,
+    answer_plan as answer_plan,
+    answer_with_advice as answer_with_advice,
     handle as handle,
-    plan as plan,
     planned as planned,
-    with_advice as with_advice,
 )
-from .hand_spaces import wrench_space as wrench_space
+from .hand_spaces import answer_wrench_space as answer_wrench_space
 from .mesh_files import MeshFiles as MeshFiles
 from .own_models import (
     Robots as Robots,
@@ -20,6 +20,6 @@ from .own_models import (
     with_hand as with_hand,
     with_robot as with_robot,
 )
-from .questions import question as question, route as route
+from .questions import question as question, route_of as route_of
 from .stances import stance as stance
 from .streams import Streams as Streams, opened as opened, set_points_reply as set_points_reply

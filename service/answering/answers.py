@@ -110,10 +110,10 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
     )
 
 
-def _certificate(proof: Certificate, model: bool) -> replies.Certificate:
+def _certificate(proof: Certificate, model: bool) -> replies.CertificateReply:
     """Return why there is no plan, with the hands' wrench spaces if ``model``."""
     spaces = proof.spaces.items()
-    found = as_lists(replace(proof, wrench_spaces=UNSET), replies.Certificate)
+    found = as_lists(replace(proof, wrench_spaces=UNSET), replies.CertificateReply)
     if not model:
         return found
     return replace(found, wrench_spaces={limb: wrench_set_reply(each) for limb, each in spaces})
@@ -200,9 +200,9 @@ def _listed_by_limb(arrays: Mapping[str, Array] | None) -> dict[str, replies.Vec
     return None if arrays is None else {limb: array.tolist() for limb, array in arrays.items()}
 
 
-def _hand_reply(part: HandPlan, model: bool) -> replies.Hand:
+def _hand_reply(part: HandPlan, model: bool) -> replies.HandReply:
     """Return the reply's hand of a plan's hand, with its wrench space if ``model``."""
-    return replies.Hand(
+    return replies.HandReply(
         limb=part.limb,
         wrench=part.wrench.tolist(),
         fingers=part.finger_by_finger(model=model),
@@ -241,9 +241,9 @@ def _frame(pose: Pose) -> replies.PlacedFrame:
     )
 
 
-def seating_reply(seating: Seating) -> replies.Seating:
+def seating_reply(seating: Seating) -> replies.SeatingReply:
     """Return where a hold is in H."""
-    return replies.Seating(
+    return replies.SeatingReply(
         rule=seating.rule, pose=_frame(seating.pose), backed_off=float(seating.backed_off)
     )
 
@@ -262,7 +262,7 @@ def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
             for name, column in zip(space.columns, space.generators.T.tolist(), strict=True)
         ],
         rows=[
-            replies.Row(
+            replies.RowReply(
                 name=row.label,
                 kind=row.kind,
                 finger=row.finger,

@@ -118,8 +118,8 @@ def _capability(more: End | None, pure: End | None, extent: End | None) -> repli
     )
 
 
-def _section(section: BodySection) -> replies.BodySection:
-    reply = replies.BodySection(
+def _section(section: BodySection) -> replies.BodySectionReply:
+    reply = replies.BodySectionReply(
         axes=list(section.axes), others=section.others, inner=[], outer=[], gap=None, limiting=[]
     )
     polygon = section.polygon

@@ -42,16 +42,18 @@ from service.wire import (
 
 __all__ = [
     "SERVICES_BY_NAME",
+    "answer_plan",
+    "answer_with_advice",
     "handle",
-    "plan",
     "planned",
-    "with_advice",
 ]
 
 log = logging.getLogger(__name__)
 
 
-def plan(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> PlanReply | BriefPlanReply:
+def answer_plan(
+    request: PlanRequest, robots: Robots = BUNDLED_ROBOTS
+) -> PlanReply | BriefPlanReply:
     """Answer a plan request.
 
     Parameters
@@ -69,7 +71,7 @@ def plan(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> PlanReply | B
 
 
 def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
-    """Answer a plan request as `plan` does, and keep the question and the plan."""
+    """Answer a plan request as `answer_plan` does, and keep the question and the plan."""
     detail = request.detail or "full"
     if detail != "full":
         # compute only what the reply contains
@@ -81,7 +83,7 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
     return Planned.of(asked, answer, request.id, detail, model="model" in request.want)
 
 
-def with_advice(answer: Planned) -> Planned:
+def answer_with_advice(answer: Planned) -> Planned:
     """Return an answer with advice, if its reply is whole and has none yet."""
     if not isinstance(answer.reply, PlanReply) or answer.plan.advice is not None:
         return answer
@@ -98,9 +100,9 @@ def with_advice(answer: Planned) -> Planned:
 
 
 def _wrench_space(asked: WrenchSpaceRequest, robots: Robots, _: Streams) -> Reply:
-    from service.answering.hand_spaces import wrench_space
+    from service.answering.hand_spaces import answer_wrench_space
 
-    return wrench_space(asked, robots)
+    return answer_wrench_space(asked, robots)
 
 
 def _body_space(asked: BodySpaceRequest, robots: Robots, _: Streams) -> Reply:
@@ -197,7 +199,7 @@ def handle(
             request = over_default(request, hand)
         within = request.deadline if isinstance(request, Query) else None
         with deadline.within(within, started=started):
-            deadline.check("an answer was begun")
+            deadline.check("the answer was started")
             found = service.answer(request, robots, streams)
         try:
             reply, data = fitted(request, found, form)
@@ -218,5 +220,5 @@ def handle(
         raise
     except Exception as error:
         log.exception("the request at %s failed", key)
-        excuse = CruxError(f"the service failed ({type(error).__name__}); its log says where")
+        excuse = CruxError(f"internal error of the service ({type(error).__name__}); see its log")
         return failed(excuse, "internal")

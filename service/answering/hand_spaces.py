@@ -10,7 +10,7 @@ import numpy as np
 from hand_models.base import Array, EmptySetError, InvalidInputError, LimitError
 from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import Robustness, robustness, tension_limits
-from hand_models.hand import FINGERS, SettledHand, Tile, closing_sequence, nearby_closures
+from hand_models.hand import FINGERS, SettledHand, SettledTile, closing_sequence, nearby_closures
 from hand_models.wrench_spaces import WrenchSpace
 from planner import WristPlan, deadline, resting_hand
 from service import replies
@@ -26,13 +26,15 @@ from service.answering.stances import stance
 from service.replies import WRENCH_AXES, WrenchSpaceReply
 from service.requests import SpaceWant, WrenchSpaceRequest
 
-__all__ = ["wrench_space"]
+__all__ = ["answer_wrench_space"]
 
 View = TypeVar("View")
 
 
-def wrench_space(request: WrenchSpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchSpaceReply:
-    """Answer a wrench-space request; parameters as for `plan`.
+def answer_wrench_space(
+    request: WrenchSpaceRequest, robots: Robots = BUNDLED_ROBOTS
+) -> WrenchSpaceReply:
+    """Answer a wrench-space request; parameters as for `answer_plan`.
 
     Raises
     ------
@@ -57,7 +59,7 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = BUNDLED_ROBOTS) -
         contacts=_contacts(settled),
         closing=[],
         tension_limits=[
-            replies.TensionLimit(
+            replies.TensionLimitReply(
                 finger=each.finger, tension=finite(each.tension), phalanx=each.phalanx
             )
             for each in tension_limits(settled)
@@ -80,11 +82,11 @@ def wrench_space(request: WrenchSpaceRequest, robots: Robots = BUNDLED_ROBOTS) -
     return reply
 
 
-def _contacts(settled: SettledHand) -> list[replies.Contact]:
+def _contacts(settled: SettledHand) -> list[replies.ContactReply]:
     """Return the contact of each tile with the rock."""
     places = zip(settled.tiles, settled.positions.tolist(), settled.axes.tolist(), strict=True)
     return [
-        replies.Contact(
+        replies.ContactReply(
             finger=tile.finger,
             phalanx=tile.phalanx,
             contact=tile.contact,
@@ -98,20 +100,20 @@ def _contacts(settled: SettledHand) -> list[replies.Contact]:
     ]
 
 
-def _stop(settled: SettledHand, tile: Tile) -> str | None:
+def _stop(settled: SettledHand, tile: SettledTile) -> str | None:
     if tile.phalanx not in PHALANGES:
         return None
     finger = settled.fingers[FINGERS.index(tile.finger)]
     return finger.contacts[PHALANGES.index(tile.phalanx)].stop
 
 
-def _closings(settled: SettledHand) -> list[replies.ClosingSequence]:
+def _closings(settled: SettledHand) -> list[replies.ClosingSequenceReply]:
     """Return the closure of each finger, and those for rock a little elsewhere."""
     return [
-        replies.ClosingSequence(
+        replies.ClosingSequenceReply(
             finger=closing.finger,
             stages=[
-                replies.ClosingStage(part=each.part, starts=each.starts, ends=each.ends)
+                replies.ClosingStageReply(part=each.part, starts=each.starts, ends=each.ends)
                 for each in closing.stages
             ],
             in_order=bool(closing.in_order),
@@ -210,10 +212,10 @@ def _add_views(
         reply.warnings = []
 
 
-def _half_spaces(space: WrenchSpace) -> replies.HalfSpaces:
+def _half_spaces(space: WrenchSpace) -> replies.HalfSpacesReply:
     deadline.check("it was known how far the hand's set reaches")
     faces = space.half_spaces()
-    return replies.HalfSpaces(
+    return replies.HalfSpacesReply(
         normals=faces.normals.tolist(),
         offsets=faces.offsets.tolist(),
         equations=replies.HalfSpaceEquations(

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import msgspec
 
-from hand_models.base import BoundedStore, InvalidInputError, within
+from hand_models.base import BoundedStore, InvalidInputError, errors_under
 from hand_models.rock import read_mesh
 from service.requests import Hand, Hold, Mesh, PlanRequest, Request, RouteRequest
 
@@ -93,7 +93,7 @@ class MeshFiles:
     def _filled(self, hold: HoldT, path: str) -> HoldT:
         if not isinstance(hold, Mesh) or hold.file is None:
             return hold
-        with within(path):
+        with errors_under(path):
             if hold.vertices is not None or hold.faces is not None:
                 raise InvalidInputError(
                     "give a file, or vertices and faces, not both", field="file"

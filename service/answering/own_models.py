@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 
 import msgspec
 
-from hand_models.base import InvalidInputError, in_file, within
+from hand_models.base import InvalidInputError, errors_under, in_file
 from hand_models.hand import spiny_hand
 from hand_models.parameters import ParameterTable, load_own_hand, own_draw, own_hand
 from planner import Robot, RobotFile, robosimian, robot_of
@@ -86,10 +86,12 @@ def read_draws(path: Path) -> list[Draw]:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
         given = raw.get("draws")
         if list(raw) != ["draws"] or not isinstance(given, list) or not given:
-            raise InvalidInputError("a list is needed, [[draws]], and nothing else", field="draws")
+            raise InvalidInputError(
+                "must be a list, [[draws]], with no other entries", field="draws"
+            )
         found = []
         for i, draw in enumerate(given):
-            with within(f"draws[{i}]"):
+            with errors_under(f"draws[{i}]"):
                 if not isinstance(draw, Mapping):
                     raise InvalidInputError("hand or surfaces is needed")
                 own_draw(draw)
@@ -175,8 +177,8 @@ def with_robot(request: RequestT, file: RobotFile | None) -> RequestT:
     named = request.stance.robot
     if named not in (None, file.name):
         raise InvalidInputError(
-            f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; valid "
-            "is that, or no name",
+            f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; use "
+            "that name, or none",
             field="stance.robot",
         )
     stance = msgspec.structs.replace(request.stance, robot=file.name)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hand_models.base import InvalidInputError, within
-from hand_models.parameters import Draw, own_draw
+from hand_models.base import InvalidInputError, errors_under
+from hand_models.parameters import ParameterSample, own_draw
 from planner import Load, Question
 from service import requests
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
@@ -20,12 +20,12 @@ from service.answering.stances import (
     stance,
     with_rocks,
 )
-from service.replies import RouteReply, RouteStage
+from service.replies import RouteReply, RouteStageReply
 
 if TYPE_CHECKING:
     from planner import Route
 
-__all__ = ["climb", "question", "route"]
+__all__ = ["climb", "question", "route_of"]
 
 
 def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Question:
@@ -59,7 +59,7 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
     )
 
 
-def route(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Route:
+def route_of(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Route:
     """Return the climb of a route file; parameters as for `question`.
 
     Raises
@@ -87,11 +87,11 @@ def route(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
     )
 
 
-def _draws(messages: Sequence[requests.Draw]) -> tuple[Draw, ...] | None:
+def _draws(messages: Sequence[requests.Draw]) -> tuple[ParameterSample, ...] | None:
     """Return a caller's own draws; None for the bundled ones."""
     found = []
     for i, message in enumerate(messages):
-        with within(f"draws[{i}]"):
+        with errors_under(f"draws[{i}]"):
             found.append(own_draw({"hand": message.hand, "surfaces": message.surfaces}))
     return tuple(found) or None
 
@@ -112,7 +112,7 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
     """
     from planner import evaluate
 
-    result = evaluate(route(request, robots), workers=1)
+    result = evaluate(route_of(request, robots), workers=1)
     crux = result.plans[result.crux]
     return RouteReply(
         id=request.id,
@@ -125,7 +125,7 @@ def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Ro
         load_factor_status=result.load_factor_status,
         limiting=crux.limiting,
         stages=[
-            RouteStage(
+            RouteStageReply(
                 move=stage.move,
                 phase=stage.phase,
                 limb=stage.limb,

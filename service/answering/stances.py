@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from hand_models import rock
-from hand_models.base import Array, BoundedStore, InvalidInputError, LimitError, Pose, within
+from hand_models.base import Array, BoundedStore, InvalidInputError, LimitError, Pose, errors_under
 from hand_models.fixed_wrist import ALONG_FINGERS, approach_frame
 from hand_models.hand import SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
@@ -50,13 +50,13 @@ def stance(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> Stance:
 
 def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tuple[Stance, Rocks]:
     """Return the stance of a request, and its rocks by name; otherwise as `stance`."""
-    with within("stance"):
+    with errors_under("stance"):
         _check_costs(message)
         build = builder_of(message.robot, robots)
         if message.hand is None:
             robot = build(None)
         else:
-            with within("hand"):
+            with errors_under("hand"):
                 robot = build(own_hand(ParameterTable.of(message.hand)))
         rocks = _rocks(message, robot.hand.table)
         found = Stance(
@@ -225,7 +225,7 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
         axes, point, up = from_world.rotation, from_world.apply(place.point), up or (0.0, 0.0, 1.0)
     else:
         axes, point, up = np.eye(3), np.array(place.point), up or ALONG_FINGERS
-    with within("place"):
+    with errors_under("place"):
         return approach_frame(point, axes @ place.approach, place.wrist_angle, axes @ up)
 
 
@@ -260,7 +260,7 @@ def _rocks(message: requests.Stance, numbers: ParameterTable) -> Rocks:
     for name, each in message.rocks.items():
         if not name:
             raise InvalidInputError("a rock needs a name, got ''", field="rocks")
-        with within(f"rocks.{name}"):
+        with errors_under(f"rocks.{name}"):
             if each.pose_in_hand is not None:
                 raise InvalidInputError(
                     "hands share this rock; give its pose, or pose_in_hand where a hand refers to "
@@ -340,7 +340,7 @@ def _check_costs(stance: requests.Stance) -> None:
     if planes > most_planes:
         raise LimitError(
             f"half_planes of all hands are {planes} together, those of a floating hand counted "
-            f"{rounds} times; at most {most_planes} are worked with",
+            f"{rounds} times; the maximum is {most_planes}",
             field="hands",
         )
     points = sum(_points(hand.hold, stance.rocks) for hand in stance.hands)
@@ -348,8 +348,7 @@ def _check_costs(stance: requests.Stance) -> None:
     most_points = 40_000
     if points > most_points:
         raise LimitError(
-            f"profiles of all hands have {points} points together; at most {most_points} are "
-            "worked with",
+            f"profiles of all hands have {points} points together; the maximum is {most_points}",
             field="hands",
         )
 

@@ -4,7 +4,7 @@ from .chunks import (
 )
 from .columns import (
     Column as Column,
-    Row as Row,
+    TableRow as TableRow,
     chosen_columns as chosen_columns,
     columns_of as columns_of,
     route_columns as route_columns,

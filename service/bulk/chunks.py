@@ -32,7 +32,7 @@ __all__ = [
     "Setting",
     "about",
     "answer_chunk",
-    "grouped",
+    "grouping_order",
     "own_versions",
 ]
 
@@ -165,8 +165,8 @@ def _check_versions(there: dict[str, str | None]) -> None:
     if other:
         listed = (", ".join(f"{name} {at.get(name)}" for name in other) for at in (here, there))
         raise CruxError(
-            "where it is to be answered there is {}, and where it is asked {}; answers are equal "
-            "to the last digit only with the same versions on both".format(*listed)
+            "the worker has {}, and the client {}: install the same versions on both, for answers "
+            "that are equal to the last digit".format(*listed)
         )
 
 
@@ -233,7 +233,7 @@ def _digest(*parts: msgspec.Raw) -> bytes:
     return found.digest()
 
 
-def grouped(abouts: Sequence[About]) -> list[int]:
+def grouping_order(abouts: Sequence[About]) -> list[int]:
     """Return the indices of questions so that what is about the same stands together.
 
     Groups, and questions within them, stay in the order of their first ones.

@@ -16,7 +16,7 @@ from hand_models.hand import FINGERS
 from planner import LimitName
 from service.replies import WRENCH_AXES, ErrorDetail
 
-__all__ = ["Column", "Row", "chosen_columns", "columns_of", "route_columns", "row_of"]
+__all__ = ["Column", "TableRow", "chosen_columns", "columns_of", "route_columns", "row_of"]
 
 Kind = Literal["int", "float", "bool", "text"]
 
@@ -47,7 +47,7 @@ class Column(NamedTuple):
         return self.name == "index"
 
 
-class Row(msgspec.Struct):
+class TableRow(msgspec.Struct):
     """Row of a table for one answer: the chosen values, and always its status and error."""
 
     values: list[Any]
@@ -168,12 +168,12 @@ def chosen_columns(
     )
 
 
-def row_of(payload: bytes, columns: Sequence[Column]) -> Row:
+def row_of(payload: bytes, columns: Sequence[Column]) -> TableRow:
     """Return a reply in JSON, brief or whole, or an error as a row of columns but ``index``."""
     reply = msgspec.json.decode(payload)
     error = reply.get("error")
     values = _readable(reply)
-    return Row(
+    return TableRow(
         [_at(values, column.path or (column.name,)) for column in columns if not column.is_index],
         reply.get("status"),
         None if error is None else msgspec.convert(error, ErrorDetail),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hand_models.parameters import ParameterTable
 from planner import Lost
-from service.bulk.chunks import BULK_SETTINGS, Setting, about, grouped
+from service.bulk.chunks import BULK_SETTINGS, Setting, about, grouping_order
 from service.bulk.pools import Here, Pool, pool_on
 from service.requests import PlanRequest, RouteRequest
 from service.wire import (
@@ -207,7 +207,7 @@ class _Work:
         """Give out chunks of questions about the same, as far as may be."""
         abouts = [about(payload, self._form) for _, payload in window]
         chunk, size, rock = _Chunk([], []), 0, b""
-        for k in grouped(abouts):
+        for k in grouping_order(abouts):
             place, payload = window[k]
             size += len(payload)
             full = len(chunk.places) == self._together or size > BULK_SETTINGS.most_bytes
@@ -244,4 +244,4 @@ def _encoded(question: Question, form: Format) -> bytes | Answer:
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         name: Any = getattr(question, "id", None)
         known = name if isinstance(name, str) else None
-        return encode_error(MalformedError(f"no request: {error}"), form, known)
+        return encode_error(MalformedError(f"not a request: {error}"), form, known)

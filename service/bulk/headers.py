@@ -38,7 +38,7 @@ class Header(msgspec.Struct):
             there = msgspec.json.decode(before, type=Header)
         except (msgspec.DecodeError, UnicodeDecodeError):
             raise InvalidInputError(
-                f"{path}: no table that a batch has written, or a sweep", field="--resume"
+                f"{path}: not a table of crux batch or crux sweep", field="--resume"
             ) from None
         known, wanted = there._compared(), self._compared()
         for name in dict.fromkeys([*known, *wanted]):
@@ -48,7 +48,7 @@ class Header(msgspec.Struct):
                 digest = name in {"hand", "robot", "stance"}
                 which = "" if digest else f" ({values[0]!r}, now {values[1]!r})"
                 raise InvalidInputError(
-                    f"{path}: was begun with another {name}{which}; begin anew without it",
+                    f"{path}: was started with another {name}{which}; start again without --resume",
                     field="--resume",
                 )
 

@@ -143,8 +143,8 @@ def check_address(address: object) -> None:
         good = False
     if not good:
         raise InvalidInputError(
-            f"{text!r} is no place to work at; valid are processes, here, {LOCAL_CLUSTER}, "
-            "tcp://HOST:PORT of a Dask scheduler, or its client",
+            f"{text!r} is unknown; valid are processes, here, {LOCAL_CLUSTER}, tcp://HOST:PORT of "
+            "a Dask scheduler, or its client",
             field="on",
         )
 
@@ -179,7 +179,8 @@ class DaskPool:
             check_address(on)
             if workers is not None:
                 raise InvalidInputError(
-                    "a cluster has workers of its own; leave it out", field="workers"
+                    "not available with a cluster, which has its own workers: remove it",
+                    field="workers",
                 )
         self._on, self._workers, self._setting = on, workers, setting
         self._stack = ExitStack()

@@ -20,7 +20,7 @@ import msgspec
 
 from hand_models.base import InvalidInputError
 from planner import Time
-from service.bulk.columns import Column, Row, row_of
+from service.bulk.columns import Column, TableRow, row_of
 from service.bulk.exports import exporter_at
 from service.bulk.headers import Header
 from service.bulk.lines import Asked
@@ -132,7 +132,7 @@ class Run(ABC):
         # each line of replies begins so
         reply = b'{"v":1,'
         if last and not heads and not last.startswith(reply[: len(last)]):
-            raise InvalidInputError(f"{file}: its end is of no reply", field="--resume")
+            raise InvalidInputError(f"{file}: its end is not a reply", field="--resume")
         return kept
 
 
@@ -191,7 +191,7 @@ class ReplyLines(Run):
         try:
             reply = msgspec.json.decode(line, type=_Reply)
         except (msgspec.DecodeError, UnicodeDecodeError):
-            raise InvalidInputError(f"{where}: no reply", field="--resume") from None
+            raise InvalidInputError(f"{where}: not a reply", field="--resume") from None
         name = identifier(question, Format.JSON)
         if reply.id != name:
             raise InvalidInputError(
@@ -200,11 +200,11 @@ class ReplyLines(Run):
                 field="--resume",
             )
         if reply.status is None and reply.error is None:
-            raise InvalidInputError(f"{where}: no reply", field="--resume")
+            raise InvalidInputError(f"{where}: not a reply", field="--resume")
         return reply.outcome
 
 
-class _RowLine(Row, omit_defaults=True, kw_only=True):
+class _RowLine(TableRow, omit_defaults=True, kw_only=True):
     """A row as a line: with a digest of the question that it answers."""
 
     asked: str
@@ -251,7 +251,7 @@ class TableLines(Run):
         # an unfinished table may have less of its header
         if not b'{"crux":'.startswith(first):
             raise InvalidInputError(
-                f"{file}: no table that a batch has written, or a sweep",
+                f"{file}: not a table of crux batch or crux sweep",
                 field="--resume" if resume else "-o",
             )
 
@@ -261,16 +261,16 @@ class TableLines(Run):
         # versions before runs were lines had a manifest
         if Path(f"{table}.manifest.json").exists() or (table / "_manifest.json").exists():
             raise InvalidInputError(
-                f"{table}: was begun by an older version, and cannot be gone on with; begin anew "
-                "without it",
+                f"{table}: was started by an older version and cannot be resumed; start again "
+                "without --resume",
                 field="--resume",
             )
         if table.exists():
             raise InvalidInputError(
-                f"{table}: no table that a batch has written, or a sweep", field="--resume"
+                f"{table}: not a table of crux batch or crux sweep", field="--resume"
             )
 
-    def row(self, payload: bytes) -> Row:
+    def row(self, payload: bytes) -> TableRow:
         """Return what the table says of the answer to the next question."""
         return row_of(payload, self._described)
 
@@ -288,7 +288,7 @@ class TableLines(Run):
             values = ([i, *each] for i, each in enumerate(values))
         self._export(self._table, self._described, values)
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[TableRow]:
         """Yield the rows of what is answered, in order."""
         assert self.file is not None
         with self.file.open("rb") as lines:
@@ -307,7 +307,7 @@ class TableLines(Run):
         except (msgspec.DecodeError, UnicodeDecodeError):
             whole = False
         if not whole:
-            raise InvalidInputError(f"{where}: no row of this table", field="--resume")
+            raise InvalidInputError(f"{where}: not a row of this table", field="--resume")
         if row.asked != _digest(question):
             raise InvalidInputError(
                 f"{where}: its rows answer other requests than those given now; "

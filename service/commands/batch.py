@@ -20,10 +20,10 @@ from hand_models.base import CruxError, InvalidInputError
 from service import bulk, processes, tables, wire
 from service.commands import options
 
-__all__ = ["answer_rest", "batch", "complain", "exit_status", "new_run", "writing_answers"]
+__all__ = ["answer_rest", "batch_command", "complain", "exit_status", "new_run", "writing_answers"]
 
 
-@click.command()
+@click.command("batch")
 @click.argument("requests")
 @click.option(
     "-o",
@@ -56,13 +56,13 @@ __all__ = ["answer_rest", "batch", "complain", "exit_status", "new_run", "writin
 )
 @options.own_options
 @options.json_option
-def batch(
+def batch_command(
     requests: str,
     file: Path | None,
     columns: str | None,
     resume: bool,
     export: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     explain: bool | None,
     own: options.Own,
     as_json: bool,
@@ -79,11 +79,11 @@ def batch(
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
     """
     if resume and file is None:
-        raise InvalidInputError("needs the FILE of -o that it is to go on with", field="--resume")
+        raise InvalidInputError("requires -o FILE, the output to resume", field="--resume")
     is_table = file is not None and bulk.exporter_at(file) is not None
     for given, name in ((columns is not None, "--columns"), (export, "--export")):
         if given and not is_table:
-            raise InvalidInputError("needs a table: -o FILE.csv or FILE.parquet", field=name)
+            raise InvalidInputError("requires a table: -o FILE.csv or FILE.parquet", field=name)
     if file is not None:
         _check_output(file, requests, resume, is_table)
         tables.write_alone(file)
@@ -243,12 +243,14 @@ def _check_output(file: Path, requests: str, resume: bool, is_table: bool) -> No
     try:
         if not is_table and file.is_dir():
             field = "--resume" if resume else "-o"
-            raise InvalidInputError(f"{file}: no file that a batch has written", field=field)
+            raise InvalidInputError(f"{file}: not an output of crux batch", field=field)
         if resume and not is_table and file.exists() and not file.is_file():
-            raise InvalidInputError(f"{file}: no file that a batch has written", field="--resume")
+            raise InvalidInputError(f"{file}: not an output of crux batch", field="--resume")
         given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
         if file.is_file() and os.path.samestat(file.stat(), given):
-            raise InvalidInputError(f"{file}: the requests are there", field="-o")
+            raise InvalidInputError(
+                f"{file}: is the file of the requests; give another output", field="-o"
+            )
     except OSError:
         # reading or writing reports it
         return

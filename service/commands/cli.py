@@ -21,7 +21,7 @@ import click
 from hand_models.base import DISTRIBUTION_NAME
 from service.tables import VERBOSITY_KEY, ExitStatus
 
-__all__ = ["COMMANDS_BY_NAME", "crux", "run"]
+__all__ = ["COMMANDS_BY_NAME", "crux", "run_command_line"]
 
 
 class Entry(NamedTuple):
@@ -115,7 +115,7 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS_BY_NAME:
             return None
         module = import_module(f"service.commands.{COMMANDS_BY_NAME[cmd_name].module}")
-        command: click.Command = getattr(module, cmd_name.replace("-", "_"))
+        command: click.Command = getattr(module, f"{cmd_name.replace('-', '_')}_command")
         if not any(option.name == "verbose" for option in command.params):
             _say_more_or_less(command)
         return command
@@ -159,7 +159,7 @@ class Commands(click.Group):
         return commands + click.Command.shell_complete(self, ctx, incomplete)
 
 
-def run(arguments: Sequence[str] | None = None) -> int:
+def run_command_line(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, and return its exit status."""
     try:
         status = crux.main(args=arguments, prog_name="crux", standalone_mode=False)

@@ -17,9 +17,9 @@ def main() -> None:
     """Run the command line of this process, and exit."""
     _open_what_is_closed()
     with interruptible():
-        from service.commands.cli import run
+        from service.commands.cli import run_command_line
 
-        sys.exit(run())
+        sys.exit(run_command_line())
 
 
 def _open_what_is_closed() -> None:

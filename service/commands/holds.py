@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
     Outcome = fixed_wrist.FoundHold | InvalidInputError
-    Pair = tuple[fixed_wrist.Trial, fixed_wrist.FoundHold]
+    Pair = tuple[fixed_wrist.HoldTrial, fixed_wrist.FoundHold]
 
-__all__ = ["holds"]
+__all__ = ["holds_command"]
 
 
-@click.command()
+@click.command("holds")
 @click.argument("rock", type=click.Path(path_type=Path))
 @click.option(
     "-o",
@@ -84,7 +84,7 @@ __all__ = ["holds"]
 @options.hand_option
 @options.plot_option("Draw the rock there, and on it the largest pull-off at each point.")
 @options.json_option
-def holds(
+def holds_command(
     rock: Path,
     output: Path,
     spacing: float,
@@ -93,7 +93,7 @@ def holds(
     surface: str,
     seat: Literal["rest", "best"],
     robust: int,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     hand: ParameterTable | None,
     picture: Path | None,
     as_json: bool,
@@ -127,8 +127,8 @@ def holds(
         )
     if not trials:
         raise InvalidInputError(
-            "no point of the grid is on rock that faces −z of its frame; is it turned over, or "
-            "smaller than the grid?",
+            "no grid point is on rock that faces −z of its frame; is the mesh flipped, or "
+            "smaller than the spacing?",
             field="--spacing",
         )
     # fail before the work is done
@@ -192,7 +192,7 @@ def holds(
 
 def _keep(
     title: str,
-    trials: Sequence[fixed_wrist.Trial],
+    trials: Sequence[fixed_wrist.HoldTrial],
     tried: Generator[tuple[int, Outcome], None, None],
     outcomes: dict[int, Outcome],
 ) -> None:
@@ -225,7 +225,7 @@ def _reason(error: InvalidInputError) -> str:
 
 
 def _refusals(
-    trials: Sequence[fixed_wrist.Trial], outcomes: Mapping[int, Outcome]
+    trials: Sequence[fixed_wrist.HoldTrial], outcomes: Mapping[int, Outcome]
 ) -> list[dict[str, Any]]:
     """Return the points where hands cannot be, with the number of trials for each reason."""
     found: dict[tuple[float, float, float], Counter[str]] = {}
@@ -235,7 +235,7 @@ def _refusals(
     return [{"point": point, "reasons": dict(reasons)} for point, reasons in found.items()]
 
 
-def _entry(trial: fixed_wrist.Trial, found: fixed_wrist.FoundHold) -> dict[str, Any]:
+def _entry(trial: fixed_wrist.HoldTrial, found: fixed_wrist.FoundHold) -> dict[str, Any]:
     """Return a hold as JSON values."""
     from hand_models import fixed_wrist
 
@@ -269,7 +269,7 @@ def _entry(trial: fixed_wrist.Trial, found: fixed_wrist.FoundHold) -> dict[str, 
 
 
 def _draw(
-    mesh: Any, trials: list[fixed_wrist.Trial], found: list[Pair], path: Path, name: str
+    mesh: Any, trials: list[fixed_wrist.HoldTrial], found: list[Pair], path: Path, name: str
 ) -> None:
     import numpy as np
 
@@ -299,7 +299,7 @@ def _finite(value: float) -> str:
 
 
 def _print(
-    trials: list[fixed_wrist.Trial],
+    trials: list[fixed_wrist.HoldTrial],
     found: list[Pair],
     refused: Counter[str],
     oddities: Sequence[str],

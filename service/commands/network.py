@@ -19,7 +19,7 @@ from service.commands import options, stances
 if TYPE_CHECKING:
     import zenoh
 
-__all__ = ["demo", "query", "schema", "serve"]
+__all__ = ["demo_command", "query_command", "schema_command", "serve_command"]
 
 
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -45,7 +45,7 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return with_config
 
 
-@click.command()
+@click.command("serve")
 @zenoh_options
 @options.own_options
 @click.option(
@@ -69,7 +69,7 @@ def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
 )
 @click.option("--log-format", type=click.Choice(["text", "json"]), default="text")
 @options.json_option
-def serve(
+def serve_command(
     config: zenoh.Config,
     own: options.Own,
     workers: int | None,
@@ -159,14 +159,14 @@ def _leave(*_: object) -> None:
         os._exit(0)
 
 
-@click.command()
+@click.command("query")
 @options.stance_argument
 @zenoh_options
 @options.timeout_option
 @options.wait_option
 @options.own_options
 @options.json_option
-def query(
+def query_command(
     stance: str,
     config: zenoh.Config,
     timeout: float | None,
@@ -186,7 +186,7 @@ def query(
     return tables.show(reply, as_json)
 
 
-@click.command()
+@click.command("demo")
 @click.option(
     "-o",
     "--output",
@@ -199,7 +199,7 @@ def query(
 )
 @options.own_options
 @options.json_option
-def demo(picture: Path, own: options.Own, as_json: bool) -> int:
+def demo_command(picture: Path, own: options.Own, as_json: bool) -> int:
     """Start the service, ask it for a plan of a real stance, and draw the answer.
 
     A robot of --robot whose limbs do not reach that stance's holds is planned for without joints.
@@ -222,16 +222,16 @@ def demo(picture: Path, own: options.Own, as_json: bool) -> int:
             stance = msgspec.structs.replace(request.stance, joints=None)
             request = msgspec.structs.replace(request, stance=stance)
             reply = client.plan(request)
-    tables.draw_plan(answering.planned(request, own.robots), picture)
+    tables.write_plan_picture(answering.planned(request, own.robots), picture)
     status = tables.show(reply, as_json)
     if not as_json:
         tables.console().print(f"picture: {picture}")
     return status
 
 
-@click.command()
+@click.command("schema")
 @options.json_option
-def schema(as_json: bool) -> None:
+def schema_command(as_json: bool) -> None:
     """Print the JSON Schema of every message."""
     text = msgspec.json.encode(wire.schema())
     click.echo(text if as_json else msgspec.json.format(text))

@@ -26,7 +26,7 @@ __all__ = [
     "OutputFile",
     "Own",
     "Wanted",
-    "Workers",
+    "WorkersOption",
     "asked_for",
     "beginning_so",
     "folder_option",
@@ -158,7 +158,7 @@ class Own(NamedTuple):
         return answering.robots_of(self.robot)
 
 
-class Workers(NamedTuple):
+class WorkersOption(NamedTuple):
     """Place where many questions are answered: this process, local workers or Dask."""
 
     workers: int | None
@@ -344,7 +344,7 @@ wait_option = click.option(
     help="Wait so long for a service that is not there yet.",
 )
 workers_options = asked_for(
-    Workers,
+    WorkersOption,
     "parallel",
     click.option(
         "--workers",

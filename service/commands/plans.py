@@ -14,10 +14,10 @@ from hand_models.base import InvalidInputError
 from service import answering, replies, requests, tables
 from service.commands import options, stances
 
-__all__ = ["plan"]
+__all__ = ["plan_command"]
 
 
-@click.command()
+@click.command("plan")
 @options.stance_argument
 @options.plot_option("Draw it there.")
 @click.option(
@@ -39,7 +39,7 @@ __all__ = ["plan"]
 @options.wanted_options
 @options.own_options
 @options.json_option
-def plan(
+def plan_command(
     stance: str,
     picture: Path | None,
     robust: bool,
@@ -60,7 +60,7 @@ def plan(
     extras = [want for want, chosen in further.items() if chosen]
     request = options.with_extras(wanted.of(plain), *extras, whole=not as_json)
     if advice_folder is not None and request.detail not in (None, "full"):
-        raise InvalidInputError("--advice needs the full reply; leave it out", field="detail")
+        raise InvalidInputError("--advice requires the full reply; remove detail", field="detail")
     robots = own.robots
     brief = not as_json and tables.verbosity() < 0
     advised = "advice" in request.want
@@ -74,7 +74,7 @@ def plan(
             full = request.detail in (None, "full") and not brief
             bare = _without_palms(request, robots) if full else None
         if picture is not None:
-            tables.draw_plan(answer, picture)
+            tables.write_plan_picture(answer, picture)
     if not as_json:
         _print(answer, bare, brief)
         if advised or (not brief and not _holds(answer)):
@@ -112,9 +112,9 @@ def _holds(answer: answering.Planned) -> bool:
 
 def _with_advice(answer: answering.Planned, brief: bool) -> answering.Planned:
     """Search for advice that makes a stance hold, or hold more, and print it."""
-    better = "be better" if _holds(answer) else "hold"
-    with tables.working(f"looking for what would {better}"):
-        found = answering.with_advice(answer)
+    wanted = "better" if _holds(answer) else "feasible"
+    with tables.working(f"searching for {wanted} changes"):
+        found = answering.answer_with_advice(answer)
     assert isinstance(found.reply, replies.PlanReply)  # as a person is given
     assert isinstance(answer.reply, replies.PlanReply)
     if not brief:
@@ -169,7 +169,7 @@ def _without_palms(
     stance = replace(request.stance, hands=hands)
     alone = replace(request, stance=stance, want=["load_factor"], draws=[], explain=False)
     try:
-        reply = answering.plan(alone, robots)
+        reply = answering.answer_plan(alone, robots)
     except planner.DeadlineError:
         return None
     assert isinstance(reply, replies.PlanReply)  # of a whole request

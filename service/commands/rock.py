@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-__all__ = ["rock"]
+__all__ = ["rock_command"]
 
 SCAN_NUMBERS: Final = parameters.scan_table()
 
@@ -32,11 +32,11 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     except ValueError:
         numbers = ()
     if len(numbers) != 3:
-        raise click.BadParameter(f"three numbers with commas between are needed, got {text!r}")
+        raise click.BadParameter(f"must be three numbers separated by commas, got {text!r}")
     return numbers
 
 
-@click.command(epilog=f"FILE ends in {', '.join(scans.SCAN_ENDINGS)}.")
+@click.command("rock", epilog=f"FILE ends in {', '.join(scans.SCAN_ENDINGS)}.")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "-o",
@@ -120,7 +120,7 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
 )
 @options.plot_option("Draw the rock there, as the scanner saw it.")
 @options.json_option
-def rock(
+def rock_command(
     file: Path,
     output: Path,
     spacing: float | None,
@@ -139,7 +139,7 @@ def rock(
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
     if neighbours is not None and std_ratio is None:
-        raise InvalidInputError("is of outliers, which --std-ratio drops", field="neighbours")
+        raise InvalidInputError("requires --std-ratio", field="neighbours")
     if output.exists() and file.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself", field="--output")
     with tables.progress(f"meshing {file.name}") as report:

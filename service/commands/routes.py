@@ -20,12 +20,12 @@ from service import answering, bulk, requests, tables, wire
 from service.commands import options, stances
 from service.commands.batch import answer_rest, complain, exit_status, new_run
 
-__all__ = ["route"]
+__all__ = ["route_command"]
 
 LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 
 
-@click.command()
+@click.command("route")
 @options.routes_argument
 @click.option(
     "-o",
@@ -46,11 +46,11 @@ LISTED_ENDINGS: Final = ".jsonl or .csv or .parquet"
 @options.wanted_options
 @options.own_options
 @options.json_option
-def route(
+def route_command(
     routes: tuple[str, ...],
     output: Path,
     resume: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     wanted: options.Wanted,
     own: options.Own,
     as_json: bool,
@@ -66,7 +66,7 @@ def route(
     if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
-                raise InvalidInputError("is for one route: needs -o DIR", field=option)
+                raise InvalidInputError("is for one route: requires -o DIR", field=option)
         return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
     if len(routes) > 1 or Path(routes[0]).is_dir():
         raise InvalidInputError(
@@ -74,9 +74,9 @@ def route(
         )
     for option, given in (("--resume", resume), ("--dask", parallel.dask is not None)):
         if given:
-            raise InvalidInputError(f"needs -o FILE that ends in {LISTED_ENDINGS}", field=option)
+            raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field=option)
     if output.exists() and not output.is_dir():
-        raise InvalidInputError(f"{output}: is no folder", field="-o")
+        raise InvalidInputError(f"{output}: is not a folder", field="-o")
     request = wanted.of(own.asked(stances.read_route(routes[0])))
     return _one(request, output, parallel.workers, own, as_json)
 
@@ -89,7 +89,7 @@ def _one(
     as_json: bool,
 ) -> int:
     """Evaluate one route, and write its report."""
-    climb = answering.route(request, own.robots)
+    climb = answering.route_of(request, own.robots)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)
     tables.write_alone(folder / "route", folder)
@@ -166,7 +166,7 @@ def _many(
     routes: _Routes,
     file: Path,
     resume: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     wanted: options.Wanted,
     own: options.Own,
     as_json: bool,
@@ -177,7 +177,7 @@ def _many(
     tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
-        raise InvalidInputError(f"{file}: is no file", field="-o")
+        raise InvalidInputError(f"{file}: is not a file", field="-o")
     sink = new_run(
         file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )

@@ -15,7 +15,7 @@ from service.commands import options, stances
 if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
-__all__ = ["body_space", "wrench_space"]
+__all__ = ["body_space_command", "wrench_space_command"]
 
 
 @click.command("wrench-space")
@@ -34,7 +34,7 @@ __all__ = ["body_space", "wrench_space"]
 )
 @options.robot_option
 @options.json_option
-def wrench_space(
+def wrench_space_command(
     stance: str,
     limb_and_hand: tuple[str, ParameterTable | None],
     picture: Path | None,
@@ -49,10 +49,10 @@ def wrench_space(
     robots = own.robots
     plan = own.asked(stances.read_request(stance))
     request = requests.WrenchSpaceRequest(v=1, stance=plan.stance, limb=limb)
-    reply = answering.wrench_space(request, robots)
+    reply = answering.answer_wrench_space(request, robots)
     if robust:
         alone = msgspec.structs.replace(request, want=["robust"])
-        reply.robust = answering.wrench_space(alone, robots).robust
+        reply.robust = answering.answer_wrench_space(alone, robots).robust
     found = None
     if per_axis is not None:
         wrist = planner.floating_wrist(answering.stance(request.stance, robots), limb)
@@ -115,7 +115,7 @@ def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[reque
 @options.plot_option("Draw it there, and the largest accelerations in two planes.")
 @options.own_options
 @options.json_option
-def body_space(
+def body_space_command(
     stance: str,
     axes: list[requests.Axis],
     projection: bool,

@@ -15,10 +15,10 @@ from hand_models.base import InvalidInputError, UnsupportedError
 from service import answering, replies, requests, tables, wire
 from service.commands import options, stances
 
-__all__ = ["stream"]
+__all__ = ["stream_command"]
 
 
-@click.command()
+@click.command("stream")
 @options.stance_argument
 @click.option(
     "--radius",
@@ -29,7 +29,7 @@ __all__ = ["stream"]
 )
 @options.own_options
 @options.json_option
-def stream(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
+def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
     """Give set-points for one body wrench after another: one a line in, one a line out.
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first
@@ -77,7 +77,7 @@ def _declared(plan: requests.PlanRequest, radius: float) -> requests.StreamReque
     """Return the declaration of a plan request's stance."""
     if plan.objective != "max_margin":
         raise UnsupportedError(
-            f"{plan.objective} is not for streams; valid is max_margin", field="objective"
+            f"{plan.objective} is not available for streams; valid is max_margin", field="objective"
         )
     return requests.StreamRequest(
         v=1,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hand_models.parameters import ParameterTable
 
 
-__all__ = ["STUDY_NAMES", "SURFACE_NAMES", "study"]
+__all__ = ["STUDY_NAMES", "SURFACE_NAMES", "study_command"]
 
 STUDY_NAMES: Final = (
     "fig06",
@@ -65,7 +65,7 @@ def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
     of_rock = {key: given.pop(key) for key in ("diameter", "tension", "surface") if key in given}
     if "measures" in given:
         given["measures"] = tuple(dict.fromkeys(given["measures"]))
-    return experiments.Sweep(
+    return experiments.GripperSweep(
         conditions=replace(experiments.Conditions.of_fig16()[0], **of_rock), **given
     )
 
@@ -81,7 +81,7 @@ def _measurements() -> studies.Study:
     return planner.MeasurementStudy(fixed)
 
 
-@click.command(epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
+@click.command("study", epilog=f"NAME is one of {', '.join(STUDY_NAMES)}.")
 @click.argument("name", shell_complete=options.beginning_so(STUDY_NAMES))
 @options.folder_option("Where result.json and the pictures go.")
 @click.option(
@@ -115,7 +115,7 @@ def _measurements() -> studies.Study:
 )
 @options.hand_option
 @options.json_option
-def study(
+def study_command(
     name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **wanted: Any
 ) -> None:
     """Run an experiment of the paper again, and hold its claims against the model.

@@ -7,15 +7,15 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from hand_models.base import InvalidInputError, within
+from hand_models.base import InvalidInputError, errors_under
 from service import processes, sweeping, tables
 from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
 
-__all__ = ["sweep"]
+__all__ = ["sweep_command"]
 
 
-@click.command()
+@click.command("sweep")
 @options.stance_argument
 @click.option(
     "--vary",
@@ -53,7 +53,7 @@ __all__ = ["sweep"]
 @options.folder_option("Where the table and the picture go.")
 @options.own_options
 @options.json_option
-def sweep(
+def sweep_command(
     stance: str,
     variations: tuple[str, ...],
     samples: int | None,
@@ -61,7 +61,7 @@ def sweep(
     over: str | None,
     tolerance: float,
     resume: bool,
-    parallel: options.Workers,
+    parallel: options.WorkersOption,
     folder: Path,
     own: options.Own,
     as_json: bool,
@@ -77,7 +77,7 @@ def sweep(
     a point failed or was lost.
     """
     if seed is not None and samples is None:
-        raise InvalidInputError("is of samples: give --samples, too", field="--seed")
+        raise InvalidInputError("requires --samples", field="--seed")
     request = own.asked(stances.read_request(stance))
     try:
         chosen = [
@@ -89,10 +89,10 @@ def sweep(
         raise InvalidInputError(error.message, field=where) from None
     given = click.get_current_context().get_parameter_source("tolerance")
     if given is ParameterSource.COMMANDLINE and design.number is None:
-        raise InvalidInputError("is of one number that varies alone", field="--tolerance")
+        raise InvalidInputError("requires exactly one varied number", field="--tolerance")
     pair = None if over is None else over.split(",")
     if pair is not None:
-        with within("--over"):
+        with errors_under("--over"):
             design.places_of(pair)
     with tables.filling_folder():
         folder.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ from service.wire import Answer, Format
 if TYPE_CHECKING:
     from distributed import Client
 
-    from hand_models.fixed_wrist import FoundHold, Trial
+    from hand_models.fixed_wrist import FoundHold, HoldTrial
     from hand_models.rock import Mesh
 
 __all__ = ["HoldTrials"]
@@ -65,12 +65,12 @@ class HoldTrials:
     def __exit__(self, *error: object) -> None:
         self._pool.__exit__(*error)
 
-    def each(self, trials: Sequence[Trial], *, robust: bool = False) -> Found:
+    def each(self, trials: Sequence[HoldTrial], *, robust: bool = False) -> Found:
         """Yield each place's index, and what a hand holds there, batch by batch.
 
         Parameters
         ----------
-        trials : sequence of Trial
+        trials : sequence of HoldTrial
         robust : bool, optional
             As of `hand_models.fixed_wrist.try_holds`.
 
@@ -91,7 +91,7 @@ class HoldTrials:
             yield from zip(batch, _outcomes(answer, len(batch)), strict=True)
 
 
-def _batches(trials: Sequence[Trial], most: int, width: int) -> list[list[int]]:
+def _batches(trials: Sequence[HoldTrial], most: int, width: int) -> list[list[int]]:
     """Return the indices of trials in batches, as many for each process."""
     # what hands at one place have alike is found once
     places = [list(of) for _, of in groupby(range(len(trials)), lambda i: trials[i][:3])]

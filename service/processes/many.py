@@ -80,7 +80,7 @@ class Planners:
     ) -> list[PlanReply | BriefPlanReply | ErrorReply]:
         """Return the reply to each request, or the error in its place; as `plan_many`."""
         if self._closed:
-            raise InvalidInputError("is closed; enter another, or this one again", field="planners")
+            raise InvalidInputError("is closed; use it inside a with block", field="planners")
         answers = []
         try:
             for answer in answered(requests, self._pool, Format.MSGPACK):

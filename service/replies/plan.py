@@ -20,23 +20,23 @@ from planner import (
     TensionPath,
     Time,
 )
-from service.replies.reply import Reply, Seating, StanceReply, Vector, WrenchSet, Wrist
+from service.replies.reply import Reply, SeatingReply, StanceReply, Vector, WrenchSet, Wrist
 
 __all__ = [
     "BriefPlanReply",
-    "Certificate",
-    "Hand",
+    "CertificateReply",
     "HandColumns",
+    "HandReply",
     "HandSetPoints",
     "PlanReply",
     "RouteReply",
-    "RouteStage",
+    "RouteStageReply",
     "SetPointsReply",
     "StreamReply",
 ]
 
 
-class Certificate(CertificateOf[Vector, WrenchSet], frozen=True, kw_only=True, eq=False):
+class CertificateReply(CertificateOf[Vector, WrenchSet], frozen=True, kw_only=True, eq=False):
     """Why nothing balances the body: at any ``utilisation`` (null), or up to that cap on it.
 
     Every body wrench w that the hands can supply with loads up to 10⁶ N, and their wrenches v on
@@ -55,7 +55,7 @@ class Certificate(CertificateOf[Vector, WrenchSet], frozen=True, kw_only=True, e
     """
 
 
-class Hand(Struct, kw_only=True):
+class HandReply(Struct, kw_only=True):
     """One hand of a plan. Its wrench space comes with ``"want": ["model"]``."""
 
     limb: str
@@ -63,7 +63,7 @@ class Hand(Struct, kw_only=True):
     fingers: list[Finger]
     palm: Palm[Vector]
     utilisation: float
-    seating: Seating
+    seating: SeatingReply
     wrist: Wrist
     wrench_space: WrenchSet | UnsetType = UNSET
 
@@ -101,13 +101,13 @@ class PlanReply(StanceReply, kw_only=True):
     load_factor_status: LoadFactorStatus = "not_asked"
     survival_probability: float | None = None
     limiting: LimitName | None = None
-    hands: list[Hand] | None = None
+    hands: list[HandReply] | None = None
     joints: dict[str, Vector] | None = None
     joint_torque: dict[str, Vector] | None = None
     joint_torque_limit: dict[str, Vector] | None = None
     prices: list[Price] | None = None
     effort_prices: list[Price] | None = None
-    certificate: Certificate | None = None
+    certificate: CertificateReply | None = None
     residual: Vector | None = None
     path: TensionPath | None = None
     verified: bool
@@ -210,7 +210,7 @@ class SetPointsReply(Reply, kw_only=True):
     took: float
 
 
-class RouteStage(Struct, kw_only=True):
+class RouteStageReply(Struct, kw_only=True):
     """A stance of a climb. ``move``: from one, zero for the start; ``phase``: of the move.
 
     ``limb``: the one that moves. ``reason``: what limits the plan, or why there is none.
@@ -245,5 +245,5 @@ class RouteReply(Reply, kw_only=True):
     load_factor_unbounded: bool
     load_factor_status: LoadFactorStatus
     limiting: LimitName | None
-    stages: list[RouteStage]
+    stages: list[RouteStageReply]
     warnings: list[str]

@@ -21,8 +21,8 @@ __all__ = [
     "PlacedFrame",
     "ProcessHealth",
     "Reply",
-    "Row",
-    "Seating",
+    "RowReply",
+    "SeatingReply",
     "StanceReply",
     "Vector",
     "WrenchSet",
@@ -55,7 +55,7 @@ class StanceReply(Reply, kw_only=True):
     poses: dict[str, PlacedFrame] | UnsetType = UNSET
 
 
-class Seating(Struct):
+class SeatingReply(Struct):
     """The place of the hold in H, and the rule by which it was found.
 
     ``backed_off``: how far the hand moved off the rock along -z of H, so that its open fingers
@@ -98,7 +98,7 @@ class Generator(Struct):
     wrench: Vector
 
 
-class Row(Struct, kw_only=True):
+class RowReply(Struct, kw_only=True):
     """An inequality of a hand's wrench space.
 
     ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
@@ -122,7 +122,7 @@ class WrenchSet(Struct, kw_only=True):
 
     origin: Vector
     generators: list[Generator]
-    rows: list[Row]
+    rows: list[RowReply]
 
 
 class ErrorDetail(Struct):

@@ -5,26 +5,26 @@ from __future__ import annotations
 from msgspec import UNSET, Struct, UnsetType
 
 from planner import Finding, LimitName, Time
-from service.replies.reply import Generator, Row, Seating, StanceReply, Vector, Wrist
+from service.replies.reply import Generator, RowReply, SeatingReply, StanceReply, Vector, Wrist
 
 __all__ = [
     "Acceleration",
     "AxisCapability",
     "BodyCapability",
-    "BodySection",
+    "BodySectionReply",
     "BodySpaceReply",
-    "ClosingSequence",
-    "ClosingStage",
-    "Contact",
+    "ClosingSequenceReply",
+    "ClosingStageReply",
+    "ContactReply",
     "HalfSpaceEquations",
-    "HalfSpaces",
+    "HalfSpacesReply",
     "RobustCapability",
-    "TensionLimit",
+    "TensionLimitReply",
     "WrenchSpaceReply",
 ]
 
 
-class Contact(Struct):
+class ContactReply(Struct):
     """The place where a finger tile meets the rock, and the axes of its loads.
 
     ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``
@@ -41,7 +41,7 @@ class Contact(Struct):
     lateral_axis: Vector
 
 
-class ClosingStage(Struct):
+class ClosingStageReply(Struct):
     """One part of a closing finger: from which tension it moves, at which it is at rest [N]."""
 
     part: str
@@ -49,7 +49,7 @@ class ClosingStage(Struct):
     ends: float
 
 
-class ClosingSequence(Struct):
+class ClosingSequenceReply(Struct):
     """The way a finger has closed: its nail, its joints from the base outward, its tiles.
 
     ``in_order``: whether nail and joints move one after the other. ``closure``: how it has ended:
@@ -59,14 +59,14 @@ class ClosingSequence(Struct):
     """
 
     finger: str
-    stages: list[ClosingStage]
+    stages: list[ClosingStageReply]
     in_order: bool
     closure: str
     nearby: list[str]
     nearby_turn: float
 
 
-class TensionLimit(Struct):
+class TensionLimitReply(Struct):
     """The tension at which a finger's first tile lets go [N]; null where none ever does."""
 
     finger: str
@@ -81,7 +81,7 @@ class HalfSpaceEquations(Struct):
     offsets: Vector
 
 
-class HalfSpaces(Struct):
+class HalfSpacesReply(Struct):
     """``normals · w ≤ offsets``, and what holds with equality where the set is flat."""
 
     normals: list[Vector]
@@ -130,15 +130,15 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
     robot: str
     limb: str
     wrist: Wrist
-    seating: Seating
-    contacts: list[Contact]
-    closing: list[ClosingSequence]
-    tension_limits: list[TensionLimit]
+    seating: SeatingReply
+    contacts: list[ContactReply]
+    closing: list[ClosingSequenceReply]
+    tension_limits: list[TensionLimitReply]
     origin: Vector
     generators: list[Generator]
-    rows: list[Row]
+    rows: list[RowReply]
     vertices: list[Vector] | None
-    half_spaces: HalfSpaces | None
+    half_spaces: HalfSpacesReply | None
     dimension: int | None
     capability: dict[str, AxisCapability] | None
     warnings: list[str] = []
@@ -159,7 +159,7 @@ class BodyCapability(Struct, kw_only=True):
     limiting: LimitName | None
 
 
-class BodySection(Struct, kw_only=True):
+class BodySectionReply(Struct, kw_only=True):
     """The body wrenches that are held in the plane of two axes, between two polygons [N, N·m].
 
     Every point of the inner polygon is held, and none outside the outer one. Corners go
@@ -204,7 +204,7 @@ class BodySpaceReply(StanceReply, kw_only=True):
     linearisation_error: float
     error: float
     capability: dict[str, BodyCapability]
-    section: BodySection
+    section: BodySectionReply
     acceleration: dict[str, Acceleration] | None
     angular_acceleration: dict[str, Acceleration] | None
     along: list[Acceleration] | None

@@ -274,4 +274,4 @@ def _read(received: zenoh.Sample | zenoh.ReplyError, kind: type[ReplyT]) -> Repl
     try:
         return Format.named(str(received.encoding)).decode(received.payload.to_bytes(), kind)
     except (MalformedError, msgspec.ValidationError) as error:
-        raise ServiceError("internal", f"a reply that is no {kind.__name__}: {error}") from None
+        raise ServiceError("internal", f"the reply is not a {kind.__name__}: {error}") from None

@@ -317,7 +317,8 @@ def _must_be_endpoint(endpoint: str, flag: str) -> None:
             problem = f"{port!r} is no port"
     if problem is not None:
         raise InvalidInputError(
-            f"{_shown(endpoint)} is no endpoint ({problem}); valid is such as tcp/127.0.0.1:7447",
+            f"{_shown(endpoint)} is not an endpoint ({problem}); valid is, for example, "
+            "tcp/127.0.0.1:7447",
             field=flag,
         )
 

@@ -24,9 +24,9 @@ import zenoh
 from hand_models.base import CruxError
 from planner import DeadlineError, PriorityLane, WorkerHandle
 from service.processes import Job
-from service.serving.monitor import ServiceMonitor, State
-from service.serving.names import Names
-from service.serving.question import Question, client_of, take
+from service.serving.monitor import ServiceMonitor, ServiceState
+from service.serving.names import ClientNames
+from service.serving.question import PendingQuestion, client_of, received_question
 from service.serving.reply_sender import Replies, SharedQueue, reply_to
 from service.serving.settings import SERVING_SETTINGS
 from service.serving.shares import Shares
@@ -69,7 +69,7 @@ class Dispatcher:
         self._pool, self._seconds, self._inquire = pool, seconds, inquire
         self.monitor = ServiceMonitor(robot, self._state)
         self._replies = Replies(self.monitor)
-        self._names, self._shares = Names(), Shares()
+        self._names, self._shares = ClientNames(), Shares()
         self._costs = Costs(self._shares)
         self._waiting = Waiting(self._shares)
         self._started = threading.Event()
@@ -96,7 +96,7 @@ class Dispatcher:
         if not self._pool.up:
             self.stop()
             self.close()
-            raise LostError("the processes that answer do not live to be ready; the log says how")
+            raise LostError("no worker starts; see the log")
 
     def ask(self, query: zenoh.Query, key: str) -> None:
         """Take a query at a key; returns at once, whatever the thread."""
@@ -218,10 +218,10 @@ class Dispatcher:
 
     def _admit(self, query: zenoh.Query, key: str, arrived: float) -> None:
         try:
-            question = take(query, key, arrived, self._seconds)
+            question = received_question(query, key, arrived, self._seconds)
         except Exception:
             log.exception("a query at %s cannot be read", key)
-            unread = CruxError("the service could not read the query; its log says why")
+            unread = CruxError("the service could not read the query; see its log")
             answer = encode_error(unread, Format.JSON, kind="internal")
             self._replies.later(SharedQueue.UNREAD, partial(reply_to, query, key, lambda: answer))
             return
@@ -238,7 +238,7 @@ class Dispatcher:
         self._shares.asks(question.place)
         self._put(self._costs.kind(question), question)
 
-    def _put(self, kind: Kind, question: Question) -> None:
+    def _put(self, kind: Kind, question: PendingQuestion) -> None:
         """Let a question wait; refuse the one that then has no room as busy."""
         if refused := self._waiting.put(kind, question):
             self._replies.busy(refused, len(self._waiting) / self._pool.workers)
@@ -267,7 +267,7 @@ class Dispatcher:
             if question := self._waiting.take(*kinds):
                 self._give(lane, question)
 
-    def _give(self, lane: PriorityLane[Job, Answer], question: Question) -> None:
+    def _give(self, lane: PriorityLane[Job, Answer], question: PendingQuestion) -> None:
         question.begun = time.perf_counter()
         self._pool.work[lane] = question
         rehearsal = question.name == ServiceName.STREAM and not question.rehearsed
@@ -279,7 +279,7 @@ class Dispatcher:
             return
         names.gone(client)
         self._shares.gone(client)
-        gone = LostError("its client has gone, as its link or its liveliness token says")
+        gone = LostError("the client disconnected: its link or its liveliness token is gone")
         for question in self._waiting.remove(lambda each: each.place == client):
             self._replies.refuse(question, gone, "gone")
 
@@ -295,7 +295,7 @@ class Dispatcher:
             how, left = self._end_process(lane.handle)
             for question in left:
                 self._shares.ended_process(question.place, time.perf_counter() - question.begun)
-                lost = LostError(f"the process that worked on it {how}; {rest}")
+                lost = LostError(f"its worker {how}; {rest}")
                 self._replies.refuse(question, lost)
             return
         if done is None:
@@ -321,7 +321,7 @@ class Dispatcher:
         """End questions whose time is over, and processes that do not stop at it."""
         now = time.perf_counter()
         for question in self._waiting.remove(lambda each: each.deadline <= now):
-            self._replies.refuse(question, DeadlineError(question.seconds, "it was its turn"))
+            self._replies.refuse(question, DeadlineError(question.seconds, "a worker was free"))
         for lane, asked in list(self._pool.work.items()):
             if asked is None or lane not in self._pool.work:
                 continue
@@ -337,22 +337,22 @@ class Dispatcher:
 
     def _end_process(
         self, handle: WorkerHandle[Job, Answer], why: str | None = None
-    ) -> tuple[str, list[Question]]:
+    ) -> tuple[str, list[PendingQuestion]]:
         """End a process, which another replaces; as `WorkerPool.stop_worker`."""
         how, left = self._pool.stop_worker(handle, dead=why is None)
         self.monitor.ended(handle.process.pid, why or how)
         return how, left
 
-    def _state(self) -> State:
+    def _state(self) -> ServiceState:
         """Return what the service does, to whatever thread."""
         if threading.current_thread() is self._thread or not self._thread.is_alive():
-            return State(self._pool.states(), self._waiting.counts())
-        found: SimpleQueue[State] = SimpleQueue()
+            return ServiceState(self._pool.states(), self._waiting.counts())
+        found: SimpleQueue[ServiceState] = SimpleQueue()
         self._post(lambda: found.put(self._state()))
         try:
             return found.get(timeout=1.0)
         except Empty:
-            return State([], {})
+            return ServiceState([], {})
 
     # the end -------------------------------------------------------------------------------------
 
@@ -370,7 +370,7 @@ class Dispatcher:
         left, now = self._pool.left(), time.perf_counter()
         if (left or now < self._quiet_from) and now < self._stops_at:
             return False
-        lost = LostError("the service ended before there was an answer")
+        lost = LostError("the service stopped before the question was answered")
         for question in left:
             self._replies.refuse(question, lost)
         return True

@@ -21,15 +21,15 @@ from prometheus_client.registry import Collector
 
 from hand_models.base import installed_version
 from service.replies import HealthReply, LastFailure, ProcessHealth
-from service.serving.question import Question
+from service.serving.question import PendingQuestion
 from service.wire import Answer, Format
 
-__all__ = ["ServiceMonitor", "State"]
+__all__ = ["ServiceMonitor", "ServiceState"]
 
 log = logging.getLogger(__name__)
 
 
-class State(NamedTuple):
+class ServiceState(NamedTuple):
     """State of a service at this moment.
 
     Attributes
@@ -53,7 +53,7 @@ class ServiceMonitor:
         Returns what the service does at this moment.
     """
 
-    def __init__(self, robot: str, state: Callable[[], State]) -> None:
+    def __init__(self, robot: str, state: Callable[[], ServiceState]) -> None:
         self._robot, self._version, self._state = robot, installed_version(), state
         self._started = time.time()
         self._failure: LastFailure | None = None
@@ -92,12 +92,12 @@ class ServiceMonitor:
         """
         start_http_server(port, addr="127.0.0.1", registry=self.registry)
 
-    def count(self, question: Question, status: str, worked: float) -> None:
+    def count(self, question: PendingQuestion, status: str, worked: float) -> None:
         """Count a reply.
 
         Parameters
         ----------
-        question : Question
+        question : PendingQuestion
         status : str
             Of the reply, or the kind of an error.
         worked : float
@@ -164,7 +164,7 @@ class ServiceMonitor:
 class _Now(Collector):
     """Metrics that are read at the moment when they are asked for."""
 
-    def __init__(self, state: Callable[[], State], started: float) -> None:
+    def __init__(self, state: Callable[[], ServiceState], started: float) -> None:
         self._state, self._started = state, started
 
     def describe(self) -> list[Metric]:

@@ -15,7 +15,7 @@ from cachetools import LRUCache, TTLCache
 
 from service.serving.settings import SERVING_SETTINGS
 
-__all__ = ["Names", "digest"]
+__all__ = ["ClientNames", "digest"]
 
 
 def digest(secret: bytes) -> bytes:
@@ -23,7 +23,7 @@ def digest(secret: bytes) -> bytes:
     return hashlib.sha256(secret).digest()
 
 
-class Names:
+class ClientNames:
     """Links and proofs that are known of the sessions that ask. For one thread.
 
     Attributes

@@ -23,7 +23,7 @@ from service.wire import (
     encode_error,
 )
 
-__all__ = ["Question", "client_of", "take"]
+__all__ = ["PendingQuestion", "client_of", "received_question"]
 
 
 class _Head(msgspec.Struct):
@@ -37,7 +37,7 @@ class _Head(msgspec.Struct):
 
 
 @dataclass(eq=False, slots=True)
-class Question:
+class PendingQuestion:
     """A query on its way.
 
     Attributes
@@ -123,7 +123,9 @@ def client_of(query: zenoh.Query) -> str:
     return "" if source is None else str(source.source_id.zid)
 
 
-def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Question:
+def received_question(
+    query: zenoh.Query, key: str, arrived: float, longest: float
+) -> PendingQuestion:
     """Return a query as a question.
 
     Parameters
@@ -142,8 +144,8 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
             most = SERVING_SETTINGS.most_attached
             if len(attached) > most:
                 raise LimitError(
-                    f"the query's attachment has {len(attached)} bytes; {most} at most, send "
-                    "what is asked as its payload",
+                    f"the query's attachment has {len(attached)} bytes; the maximum is "
+                    f"{most}: send the request as the payload",
                     field="attachment",
                 )
             secret = attached.to_bytes()
@@ -152,7 +154,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
             payload = given.to_bytes()
     except LimitError as error:
         fault = error
-    question = Question(
+    question = PendingQuestion(
         query=query,
         key=key,
         name=name,
@@ -172,7 +174,7 @@ def take(query: zenoh.Query, key: str, arrived: float, longest: float) -> Questi
     return question
 
 
-def _read(question: Question) -> None:
+def _read(question: PendingQuestion) -> None:
     try:
         head = question.form.decode(question.payload, _Head)
     except (MalformedError, msgspec.ValidationError):

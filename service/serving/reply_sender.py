@@ -18,7 +18,7 @@ import zenoh
 
 from hand_models.base import CruxError
 from service.serving.monitor import ServiceMonitor
-from service.serving.question import Question
+from service.serving.question import PendingQuestion
 from service.wire import Answer, BusyError
 
 __all__ = ["Replies", "ReplySender", "SharedQueue", "reply_to"]
@@ -119,22 +119,24 @@ class Replies:
         """Let work that may wait for a client be done, after what was handed in for it before."""
         self._sender.send(client, work)
 
-    def refuse(self, question: Question, error: CruxError, status: str | None = None) -> None:
+    def refuse(
+        self, question: PendingQuestion, error: CruxError, status: str | None = None
+    ) -> None:
         """Reply with an error; the status is its kind, unless another is given."""
         answer = question.refusal(error)
         self.reply(question, answer if status is None else answer._replace(status=status))
 
-    def busy(self, question: Question, ahead: float) -> None:
+    def busy(self, question: PendingQuestion, ahead: float) -> None:
         """Refuse a question that has no room, for now; ``ahead``: questions for each process."""
         again = round(min(max(self._mean * ahead, 0.05), self._longest_retry), 3)
         busy = f"the service has too many questions; ask again in {again:g} s"
         self.refuse(question, BusyError(busy, again))
 
-    def ending(self, question: Question) -> None:
+    def ending(self, question: PendingQuestion) -> None:
         """Refuse a question because the service is ending."""
-        self.refuse(question, BusyError("the service is ending", self._longest_retry))
+        self.refuse(question, BusyError("the service is shutting down", self._longest_retry))
 
-    def reply(self, question: Question, answer: Answer) -> None:
+    def reply(self, question: PendingQuestion, answer: Answer) -> None:
         """Reply with an answer."""
         if answer.seconds > 0.0:
             # a mean over about 20 questions

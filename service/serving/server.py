@@ -80,10 +80,10 @@ class PlanService:
         # even on one core, what takes long leaves a process to others
         count = max(2, cores()) if workers is None else workers
         if count < 1:
-            raise InvalidInputError(f"must be 1 at least, got {count}", field="workers")
+            raise InvalidInputError(f"must be at least 1, got {count}", field="workers")
         if not 0.0 < seconds <= LONGEST_DEADLINE:
             raise InvalidInputError(
-                f"must be above 0 s and {LONGEST_DEADLINE:g} s at most, got {seconds:g}",
+                f"must be above 0 s and at most {LONGEST_DEADLINE:g} s, got {seconds:g}",
                 field="seconds",
             )
         (self.robot,) = robots_of(robot)

@@ -18,7 +18,7 @@ from weakref import WeakSet
 
 from cachetools import LRUCache
 
-from service.serving.question import Question
+from service.serving.question import PendingQuestion
 from service.serving.settings import SERVING_SETTINGS
 from service.serving.shares import Shares
 from service.wire import ServiceName
@@ -69,7 +69,7 @@ class Costs:
         (seen.again if process in seen.known_to else seen.new).append(seconds)
         seen.known_to.add(process)
 
-    def kind(self, question: Question) -> Kind:
+    def kind(self, question: PendingQuestion) -> Kind:
         """Return the queue in which a question is to wait."""
         if question.name == ServiceName.SET_POINTS:
             return Kind.SET_POINTS
@@ -115,10 +115,10 @@ class Waiting:
 
     def __init__(self, shares: Shares) -> None:
         self._shares = shares
-        self._queues: dict[Kind, list[Question]] = {kind: [] for kind in Kind}
+        self._queues: dict[Kind, list[PendingQuestion]] = {kind: [] for kind in Kind}
         self._turns = deque([Kind.SHORT, Kind.OTHER, Kind.DEAR])
 
-    def __iter__(self) -> Iterator[Question]:
+    def __iter__(self) -> Iterator[PendingQuestion]:
         return chain.from_iterable(self._queues.values())
 
     def __len__(self) -> int:
@@ -128,7 +128,7 @@ class Waiting:
         """Return how many there are, by kind."""
         return {kind.value: len(queue) for kind, queue in self._queues.items()}
 
-    def _fits(self, question: Question) -> bool:
+    def _fits(self, question: PendingQuestion) -> bool:
         """Return whether there is room for a question; bytes are limited only for large ones."""
         size, large = len(question.payload), SERVING_SETTINGS.large_payload
         if size <= large:
@@ -142,7 +142,7 @@ class Waiting:
         fits_own = not own or own + size <= SERVING_SETTINGS.waiting_bytes_of_place
         return not held or (fits_own and fits)
 
-    def put(self, kind: Kind, question: Question) -> Question | None:
+    def put(self, kind: Kind, question: PendingQuestion) -> PendingQuestion | None:
         """Let a question wait; return the one that has no room then: this one, or another's."""
         queue = self._queues[kind]
         clients = Counter((each.place, each.client) for each in queue)
@@ -162,7 +162,7 @@ class Waiting:
         queue.append(question)
         return removed
 
-    def take(self, *kinds: Kind) -> Question | None:
+    def take(self, *kinds: Kind) -> PendingQuestion | None:
         """Return the next question of the first of some kinds that has one that need not wait.
 
         Its place and its client come last among equals of its queue from then on.
@@ -183,7 +183,7 @@ class Waiting:
         # set-points end no process, and others are not to end with one
         return 0.0 if kind is Kind.SET_POINTS else self._shares.waits(place)
 
-    def next(self, *, dear: bool) -> Question | None:
+    def next(self, *, dear: bool) -> PendingQuestion | None:
         """Return the next question of those kinds that have their turns one after another.
 
         Parameters
@@ -202,14 +202,16 @@ class Waiting:
                 return question
         return None
 
-    def take_out(self, wanted: Callable[[Question], bool]) -> list[tuple[Kind, Question]]:
+    def take_out(
+        self, wanted: Callable[[PendingQuestion], bool]
+    ) -> list[tuple[Kind, PendingQuestion]]:
         """Take some questions out, wherever they wait; return them with their queues."""
         found = [(kind, each) for kind, own in self._queues.items() for each in own if wanted(each)]
         for kind, question in found:
             self._queues[kind].remove(question)
         return found
 
-    def remove(self, unwanted: Callable[[Question], bool]) -> list[Question]:
+    def remove(self, unwanted: Callable[[PendingQuestion], bool]) -> list[PendingQuestion]:
         """Take some questions out, wherever they wait; return them."""
         return [question for _, question in self.take_out(unwanted)]
 
@@ -227,7 +229,7 @@ class Waiting:
         return min((each.deadline for each in self), default=math.inf)
 
 
-def _turn_after(question: Question, taken: Question) -> int:
+def _turn_after(question: PendingQuestion, taken: PendingQuestion) -> int:
     """Return when a question has its turn after one that is taken, the first of equals before."""
     if question.place != taken.place:
         return 0

@@ -10,7 +10,7 @@ from typing import Literal
 from planner import Make, PriorityLane, WorkerHandle, resident
 from service.processes import Job
 from service.replies import ProcessHealth
-from service.serving.question import Question
+from service.serving.question import PendingQuestion
 from service.serving.settings import SERVING_SETTINGS
 from service.wire import Answer
 
@@ -48,7 +48,7 @@ class WorkerPool:
 
     def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
         self._make, self.workers, self._memory = make, workers, memory
-        self.work: dict[PriorityLane[Job, Answer], Question | None] = {}
+        self.work: dict[PriorityLane[Job, Answer], PendingQuestion | None] = {}
         self.rests_until = 0.0
         self.failed_starts = 0
         self.start = 0.0
@@ -164,14 +164,14 @@ class WorkerPool:
 
     def stop_worker(
         self, handle: WorkerHandle[Job, Answer], *, dead: bool = False
-    ) -> tuple[str, list[Question]]:
+    ) -> tuple[str, list[PendingQuestion]]:
         """End a process; parameters as for `WorkerHandle.kill`.
 
         Returns
         -------
         how : str
             How it ended.
-        left : list of Question
+        left : list of PendingQuestion
             Questions that it had, and nobody has replied to.
         """
         asked = [self.work.pop(lane, None) for lane in handle.lanes]
@@ -184,7 +184,7 @@ class WorkerPool:
         left = [each for each in asked if each is not None and not each.replied]
         return handle.kill(dead=dead), left
 
-    def left(self) -> list[Question]:
+    def left(self) -> list[PendingQuestion]:
         """Return the questions in work that nobody has replied to."""
         return [each for each in self.work.values() if each is not None and not each.replied]
 

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import msgspec
 
 from service.sweeping.design import Design
-from service.sweeping.rows import Row
+from service.sweeping.rows import SweepRow
 
 __all__ = ["BORDER_TOLERANCE", "Border", "Held", "borders", "held"]
 
@@ -66,14 +66,14 @@ class Held(NamedTuple):
 
 
 def borders(
-    design: Design, rows: Sequence[Row], tolerance: float, plan: Callable[[float], Row]
+    design: Design, rows: Sequence[SweepRow], tolerance: float, plan: Callable[[float], SweepRow]
 ) -> Iterator[Border]:
     """Yield every border that two neighbouring points show, if one number varies alone.
 
     Parameters
     ----------
     design : Design
-    rows : sequence of Row
+    rows : sequence of SweepRow
         Of its points.
     tolerance : float
         Over the range of the number.
@@ -96,13 +96,13 @@ def borders(
 
 
 def _narrowed(
-    holds: Row,
-    fails: Row,
+    holds: SweepRow,
+    fails: SweepRow,
     place: int,
     whole: bool,
     tolerance: float,
-    plan: Callable[[float], Row],
-) -> tuple[Row, Row, int]:
+    plan: Callable[[float], SweepRow],
+) -> tuple[SweepRow, SweepRow, int]:
     """Return two rows that are closer: by interpolation, and every third time bisection."""
     enough = max(tolerance, 1.0) if whole else tolerance
     for plans in itertools.count():
@@ -123,12 +123,12 @@ def _narrowed(
     return holds, fails, plans
 
 
-def held(rows: Sequence[Row], place: int) -> Iterator[Held]:
+def held(rows: Sequence[SweepRow], place: int) -> Iterator[Held]:
     """Yield where rows hold, in the order of a variable, by interpolation between them.
 
     Parameters
     ----------
-    rows : sequence of Row
+    rows : sequence of SweepRow
         That differ in one variable, in its order.
     place : int
         Of that variable in their points.
@@ -140,13 +140,13 @@ def held(rows: Sequence[Row], place: int) -> Iterator[Held]:
             yield Held(low, None if after is None else _between(group[-1], after[0], place))
 
 
-def _between(holds: Row, fails: Row, place: int) -> float:
+def _between(holds: SweepRow, fails: SweepRow, place: int) -> float:
     """Return where utilisation passes its cap between two points, halfway if it is not known."""
     estimate = crossing(holds, fails, place)
     return 0.5 * (at(holds, place) + at(fails, place)) if estimate is None else estimate
 
 
-def crossing(holds: Row, fails: Row, place: int) -> float | None:
+def crossing(holds: SweepRow, fails: SweepRow, place: int) -> float | None:
     """Return where utilisation over its cap passes 1 by linear interpolation; None if unknown."""
     if holds.margin is None or fails.margin is None or not fails.margin > holds.margin:
         return None
@@ -155,7 +155,7 @@ def crossing(holds: Row, fails: Row, place: int) -> float | None:
     return start + min(max(share, 0.0), 1.0) * (at(fails, place) - start)
 
 
-def at(row: Row, place: int) -> float:
+def at(row: SweepRow, place: int) -> float:
     """Return the number that varies in a row."""
     value = row.point[place]
     assert isinstance(value, (int, float))

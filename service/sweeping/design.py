@@ -14,7 +14,7 @@ import numpy as np
 
 from hand_models.base import InvalidInputError, LimitError
 from service.requests import PlanRequest
-from service.sweeping.paths import Paths, Steps, Target, put
+from service.sweeping.paths import Paths, Steps, Target, set_value
 from service.sweeping.variation import Value, Variation
 from service.wire import Format, decode_request
 
@@ -83,11 +83,11 @@ class Design:
             If there are too many points.
         """
         if not variations:
-            raise InvalidInputError("something must vary", field="variations")
+            raise InvalidInputError("at least one is needed", field="variations")
         count = math.prod(len(each.values) for each in variations) if samples is None else samples
         most = 100_000
         if not 1 <= count <= most:
-            raise LimitError(f"{count:,} points; from 1 to {most:,} are asked at once")
+            raise LimitError(f"must be 1 to {most:,} points, got {count:,}")
         asked = msgspec.structs.replace(
             request,
             detail="hands",
@@ -158,7 +158,7 @@ class Design:
         varied: list[Steps] = []
         for target, value in zip(self.targets, point, strict=True):
             for steps in target.steps:
-                put(self._paths.document, steps, value)
+                set_value(self._paths.document, steps, value)
             varied += target.steps
         self._paths.follow(varied)
         return form.encode(self._paths.document)
@@ -204,7 +204,7 @@ def _check_apart(variations: Sequence[Variation], targets: Sequence[Target]) -> 
     ]
     for (first, path), (steps, again) in itertools.combinations(ends, 2):
         if all(map(operator.eq, first, steps)):
-            raise InvalidInputError(f"varies what {path} varies, too", field=again)
+            raise InvalidInputError(f"varies the same field as {path}", field=again)
 
 
 def _whole_numbers(variation: Variation, target: Target) -> Variation:

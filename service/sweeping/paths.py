@@ -18,9 +18,9 @@ from hand_models.base import InvalidInputError
 from hand_models.tile import Surface as Preset
 from planner import EARTH_GRAVITY
 from service.requests import PlanRequest, Stance, Surface
-from service.wire import Place, entered, field_names, places_at
+from service.wire import PossibleType, entered, field_names, places_at
 
-__all__ = ["Paths", "Steps", "Target", "put"]
+__all__ = ["Paths", "Steps", "Target", "set_value"]
 
 Steps = tuple[str | int, ...]
 """Keys and indices from the document to a value."""
@@ -86,7 +86,7 @@ class Paths:
         names = path.replace("[", ".").replace("]", "").split(".")
         if names[0] in _fields(Stance):
             names.insert(0, "stance")
-        found: list[tuple[Steps, list[Place]]] = [((), places_at(PlanRequest, ()))]
+        found: list[tuple[Steps, list[PossibleType]]] = [((), places_at(PlanRequest, ()))]
         for name in names:
             found = [each for end in found for each in self._entered(path, name, *end)]
         for steps, places in found:
@@ -96,7 +96,7 @@ class Paths:
             ):
                 known = ", ".join(self._listed(steps, places, _at(self.document, steps)))
                 more = f"; give one of its entries: {known}" if known else ""
-                raise InvalidInputError(f"is no number or word{more}", field=path)
+                raise InvalidInputError(f"is not a number or a word{more}", field=path)
         steps, places = found[0]
         kinds = {type(each.kind): each.units for each in places}
         units = kinds.get(inspect.FloatType) or kinds.get(inspect.IntType) or self._own_unit(steps)
@@ -114,11 +114,11 @@ class Paths:
             # its parameter file gives these over its shear limit
             for key in ("pull_off_limit", "lateral_limit", "shear_scatter"):
                 if (*steps, key) not in given:
-                    put(self.document, (*steps, key), share * getattr(preset, key))
+                    set_value(self.document, (*steps, key), share * getattr(preset, key))
 
     def _entered(
-        self, path: str, name: str, steps: Steps, places: list[Place]
-    ) -> list[tuple[Steps, list[Place]]]:
+        self, path: str, name: str, steps: Steps, places: list[PossibleType]
+    ) -> list[tuple[Steps, list[PossibleType]]]:
         """Return the entries of a name or index, or all of them, with what may stand there."""
         value = self._opened(path, steps, places)
         places = _meant(places, value)
@@ -126,7 +126,7 @@ class Paths:
         words = self._words(steps)
         if not listed:
             raise InvalidInputError(
-                f"{words} has no entries in the request; give there what is to vary", field=path
+                f"{words} has no entries in the request; add the one to vary", field=path
             )
         free = any(isinstance(each.kind, inspect.DictType) for each in places)
         several = ["*"] if free or isinstance(value, list) else []
@@ -149,7 +149,7 @@ class Paths:
             for step in (dict.fromkeys(known.values()) if name in several else [known[name]])
         ]
 
-    def _opened(self, path: str, steps: Steps, places: list[Place]) -> Any:
+    def _opened(self, path: str, steps: Steps, places: list[PossibleType]) -> Any:
         """Return the value that a path leads through; put there, if it is left out."""
         value = _at(self.document, steps)
         kinds = [each.kind for each in places]
@@ -157,11 +157,11 @@ class Paths:
             value = next(
                 (_default(each) for each in kinds if isinstance(each, inspect.StructType)), {}
             )
-            put(self.document, steps, value)
+            set_value(self.document, steps, value)
         elif isinstance(value, str) and any(_is_surface(kind) for kind in kinds):
             self.presets[steps], preset = value, Preset.named(value)
             value = {key: getattr(preset, key) for key in _fields(Surface)}
-            put(self.document, steps, value)
+            set_value(self.document, steps, value)
         if isinstance(value, (dict, list)):
             return value
         words = self._words(steps)
@@ -169,7 +169,7 @@ class Paths:
             isinstance(kind, (*LISTED_TYPES, inspect.AnyType)) for kind in kinds
         ):
             raise InvalidInputError(
-                f"{words} has no value in the request, of which an entry could vary: give it there",
+                f"{words} has no value in the request; add one to vary its entries",
                 field=path,
             )
         found = f"is {value!r} in the request" if _meant(places, value) else "is a number or a word"
@@ -182,7 +182,7 @@ class Paths:
         unit = entry.get("unit") if isinstance(entry, dict) else None
         return (unit,) if isinstance(unit, str) and steps[4:5] == ("value",) else ()
 
-    def _listed(self, steps: Steps, places: list[Place], value: Any) -> list[str]:
+    def _listed(self, steps: Steps, places: list[PossibleType], value: Any) -> list[str]:
         """Return the names that are valid one step further."""
         limbs = [hand["limb"] for hand in self.document["stance"]["hands"]]
         if isinstance(value, list):
@@ -212,7 +212,7 @@ class Paths:
         return ".".join(words[1:] if words[1:] and words[0] == "stance" else words) or "a request"
 
 
-def put(document: Any, steps: Steps, value: Any) -> None:
+def set_value(document: Any, steps: Steps, value: Any) -> None:
     """Set a value in a document."""
     _at(document, steps[:-1])[steps[-1]] = value
 
@@ -257,7 +257,7 @@ def _is_surface(kind: inspect.Type) -> bool:
     return isinstance(kind, inspect.StructType) and kind.cls is Surface
 
 
-def _meant(places: list[Place], value: Any) -> list[Place]:
+def _meant(places: list[PossibleType], value: Any) -> list[PossibleType]:
     """Return the places of compounds that a value is one of."""
     found = []
     for place in places:

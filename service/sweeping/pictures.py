@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 
 from hand_models.base import Array, whole_file
 from service.sweeping.results import Sweep
-from service.sweeping.rows import Row, State
+from service.sweeping.rows import State, SweepRow
 from service.sweeping.variation import Value, word_of
 
 __all__ = ["plot_sweep"]
@@ -121,7 +121,7 @@ class Side:
             self.words = list(map(word_of, self.values))
         self.places = np.array(range(len(self.words)) if self.words else self.values, float)
 
-    def of(self, rows: Sequence[Row]) -> Array:
+    def of(self, rows: Sequence[SweepRow]) -> Array:
         """Return where rows are along the axis."""
         found = (self.places[self.values.index(row.point[self.place])] for row in rows)
         return np.fromiter(found, float)
@@ -145,7 +145,7 @@ class Side:
             axis.axes.set(**{f"{axis.axis_name}lim": self.edges[[0, -1]]})
 
 
-def _columns(rows: Sequence[Row], x: Side, y: Side | None = None) -> Columns:
+def _columns(rows: Sequence[SweepRow], x: Side, y: Side | None = None) -> Columns:
     """Return what is drawn of rows."""
     found: Columns = {
         name: np.array([getattr(row, name.replace(" ", "_")) for row in rows], float)
@@ -175,7 +175,7 @@ def _legend(figure: Figure, handles: Sequence[Any], title: str | None = None) ->
         figure.legend(handles=handles, title=title, fontsize=9, **place)
 
 
-def _markers(rows: Sequence[Row], colour: str | None = None) -> list[Any]:
+def _markers(rows: Sequence[SweepRow], colour: str | None = None) -> list[Any]:
     """Return the legend of the states that there are, in their colours or in one."""
     return [
         Line2D([], [], ls="", marker=look.marker, color=colour or look.colour, label=look.words)
@@ -284,7 +284,7 @@ def _maps(sweep: Sweep, *pair: int) -> Figure:
     return figure
 
 
-def _colours(rows: Sequence[Row]) -> tuple[dict[str, Any], str]:
+def _colours(rows: Sequence[SweepRow]) -> tuple[dict[str, Any], str]:
     """Return the scale of utilisations, the cap in its middle, and whether some are beyond it.
 
     It is blue where it holds, white at the cap, and red beyond.
@@ -299,7 +299,7 @@ def _colours(rows: Sequence[Row]) -> tuple[dict[str, Any], str]:
     return {"cmap": "RdBu_r", "norm": norm}, "max" if high > top else "neither"
 
 
-def _map_handles(rows: Sequence[Row]) -> list[Any]:
+def _map_handles(rows: Sequence[SweepRow]) -> list[Any]:
     """Return the legend of a map: its border, and cells without a utilisation."""
     handles: list[Any] = []
     if len({row.holds for row in rows if row.state != "error"}) > 1:

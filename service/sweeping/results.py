@@ -15,7 +15,7 @@ from service.bulk import write_csv
 from service.requests import PlanRequest
 from service.sweeping.border import BORDER_TOLERANCE, Border, borders
 from service.sweeping.design import Design
-from service.sweeping.rows import Row, asking, columns_of, rows_at
+from service.sweeping.rows import SweepRow, asking, rows_at, sweep_columns
 from service.sweeping.variation import Variation
 
 if TYPE_CHECKING:
@@ -33,14 +33,14 @@ class Sweep(NamedTuple):
     ----------
     design : Design
         What varies, and where.
-    rows : tuple of Row
+    rows : tuple of SweepRow
         In the order of the design's points.
     borders : tuple of Border
         Where it stops holding, over one variable.
     """
 
     design: Design
-    rows: tuple[Row, ...]
+    rows: tuple[SweepRow, ...]
     borders: tuple[Border, ...] = ()
 
     @property
@@ -51,7 +51,7 @@ class Sweep(NamedTuple):
         return {status: found[status] for status in statuses}
 
     @property
-    def extremes(self) -> tuple[Row, ...]:
+    def extremes(self) -> tuple[SweepRow, ...]:
         """The points of least and of most utilisation; none where no point has one."""
         rows = [row for row in self.rows if row.utilisation is not None]
         return tuple(
@@ -66,7 +66,7 @@ class Sweep(NamedTuple):
         OSError
             If it cannot be written.
         """
-        write_csv(path, columns_of(self.design), (row.cells for row in self.rows))
+        write_csv(path, sweep_columns(self.design), (row.cells for row in self.rows))
 
     def summary(self) -> dict[str, Any]:
         """Return what a program needs to know: what varied, how many hold, and the borders."""
@@ -101,12 +101,12 @@ class Sweep(NamedTuple):
 
 
 def with_borders(
-    design: Design, rows: Sequence[Row], robot: RobotFile | None, tolerance: float
+    design: Design, rows: Sequence[SweepRow], robot: RobotFile | None, tolerance: float
 ) -> Sweep:
     """Return a sweep of which every point is answered, with its borders, which take more plans."""
     ask = asking(1, 1, robot)
 
-    def plan(value: float) -> Row:
+    def plan(value: float) -> SweepRow:
         point = list(design.points[0])
         point[place] = int(value) if design.targets[place].whole else value
         (row,) = rows_at(design, [tuple(point)], ask)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from planner import RobotFile
 
-__all__ = ["Ask", "PointRows", "Row", "State", "asking", "columns_of", "rows_at"]
+__all__ = ["Ask", "PointRows", "State", "SweepRow", "asking", "rows_at", "sweep_columns"]
 
 Ask = Callable[[Iterable[bytes]], Generator[Answer, None, None]]
 """Yields the answers to encoded requests, in order."""
@@ -44,7 +44,7 @@ RESULT_COLUMNS: Final = (
 """Columns after those of what varies."""
 
 
-class Row(msgspec.Struct, frozen=True):
+class SweepRow(msgspec.Struct, frozen=True):
     """Result of one point of a sweep; as in a reply, but for its point and cap.
 
     Attributes
@@ -121,7 +121,7 @@ class Row(msgspec.Struct, frozen=True):
         return [*point, self.status, self.utilisation, factor, *limit, self.complaint]
 
     @classmethod
-    def read(cls, design: Design, point: Point, line: bulk.Row) -> Row:
+    def read(cls, design: Design, point: Point, line: bulk.TableRow) -> SweepRow:
         """Return the row of a point that was written as a line."""
         names = (column.name for column in RESULT_COLUMNS)
         known = dict(zip(names, line.values[len(point) :], strict=True))
@@ -154,20 +154,20 @@ def asking(
     return partial(evaluate, on=place, workers=workers, robot=robot, form=Format.MSGPACK)
 
 
-def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[Row]:
+def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[SweepRow]:
     """Yield the row of each point, in order."""
     answers = ask(design.payload(point) for point in points)
     for point, answer in zip(points, answers, strict=True):
-        yield row_of(design, point, answer.payload)
+        yield sweep_row(design, point, answer.payload)
 
 
-def row_of(design: Design, point: Point, payload: bytes) -> Row:
+def sweep_row(design: Design, point: Point, payload: bytes) -> SweepRow:
     """Return the row of a point whose answer is there."""
-    row = msgspec.msgpack.decode(payload, type=Row)
+    row = msgspec.msgpack.decode(payload, type=SweepRow)
     return msgspec.structs.replace(row, point=point, cap=design.cap(point))
 
 
-def columns_of(design: Design) -> tuple[Column, ...]:
+def sweep_columns(design: Design) -> tuple[Column, ...]:
     """Return the columns of a design's table: what varies, and what that comes to."""
     varied = zip(design.labels, design.variations, design.targets, strict=True)
     return (
@@ -211,7 +211,7 @@ class PointRows(TableLines):
         hand: ParameterTable | None,
         robot: RobotFile | None,
     ) -> None:
-        columns, self._design = columns_of(design), design
+        columns, self._design = sweep_columns(design), design
         about = {
             "stance": bulk.digest_of(msgspec.json.encode(request)),
             "--samples": f"{design.count} of seed {seed}" if design.sampled else "none",
@@ -220,13 +220,13 @@ class PointRows(TableLines):
         header = bulk.new_header(columns, False, hand, robot, about)
         super().__init__(path, columns, header, resume, design)
 
-    def row(self, payload: bytes) -> bulk.Row:
+    def row(self, payload: bytes) -> bulk.TableRow:
         """Return the cells of the point that is next."""
-        row = row_of(self._design, self._design.points[self.tally.count], payload)
-        return bulk.Row(row.cells, None if row.error else row.status, row.error)
+        row = sweep_row(self._design, self._design.points[self.tally.count], payload)
+        return bulk.TableRow(row.cells, None if row.error else row.status, row.error)
 
     @property
-    def points(self) -> list[Row]:
+    def points(self) -> list[SweepRow]:
         """Rows of the points that are answered."""
         pairs = zip(self._design.points, self.rows(), strict=False)
-        return [Row.read(self._design, point, line) for point, line in pairs]
+        return [SweepRow.read(self._design, point, line) for point, line in pairs]

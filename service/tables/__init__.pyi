@@ -20,7 +20,6 @@ from .output_lock import write_alone as write_alone
 from .plans import print_plan as print_plan, print_route as print_route
 from .sweeps import print_sweep as print_sweep
 from .terminal import (
-    draw_plan as draw_plan,
     filling_folder as filling_folder,
     note as note,
     progress as progress,
@@ -31,5 +30,6 @@ from .terminal import (
     verbosity as verbosity,
     waiting as waiting,
     working as working,
+    write_plan_picture as write_plan_picture,
     writing as writing,
 )

@@ -12,14 +12,14 @@ from planner import OTHER_COMPONENTS, WRENCH_COMPONENTS
 from service import replies
 from service.replies import BodySpaceReply
 from service.tables.layout import (
-    Column,
+    PrintedColumn,
+    axis_unit,
     in_colour,
     name,
     number,
     print_rows,
     print_warnings,
     text,
-    unit_of,
 )
 
 __all__ = ["print_body_space"]
@@ -37,7 +37,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
         for axis, value in zip(WRENCH_COMPONENTS, reply.body_wrench, strict=True)
     )
     out.print(f"body wrench asked for (in B): {asked} [N, N·m]")
-    axis = name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}")
+    axis = name("axis", lambda row: f"{row[0]} {axis_unit(row[0][1:])}")
     ends = [number(part, f"1.{part}", "z.1f") for part in ("more", "pure", "extent")]
     title = "how far body wrenches that are held go along the axes of B"
     print_rows(reply.capability.items(), (axis, *ends, _lets_go()), out, title)
@@ -47,7 +47,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     _print_accelerations(reply, out)
 
 
-def _lets_go() -> Column:
+def _lets_go() -> PrintedColumn:
     """Return the column of what lets go first."""
 
     def words(limit: Any) -> str:
@@ -57,7 +57,7 @@ def _lets_go() -> Column:
     return text("first to let go", "1.limiting", words)
 
 
-def _print_section(section: replies.BodySection, out: Console) -> None:
+def _print_section(section: replies.BodySectionReply, out: Console) -> None:
     """Print the size of a plane's part that is held."""
     plane = f"plane of {' and '.join(section.axes)}, {OTHER_COMPONENTS[section.others]}"
     if not section.inner or section.gap is None:
@@ -65,7 +65,7 @@ def _print_section(section: replies.BodySection, out: Console) -> None:
         return
     corners = np.array(section.inner)
     ranges = ", ".join(
-        f"{axis} {low:z.1f} to {high:z.1f} {unit_of(axis)}"
+        f"{axis} {low:z.1f} to {high:z.1f} {axis_unit(axis)}"
         for axis, low, high in zip(
             section.axes, corners.min(axis=0), corners.max(axis=0), strict=True
         )

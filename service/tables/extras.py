@@ -16,29 +16,30 @@ __all__ = [
     "print_advice",
     "robust_sentence",
     "spread_sentence",
-    "within",
+    "with_interval",
     "words_of",
 ]
 
 
 def words_of(advice: Advice, *, holding: bool = False) -> str:
     """Return in words what one change would do; ``holding``: the stance already holds."""
-    what = "would be better" if holding else "would hold" if advice.holds else "would help"
-    return f"{what}, utilisation {advice.utilisation:.2f}: {advice.sentence}"
+    what = "better" if holding else "feasible" if advice.holds else "less overloaded"
+    colon = "" if advice.sentence.startswith("if ") else ":"
+    return f"{what} (utilisation {advice.utilisation:.2f}){colon} {advice.sentence}"
 
 
 def print_advice(reply: PlanReply, out: Console) -> None:
-    """Print the advice of a plan, or that none of the changes that were tried would help."""
+    """Print the advice of a plan, or that no change that was tried lowers the utilisation."""
     holding = reply.status == "optimal"
     # the three best changes
     for advice in islice(reply.advice or (), 3):
         out.print(words_of(advice, holding=holding))
     doubtful = any(each.kind == "unit" for each in reply.findings)
     if reply.advice == [] and "advice" not in reply.unfinished and not doubtful:
-        out.print("of all changes that were tried none would help")
+        out.print("no change that was tried lowers the utilisation")
 
 
-def within(value: float, spread: Quantiles | None) -> str:
+def with_interval(value: float, spread: Quantiles | None) -> str:
     """Return a number with its 5 to 95 % interval, if that is known.
 
     The interval has the first decimal in which its ends differ, the number one more.
@@ -51,31 +52,32 @@ def within(value: float, spread: Quantiles | None) -> str:
 
 def spread_sentence(spread: Spread) -> str:
     """Return in how many samples a stance holds, its largest sensitivity, and what was left out."""
-    said = f"holds in {spread.holds} of {spread.draws} draws"
+    said = f"feasible in {spread.holds} of {spread.draws} samples"
     if spread.cap < 1.0:
         said += f" within a utilisation of {spread.cap:g}"
     # fewer samples correlate by chance
-    if spread.hangs_on and spread.draws >= 10:
-        most = spread.hangs_on[0]
-        said += f"; hangs most on {most.quantity} ({100.0 * most.share:.0f} %)"
+    if spread.sensitive_to and spread.draws >= 10:
+        most = spread.sensitive_to[0]
+        correlation = math.sqrt(most.share)
+        said += f"; most sensitive to {most.quantity} (rank correlation {correlation:.2f})"
     if spread.without:
-        said += f"; {spread.without} {'have' if spread.without > 1 else 'has'} no plan"
+        said += f"; {spread.without} without a plan"
     lost = spread.load_factors.count(None)
     if lost > spread.without:
-        said += f"; {lost} have no load factor"
+        said += f"; {lost} without a load factor"
     return said + _refused(spread.refused)
 
 
 def robust_sentence(robust: RobustLoadFactor) -> str:
     """Return the load factor for places of the hands near the given ones, in a sentence."""
     low, high = robust.tenth_interval
-    said = f"nine in ten above {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
-    said += f"99 in 100 above {robust.hundredth:.3f}"
-    said += f"; {robust.without} hold nothing" if robust.without else ""
+    said = f"10 % quantile {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
+    said += f"1 % quantile {robust.hundredth:.3f}"
+    said += f"; {robust.without} with a load factor of 0" if robust.without else ""
     said += _refused(robust.refused, robust.reasons)
     return (
         f"load factor with each hand up to {1e3 * robust.position:g} mm and "
-        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} draws:\n{said}"
+        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} samples:\n{said}"
     )
 
 

@@ -16,7 +16,7 @@ from hand_models.wrench_spaces import Row
 from planner import Survey
 from service import replies
 from service.replies import WRENCH_AXES
-from service.tables.layout import in_order, name, number, print_rows, text, unit_of
+from service.tables.layout import axis_unit, in_order, name, number, print_rows, text
 
 __all__ = ["print_failures", "print_robust", "print_survey", "print_wrench_space", "survey_json"]
 
@@ -72,7 +72,7 @@ def _print_ends(
 ) -> None:
     """Print the least and the most of each component, from the reach both ways along its axis."""
     heads = [f"{what}{end}" for what in reaches for end in ("least", "most")]
-    rows: list[list[Any]] = [[f"{axis} {unit_of(axis)}"] for axis in WRENCH_AXES]
+    rows: list[list[Any]] = [[f"{axis} {axis_unit(axis)}"] for axis in WRENCH_AXES]
     for row, axis in zip(rows, WRENCH_AXES, strict=True):
         for ways in reaches.values():
             back = ways[f"-{axis}"]
@@ -130,7 +130,7 @@ def _print_closing(reply: replies.WrenchSpaceReply, out: Console) -> None:
     print_rows(rows, columns, out, title)
 
 
-def _nearby_sentence(closing: replies.ClosingSequence) -> str:
+def _nearby_sentence(closing: replies.ClosingSequenceReply) -> str:
     """Return in a sentence which closures a finger has on rock a little elsewhere."""
     ends = f", or {', '.join(closing.nearby)}" if closing.nearby else ""
     return (
@@ -187,7 +187,7 @@ def print_survey(survey: Survey, out: Console) -> None:
 def _print_survey_ends(survey: Survey, out: Console) -> None:
     """Print where the hand lets go along each axis."""
     columns = (
-        name("axis", lambda row: f"{row[0]} {unit_of(row[0][1:])}"),
+        name("axis", lambda row: f"{row[0]} {axis_unit(row[0][1:])}"),
         number("reach", "1.reach", ".2f"),
         *(text(part, f"1.limiting.{part}") for part in ("finger", "phalanx", "limit")),
     )

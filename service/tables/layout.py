@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 __all__ = [
-    "Column",
+    "PrintedColumn",
+    "axis_unit",
     "console",
     "in_colour",
     "in_order",
@@ -21,7 +22,6 @@ __all__ = [
     "print_warnings",
     "short",
     "text",
-    "unit_of",
 ]
 
 
@@ -62,7 +62,7 @@ def short(value: float, digits: int) -> str:
     return f"{value:z.{digits}f}"
 
 
-class Column(NamedTuple):
+class PrintedColumn(NamedTuple):
     """A column of a table.
 
     Attributes
@@ -107,14 +107,14 @@ class Column(NamedTuple):
         return row
 
 
-name = Column
-number = partial(Column, kind="number")
-text = partial(Column, kind="text")
+name = PrintedColumn
+number = partial(PrintedColumn, kind="number")
+text = partial(PrintedColumn, kind="text")
 
 
 def in_order(
     names: Iterable[str], numbers: Iterable[str] = (), texts: Iterable[str] = (), form: str = ""
-) -> list[Column]:
+) -> list[PrintedColumn]:
     """Return columns of rows that are sequences: names, numbers in one form, and texts."""
     columns = [*map(name, names), *map(partial(number, form=form), numbers), *map(text, texts)]
     return [column._replace(value=str(i)) for i, column in enumerate(columns)]
@@ -122,7 +122,7 @@ def in_order(
 
 def print_rows(
     rows: Iterable[Any],
-    columns: Iterable[Column],
+    columns: Iterable[PrintedColumn],
     out: Console,
     title: str = "",
     *,
@@ -137,7 +137,7 @@ def print_rows(
     ----------
     rows : iterable
         Structs, or sequences of cells.
-    columns : iterable of Column
+    columns : iterable of PrintedColumn
     out : Console
     title : str, optional
         Printed above it, in bold.
@@ -177,6 +177,6 @@ def print_rows(
     out.print(table)
 
 
-def unit_of(axis: str) -> str:
+def axis_unit(axis: str) -> str:
     """Return the unit of a component of a wrench."""
     return "N" if axis.startswith("f") else "N·m"

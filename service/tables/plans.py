@@ -14,7 +14,7 @@ from rich.text import Text
 
 import planner
 from service import replies
-from service.tables.extras import robust_sentence, spread_sentence, within
+from service.tables.extras import robust_sentence, spread_sentence, with_interval
 from service.tables.layout import (
     in_colour,
     in_order,
@@ -88,7 +88,7 @@ def _print_prices(prices: Sequence[planner.Price], what: str, out: Console) -> N
         name("limit"),
         number("price", lambda price: f"{price.price:.2g} /{price.unit}"),
     )
-    title = f"what one unit more of a limit would take off the {what}"
+    title = f"decrease of the {what} per unit of a limit"
     most = 8
     if len(prices) > most:
         title += f" ({most} of {len(prices)})"
@@ -99,18 +99,20 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
     """Yield the main numbers of a plan; intervals take the place of less important ones."""
     used, factor = (None, None) if spread is None else (spread.utilisation, spread.load_factor)
     if reply.utilisation is not None:
-        yield f"utilisation {within(reply.utilisation, used)}"
+        yield f"utilisation {with_interval(reply.utilisation, used)}"
     if reply.load_factor is None:
         yield f"load factor {_load_factor(reply)}"
     else:
-        yield f"load factor {within(reply.load_factor, factor)}"
+        yield f"load factor {with_interval(reply.load_factor, factor)}"
     if spread is None:
         if reply.effort is not None:
             yield f"effort {reply.effort:.3g}"
         yield f"{1e3 * reply.time.total:.0f} ms"
 
 
-def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out: Console) -> None:
+def _print_certificate(
+    proof: replies.CertificateReply, needed: Sequence[float], out: Console
+) -> None:
     """Print the missing wrench, the nearest one that is held, and the limits in the way."""
     if proof.shortfall is not None and proof.nearest is not None:
         where = "at any utilisation"
@@ -136,15 +138,15 @@ def _print_certificate(proof: replies.Certificate, needed: Sequence[float], out:
 
 
 def _sufficient_sentence(names: Sequence[planner.LimitName]) -> str:
-    """Return in a sentence which limits, taken away alone, would let the stance be held."""
+    """Return in a sentence which single limits, removed, would make the stance feasible."""
     if not names:
-        return "no single one of them, taken away alone, would do"
+        return "removing no single one of them would make it feasible"
     which = "this one" if len(names) == 1 else "any one of these"
     limits = ", ".join(
         f"{limb} {limit}" + (f" ({', '.join(owners)})" if owners else "")
         for (limb, limit), owners in _alike(names).items()
     )
-    return f"{which}, taken away alone, would let it be held: {limits}"
+    return f"removing {which} would make it feasible: {limits}"
 
 
 def _alike(names: Iterable[planner.LimitName]) -> dict[tuple[str, str], list[str]]:
@@ -174,7 +176,7 @@ def _load_factor(reply: replies.PlanReply) -> str:
     return f"{reply.load_factor:.3f}"
 
 
-def _print_hands(hands: Sequence[replies.Hand], out: Console) -> None:
+def _print_hands(hands: Sequence[replies.HandReply], out: Console) -> None:
     """Print the load of each hand, the twist of floating wrists, and the tendons of each finger."""
     columns = (
         name("hand", "limb"),

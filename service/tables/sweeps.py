@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from rich.console import Console
 
-from service.sweeping import Held, Row, Sweep, held, word_of
+from service.sweeping import Held, Sweep, SweepRow, held, word_of
 from service.tables.layout import in_order, name, number, print_rows, text
 
 __all__ = ["print_sweep"]
@@ -72,14 +72,14 @@ def _print_points(sweep: Sweep, x: int, out: Console) -> None:
         out.print(f"{len(shown)} of {len(rows)} points are shown")
 
 
-def _factor(row: Row) -> str | None:
+def _factor(row: SweepRow) -> str | None:
     """Return a load factor in words."""
     if row.load_factor_unbounded:
         return "any"
     return None if row.load_factor is None else f"{row.load_factor:.3f}"
 
 
-def _limit(row: Row) -> str | None:
+def _limit(row: SweepRow) -> str | None:
     """Return the limit of a plan, or the error of a point."""
     if row.error is not None or row.limiting is None:
         return None if row.error is None else row.error.kind

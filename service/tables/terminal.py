@@ -19,7 +19,6 @@ from service.tables.command_line import VERBOSITY_KEY, ExitStatus
 from service.tables.layout import console
 
 __all__ = [
-    "draw_plan",
     "filling_folder",
     "note",
     "progress",
@@ -30,6 +29,7 @@ __all__ = [
     "verbosity",
     "waiting",
     "working",
+    "write_plan_picture",
     "writing",
 ]
 
@@ -83,7 +83,7 @@ def tell_solver(reply: replies.PlanReply) -> None:
         )
 
 
-def draw_plan(answer: answering.Planned, picture: Path) -> None:
+def write_plan_picture(answer: answering.Planned, picture: Path) -> None:
     """Draw a plan in its stance."""
     with writing(picture):
         planner.plot_plan(answer.plan, answer.question, picture)

@@ -26,7 +26,7 @@ from .keys import (
     service_key as service_key,
 )
 from .validation_errors import (
-    Place as Place,
+    PossibleType as PossibleType,
     Step as Step,
     entered as entered,
     field_names as field_names,

@@ -30,7 +30,7 @@ from service.requests import (
 from service.wire.codec import LATER_FIELDS
 from service.wire.keys import ServiceName, service_key
 
-__all__ = ["MESSAGE_KINDS", "schema"]
+__all__ = ["MESSAGE_KINDS", "part_name", "schema"]
 
 MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
     PlanRequest,
@@ -51,6 +51,10 @@ MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
 )
 
 
+ALIKE: Final = frozenset({"Hand"})
+"""Names of a request's part that a reply's part has too; the reply's keeps its ending ``Reply``."""
+
+
 def schema() -> dict[str, Any]:
     """Return one schema whose ``$defs`` hold every message; a valid document is one of them.
 
@@ -59,12 +63,14 @@ def schema() -> dict[str, Any]:
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGE_KINDS, Quantity), ref_template="#/$defs/{name}"
     )
-    names = {name: _plain_name(name, part["title"]) for name, part in parts.items()}
+    names = {name: part_name(part["title"]) for name, part in parts.items()}
     assert len({*names.values()}) == len(parts)
-    for part in parts.values():
+    for name, part in parts.items():
+        if part["title"].endswith("Reply"):
+            part["title"] = names[name]
         # fields of later versions are left out
-        for name in LATER_FIELDS.keys() & part.get("properties", {}).keys():
-            del part["properties"][name]
+        for field in LATER_FIELDS.keys() & part.get("properties", {}).keys():
+            del part["properties"][field]
         # keep the first sentence of a docstring
         if "description" in part:
             part["description"] = part["description"].partition("\n\n")[0]
@@ -86,10 +92,11 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _plain_name(name: str, title: str) -> str:
-    """Return a part's name without module and parameters; a reply's part gets the suffix Reply."""
-    # a part of a request may have the same name
-    return title.partition("[")[0] + ("Reply" if name.startswith("service.replies.") else "")
+def part_name(title: str) -> str:
+    """Return the schema's name of a class: no parameters, and no Reply after a part of a reply."""
+    name = title.partition("[")[0]
+    short = name.removesuffix("Reply")
+    return name if short in ALIKE or name in {each.__name__ for each in MESSAGE_KINDS} else short
 
 
 def _renamed(part: Any, names: Mapping[str, str]) -> Any:

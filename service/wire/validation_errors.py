@@ -17,7 +17,7 @@ from msgspec import inspect
 from hand_models.base import InvalidInputError
 from service.requests import Later
 
-__all__ = ["Place", "Step", "entered", "field_names", "places_at", "validation_error"]
+__all__ = ["PossibleType", "Step", "entered", "field_names", "places_at", "validation_error"]
 
 Step = str | int | None
 """Step of a path; None for a key that the caller chose."""
@@ -186,7 +186,7 @@ def _plain(match: re.Match[str]) -> str:
     return " or ".join(words.get(word, word) for word in match[1].split(" | "))
 
 
-def _unit_of(places: Iterable[Place]) -> str | None:
+def _unit_of(places: Iterable[PossibleType]) -> str | None:
     """Return the unit that a number at these places has, if they agree on one."""
     numbers = (inspect.FloatType, inspect.IntType)
     units = {place.units for place in places if isinstance(place.kind, numbers)}
@@ -236,14 +236,14 @@ def _values(types: Iterable[inspect.Type]) -> list[str]:
 # Places ------------------------------------------------------------------------------------------
 
 
-class Place(NamedTuple):
+class PossibleType(NamedTuple):
     """Type that is possible at a place, without its metadata, and the units of its numbers."""
 
     kind: inspect.Type
     units: tuple[str, ...]
 
 
-def places_at(kind: type, steps: Iterable[Step]) -> list[Place]:
+def places_at(kind: type, steps: Iterable[Step]) -> list[PossibleType]:
     """Return the types that are possible at the end of a path into a message of a kind."""
     places = list(_bare(_known(kind)))
     for step in steps:
@@ -251,9 +251,9 @@ def places_at(kind: type, steps: Iterable[Step]) -> list[Place]:
     return places
 
 
-def entered(places: Iterable[Place], step: Step) -> list[Place]:
+def entered(places: Iterable[PossibleType], step: Step) -> list[PossibleType]:
     """Return the types that are possible one step further."""
-    found: list[Place] = []
+    found: list[PossibleType] = []
     for place in places:
         parent = place.kind
         if isinstance(parent, inspect.StructType) and isinstance(step, str):
@@ -292,7 +292,7 @@ def _known(kind: Any) -> inspect.Type:
     return inspect.type_info(kind)
 
 
-def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[Place]:
+def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[PossibleType]:
     """Yield a type without its metadata, and each member of a union."""
     if isinstance(kind, inspect.Metadata):
         # one unit, or two of a wrench, forces first
@@ -304,7 +304,7 @@ def _bare(kind: inspect.Type, units: tuple[str, ...] = ()) -> Iterator[Place]:
         for member in kind.types:
             yield from _bare(member, units)
     else:
-        yield Place(kind, units)
+        yield PossibleType(kind, units)
 
 
 def _units_of(units: tuple[str, ...], entry: int, length: int) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from hand_models.experiments import pulling
 from hand_models.studies import load_study
 from service.answering import dispatch
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 
 __all__ = ["KEYS", "ask"]
 
@@ -69,7 +69,7 @@ def _command(problem: dict[str, Any]) -> dict[str, Any]:
         if arguments[0] in ("route", "study"):
             arguments += ["-o", folder]
         with CliRunner().isolation(given) as (out, *_):
-            status = run([*arguments, "--json"])
+            status = run_command_line([*arguments, "--json"])
             told = out.getvalue().decode("utf-8").splitlines()
         tables = {
             file.name: [

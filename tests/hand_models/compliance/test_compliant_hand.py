@@ -203,7 +203,7 @@ def test_an_impossible_preload_is_told_as_a_plain_list():
 def test_a_hand_on_its_nails_cannot_float():
     hold = Edge(fillet_radius=0.002, angle=1.5707963)
     settled = HAND.settle(hold, ROCK, Grasp(fingernail=True))
-    with pytest.raises(UnsupportedError, match="nails"):
+    with pytest.raises(UnsupportedError, match="fingernail"):
         CompliantHand(settled)
 
 

@@ -110,5 +110,5 @@ def test_a_gripper_that_does_not_hold_itself_is_refused():
     weak = replace(
         sandpaper(gripper_table()), shear_limit=1.0, pull_off_limit=0.2, lateral_limit=0.9
     )
-    with pytest.raises(EmptySetError, match="closing alone is too much"):
+    with pytest.raises(EmptySetError, match="the closing tension alone is too large"):
         pull(Gripper(0.3, 37.0, weak), np.array([[0.0, -1.0, 0.0]]))

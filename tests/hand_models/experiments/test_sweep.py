@@ -10,8 +10,8 @@ from hand_models.compliance import gripper_table
 from hand_models.experiments import (
     Axis,
     Conditions,
+    GripperSweep,
     HullPoints,
-    Sweep,
     radius_axes,
     rest_state,
     sharpened,
@@ -20,7 +20,7 @@ from hand_models.experiments import (
 )
 from hand_models.experiments.pictures import entry_name
 from hand_models.parameters import ParameterTable, Quantity, hand_table
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 
 CONDITIONS = Conditions(0.3, 46.0)
 FINE = "concrete-fine"
@@ -59,7 +59,7 @@ def test_both_entries_may_be_of_one_list(table):
 def test_the_surfaces_strength_is_an_entry_where_the_gripper_reads_it(table):
     text = "gripper.shear_limit=10:30:3"
     assert Axis.parse(text, table, "sandpaper-36").unit == "N"
-    with pytest.raises(InvalidInputError, match="reads no"):
+    with pytest.raises(InvalidInputError, match="has no parameter"):
         Axis.parse(text, table, FINE)
 
 
@@ -108,7 +108,7 @@ def test_a_grasp_that_cannot_be_is_a_cell_of_its_own(table):
     found = sweep_map(table, bases, slope, CONDITIONS, ["normal"], quiet)
     assert found["state"].tolist() == [["holds", "no grasp"]] * 2
     with pytest.raises(InvalidInputError, match="too far"):
-        Sweep("gripper.base_half_spacing=0.4:0.5:2", "gripper.pull_off_slope=3:4:2").run(
+        GripperSweep("gripper.base_half_spacing=0.4:0.5:2", "gripper.pull_off_slope=3:4:2").run(
             quiet, hand_table()
         )
 
@@ -118,7 +118,7 @@ def test_a_hand_of_ones_own_is_where_the_sweep_begins():
     radii = hand_table().quantity("finger", "pulley_radii")
     own = Quantity([0.0055, 0.0040, 0.0020], radii.unit, "assumed")
     hand = hand_table().replaced(ParameterTable({"finger": {"pulley_radii": own}}))
-    sweep = Sweep(
+    sweep = GripperSweep(
         "finger.pulley_radii[1]=0.003:0.004:2",
         "finger.pulley_radii[2]=0.001:0.002:2",
         CONDITIONS,
@@ -140,7 +140,7 @@ def test_the_command_draws_a_map_and_leaves_its_numbers(tmp_path, capsys):
         "--y",
         "gripper.base_half_spacing=0.03:0.04:2",
     ]
-    assert run([*arguments, "--measure", "moment", "--measure", "volume"]) == 0
+    assert run_command_line([*arguments, "--measure", "moment", "--measure", "volume"]) == 0
     reply = json.loads(capsys.readouterr().out)
     written = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert reply["data"] == written["data"]
@@ -160,7 +160,7 @@ def test_the_command_draws_a_map_and_leaves_its_numbers(tmp_path, capsys):
 def test_the_command_tells_where_it_is_best(tmp_path, capsys):
     arguments = ["study", "sweep", "-o", str(tmp_path), "--measure", "normal"]
     arguments += ["--x", "gripper.pull_off_slope=2:4:2", "--y", "gripper.entry_friction=0.2:0.3:2"]
-    assert run(arguments) == 0
+    assert run_command_line(arguments) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert "most normal:" in out
     assert "gripper.pull_off_slope = 2 1" in out
@@ -170,8 +170,8 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["--x", "finger.pulley_radii[3]=0.001:0.005:3"], "--x: the gripper reads no"),
-        (["--y", "palm.length=0.1:0.2:3"], "--y: the gripper reads no"),
+        (["--x", "finger.pulley_radii[3]=0.001:0.005:3"], "--x: the gripper has no parameter"),
+        (["--y", "palm.length=0.1:0.2:3"], "--y: the gripper has no parameter"),
         (["--x", "finger.pulley_radii[1]"], "--x: must be SECTION.NAME"),
         (["--x", "finger.pulley_radii[1]=0.001:0.005:2.5"], "--x: must be SECTION.NAME"),
         (["--x", "finger.pulley_radii[1]=0.001:0.002:0.003:3"], "--x: must be SECTION.NAME"),
@@ -182,7 +182,7 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
         (["--x", "gripper.added_radius=0:10:3"], "HIGH must not exceed 1 m"),
         (["--x", "finger.pulley_radii[1]=1:5:3"], "HIGH must not exceed 1 m"),
         (["--x", "finger.pulley_radii[1]=0.001:0.005:1"], "N must be from 2"),
-        (["--x", "finger.pulley_radii[2]=0.001:0.005:3"], "--y: must not be that of --x"),
+        (["--x", "finger.pulley_radii[2]=0.001:0.005:3"], "--y: must differ from --x"),
         (["--measure", "weight"], "--measure: 'weight': valid are shear, normal, moment, volume"),
         (["--surface", "moon"], "surface: unknown surface 'moon'; known are"),
         (["--diameter", "-0.3"], "--diameter: must be from 0.02 to 10 m, got -0.3"),
@@ -193,7 +193,7 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
     ],
 )
 def test_what_cannot_be_swept_is_refused_in_one_line(options, expected, tmp_path, capsys):
-    assert run(["study", "sweep", "-o", str(tmp_path), *options]) == 2
+    assert run_command_line(["study", "sweep", "-o", str(tmp_path), *options]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1
     assert expected in line
@@ -212,7 +212,7 @@ def test_what_cannot_be_swept_is_refused_in_one_line(options, expected, tmp_path
     ],
 )
 def test_other_studies_refuse_the_options_of_a_sweep(option, value, tmp_path, capsys):
-    assert run(["study", "fig06", "-o", str(tmp_path / "new"), option, value]) == 2
+    assert run_command_line(["study", "fig06", "-o", str(tmp_path / "new"), option, value]) == 2
     assert capsys.readouterr().err == f"crux: {option}: only the study sweep takes it, not fig06\n"
     assert not (tmp_path / "new").exists()
 

@@ -10,7 +10,7 @@ from hand_models import Grasp, InvalidInputError, place
 from hand_models.fixed_wrist import (
     TRIAL_WAYS,
     FoundHold,
-    Trial,
+    HoldTrial,
     approach_frame,
     grid_of_trials,
     robustness,
@@ -82,13 +82,13 @@ def test_what_is_found_is_what_a_hand_placed_there_can_carry(wall):
 
 
 def test_the_border_of_a_scan_is_no_edge_to_hold(wall):
-    (found,) = try_holds(HAND, wall, ROCK, [Trial((0.2, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0)])
+    (found,) = try_holds(HAND, wall, ROCK, [HoldTrial((0.2, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0)])
     assert isinstance(found, InvalidInputError)
     assert "the scan ends" in str(found)
 
 
 def test_a_finger_beyond_the_scan_holds_nothing_of_it(wall):
-    trials = [Trial((0.0, y, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0) for y in (0.33, 0.35, 0.4)]
+    trials = [HoldTrial((0.0, y, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0) for y in (0.33, 0.35, 0.4)]
     for found in try_holds(HAND, wall, ROCK, trials):
         assert isinstance(found, InvalidInputError)
 
@@ -107,7 +107,7 @@ def test_the_grid_does_not_depend_on_how_finely_triangles_tell_the_rock():
 
 @pytest.mark.slow
 def test_robust_is_that_of_the_hand(wall):
-    trial = Trial((0.1, 0.1, 0.0), (0.0, 0.0, 1.0), 0.3, 0.0)
+    trial = HoldTrial((0.1, 0.1, 0.0), (0.0, 0.0, 1.0), 0.3, 0.0)
     (found,) = try_holds(HAND, wall, ROCK, [trial], robust=True)
     assert isinstance(found, FoundHold)
     at = approach_frame(trial.point, trial.approach, trial.wrist_angle)

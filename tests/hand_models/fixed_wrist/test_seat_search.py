@@ -126,7 +126,7 @@ def test_a_hand_that_can_be_nowhere_is_told_why():
 
 def test_a_hand_with_a_pose_is_not_seated():
     given = Placement(Edge(0.05, 1.5), ROCK, Grasp(), Pose.identity())
-    with pytest.raises(InvalidInputError, match="leave out the pose") as caught:
+    with pytest.raises(InvalidInputError, match="remove the pose") as caught:
         best_seats(HAND, [given])
     assert caught.value.field == "seat"
 

@@ -162,7 +162,7 @@ def test_few_sets_are_refused():
     ("raw", "field", "message"),
     [
         ({}, None, "at least one entry"),
-        ({"hands": {}}, "hands", "a draw has hand and surfaces"),
+        ({"hands": {}}, "hands", "a sample has hand and surfaces"),
         ({"hand": {"finger": {"reach": own(1.0, "m")}}}, "hand.finger.reach", "unknown entry"),
         ({"hand": {"toe": {}}}, "hand.toe", "unknown section"),
         (

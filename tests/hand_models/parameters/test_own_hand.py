@@ -22,7 +22,7 @@ from planner.robots import robosimian
 from service.answering import dispatch, read_hand, with_hand
 from service.answering.own_models import over_default
 from service.answering.questions import question
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.replies import PlanReply
 from service.requests import PlanRequest
 from service.serving import CruxClient, PlanService, open_session, zenoh_config
@@ -201,7 +201,7 @@ def test_a_file_with_the_bundled_numbers_gives_the_same_plan(
         )
     replies = []
     for more in ([], ["--hand", file(text)]):
-        assert run(["plan", stance, "--json", *more]) == 0
+        assert run_command_line(["plan", stance, "--json", *more]) == 0
         replies.append(msgspec.json.decode(capfd.readouterr().out))
     for reply in replies:
         del reply["time"]
@@ -322,7 +322,7 @@ def test_a_bad_file_is_refused_in_one_line(
 ) -> None:
     text, complaint = BAD[what]
     path = file(text)
-    assert run(["plan", "wall-300", "--hand", path]) == 2
+    assert run_command_line(["plan", "wall-300", "--hand", path]) == 2
     out, err = capfd.readouterr()
     assert out == ""
     assert err.startswith(f"crux: {path}: {complaint}")
@@ -337,7 +337,9 @@ def test_a_file_that_is_none_is_refused(
     path = tmp_path / name
     with pytest.raises(InvalidInputError):
         load_own_hand(path)
-    assert run(["study", "fig06", "-o", str(tmp_path / "out"), "--hand", str(path)]) == 2
+    assert (
+        run_command_line(["study", "fig06", "-o", str(tmp_path / "out"), "--hand", str(path)]) == 2
+    )
     assert capfd.readouterr().err.startswith(f"crux: {path}: ")
     assert not (tmp_path / "out").exists()
 
@@ -352,10 +354,10 @@ def told(capfd: pytest.CaptureFixture[str]) -> dict:
 
 
 def test_a_plan_is_for_the_hand_of_the_file(file, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["plan", "wall-300", "--json"]) == 0
+    assert run_command_line(["plan", "wall-300", "--json"]) == 0
     assert told(capfd)["limiting"]["limit"] != "tendon_tension"
     path = file(entry_toml("tendon", "maximum_tension", 60.0))
-    assert run(["plan", "wall-300", "--json", "--hand", path]) == 3
+    assert run_command_line(["plan", "wall-300", "--json", "--hand", path]) == 3
     reply = told(capfd)
     assert reply["limiting"]["limit"] == "tendon_tension"
     tensions = [f["tendon_tension"] for hand in reply["hands"] for f in hand["fingers"]]
@@ -368,7 +370,9 @@ def test_the_file_has_the_last_word_over_the_stance(
     request = put(wall_request(None), ("stance", "hand"), msgspec.to_builtins(THICK.sections))
     request["stance"]["hand"]["hand"] = {"mass": {"value": 9.0, "unit": "kg", "source": "assumed"}}
     stance = file(json.dumps(request), "stance.json")
-    assert run(["plan", stance, "--json", "--hand", file(entry_toml("hand", "mass", 4.6))]) in (
+    assert run_command_line(
+        ["plan", stance, "--json", "--hand", file(entry_toml("hand", "mass", 4.6))]
+    ) in (
         0,
         3,
     )
@@ -376,15 +380,15 @@ def test_the_file_has_the_last_word_over_the_stance(
     got = told(capfd)
     np.testing.assert_allclose(np.linalg.norm(got["body_wrench"][:3]), weight, rtol=1e-9)
     both = own_hand(THICK.replaced(own("hand", "mass", 4.6)))
-    want = dispatch.plan(with_hand(request_for(mass=None), both))
+    want = dispatch.answer_plan(with_hand(request_for(mass=None), both))
     assert got["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
 
 
 def test_one_file_is_a_hand_and_a_limb_is_none(file, capfd: pytest.CaptureFixture[str]) -> None:
     path = file(entry_toml("hand", "mass", 3.0))
-    assert run(["plan", "wall-300", "--hand", path, "--hand", path]) == 2
+    assert run_command_line(["plan", "wall-300", "--hand", path, "--hand", path]) == 2
     assert f"one FILE at most, got {path}, {path}" in capfd.readouterr().err
-    assert run(["plan", "wall-300", "--hand", "front_left"]) == 2
+    assert run_command_line(["plan", "wall-300", "--hand", "front_left"]) == 2
     assert "a FILE with numbers of a hand is wanted" in capfd.readouterr().err
 
 
@@ -392,12 +396,15 @@ def test_a_wrench_space_takes_a_limb_and_a_file(file, capfd: pytest.CaptureFixtu
     path = file(entry_toml("tendon", "maximum_tension", 60.0))
     limits = {}
     for more in ([], ["--hand", path]):
-        assert run(["wrench-space", "wall-300", "--json", "--hand", "front_left", *more]) == 0
+        assert (
+            run_command_line(["wrench-space", "wall-300", "--json", "--hand", "front_left", *more])
+            == 0
+        )
         rows = told(capfd)["rows"]
         limits[len(more)] = {row["capacity"] for row in rows if row["limit"] == "tendon_tension"}
     assert limits == {0: {700.0}, 2: {60.0}}
     for given in (["--hand", path], ["--hand", "front_left", "--hand", "rear_left"]):
-        assert run(["wrench-space", "wall-300", *given]) == 2
+        assert run_command_line(["wrench-space", "wall-300", *given]) == 2
         assert "one LIMB and at most one FILE that ends in .toml" in capfd.readouterr().err
 
 
@@ -409,7 +416,7 @@ def test_a_route_is_climbed_with_the_hand(
     tables = {}
     for workers in ("1", "2"):
         flags = ["--json", "--hand", path, "--workers", workers]
-        assert run(["route", "six-moves", "-o", str(tmp_path / workers), *flags]) == 3
+        assert run_command_line(["route", "six-moves", "-o", str(tmp_path / workers), *flags]) == 3
         assert told(capfd)["feasible"] is False
         tables[workers] = (tmp_path / workers / "stages.csv").read_text()
     assert tables["1"] == tables["2"]
@@ -421,7 +428,9 @@ def test_the_demo_asks_for_the_hand(
     file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = file(entry_toml("tendon", "maximum_tension", 60.0))
-    assert run(["demo", "-o", str(tmp_path / "demo.png"), "--json", "--hand", path]) == 3
+    assert (
+        run_command_line(["demo", "-o", str(tmp_path / "demo.png"), "--json", "--hand", path]) == 3
+    )
     assert told(capfd)["limiting"]["limit"] == "tendon_tension"
     assert (tmp_path / "demo.png").read_bytes().startswith(b"\x89PNG")
 
@@ -430,7 +439,7 @@ def test_a_study_is_of_the_hand_and_says_so(
     file, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = file(entry_toml("palm", "spring_stiffness", 400.0))
-    assert run(["study", "fig06", "-o", str(tmp_path), "--json", "--hand", path]) == 0
+    assert run_command_line(["study", "fig06", "-o", str(tmp_path), "--json", "--hand", path]) == 0
     reply = told(capfd)
     assert reply["hand"]["palm"]["spring_stiffness"]["value"] == 400.0
     k1, k2, mu, kp = 2200.0, 1400.0, 0.34, 400.0
@@ -446,12 +455,12 @@ def test_the_studies_of_the_palm_bear_any_possible_palm(
 ) -> None:
     path = file(entry_toml("palm", "pulley_friction", friction))
     for name in ("fig06", "fig07"):
-        assert run(["study", name, "-o", str(tmp_path), "--json", "--hand", path]) == 0
+        assert run_command_line(["study", name, "-o", str(tmp_path), "--json", "--hand", path]) == 0
         assert told(capfd)["data"]["friction"] == friction
 
 
 def test_the_help_of_study_lists_the_studies(capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["study", "--help"]) == 0
+    assert run_command_line(["study", "--help"]) == 0
     text = " ".join(capfd.readouterr().out.split())
     assert "NAME is one of fig06, fig07, fig10" in text
 
@@ -468,7 +477,7 @@ def alone() -> Iterator[zenoh.Session]:
 @pytest.mark.slow
 def test_two_hands_ask_one_service_and_do_not_disturb_each_other(alone: zenoh.Session) -> None:
     asked = [request_for(), request_for(THICK), request_for(WEAK), request_for(THICK, WEAK)]
-    want = [untimed(dispatch.plan(request)) for request in asked]
+    want = [untimed(dispatch.answer_plan(request)) for request in asked]
     assert len({reply["utilisation"] for reply in want}) >= 2
     order = [i for _ in range(5) for i in (0, 1, 2, 3, 1, 0)]
     with PlanService(alone, workers=1), ThreadPoolExecutor(4) as pool:
@@ -501,16 +510,18 @@ def test_a_service_has_a_hand_of_its_own_and_a_request_the_last_word(
         with zenoh.open(client_config(served.endpoint)) as session:
             client = CruxClient(session, timeout=PATIENCE)
             for request in (plain, with_hand(plain, THICK), with_hand(plain, heavy)):
-                want = dispatch.plan(over_default(request, default))
+                want = dispatch.answer_plan(over_default(request, default))
                 assert untimed(client.plan(request)) == untimed(want)
             back = own("structure", "held_mass", 50.0)
-            assert untimed(client.plan(with_hand(plain, back))) == untimed(dispatch.plan(plain))
+            assert untimed(client.plan(with_hand(plain, back))) == untimed(
+                dispatch.answer_plan(plain)
+            )
         stance = file(json.dumps(wall_request(HEAVY)), "stance.json")
         flags = ["-m", "client", "-e", served.endpoint, "--no-multicast-scouting"]
         flags += ["--timeout", str(PATIENCE)]
         hand = file(entry_toml("structure", "held_mass", 45.0), "mine.toml")
-        assert run(["query", stance, *flags, "--json", "--hand", hand]) in (0, 3)
-        want = dispatch.plan(with_hand(plain, own("structure", "held_mass", 45.0)))
+        assert run_command_line(["query", stance, *flags, "--json", "--hand", hand]) in (0, 3)
+        want = dispatch.answer_plan(with_hand(plain, own("structure", "held_mass", 45.0)))
         assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
     finally:
         served.stop(signal.SIGTERM)

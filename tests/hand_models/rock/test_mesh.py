@@ -278,7 +278,7 @@ def test_a_cut_without_end_is_refused():
         faces[:, ::-1],
         faces,
     )
-    with pytest.raises(InvalidInputError, match="at most 4 m is possible") as caught:
+    with pytest.raises(InvalidInputError, match="the maximum is 4 m") as caught:
         HAND.settle(Mesh(soup, faces), ROCK)
     assert caught.value.field == "hold"
 

@@ -123,7 +123,11 @@ def test_a_section_never_leaves_raw_rock_outside(seed):
         ([[-0.1, 0.0], [0.1, 0.1], [0.1, 0.0], [-0.1, 0.1], [0.2, 0.3]], "points", "crosses"),
         ([[-0.1, 0.0], [0.2, 0.0], [0.1, 0.0], [0.3, 0.1]], "points", "crosses"),
         ([[-0.1, 0.0], [0.1, 0.1], [0.1, 0.0], [-0.1, 0.0], [0.2, 0.3]], "points", "crosses"),
-        (np.column_stack([np.arange(50) / 100, np.arange(50) % 2]), "points", "at most 10 times"),
+        (
+            np.column_stack([np.arange(50) / 100, np.arange(50) % 2]),
+            "points",
+            "maximum is 10 times",
+        ),
         ({"outer_left": [[0.0, 0.0], [0.1, 0.0]]}, "profiles", "one outline for each of"),
         (
             {name: [[0.0, 0.0], [0.1, 0.0]][: 1 + (name != "inner_right")] for name in STRIP_NAMES},

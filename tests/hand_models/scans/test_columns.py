@@ -52,15 +52,18 @@ def test_every_usual_table_has_the_points_that_were_written(text, encoding, tmp_
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (table(",", ","), "commas are between the columns and in the numbers"),
-        ("".join(f"{i} 1.5 2.5 3.5\n" for i in range(1, 5)), "the first column counts the points"),
+        (table(",", ","), "commas separate the columns and are in the numbers"),
+        (
+            "".join(f"{i} 1.5 2.5 3.5\n" for i in range(1, 5)),
+            "the first column is the index",
+        ),
         ("lat,lon,alt\n47.1,8.1,300\n47.2,8.2,301\n", "column lat is in degrees"),
         ("id;longitude;latitude;h\n1;8.1;47.1;300\n2;8.2;47.2;301\n", "is in degrees"),
-        ("a,b,c,d\n1,2,3,4\n5,6,7,8\n", "which columns are x, y and z does not follow"),
+        ("a,b,c,d\n1,2,3,4\n5,6,7,8\n", "no columns are named x, y and z, got a, b, c, d"),
         ("x,y,z\n1,2,3\n4,5\n6,7,8\n", "line 3, '4,5', has 2 columns, 3 are needed"),
         ("x,y,z,i\n1,2,3\n4,5,6\n6,7,8\n", "4 columns have names, and the next line has 3"),
-        ("1 2\n3 4\n5 6\n", "no three numbers in a line"),
-        ("POINT (1 2 3)\nPOINT (4 5 6)\n", "no three numbers in a line"),
+        ("1 2\n3 4\n5 6\n", "no line has three numbers"),
+        ("POINT (1 2 3)\nPOINT (4 5 6)\n", "no line has three numbers"),
         ("1 2 3\n4 5 6\n7 8 1e38\n", "write nan"),
     ],
 )

@@ -120,9 +120,9 @@ def test_unit_up_origin_and_vertices_without_numbers(tmp_path):
 
 def test_triangles_take_no_options_of_points(tmp_path):
     scan = read_scan(written(surface(), tmp_path / "wall.ply"))
-    with pytest.raises(InvalidInputError, match=r"^spacing: is of points"):
+    with pytest.raises(InvalidInputError, match=r"^spacing: is for points"):
         mesh_scan(scan, spacing=0.01)
-    with pytest.raises(InvalidInputError, match=r"^std_ratio: is of points"):
+    with pytest.raises(InvalidInputError, match=r"^std_ratio: is for points"):
         drop_outliers(scan, 2.0)
     cloud = read_scan(write_cloud(tmp_path / "cloud.ply", wall(0.01)), view=(0, 1, 0))
     assert cloud.faces is None

@@ -71,9 +71,9 @@ def test_a_viewpoint_that_is_no_pose_is_refused(pose, tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"pose": "0 0 0"}, "VIEWPOINT of its header is to be seven numbers, .* got 0 0 0: "),
-        ({"kind": "F F Q"}, "TYPE of its header is to be F, I or U of each field, got F F Q: "),
-        ({"kind": "F F"}, "TYPE of its header"),
+        ({"pose": "0 0 0"}, "VIEWPOINT of the header must be seven numbers, .* got 0 0 0: "),
+        ({"kind": "F F Q"}, "TYPE of the header must be F, I or U for each field, got F F Q: "),
+        ({"kind": "F F"}, "TYPE of the header"),
     ],
 )
 def test_a_line_of_the_header_that_is_wrong_is_named(change, words, tmp_path):

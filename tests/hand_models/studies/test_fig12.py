@@ -7,7 +7,7 @@ import pytest
 
 from hand_models.compliance import Gripper
 from hand_models.studies.fig12 import balance_matrix
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from tests.hand_models.studies.runs import check_written, studied
 
 
@@ -73,7 +73,7 @@ def test_the_pull_ends_at_the_limit_of_the_phalanx_named(study):
 
 @pytest.mark.slow
 def test_the_command_writes_it(tmp_path, capsys):
-    assert run(["study", "fig12", "-o", str(tmp_path / "out"), "--json"]) == 0
+    assert run_command_line(["study", "fig12", "-o", str(tmp_path / "out"), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["name"] == "fig12"
     assert sorted(f.name for f in (tmp_path / "out").iterdir()) == ["fig12.png", "result.json"]

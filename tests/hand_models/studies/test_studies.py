@@ -11,7 +11,7 @@ from hand_models import InvalidInputError
 from hand_models.experiments import PalmExperiment
 from hand_models.parameters import hand_table
 from hand_models.studies import STUDY_MODULES, load_study
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from tests.hand_models.studies.runs import check_written
 
 PALM_STUDIES = ("fig06", "fig07")
@@ -127,7 +127,7 @@ def test_a_study_leaves_its_result_and_pictures():
 
 def test_the_command_prints_the_claims_in_80_columns(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    assert run(["study", "fig07", "-o", str(tmp_path)]) == 0
+    assert run_command_line(["study", "fig07", "-o", str(tmp_path)]) == 0
     out, said = capsys.readouterr()
     assert said == "crux: study fig07: started; it may take minutes\n"
     table = out.split("not tested:")[0]
@@ -138,7 +138,7 @@ def test_the_command_prints_the_claims_in_80_columns(tmp_path, capsys, monkeypat
 
 
 def test_the_command_prints_json_and_nothing_else(tmp_path, capsys):
-    assert run(["study", "fig06", "-o", str(tmp_path), "--json"]) == 0
+    assert run_command_line(["study", "fig06", "-o", str(tmp_path), "--json"]) == 0
     captured = capsys.readouterr()
     reply = json.loads(captured.out)
     assert captured.err == ""
@@ -154,7 +154,7 @@ def test_the_command_prints_json_and_nothing_else(tmp_path, capsys):
 def test_a_study_that_does_not_exist_is_refused_with_those_that_do(tmp_path, capsys):
     with pytest.raises(InvalidInputError):
         load_study("fig99")
-    assert run(["study", "fig99", "-o", str(tmp_path / "out")]) == 2
+    assert run_command_line(["study", "fig99", "-o", str(tmp_path / "out")]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1
     assert all(name in line for name in (*STUDY_MODULES, "fig99"))
@@ -164,5 +164,5 @@ def test_a_study_that_does_not_exist_is_refused_with_those_that_do(tmp_path, cap
 @pytest.mark.parametrize("below", ["file", "file/folder"])
 def test_a_folder_that_cannot_be_written_is_refused_in_one_line(below, tmp_path, capsys):
     (tmp_path / "file").write_text("", encoding="utf-8")
-    assert run(["study", "fig06", "-o", str(tmp_path / below)]) == 2
+    assert run_command_line(["study", "fig06", "-o", str(tmp_path / below)]) == 2
     assert capsys.readouterr().err.count("\n") == 1

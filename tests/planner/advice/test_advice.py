@@ -60,7 +60,7 @@ def asked() -> PlanRequest:
 
 @pytest.fixture(scope="module")
 def reply(asked):
-    return answering.plan(asked)
+    return answering.answer_plan(asked)
 
 
 def of_kind(told, kind: str) -> list[Advice]:
@@ -73,7 +73,7 @@ def test_each_advice_gives_what_it_promised_when_its_request_is_planned(asked, r
     for sent in reply.advice:
         told = msgspec.json.decode(msgspec.json.encode(sent), type=Advice)
         written = msgspec.json.encode(advised(asked, told))
-        answer = answering.plan(msgspec.json.decode(written, type=PlanRequest))
+        answer = answering.answer_plan(msgspec.json.decode(written, type=PlanRequest))
         assert answer.verified
         assert answer.status == told.status
         assert answer.utilisation == pytest.approx(told.utilisation, abs=1e-6)
@@ -363,4 +363,4 @@ def test_nothing_is_advised_that_is_far_from_holding_or_while_a_unit_is_in_doubt
     in_millimetres = replace(asked, load=Load(com=(0.33, -0.82, -132.9)))
     answer = plan(in_millimetres)
     assert answer.advice == ()
-    assert answer.warnings[-1] == "no advice is looked for while a unit is in doubt: load.com"
+    assert answer.warnings[-1] == "no search for advice while a unit is in doubt: load.com"

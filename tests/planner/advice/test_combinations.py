@@ -86,5 +86,5 @@ def test_hands_of_several_free_limbs_are_put_together():
         *(each for each in first.limbs if each != hand.limb),
     ]
     assert planned(there).utilisation == pytest.approx(first.utilisation, abs=1e-6)
-    written = answering.plan(advised(message, first))
+    written = answering.answer_plan(advised(message, first))
     assert written.utilisation == pytest.approx(first.utilisation, abs=1e-6)

@@ -21,7 +21,7 @@ from planner.programs import CAP_SLACK
 from planner.question import ForceCap, Limits, Load, Question
 from planner.solving import plan
 from service.answering import dispatch, questions
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.replies import BodySpaceReply, ErrorReply
 from service.requests import PlanRequest
 from service.wire import Format, decode_request
@@ -560,10 +560,12 @@ def test_requests_are_strict(more, field, text):
 
 def test_the_command_prints_what_the_reply_says(stance_file, capfd):
     path = stance_file(wall_request())
-    assert run(["body-space", path, "--axes", "fy,fz", "--projection", "--json"]) == DONE
+    assert (
+        run_command_line(["body-space", path, "--axes", "fy,fz", "--projection", "--json"]) == DONE
+    )
     reply = msgspec.convert(result(capfd), BodySpaceReply)
     assert (reply.section.axes, reply.section.others) == (["fy", "fz"], "free")
-    assert run(["body-space", path, "--axes", "fy,fz", "--projection"]) == DONE
+    assert run_command_line(["body-space", path, "--axes", "fy,fz", "--projection"]) == DONE
     out, err = capfd.readouterr()
     assert err == ""
     assert max(len(line) for line in out.splitlines()) <= 80
@@ -585,13 +587,13 @@ def test_the_command_draws(stance_file, tmp_path: Path, capfd):
     ):
         picture = tmp_path / name
         arguments = ["body-space", stance_file(request), "--pure", "--json", "--plot", str(picture)]
-        assert run(arguments) == status
+        assert run_command_line(arguments) == status
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert result(capfd)["section"]["others"] == "zero"
 
 
 def test_an_overloaded_body_ends_with_three(stance_file, capfd):
-    assert run(["body-space", stance_file(wall_request(HEAVY))]) == OVERLOADED
+    assert run_command_line(["body-space", stance_file(wall_request(HEAVY))]) == OVERLOADED
     out, _ = capfd.readouterr()
     assert "OVERLOADED" in out
     assert "cannot be held at rest" in out
@@ -599,5 +601,7 @@ def test_an_overloaded_body_ends_with_three(stance_file, capfd):
 
 @pytest.mark.parametrize("axes", ["fx", "fx,fx", "fx,fq", "fx,fy,fz", ""])
 def test_wrong_axes_are_one_line(stance_file, axes, capfd):
-    assert run(["body-space", stance_file(wall_request()), "--axes", axes]) == BAD_INPUT
+    assert (
+        run_command_line(["body-space", stance_file(wall_request()), "--axes", axes]) == BAD_INPUT
+    )
     assert "two different ones of fx, fy, fz, mx, my, mz" in complaint(capfd)

@@ -11,7 +11,7 @@ import pytest
 from hand_models.parameters import bundled_draws, experiment_table, hand_table, own_draw
 from hand_models.studies import run_study
 from planner.capability import MeasurementStudy, measured, measurements, widths
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.studies import STUDY_NAMES
 from tests.suite.helpers.commands import BAD_INPUT, complaint, result
 from tests.suite.helpers.stances import ask, on_wall
@@ -122,7 +122,7 @@ def test_a_run_ranks_all_measurements(pulled, tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_the_command_finds_it_beside_the_studies_of_one_hand(tmp_path, capfd):
-    assert run(["study", "measure", "-o", str(tmp_path), "--json"]) == 0
+    assert run_command_line(["study", "measure", "-o", str(tmp_path), "--json"]) == 0
     found = result(capfd)
     assert "boulders" in found["data"]["stances"]
     assert "wall-300-floating" not in found["data"]["stances"]
@@ -131,8 +131,10 @@ def test_the_command_finds_it_beside_the_studies_of_one_hand(tmp_path, capfd):
 
 def test_the_command_names_it_among_the_studies(tmp_path, capfd):
     assert "measure" in STUDY_NAMES
-    assert run(["study", "measures", "-o", str(tmp_path)]) == BAD_INPUT
+    assert run_command_line(["study", "measures", "-o", str(tmp_path)]) == BAD_INPUT
     told = complaint(capfd)
     assert all(name in told for name in STUDY_NAMES)
-    assert run(["study", "measure", "-o", str(tmp_path), "--tension", "40"]) == BAD_INPUT
+    assert (
+        run_command_line(["study", "measure", "-o", str(tmp_path), "--tension", "40"]) == BAD_INPUT
+    )
     assert "only the study sweep takes it, not measure" in complaint(capfd)

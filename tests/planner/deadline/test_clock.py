@@ -37,7 +37,7 @@ from planner.solving import (
 )
 from service import answering
 from service.answering import dispatch, questions
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from service.serving import CruxClient
 from service.wire import ServiceError
@@ -162,7 +162,7 @@ def test_no_linear_program_begins_after_the_end(clock):
 def test_the_error_says_how_long_and_what_was_missing_also_after_a_journey():
     error = pickle.loads(pickle.dumps(DeadlineError(0.005, "a plan was found")))
     assert (error.seconds, error.missing, error.field) == (0.005, "a plan was found", "deadline")
-    assert str(error) == "deadline: 0.005 s were over before a plan was found; allow longer"
+    assert str(error) == "deadline: 0.005 s expired before a plan was found; give a longer deadline"
 
 
 def test_a_deadline_that_cannot_be_is_bad_input():
@@ -216,7 +216,7 @@ def test_the_load_factor_is_left_out(monkeypatch, clock):
     assert answer.verified
     assert answer.utilisation == pytest.approx(in_time("plain").utilisation, rel=1e-9)
     assert answer.prices == in_time("plain").prices
-    assert told(answer) == f"the deadline of {LONG:g} s came before the load factor was found"
+    assert told(answer) == f"the deadline of {LONG:g} s expired before the load factor was found"
 
 
 def test_the_robust_load_factor_is_left_out_and_nothing_else(monkeypatch, clock, few_places):
@@ -464,7 +464,7 @@ def test_the_clock_of_a_query_starts_where_it_is_taken():
     assert not reply["good"]
     assert reply["error"]["kind"] == "deadline"
     assert reply["error"]["field"] == "deadline"
-    assert reply["error"]["message"].startswith("500 s were over before ")
+    assert reply["error"]["message"].startswith("500 s expired before ")
 
 
 def test_a_deadline_that_cannot_be_is_refused_by_name():
@@ -485,29 +485,29 @@ def test_a_deadline_that_is_no_number_is_refused_by_name():
 def test_on_the_command_line_a_deadline_that_is_too_short_is_a_failure(tmp_path, capfd):
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request() | {"deadline": 1e-6}))
-    assert run(["plan", str(path), "--json"]) == 1
+    assert run_command_line(["plan", str(path), "--json"]) == 1
     out, err = capfd.readouterr()
     assert out == ""
-    assert err.startswith("crux: deadline: 1e-06 s were over before the hands were closed")
-    assert err.endswith("; allow longer\n")
+    assert err.startswith("crux: deadline: 1e-06 s expired before the hands were closed")
+    assert err.endswith("; give a longer deadline\n")
     assert err.count("\n") == 1
 
 
 def test_on_the_command_line_the_plan_without_palms_may_come_too_late(tmp_path, capfd, monkeypatch):
-    original = answering.plan
+    original = answering.answer_plan
 
     def plan_late(request, robots):
         with deadline.within(1e-9):
             return original(request, robots)
 
-    monkeypatch.setattr(answering, "plan", plan_late)
+    monkeypatch.setattr(answering, "answer_plan", plan_late)
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request() | {"deadline": LONG}))
-    assert run(["plan", str(path), "--json"]) == 0
+    assert run_command_line(["plan", str(path), "--json"]) == 0
     reply = json.loads(capfd.readouterr().out)
     assert reply["load_factor_without_palm"] is None
     assert reply["load_factor"] > 1.0
-    assert run(["plan", str(path)]) == 0
+    assert run_command_line(["plan", str(path)]) == 0
     assert "load factor without the palms" not in capfd.readouterr().out
 
 
@@ -518,7 +518,7 @@ def test_a_service_keeps_deadlines():
         with CruxClient(client_config(server.endpoint), timeout=PATIENCE) as client:
             known = client.plan(plan_request())
             asked = plan_request(wall_request() | {"deadline": 1e-4})
-            with pytest.raises(ServiceError, match=r"were over before .*; allow longer") as caught:
+            with pytest.raises(ServiceError, match=r"expired before .*; give") as caught:
                 client.plan(asked)
             assert (caught.value.kind, caught.value.field) == ("deadline", "deadline")
             reply = client.plan(plan_request(wall_request(HEAVY) | {"deadline": LONG}))

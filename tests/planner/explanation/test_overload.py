@@ -20,7 +20,7 @@ from planner.robots import robosimian
 from planner.solving import plan
 from service.answering import questions
 from service.answering.answers import plan_reply
-from service.replies import Certificate, PlanReply
+from service.replies import CertificateReply, PlanReply
 from service.requests import PlanRequest
 from service.tables import print_plan
 from tests.suite.helpers import peer
@@ -202,7 +202,7 @@ def test_the_callers_own_limit_comes_first_and_is_told_if_it_alone_is_in_the_way
     alone = {n for n in proof.irreducible if have_loads(parts, parts.constraints - {n})}
     assert own in alone
     assert set(proof.sufficient) == alone
-    assert f"would let it be held: {limb} force_cap" in printed(answer)
+    assert f"would make it feasible: {limb} force_cap" in printed(answer)
 
 
 def test_limits_come_before_what_hands_cannot_do():
@@ -221,7 +221,7 @@ def test_what_no_single_limit_is_to_blame_for_is_told_so_in_words():
     assert answer.status == "infeasible"
     assert answer.certificate.sufficient == ()
     told = printed(answer)
-    assert "no single one of them, taken away alone, would do" in told
+    assert "removing no single one of them would make it feasible" in told
     assert "dragged_backwards: tile cannot be dragged away from the finger's base" in told
 
 
@@ -246,7 +246,7 @@ def test_weak_joints_are_named():
 # As it travels ----------------------------------------------------------------------------------
 
 
-def reply_of(request: dict) -> tuple[PlanReply, Certificate]:
+def reply_of(request: dict) -> tuple[PlanReply, CertificateReply]:
     question = questions.question(msgspec.convert(request, PlanRequest))
     reply = plan_reply(plan(question), None, model=True)
     read = msgspec.json.decode(msgspec.json.encode(reply), type=PlanReply)

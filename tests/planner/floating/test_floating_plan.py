@@ -332,4 +332,4 @@ def test_a_wrench_that_a_floating_hand_is_not_found_to_give_is_not_proven_imposs
     answer = plan(ask(replace(stance, hands=(given, second))))
     assert answer.status == "failed"
     assert answer.certificate is None
-    assert "that is no proof of none" in answer.reason
+    assert "does not prove that there is none" in answer.reason

@@ -23,7 +23,7 @@ from planner.question import Load, Question
 from planner.result import Plan
 from planner.solving import plan
 from service.answering.questions import question
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from service.requests import PlanRequest
 from service.tables import terminal
@@ -156,7 +156,7 @@ def test_no_raw_warning_leaves(stance_file, capfd):
     path = stance_file(msgspec.to_builtins(request(preload=20.0, closing=20.0, load=light)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert run(["plan", path]) in (DONE, OVERLOADED)
+        assert run_command_line(["plan", path]) in (DONE, OVERLOADED)
     out, err = capfd.readouterr()
     assert "load factor without the palms: " in out
     assert err == ""

@@ -24,14 +24,14 @@ from hand_models import Grasp, Plane, Sphere
 from hand_models.base import Pose
 from planner.explanation import constraint_words
 from planner.pictures import draw_plan, hand_plots, plot_plan
-from planner.pictures.plan_scene import scene_of, view_directions
+from planner.pictures.plan_scene import drawn_scene, view_directions
 from planner.pictures.plan_views import SCENE_STYLES, UTILISATION_COLOURS, silhouette
 from planner.pictures.settings import PICTURE_SETTINGS
 from planner.question import HandOnHold, Limits, Load, Question, Stance
 from planner.robots import RobotFile, robot_of
 from planner.solving import solve
 from service.answering import questions
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.robots import TWO_LINK, arm, limbs_toml
@@ -170,7 +170,7 @@ def test_a_plan_is_not_solved_again_for_its_picture(tmp_path, monkeypatch, capfd
         planner, "plan", lambda question: solved.append(question) or found(question)
     )
     picture = tmp_path / "plan.png"
-    assert run(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
+    assert run_command_line(["plan", "wall-300", "--plot", str(picture), "--json"]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
     # once as asked, once without palms
     palms = [[hand.grasp.palm for hand in question.stance.hands] for question in solved]
@@ -211,7 +211,7 @@ def test_under_a_ceiling_the_body_and_its_weight_are_seen_beside_the_hands(off):
     question = Question(on_wall(overhang=math.pi / 2, off=off))
     plan = replace(answered("ceiling")[1], hands=None, joints=None, certificate=None)
     axes = draw_plan(plan, question).axes[0]
-    scene = scene_of(plan, question)
+    scene = drawn_scene(plan, question)
 
     def seen(places):
         return np.column_stack(proj3d.proj_transform(*np.transpose(places), axes.get_proj())[:2])
@@ -286,7 +286,7 @@ def test_large_numbers_stay_in_their_cells():
 @pytest.mark.parametrize("name", ["solved", "overloaded"])
 def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name):
     question, plan = answered(name)
-    *forces, load = scene_of(plan, question).arrows
+    *forces, load = drawn_scene(plan, question).arrows
     ends, colours = arrows(panels(drawn(name))[1])
     assert len(ends) == len(forces) + 1
     for arrow, colour, hand, planned in zip(
@@ -307,7 +307,7 @@ def test_forces_begin_at_the_hands_and_have_their_direction_size_and_colour(name
 def test_limbs_are_drawn_where_the_model_has_them(name):
     question, plan = answered(name)
     stance = question.stance
-    lines = [line.points for line in scene_of(plan, question).lines if line.kind == "limb"]
+    lines = [line.points for line in drawn_scene(plan, question).lines if line.kind == "limb"]
     limbs = dict(zip(stance.robot.limbs, lines, strict=True))
     space, facing, _ = panels(drawn(name))
     for limb, in_space, from_behind in zip(
@@ -400,10 +400,10 @@ def test_hands_and_limbs_are_named_and_hands_behind_each_other_share_a_note():
 def test_the_load_is_called_a_weight_only_where_it_is_the_robots():
     for name in ("solved", "plain"):
         question, plan = answered(name)
-        assert scene_of(plan, question).arrows[-1].text == "weight 1082 N"
+        assert drawn_scene(plan, question).arrows[-1].text == "weight 1082 N"
         assert "weight 1082 N" in words(drawn(name).axes[1])
     question, plan = answered("overloaded")
-    load = scene_of(plan, question).arrows[-1]
+    load = drawn_scene(plan, question).arrows[-1]
     assert load.text == "load 3924 N"
     np.testing.assert_allclose(load.start, question.stance.body.apply((0.1, 0.2, -0.1)))
     np.testing.assert_allclose(load.force, [0.0, 0.0, -400.0 * 9.81])
@@ -411,7 +411,7 @@ def test_the_load_is_called_a_weight_only_where_it_is_the_robots():
     given = Question(question.stance, body_wrench=np.array([500.0, 0, 0, 0, 0, 30.0]))
     com = question.stance.robot.com_at(plan.joints)
     about = -np.array([0.0, 0, 30.0]) + np.cross(com, [500.0, 0, 0])
-    load = scene_of(solve.plan(given), given).arrows[-1]
+    load = drawn_scene(solve.plan(given), given).arrows[-1]
     assert load.text == f"load 500 N\nand {np.linalg.norm(about):.0f} N·m"
 
 
@@ -471,7 +471,7 @@ def test_a_scene_has_all_capsules_as_triangles_that_face_outward():
     question, plan = answered("solved")
     robot, body = question.stance.robot, question.stance.body
     ends, radii = robot.placed_capsules(plan.joints), robot.capsules.radii
-    scene = scene_of(plan, question)
+    scene = drawn_scene(plan, question)
     drawn_capsules = [*triangles(scene, "body"), *triangles(scene, "link")]
     assert len(drawn_capsules) == len(ends)
     for found, segment, radius in zip(drawn_capsules, ends, radii, strict=True):
@@ -482,7 +482,7 @@ def test_a_scene_has_all_capsules_as_triangles_that_face_outward():
         assert ((outward * away).sum(axis=1) >= -1e-15).all()
     question, plan = answered("plain")
     assert plan.joints is None
-    assert triangles(scene_of(plan, question), "link") == []
+    assert triangles(drawn_scene(plan, question), "link") == []
 
 
 def test_the_outline_of_a_convex_surface_is_the_hull_of_how_it_is_seen():
@@ -503,7 +503,7 @@ def test_the_outline_of_a_convex_surface_is_the_hull_of_how_it_is_seen():
 
 def test_a_robot_without_capsules_of_its_body_has_the_hull_of_its_shoulders():
     question, plan = answered("two limbs")
-    (torso,) = triangles(scene_of(plan, question), "body")
+    (torso,) = triangles(drawn_scene(plan, question), "body")
     shoulders = [
         question.stance.body.apply(question.stance.robot.link_chain(plan.joints, limb)[0])
         for limb in question.stance.robot.limbs
@@ -517,7 +517,7 @@ def test_a_scene_is_plain_data_of_which_matplotlib_knows_nothing():
     code = "import sys, planner.pictures.plan_scene; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
     assert done.stdout.strip() == "False"
-    scene = scene_of(plan, question)
+    scene = drawn_scene(plan, question)
     assert {surface.kind for surface in scene.surfaces} == {"rock", "palm", "body", "link"}
     assert all(surface.triangles.shape[1:] == (3, 3) for surface in scene.surfaces)
     assert [arrow.kind for arrow in scene.arrows] == ["force"] * 4 + ["load"]
@@ -589,9 +589,9 @@ def test_a_plans_spread_is_drawn_where_it_was_asked_for():
                 heights = [bar.get_height() for bar in each.patches if bar.get_height() > 0.0]
                 factors = [f for f in answer.spread.load_factors if f is not None]
                 assert sum(round(height) for height in heights[1:]) == len(factors)
-                assert each.get_ylabel() == "draws"
+                assert each.get_ylabel() == "samples"
         return [each.get_title() for each in axes]
 
-    (told,) = (title for title in titles("spread", "load_factor") if "draws" in title)
-    assert re.fullmatch(r"holds in \d+ of \d+ draws; hangs most on rock.shear_limit", told)
-    assert not any("draws" in title for title in titles("load_factor"))
+    (told,) = (title for title in titles("spread", "load_factor") if "samples" in title)
+    assert re.fullmatch(r"feasible in \d+ of \d+ samples; most sensitive to rock.shear_limit", told)
+    assert not any("samples" in title for title in titles("load_factor"))

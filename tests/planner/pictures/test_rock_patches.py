@@ -13,7 +13,7 @@ from hand_models import Cylinder, Edge, Ellipsoid, Grasp, Plane, Sphere
 from hand_models.base import Pose
 from hand_models.rock import Mesh, Profile
 from hand_models.rock.profile import STRIP_NAMES
-from planner.pictures.plan_scene import scene_of
+from planner.pictures.plan_scene import drawn_scene
 from planner.pictures.rock_patches import rock_patch
 from planner.pictures.settings import PICTURE_SETTINGS
 from planner.question import Question
@@ -119,7 +119,7 @@ def test_a_scan_that_hands_share_is_drawn_once_and_whole():
 
 def _rocks(question):
     """Triangles of each hand's rock."""
-    scene = scene_of(solve.plan(question), question)
+    scene = drawn_scene(solve.plan(question), question)
     return [surface.triangles for surface in scene.surfaces if surface.kind == "rock"]
 
 

@@ -17,7 +17,7 @@ from hand_models.base import stores
 from hand_models.rock import Cylinder
 from planner import deadline
 from planner.programs import TensionTrade, conic, program, solvers, stance_program
-from planner.programs.conic import Columns, ConicProgram, Solver, Solvers
+from planner.programs.conic import Columns, ConicProgram, ConicSolver, Solvers
 from planner.programs.stance_data import HandData, StanceData
 from planner.programs.stance_program import CLARABEL_SETTINGS, StanceProgram
 from tests.suite.helpers.checkout import ROOT
@@ -185,9 +185,9 @@ def test_where_the_solver_gives_up_cvxpy_comes_to_the_same(data, monkeypatch, ki
     asked = real_programs(data)[kind]
     fast, further = asked.run()
     assert fast.solved
-    gives_up = conic.Solution(conic.SOLVER_ERROR)
+    gives_up = conic.ConicSolution(conic.SOLVER_ERROR)
     monkeypatch.setattr(stance_program.WAITING_SOLVERS, "solve", lambda *_: gives_up)
-    monkeypatch.setattr(Solver, "solve", lambda _: gives_up)
+    monkeypatch.setattr(ConicSolver, "solve", lambda _: gives_up)
     slow, theirs = asked.run()
     assert slow.solved
     ours, value = (
@@ -232,7 +232,7 @@ def test_a_solver_that_is_kept_answers_as_a_new_one(kind):
     kept = Solvers(2)
     for asked in (first, second, third, fourth, first):
         found = kept.solve(asked, CLARABEL_SETTINGS)
-        fresh = Solver(asked, CLARABEL_SETTINGS).solve()
+        fresh = ConicSolver(asked, CLARABEL_SETTINGS).solve()
         assert found.status == fresh.status
         for name in ("x", "multipliers"):
             np.testing.assert_array_equal(getattr(found, name), getattr(fresh, name))

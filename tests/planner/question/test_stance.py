@@ -232,8 +232,8 @@ def test_hands_that_look_for_their_seats_stand_beside_those_that_do_not():
 def test_impossible_seats_are_refused():
     for change, field, told in [
         ({"seat": "worst"}, "seat", "known are rest, best"),
-        ({"seat": "best", "hold_in_hand": Pose.identity()}, "seat", "is not seated"),
-        ({"seat_direction": np.ones(6)}, "seat_direction", "only a hand with the seat 'best'"),
+        ({"seat": "best", "hold_in_hand": Pose.identity()}, "seat", "cannot be combined"),
+        ({"seat_direction": np.ones(6)}, "seat_direction", "requires the seat 'best'"),
         ({"seat": "best", "seat_direction": np.zeros(6)}, "seat_direction", "must not be zero"),
         ({"seat": "best", "seat_direction": [NAN] * 6}, "seat_direction", "finite"),
         ({"seat": "best", "seat_direction": [1.0]}, "seat_direction", "6"),

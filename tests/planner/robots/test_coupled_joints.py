@@ -232,7 +232,7 @@ def test_limits_of_followers_are_kept_by_the_motor():
     hand = robot_of(file).hand.mass
     assert held.joint_torque["arm"][0] == pytest.approx(10.0 * (1.0 - (1.0 + hand)))
     apart = replace(file, urdf=file.urdf.replace('lower="-0.6" upper="0.1"', 'lower="2" upper="3"'))
-    with pytest.raises(InvalidInputError, match="follows 'lift', and their limits leave no room"):
+    with pytest.raises(InvalidInputError, match=r"follows 'lift' .* no common range"):
         robot_of(apart)
 
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose
 from planner.robots import Robot, RobotFile, robot_of
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from tests.suite.helpers.requests import pose
 from tests.suite.helpers.robots import check_link_tree
 
@@ -225,7 +225,7 @@ def test_a_stance_on_the_ground_is_planned(
     }
     stance = tmp_path / "stance.json"
     stance.write_text(json.dumps(asked))
-    assert run(["plan", str(stance), "--robot", str(path), "--json"]) == 0
+    assert run_command_line(["plan", str(stance), "--robot", str(path), "--json"]) == 0
     out, err = capfd.readouterr()
     assert err == ""
     reply = json.loads(out)

@@ -19,7 +19,7 @@ from planner.robots import RobotFile, robosimian, robot_of
 from service import CruxClient
 from service.answering import dispatch, read_hand, read_robot, robots_of, with_hand, with_robot
 from service.answering.questions import question
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.requests import PlanRequest, WrenchSpaceRequest
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import NoServiceError, ServiceError, decode_request, service_key
@@ -123,7 +123,7 @@ def test_a_stance_is_planned_for_the_robot_of_the_file(
     joints: Any, file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:
     request = hanging(file, joints)
-    assert run(["plan", written(request), "--robot", str(file), "--json"]) == 0
+    assert run_command_line(["plan", written(request), "--robot", str(file), "--json"]) == 0
     reply = told(capfd)
     robot = robot_of(RobotFile.load(file))
     assert robot.mass == pytest.approx(20.0 + 2 * sum(1 / k for k in range(1, 7)) + 2 * 2.6)
@@ -154,7 +154,7 @@ def test_a_person_reads_the_torques_of_every_joint(
     file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = written(hanging(file) | {"limits": {"joint_torque": {"left": 8.0}}})
-    assert run(["plan", path, "--robot", str(file)]) == 3
+    assert run_command_line(["plan", path, "--robot", str(file)]) == 3
     out, err = capfd.readouterr()
     assert err == ""
     assert max(len(row) for row in out.splitlines()) <= 80
@@ -173,7 +173,7 @@ def test_a_stance_may_name_the_robot_of_the_file_or_none(
     named: str | None, file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = written(put(hanging(file), ("stance", "robot"), named))
-    assert run(["plan", path, "--robot", str(file), "--json"]) == 0
+    assert run_command_line(["plan", path, "--robot", str(file), "--json"]) == 0
     assert told(capfd)["status"] == "optimal"
 
 
@@ -182,22 +182,24 @@ def test_a_stance_for_another_robot_is_refused_and_both_are_named(
 ) -> None:
     path = written(put(hanging(file), ("stance", "robot"), "robosimian"))
     for command in (["plan"], ["query"], ["wrench-space", "--hand", "left"]):
-        assert run([command[0], path, *command[1:], "--robot", str(file), "--json"]) == 2
+        assert (
+            run_command_line([command[0], path, *command[1:], "--robot", str(file), "--json"]) == 2
+        )
         words = complaint(capfd)
         assert words.startswith("crux: stance.robot: the stance is for 'robosimian'")
         assert f"{file} describes 'arms'" in words
-    assert run(["plan", written(put(hanging(file), ("stance", "robot"), "arms"))]) == 2
+    assert run_command_line(["plan", written(put(hanging(file), ("stance", "robot"), "arms"))]) == 2
     assert "unknown robot 'arms'; known are robosimian" in complaint(capfd)
 
 
 def test_a_stance_with_limbs_of_another_robot_names_those_that_are_there(
     file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["plan", "wall-300", "--robot", str(file)]) == 2
+    assert run_command_line(["plan", "wall-300", "--robot", str(file)]) == 2
     assert complaint(capfd) == (
         "crux: stance.hands[0].limb: unknown limb 'front_right'; known are left, right\n"
     )
-    assert run(["plan", written(hanging(file, None))]) == 2
+    assert run_command_line(["plan", written(hanging(file, None))]) == 2
     assert "unknown limb 'left'; known are front_right" in complaint(capfd)
 
 
@@ -220,7 +222,7 @@ def test_a_bad_file_is_refused_in_one_line(
     for file, text in zip((path, tmp_path / "arms.urdf"), texts, strict=True):
         if text is not None:
             file.write_text(text)
-    assert run(["plan", "wall-300", "--robot", str(path)]) == 2
+    assert run_command_line(["plan", "wall-300", "--robot", str(path)]) == 2
     line = complaint(capfd)
     assert line.startswith(f"crux: {path}: {words}")
     assert len(line) < len(str(path)) + 600
@@ -232,7 +234,9 @@ def test_a_hand_and_a_robot_of_ones_own_go_together(
     hand = tmp_path / "hand.toml"
     hand.write_text(entry_toml("hand", "mass", 5.6))
     path = written(hanging(file))
-    assert run(["plan", path, "--robot", str(file), "--hand", str(hand), "--json"]) == 0
+    assert (
+        run_command_line(["plan", path, "--robot", str(file), "--hand", str(hand), "--json"]) == 0
+    )
     weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
     assert weight == pytest.approx(1.62 * (robot_of(RobotFile.load(file)).mass + 2 * 3.0))
 
@@ -244,7 +248,7 @@ def test_a_wrench_space_is_that_of_the_robots_hand(
     request = put(hanging(file), ("stance", "hands", 0, "grasp", "lateral"), False)
     path = written(request)
     flags = ["--robot", str(file), "--plot", str(picture), "--json"]
-    assert run(["wrench-space", path, "--hand", "left", *flags]) == 0
+    assert run_command_line(["wrench-space", path, "--hand", "left", *flags]) == 0
     reply = told(capfd)
     assert (reply["robot"], reply["limb"]) == ("arms", "left")
     assert picture.read_bytes().startswith(b"\x89PNG")
@@ -253,7 +257,10 @@ def test_a_wrench_space_is_that_of_the_robots_hand(
 def test_a_body_space_is_that_of_the_robot(
     file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["body-space", written(hanging(file)), "--robot", str(file), "--json"]) == 0
+    assert (
+        run_command_line(["body-space", written(hanging(file)), "--robot", str(file), "--json"])
+        == 0
+    )
     reply = told(capfd)
     assert reply["robot"] == "arms"
     weight = np.linalg.norm(reply["body_wrench"][:3])
@@ -263,9 +270,9 @@ def test_a_body_space_is_that_of_the_robot(
 def test_a_lighter_robot_takes_the_bundled_stances(
     lemur: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["plan", "wall-300", "--json"]) == 0
+    assert run_command_line(["plan", "wall-300", "--json"]) == 0
     heavy = told(capfd)
-    assert run(["plan", "wall-300", "--robot", str(lemur), "--json"]) == 0
+    assert run_command_line(["plan", "wall-300", "--robot", str(lemur), "--json"]) == 0
     light = told(capfd)
     assert robot_of(RobotFile.load(lemur)).mass == pytest.approx(robosimian().mass - 20.0)
     np.testing.assert_allclose(
@@ -289,7 +296,7 @@ def test_a_route_is_climbed_by_the_robot_in_other_processes_too(
     path = written(request | {"moves": moves, "objective": "min_effort"})
     out = tmp_path / "out"
     flags = ["--robot", str(file), "--workers", str(workers), "--json"]
-    assert run(["route", path, "-o", str(out), *flags]) == 3
+    assert run_command_line(["route", path, "-o", str(out), *flags]) == 3
     summary = told(capfd)
     assert summary["statuses"]["unreachable"] == 1
     assert summary["crux"]["sentence"].startswith("The crux is move 3, with left on its new hold")
@@ -318,7 +325,7 @@ def test_two_robots_are_served_side_by_side(alone: zenoh.Session, file: Path) ->
         arms, simian = (
             CruxClient(alone, name, timeout=PATIENCE) for name in ("arms", "robosimian")
         )
-        want = dispatch.plan(request, robots_of(own))
+        want = dispatch.answer_plan(request, robots_of(own))
         for asked in (request, with_robot(request, own)):
             assert arms.plan(asked).utilisation == pytest.approx(want.utilisation, rel=1e-9)
         space = WrenchSpaceRequest(v=1, stance=request.stance, limb="right")
@@ -358,9 +365,9 @@ def test_serve_and_query_a_robot_and_a_hand(
         service_key("arms", name) for name in dispatch.SERVICES_BY_NAME
     }
     flags = [*flags_to(served), "--robot", str(file), "--hand", str(hand)]
-    assert run(["query", written(hanging(file)), *flags]) == 0
+    assert run_command_line(["query", written(hanging(file)), *flags]) == 0
     request = with_hand(plan_request(hanging(file)), read_hand(hand))
-    want = dispatch.plan(request, robots_of(read_robot(file)))
+    want = dispatch.answer_plan(request, robots_of(read_robot(file)))
     assert told(capfd)["utilisation"] == pytest.approx(want.utilisation, rel=1e-9)
 
 
@@ -369,7 +376,7 @@ def test_a_query_that_names_the_robot_goes_to_its_service(
     served: Served, file: Path, written, capfd: pytest.CaptureFixture[str]
 ) -> None:
     named = written(put(hanging(file), ("stance", "robot"), "arms"))
-    assert run(["query", named, *flags_to(served)]) == 0
+    assert run_command_line(["query", named, *flags_to(served)]) == 0
     assert told(capfd)["status"] == "optimal"
 
 
@@ -390,7 +397,7 @@ def test_the_demo_is_of_the_robot(
     lemur: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     picture = tmp_path / "demo.png"
-    assert run(["demo", "-o", str(picture), "--json", "--robot", str(lemur)]) == 0
+    assert run_command_line(["demo", "-o", str(picture), "--json", "--robot", str(lemur)]) == 0
     weight = np.linalg.norm(told(capfd)["body_wrench"][:3])
     assert weight == pytest.approx(9.81 * robot_of(RobotFile.load(lemur)).mass)
     assert picture.read_bytes().startswith(b"\x89PNG")
@@ -407,7 +414,7 @@ def test_the_demo_of_a_robot_that_does_not_reach_leaves_joints_out(
     file = tmp_path / "stiff.toml"
     file.write_text(lemur.read_text(encoding="utf-8"), encoding="utf-8")
     picture = tmp_path / "demo.png"
-    assert run(["demo", "-o", str(picture), "--json", "--robot", str(file)]) == 0
+    assert run_command_line(["demo", "-o", str(picture), "--json", "--robot", str(file)]) == 0
     out, err = capfd.readouterr()
     assert err.startswith("crux: planned without joints: front_right is ")
     assert err.count("\n") == 1

@@ -324,7 +324,7 @@ def test_a_ring_of_links_is_no_robot():
         joint("one", "continuous", "a", "b"),
         joint("two", "continuous", "b", "a"),
     )
-    assert refused(text=text) == "urdf: link 'b' is in a ring; a robot must be a tree"
+    assert refused(text=text) == "urdf: link 'b' is in a loop; a robot must be a tree"
 
 
 def test_a_robot_without_mass_is_refused():
@@ -344,15 +344,15 @@ def test_limbs_that_share_a_joint_are_refused():
 def test_a_limb_beside_the_body_is_refused():
     toml = TOML.replace('body = "trunk"', 'body = "head"')
     told = refused(toml)
-    assert told.startswith("limbs.leg.link: link 'foot' does not hang on the body 'head'")
-    assert told.endswith("; all hang on body = 'trunk'")
+    assert told.startswith("limbs.leg.link: link 'foot' is not connected to the body 'head'")
+    assert told.endswith("; all are connected to body = 'trunk'")
 
 
 def test_a_limb_that_only_turns_its_hand_in_its_place_is_refused():
     toml, text = arm(1)
     assert refused(toml.replace("[0.1, 0.0, 0.0]", "[0.0, 0.0, 0.0]"), text) == (
-        "limbs.arm.position: the limb's joints only turn the hand in its place; it must be away "
-        "from them"
+        "limbs.arm.position: the hand is on the axes of the limb's joints, which cannot move it; "
+        "must be away from them"
     )
 
 

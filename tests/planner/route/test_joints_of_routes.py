@@ -26,7 +26,7 @@ def raised(pose: Pose, by: float) -> Pose:
 @pytest.fixture(scope="module")
 def solved() -> Route:
     """Two moves: a hand, and after a shift of the body another one."""
-    bundled = questions.route(read_route("six-moves"))
+    bundled = questions.route_of(read_route("six-moves"))
     start = replace(bundled.start, joints="solve")
     hand = next(each for each in start.hands if each.limb == "front_right")
     second = Move(replace(hand, pose=raised(hand.pose, 0.03)), raised(start.body, 0.01))
@@ -128,9 +128,9 @@ def test_a_limb_may_be_given_and_the_others_found(climbed, solved):
         (0, "nobody", lambda _: "solve", "moves[0].joints.nobody", "unknown limb"),
         (1, "", lambda _: "solve", "moves[1].joints.", "unknown limb"),
         (1, "rear_left", lambda _: "guess", "moves[1].joints.rear_left", "'solve'"),
-        (0, "front_left", lambda q: 0.5 * q, "moves[0].pose", "from where its joints put it"),
-        (1, "rear_right", lambda q: 0.5 * q, "stance.hands[", "from where its joints put it"),
-        (1, "front_right", lambda q: 0.9 * q, "moves[1].pose", "from where its joints put it"),
+        (0, "front_left", lambda q: 0.5 * q, "moves[0].pose", "from the pose of its joint angles"),
+        (1, "rear_right", lambda q: 0.5 * q, "stance.hands[", "from the pose of its joint angles"),
+        (1, "front_right", lambda q: 0.9 * q, "moves[1].pose", "from the pose of its joint angles"),
     ],
 )
 def test_angles_that_cannot_be_are_told_with_their_move(
@@ -151,7 +151,7 @@ def test_a_route_without_joints_takes_none(solved):
     moves = (replace(solved.moves[0], joints={"front_left": np.zeros(7)}), solved.moves[1])
     bare = replace(solved, start=replace(solved.start, joints=None))
     assert all(stage.question.stance.joints is None for stage in stages(bare))
-    with pytest.raises(InvalidInputError, match="says nothing of joints") as caught:
+    with pytest.raises(InvalidInputError, match="joints in the start stance") as caught:
         evaluate(replace(bare, moves=moves))
     assert caught.value.field == "moves[0].joints"
 
@@ -166,7 +166,7 @@ def test_a_route_of_a_file_takes_them(climbed):
     place = angles_of(climbed, 1, "place")["front_left"]
     text["moves"][0]["joints"] = {"front_left": place.tolist(), "rear_left": "solve"}
     request = decode_request(json.dumps(text).encode(), RouteRequest)
-    result = evaluate(questions.route(request))
+    result = evaluate(questions.route_of(request))
     assert [answer.status for answer in result.plans] == ["optimal"] * 3
     np.testing.assert_array_equal(result.plans[2].joints["front_left"], place)
     assert set(result.plans[0].joints) == set(robosimian().limbs)

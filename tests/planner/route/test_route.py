@@ -22,7 +22,7 @@ from planner.route import Route, evaluate
 from planner.route.climb import stages
 from planner.solving import plan
 from service.answering import questions
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import bundled, read_request, read_route
 from service.tables import console, print_route
 from tests.suite.helpers import workshop
@@ -32,7 +32,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 @pytest.fixture(scope="module")
 def route() -> Route:
-    return questions.route(read_route("six-moves"))
+    return questions.route_of(read_route("six-moves"))
 
 
 @pytest.fixture(scope="module")
@@ -189,15 +189,17 @@ def test_the_command_asks_for_the_spread_of_every_stance(tmp_path: Path, capfd):
     path = tmp_path / "route.json"
     request = msgspec.json.decode(msgspec.json.encode(read_route("six-moves")))
     path.write_bytes(msgspec.json.encode(request | {"moves": []}))
-    run(["route", str(path), "-o", str(tmp_path / "a"), "--spread", "--json"])
+    run_command_line(["route", str(path), "-o", str(tmp_path / "a"), "--spread", "--json"])
     assert json.loads(capfd.readouterr().out)["crux"]["draws"] > 1
     draws.write_text(ONE_DRAW, encoding="utf-8")
-    run(["route", str(path), "-o", str(tmp_path / "b"), "--draws", str(draws), "--json"])
+    run_command_line(
+        ["route", str(path), "-o", str(tmp_path / "b"), "--draws", str(draws), "--json"]
+    )
     assert json.loads(capfd.readouterr().out)["crux"]["draws"] == 1
-    run(["route", str(path), "-o", str(tmp_path / "c"), "--json"])
+    run_command_line(["route", str(path), "-o", str(tmp_path / "c"), "--json"])
     assert "draws" not in json.loads(capfd.readouterr().out)["crux"]
     path.write_bytes(msgspec.json.encode(request | {"moves": [], "want": ["advice"]}))
-    assert run(["route", str(path), "-o", str(tmp_path / "d")]) == 2
+    assert run_command_line(["route", str(path), "-o", str(tmp_path / "d")]) == 2
     assert "want" in capfd.readouterr().err
 
 
@@ -319,7 +321,7 @@ def test_route_command_writes_its_files_and_prints_json_alone(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
     path, out = laden(LIGHT, tmp_path), tmp_path / "out"
-    assert run(["route", path, "-o", str(out), "--json"]) == 0
+    assert run_command_line(["route", path, "-o", str(out), "--json"]) == 0
     told = json.loads(capfd.readouterr().out)
     assert told["feasible"] is True
     assert {Path(path).name for path in told["files"].values()} == {
@@ -328,7 +330,7 @@ def test_route_command_writes_its_files_and_prints_json_alone(
 
 
 def test_route_command_tells_a_person_the_crux(tmp_path, capfd: pytest.CaptureFixture[str]):
-    assert run(["route", laden(LIGHT, tmp_path), "-o", str(tmp_path)]) == 0
+    assert run_command_line(["route", laden(LIGHT, tmp_path), "-o", str(tmp_path)]) == 0
     out = capfd.readouterr().out
     assert "The crux is move 6" in out
     assert max(len(line) for line in out.splitlines() if str(tmp_path) not in line) <= 80
@@ -338,12 +340,12 @@ def test_route_command_ends_with_3_where_it_does_not_go_and_2_for_bad_input(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
     hard = Path(laden(300.0, tmp_path))
-    assert run(["route", str(hard), "-o", str(tmp_path / "out")]) == 3
+    assert run_command_line(["route", str(hard), "-o", str(tmp_path / "out")]) == 3
     text = json.loads(hard.read_bytes())
     text["moves"][1]["hold"]["diameter"] = -1.0
     hard.write_text(json.dumps(text), encoding="utf-8")
     capfd.readouterr()
-    assert run(["route", str(hard), "-o", str(tmp_path / "out")]) == 2
+    assert run_command_line(["route", str(hard), "-o", str(tmp_path / "out")]) == 2
     error = capfd.readouterr().err
     assert error.startswith("crux: moves[1].hold.diameter: ")
     assert len(error.splitlines()) == 1
@@ -359,7 +361,7 @@ def read_text(name: str) -> bytes:
 def test_a_move_that_ends_in_the_air_is_refused(route):
     move = route.moves[0]
     away = replace(move.hand, hold_in_hand=Pose(np.array([0.0, 0.0, 0.5]), np.eye(3)))
-    with pytest.raises(InvalidInputError, match="touches nothing") as caught:
+    with pytest.raises(InvalidInputError, match="does not touch this hold") as caught:
         evaluate(replace(route, moves=(replace(move, hand=away),)))
     assert caught.value.field == "moves[0].hold"
 
@@ -367,13 +369,13 @@ def test_a_move_that_ends_in_the_air_is_refused(route):
 def test_what_is_wrong_with_a_stance_on_the_way_is_told_where_the_route_has_it(route):
     first, second = route.start.hands[:2]
     start = replace(route.start, hands=(replace(first, pose=second.pose), *route.start.hands[1:]))
-    with pytest.raises(InvalidInputError, match="in one and the same place") as caught:
+    with pytest.raises(InvalidInputError, match="at the same position") as caught:
         evaluate(replace(route, start=start, moves=()))
     assert caught.value.field == "stance.hands[1].pose.position"
     move = route.moves[0]
     (there,) = (hand for hand in route.start.hands if hand.limb == route.moves[1].hand.limb)
     onto = replace(move, hand=replace(move.hand, pose=there.pose))
-    with pytest.raises(InvalidInputError, match="in one and the same place") as caught:
+    with pytest.raises(InvalidInputError, match="at the same position") as caught:
         evaluate(replace(route, moves=(onto,)))
     told = caught.value.field
     far = replace(move.hand, pose=Pose(np.array([0.0, 450.0, 600.0]), move.hand.pose.rotation))
@@ -459,14 +461,14 @@ def test_a_route_file_takes_joints_and_an_objective(
     text["moves"] = text["moves"][:2]
     path = tmp_path / "short.json"
     path.write_text(json.dumps(text), encoding="utf-8")
-    assert run(["route", str(path), "-o", str(tmp_path / "out")]) == 3
+    assert run_command_line(["route", str(path), "-o", str(tmp_path / "out")]) == 3
     out = capfd.readouterr().out
     assert max(len(line) for line in out.splitlines() if str(tmp_path) not in line) <= 80
     assert "unreachable" in out
     assert "joints" in out
     text["objective"] = "max_reliability"
     path.write_text(json.dumps(text), encoding="utf-8")
-    assert run(["route", str(path), "-o", str(tmp_path / "out")]) == 2
+    assert run_command_line(["route", str(path), "-o", str(tmp_path / "out")]) == 2
     assert capfd.readouterr().err.startswith("crux: objective: max_reliability is not supported")
 
 

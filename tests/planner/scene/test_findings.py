@@ -190,7 +190,7 @@ def test_plans_tell_what_is_odd_in_words_and_structured(bases):
 
 def test_what_cannot_be_is_refused_with_its_field(bases):
     for name, field in (
-        ("hands in one place", r"^stance\.hands\[1\]\.pose\.position: .* one and the same place"),
+        ("hands in one place", r"^stance\.hands\[1\]\.pose\.position: .* at the same position"),
         ("the body in a boulder", r"^stance\.body\.position: the body's origin is [0-9.]+ m deep"),
     ):
         with pytest.raises(InvalidInputError, match=field):

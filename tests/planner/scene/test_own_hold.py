@@ -10,7 +10,7 @@ from hand_models.rock import Cylinder, Edge, Ellipsoid, Hold, Plane, Sphere
 from hand_models.rock.holds import SweptHold
 from hand_models.sections import PolylineSection, Swept
 from planner.pictures import draw_plan
-from planner.pictures.plan_scene import scene_of as picture_scene
+from planner.pictures.plan_scene import drawn_scene
 from planner.prepare.settled_stance import settle_stance
 from planner.question import Load, Question
 from planner.robots import robosimian
@@ -103,7 +103,7 @@ def test_a_hold_of_ones_own_is_placed_on_planned_on_and_drawn(hold):
     found = plan(question)
     assert found.status == "optimal"
     assert found.verified
-    surfaces = picture_scene(found, question).surfaces
+    surfaces = drawn_scene(found, question).surfaces
     rocks = [len(surface.triangles) for surface in surfaces if surface.kind == "rock"]
     assert len(rocks) == 4
     assert min(rocks) > 50

@@ -110,9 +110,9 @@ def test_what_it_does_not_do_is_refused_by_name():
     first, *others = QUESTION.stance.hands
     first = replace(first, wrist="floating", tendon_preload=np.full(4, 70.0))
     floating = replace(QUESTION, stance=replace(QUESTION.stance, hands=(first, *others)))
-    with pytest.raises(UnsupportedError, match="least_sum is not for floating wrists"):
+    with pytest.raises(UnsupportedError, match="least_sum requires fixed wrists"):
         plan(replace(floating, objective=LeastSum(), limits=Limits()))
-    with pytest.raises(UnsupportedError, match="least_sum is not for streams"):
+    with pytest.raises(UnsupportedError, match="least_sum is not available for streams"):
         WrenchStream(replace(QUESTION, objective=LeastSum()))
     for wrong in ("most", 3, None):
         with pytest.raises(InvalidInputError) as caught:

@@ -335,6 +335,6 @@ def test_a_stance_alone_is_no_question(asks):
 
 
 def test_a_deadline_before_the_hands_are_closed_says_what_they_took():
-    words = r"closed on their holds, which took [0-9.e-]+ s; allow longer"
+    words = r"closed on their holds, which took [0-9.e-]+ s; give a longer deadline"
     with pytest.raises(DeadlineError, match=words):
         plan(ask(on_wall(), deadline=1e-6))

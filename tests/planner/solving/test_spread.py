@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import spearmanr
 
 from hand_models.base import InvalidInputError, Pose
-from hand_models.parameters import Draw, bundled_draws, own_draw, own_hand, own_surfaces
+from hand_models.parameters import ParameterSample, bundled_draws, own_draw, own_hand, own_surfaces
 from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.capability import BodySpace
@@ -31,7 +31,7 @@ def entry(value, unit: str) -> dict[str, object]:
     return {"value": value, "unit": unit, "source": "assumed"}
 
 
-def drawn(rock: float | None = None, **hand) -> Draw:
+def drawn(rock: float | None = None, **hand) -> ParameterSample:
     """A draw with another strength of rock, and entries of the hand by section."""
     surfaces = {} if rock is None else {"rock": {"shear_limit": entry(rock, "N")}}
     return own_draw({"hand": hand, "surfaces": surfaces})
@@ -62,7 +62,7 @@ def asked_of(name: str, **kwargs) -> Question:
     )
 
 
-def on_draw(asked: Question, draw: Draw) -> Question:
+def on_draw(asked: Question, draw: ParameterSample) -> Question:
     """The same question of a robot that has a draw's hands, on rock that has its strength."""
     stance = asked.stance
     surfaces = own_surfaces(draw.surfaces)
@@ -186,8 +186,8 @@ def test_the_order_of_draws_does_not_matter():
     assert again.load_factors == once.load_factors[::-1]
     assert again.load_factor == once.load_factor
     assert again.holds == once.holds
-    by_name = {each.quantity: each.share for each in once.hangs_on}
-    assert {each.quantity: each.share for each in again.hangs_on} == pytest.approx(by_name)
+    by_name = {each.quantity: each.share for each in once.sensitive_to}
+    assert {each.quantity: each.share for each in again.sensitive_to} == pytest.approx(by_name)
 
 
 def test_on_a_callers_own_numbers_only_the_hand_varies():
@@ -197,12 +197,12 @@ def test_on_a_callers_own_numbers_only_the_hand_varies():
     assert mine == usual
     one = plan(ask(on_wall(surface=mine), "spread", "load_factor", draws=STRENGTHS))
     assert one.spread.load_factors == almost([one.load_factor] * len(STRENGTHS))
-    assert one.spread.hangs_on == []
+    assert one.spread.sensitive_to == []
     changed = replace(usual, shear_limit=61.0)
     other = plan(ask(on_wall(surface=changed), "spread", draws=STRENGTHS)).spread
     assert other.load_factors == almost([other.load_factors[0]] * len(STRENGTHS))
     bundled = plan(ask(on_wall(surface=mine), "spread")).spread
-    assert {each.quantity.split(".")[0] for each in bundled.hangs_on} <= {"finger", "tile"}
+    assert {each.quantity.split(".")[0] for each in bundled.sensitive_to} <= {"finger", "tile"}
 
 
 def test_half_planes_that_were_asked_for_stay():
@@ -226,7 +226,7 @@ def seated(stance: Stance, **kwargs) -> Stance:
 def test_a_seat_that_is_given_stays_and_one_that_is_not_moves():
     moves = plan(ask(on_wall(), "spread", draws=SEATS)).spread
     assert np.ptp(moves.load_factors) > 0.01
-    assert moves.hangs_on[0].quantity == "finger.seated_contact"
+    assert moves.sensitive_to[0].quantity == "finger.seated_contact"
     stays = plan(ask(seated(on_wall()), "spread", draws=SEATS)).spread
     assert stays.load_factors == almost([moves.load_factors[1]] * 3)
 
@@ -244,8 +244,8 @@ def test_a_hand_of_the_callers_own_stays_in_what_it_changes():
     mine = own_hand(own_draw({"hand": {"finger": radii(0.003, 0.0024) | seat(0.0241)}}).hand)
     stance = replace(on_wall(surface=TILE_60N), robot=robosimian(mine))
     found = plan(ask(stance, "spread")).spread
-    assert found.hangs_on
-    assert {each.quantity.split(".")[0] for each in found.hangs_on} == {"tile"}
+    assert found.sensitive_to
+    assert {each.quantity.split(".")[0] for each in found.sensitive_to} == {"tile"}
 
 
 def test_shares_are_squared_rank_correlations():
@@ -262,8 +262,8 @@ def test_shares_are_squared_rank_correlations():
     shares = {
         name: spearmanr(each, found.load_factors).statistic ** 2 for name, each in values.items()
     }
-    assert found.hangs_on[0].quantity == max(shares, key=shares.get) == "rock.shear_limit"
-    told = {each.quantity: each.share for each in found.hangs_on}
+    assert found.sensitive_to[0].quantity == max(shares, key=shares.get) == "rock.shear_limit"
+    told = {each.quantity: each.share for each in found.sensitive_to}
     assert len(told) == 3
     for name in told.keys() & shares.keys():
         assert told[name] == pytest.approx(shares[name])
@@ -282,11 +282,11 @@ def test_ties_and_missing_load_factors_are_minded():
     found = Spread.of([DrawnPlan(load_factor=factor) for factor in factors], 1.0, {}, drawn_values)
     there = [0, 1, 2, 4, 5]
     told = spearmanr(drawn_values["a"][there], [factors[k] for k in there]).statistic ** 2
-    assert [each.quantity for each in found.hangs_on] == ["a"]
-    assert found.hangs_on[0].share == pytest.approx(told)
+    assert [each.quantity for each in found.sensitive_to] == ["a"]
+    assert found.sensitive_to[0].share == pytest.approx(told)
     assert found.utilisation is None
     few = Spread.of([DrawnPlan(load_factor=factor) for factor in (1.0, 2.0)], 1.0, {}, {})
-    assert few.hangs_on == []
+    assert few.sensitive_to == []
 
 
 def test_draws_without_an_answer_do_not_hold_and_are_told():
@@ -337,7 +337,7 @@ def test_of_no_body_wrench_there_is_a_utilisation_and_no_load_factor():
     found = plan(ask(on_wall(), "spread", body_wrench=np.zeros(6), draws=FEW)).spread
     assert found.load_factor is None
     assert found.holds == len(FEW)
-    assert found.hangs_on == []
+    assert found.sensitive_to == []
 
 
 def test_a_known_stance_tells_it_for_each_wrench():
@@ -356,8 +356,8 @@ def test_what_solvers_leave_of_equal_load_factors_is_no_variation():
         Spread.of([DrawnPlan(load_factor=each) for each in noisy], 1.0, {}, values)
         for noisy in factors + 1e-8 * rng.random((2, 30))
     ]
-    assert told[0].hangs_on == told[1].hangs_on
-    assert told[0].hangs_on[0].share < 0.2
+    assert told[0].sensitive_to == told[1].hangs_on
+    assert told[0].sensitive_to[0].share < 0.2
 
 
 def test_draws_may_set_different_numbers_of_a_preset():
@@ -365,8 +365,8 @@ def test_draws_may_set_different_numbers_of_a_preset():
     draws = (drawn(60.0), *(own_draw(ratio) for ratio in ratios))
     found = plan(ask(on_wall(), "spread", draws=draws)).spread
     assert found.load_factors[1] < found.load_factors[2] < found.load_factors[3]
-    assert found.hangs_on[0].quantity in ("rock.pull_off_ratio", "rock.shear_limit")
-    assert {each.quantity for each in found.hangs_on} >= {"rock.pull_off_ratio"}
+    assert found.sensitive_to[0].quantity in ("rock.pull_off_ratio", "rock.shear_limit")
+    assert {each.quantity for each in found.sensitive_to} >= {"rock.pull_off_ratio"}
 
 
 def test_streams_and_body_spaces_of_a_question_with_draws_leave_them_out():
@@ -385,7 +385,7 @@ def test_draws_that_cannot_be_are_refused_by_their_entry():
     with pytest.raises(InvalidInputError, match="must not exceed") as caught:
         ask(on_wall(), "spread", draws=(own_draw(ratio),))
     assert caught.value.field == "draws[0].surfaces.sandpaper-36.pull_off_limit"
-    with pytest.raises(InvalidInputError, match="add it to want") as caught:
+    with pytest.raises(InvalidInputError, match="requires 'spread' in want") as caught:
         ask(on_wall(), "load_factor", draws=FEW)
     assert caught.value.field == "draws"
     for count in (0, 101):

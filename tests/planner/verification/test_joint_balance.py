@@ -13,7 +13,7 @@ from planner.result import PlanArrays
 from planner.solving.solve import plan_on
 from planner.verification import Check
 from planner.verification.joint_balance import JointBalance
-from planner.verification.residuals import Names
+from planner.verification.residuals import PartNames
 from tests.suite.helpers.stances import ask, on_wall, random_stance
 
 STANCES = {
@@ -31,7 +31,7 @@ def of_stance(stance) -> HandBatch:
 
 
 def balance_of(known: HandBatch) -> JointBalance:
-    return JointBalance(Names(tuple(map(str, range(len(known.hands)))), known))
+    return JointBalance(PartNames(tuple(map(str, range(len(known.hands)))), known))
 
 
 def wrenches(known: HandBatch, loads: np.ndarray) -> np.ndarray:

@@ -306,7 +306,7 @@ def test_a_wrench_space_tells_what_is_left_where_the_hand_is_a_little_elsewhere(
     request = WrenchSpaceRequest(
         v=1, stance=plan_request(wall_request()).stance, limb="front_left", want=["robust"]
     )
-    reply = answering.wrench_space(request)
+    reply = answering.answer_wrench_space(request)
     robust = reply.robust
     assert (robust.draws, robust.without, robust.seed) == (8, 0, 0)
     assert set(robust.hundredth) == set(robust.tenth) == set(reply.capability)
@@ -314,14 +314,14 @@ def test_a_wrench_space_tells_what_is_left_where_the_hand_is_a_little_elsewhere(
     for axis, nominal in reply.capability.items():
         assert robust.hundredth[axis] <= robust.tenth[axis]
         assert robust.hundredth[axis] < nominal.extent
-    plain = answering.wrench_space(msgspec.structs.replace(request, want=[]))
+    plain = answering.answer_wrench_space(msgspec.structs.replace(request, want=[]))
     assert "robust" not in msgspec.to_builtins(plain)
 
 
 @pytest.mark.usefixtures("few_places")
 def test_a_plan_tells_its_load_factor_where_the_hands_are_a_little_elsewhere():
     asked = flat_request() | {"want": ["load_factor", "robust"]}
-    reply = answering.plan(plan_request(asked))
+    reply = answering.answer_plan(plan_request(asked))
     robust = reply.robust
     assert (robust.draws, robust.position, robust.angle, robust.seed) == (128, 0.002, 0.02, 0)
     assert robust.worst == robust.hundredth <= robust.tenth < reply.load_factor
@@ -330,7 +330,7 @@ def test_a_plan_tells_its_load_factor_where_the_hands_are_a_little_elsewhere():
     assert robust.without >= max(robust.refused.values(), default=0)
     assert departures("PlanRequest", asked) == []
     assert departures("PlanReply", msgspec.to_builtins(reply)) == []
-    plain = answering.plan(plan_request(flat_request()))
+    plain = answering.answer_plan(plan_request(flat_request()))
     assert "robust" not in msgspec.to_builtins(plain)
 
 
@@ -341,14 +341,14 @@ def own_draw(value: float, unit: str = "N") -> dict:
 
 def test_a_plan_tells_its_spread_over_draws():
     asked = flat_request() | {"want": ["load_factor", "spread"]}
-    reply = answering.plan(plan_request(asked))
+    reply = answering.answer_plan(plan_request(asked))
     spread = reply.spread
     assert spread.draws == len(spread.load_factors) >= 30
     assert spread.holds == sum(used <= 1.0 for used in spread.utilisations if used is not None)
     assert spread.load_factor.low < reply.load_factor < spread.load_factor.high
     assert departures("PlanRequest", asked) == []
     assert departures("PlanReply", msgspec.to_builtins(reply)) == []
-    plain = answering.plan(plan_request(flat_request()))
+    plain = answering.answer_plan(plan_request(flat_request()))
     assert "spread" not in msgspec.to_builtins(plain)
 
 
@@ -364,7 +364,8 @@ def test_a_plans_spread_over_draws_of_the_callers_own_travels():
         low, usual, high = reply["spread"]["load_factors"]
         assert low < usual < high
         assert usual == pytest.approx(reply["load_factor"], rel=1e-6)
-        assert reply["spread"]["hangs_on"] == [{"quantity": "rock.shear_limit", "share": 1.0}]
+        assert reply["spread"]["sensitive_to"] == [{"quantity": "rock.shear_limit", "share": 1.0}]
+        assert reply["spread"]["hangs_on"] == reply["spread"]["sensitive_to"]
 
 
 @pytest.mark.parametrize("detail", ["set_points", "hands"])
@@ -376,7 +377,7 @@ def test_what_brief_replies_do_not_tell_is_not_found(monkeypatch, detail):
     want = ["load_factor", "spread", "prices"]
     draws = [own_draw(Surface.named("rock").shear_limit)]
     request = flat_request() | {"want": want, "draws": draws, "detail": detail}
-    answering.plan(plan_request(request))
+    answering.answer_plan(plan_request(request))
     assert asked[0].want == ({"load_factor"} if detail == "hands" else set())
 
 
@@ -407,8 +408,8 @@ def test_robust_is_told_of_fixed_wrists_only():
     stance = msgspec.structs.replace(request.stance, hands=[floating, *others])
     asked = WrenchSpaceRequest(v=1, stance=stance, limb=first.limb, want=["robust"])
     with pytest.raises(InvalidInputError, match="requires fixed wrists") as caught:
-        answering.wrench_space(asked)
+        answering.answer_wrench_space(asked)
     assert caught.value.field == "want"
     with pytest.raises(InvalidInputError, match="requires fixed wrists") as caught:
-        answering.plan(msgspec.structs.replace(request, stance=stance, want=["robust"]))
+        answering.answer_plan(msgspec.structs.replace(request, stance=stance, want=["robust"]))
     assert caught.value.field == "want"

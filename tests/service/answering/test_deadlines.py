@@ -60,7 +60,10 @@ def test_ids_are_echoed(key: str) -> None:
     assert answered(key, asked(key, deadline=LONG))["id"] == f"of {key}"
     late = answered(key, asked(key, deadline=1.0), started=time.perf_counter() - 1.0)
     assert (late["id"], late["error"]["kind"]) == (f"of {key}", "deadline")
-    assert late["error"]["message"] == "1 s were over before an answer was begun; allow longer"
+    assert (
+        late["error"]["message"]
+        == "1 s expired before the answer was started; give a longer deadline"
+    )
 
 
 def test_no_deadline_is_longer_than_ten_minutes() -> None:

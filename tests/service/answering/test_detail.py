@@ -15,7 +15,7 @@ from service import Planners
 from service.answering import dispatch
 from service.answering.answers import brief_plan_reply
 from service.answering.questions import question
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import bundled, read_request
 from service.replies import BriefPlanReply, PlanReply, SetPointsReply
 from service.wire import Format
@@ -176,15 +176,15 @@ def test_the_command_line_prints_what_is_asked_for_and_a_person_gets_all(
 ) -> None:
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request() | {"detail": detail}))
-    assert run(["plan", str(path), "--json"]) == 0
+    assert run_command_line(["plan", str(path), "--json"]) == 0
     reply = json.loads(capfd.readouterr().out)
     assert ("solver" in reply) == ("load_factor_without_palm" in reply) == (detail == "full")
     assert ("wrench" in reply["hands"][0]) == (detail != "set_points")
-    assert run(["plan", str(path)]) == 0
+    assert run_command_line(["plan", str(path)]) == 0
     assert "tendons and their motors" in capfd.readouterr().out
     lines = tmp_path / "lines.jsonl"
     lines.write_text(json.dumps(wall_request() | {"detail": detail}) + "\n")
-    assert run(["batch", str(lines), "--json"]) == 0
+    assert run_command_line(["batch", str(lines), "--json"]) == 0
     reply = json.loads(capfd.readouterr().out)
     assert ("solver" in reply) == (detail == "full")
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError
-from service.answering import plan, questions, wrench_space
+from service.answering import answer_plan, answer_wrench_space, questions
 from service.requests import WrenchSpaceRequest
 from service.tables import console, print_plan
 from service.wire import decode_request
@@ -50,7 +50,7 @@ def in_world(up: list[float] | None = None) -> dict[str, Any]:
 
 def test_the_reply_tells_the_pose_and_a_hand_given_by_it_is_the_same() -> None:
     request = placed()
-    reply = plan(plan_request(request))
+    reply = answer_plan(plan_request(request))
     limb = request["stance"]["hands"][0]["limb"]
     assert set(reply.poses) == {limb}
     pose, seat = reply.poses[limb], reply.hands[0].seating
@@ -63,7 +63,7 @@ def test_the_reply_tells_the_pose_and_a_hand_given_by_it_is_the_same() -> None:
     hand_request = request["stance"]["hands"][0]
     del hand_request["place"]
     hand_request["pose"] = {"position": pose.position, "orientation": pose.orientation}
-    again = plan(plan_request(request))
+    again = answer_plan(plan_request(request))
     assert again.utilisation == pytest.approx(reply.utilisation, rel=1e-6)
     np.testing.assert_allclose(again.hands[0].wrench, reply.hands[0].wrench, atol=1e-4)
 
@@ -93,7 +93,7 @@ def test_a_wrench_space_and_a_best_seat_at_a_place() -> None:
     hand = request["stance"]["hands"][0]
     hand["seat"] = "best"
     asked = {"v": 1, "stance": request["stance"], "limb": hand["limb"]}
-    reply = wrench_space(decode_request(msgspec.json.encode(asked), WrenchSpaceRequest))
+    reply = answer_wrench_space(decode_request(msgspec.json.encode(asked), WrenchSpaceRequest))
     assert reply.seating.rule == "best"
     assert set(reply.poses) == {hand["limb"]}
 
@@ -116,7 +116,7 @@ def test_a_place_that_cannot_be_is_refused_by_name() -> None:
 
 
 def test_a_plan_for_a_person_tells_where_hands_are(capsys: pytest.CaptureFixture[str]) -> None:
-    reply = plan(plan_request(placed()))
+    reply = answer_plan(plan_request(placed()))
     print_plan(reply, console())
     x, *_ = reply.poses[reply.hands[0].limb].position
     assert f"front_right is at ({x:.4f}, " in capsys.readouterr().out
@@ -125,7 +125,7 @@ def test_a_plan_for_a_person_tells_where_hands_are(capsys: pytest.CaptureFixture
 def test_an_angle_of_the_wrist_in_degrees_is_refused() -> None:
     for angle in [15.0, 30.0, 45.0, 57.3, 90.0, 180.0, 270.0, 360.0, -90.0, -45.0]:
         with pytest.raises(InvalidInputError) as caught:
-            plan(plan_request(placed(wrist_angle=angle)))
+            answer_plan(plan_request(placed(wrist_angle=angle)))
         assert caught.value.field == "stance.hands[0].place.wrist_angle"
         assert f"got {angle:g}: is it in rad?" in caught.value.message
 
@@ -133,7 +133,7 @@ def test_an_angle_of_the_wrist_in_degrees_is_refused() -> None:
 def test_more_than_a_turn_is_the_same_as_the_rest_of_it() -> None:
     poses = []
     for angle in (0.2, 0.2 + 2.0 * np.pi, 0.2 - 4.0 * np.pi + 2.0 * np.pi):
-        reply = plan(plan_request(placed(wrist_angle=angle)))
+        reply = answer_plan(plan_request(placed(wrist_angle=angle)))
         poses.append(next(iter(reply.poses.values())))
     for pose in poses[1:]:
         np.testing.assert_allclose(pose.position, poses[0].position, atol=1e-9)

@@ -18,7 +18,7 @@ from service.commands.options import with_extras
 from service.commands.stances import read_request
 from service.replies import ErrorReply
 from service.requests import LEAST_REPLY_BYTES, PlanRequest
-from service.serving.question import take
+from service.serving.question import received_question
 from service.wire import LARGEST_ERROR, Answer, BusyError, Format, decode_request, encode_error
 from tests.suite.helpers.replies import PLAN
 from tests.suite.helpers.requests import HEAVY, stream_request, wall_request
@@ -258,7 +258,7 @@ def test_a_service_that_is_busy_keeps_to_it() -> None:
             source_info=None,
             encoding=form.value,
         )
-        question = take(query, PLAN, 0.0, 10.0)
+        question = received_question(query, PLAN, 0.0, 10.0)
         assert len(question.refusal(BusyError("x" * 500, 1.0)).payload) <= LEAST_REPLY_BYTES
 
 

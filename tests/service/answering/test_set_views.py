@@ -141,9 +141,9 @@ def test_the_same_in_this_process() -> None:
     from service import WrenchSpaceRequest
 
     request = msgspec.convert(asked(1), WrenchSpaceRequest)
-    reply = answering.wrench_space(msgspec.structs.replace(request, want=["half_spaces"]))
+    reply = answering.answer_wrench_space(msgspec.structs.replace(request, want=["half_spaces"]))
     assert reply.vertices is None
-    assert reply.half_spaces == answering.wrench_space(request).half_spaces
+    assert reply.half_spaces == answering.answer_wrench_space(request).half_spaces
 
 
 def test_a_floating_wrist_that_nothing_holds_some_way_adds_nothing() -> None:
@@ -173,4 +173,4 @@ def test_a_body_space_without_a_bound_is_refused_as_such(monkeypatch: pytest.Mon
     payload = json.dumps({"v": 1, "stance": stance, "directions": [[0, 0, 1]]}).encode()
     answer = dispatch.handle("crux/robosimian/body_space", payload)
     assert answer.status == "unsupported"
-    assert "has no bound" in json.loads(answer.payload)["error"]["message"]
+    assert "is unbounded" in json.loads(answer.payload)["error"]["message"]

@@ -8,7 +8,7 @@ import msgspec
 
 from planner.route.climb import stages
 from service.answering import dispatch, questions
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.requests import RouteRequest
 from service.wire import decode_request
 from tests.suite.helpers.commands import OVERLOADED, result
@@ -44,11 +44,11 @@ def test_explain_is_true_or_false():
 def test_the_command_line_leaves_it_out_of_a_plan(tmp_path, capfd):
     path = tmp_path / "stance.json"
     path.write_text(json.dumps(wall_request(HEAVY)))
-    assert run(["plan", str(path), "--json", "--no-explain"]) == OVERLOADED
+    assert run_command_line(["plan", str(path), "--json", "--no-explain"]) == OVERLOADED
     assert result(capfd)["certificate"] is None
-    assert run(["plan", str(path), "--json"]) == OVERLOADED
+    assert run_command_line(["plan", str(path), "--json"]) == OVERLOADED
     assert result(capfd)["certificate"] is not None
-    assert run(["plan", str(path), "--no-explain", "-q"]) == OVERLOADED
+    assert run_command_line(["plan", str(path), "--no-explain", "-q"]) == OVERLOADED
     assert "leave no balance" not in capfd.readouterr().out
 
 
@@ -57,9 +57,9 @@ def test_the_command_line_leaves_it_out_of_all_lines(tmp_path, capfd):
     lines = [heavy | {"id": "a"}, heavy | {"id": "b", "explain": True}, {"v": 1, "id": "c"}]
     path = tmp_path / "requests.jsonl"
     path.write_text("\n".join(map(json.dumps, lines)) + "\n{")
-    run(["batch", str(path), "--workers", "1", "--json"])
+    run_command_line(["batch", str(path), "--workers", "1", "--json"])
     told = list(map(json.loads, capfd.readouterr().out.splitlines()))
-    run(["batch", str(path), "--workers", "1", "--json", "--no-explain"])
+    run_command_line(["batch", str(path), "--workers", "1", "--json", "--no-explain"])
     alone = list(map(json.loads, capfd.readouterr().out.splitlines()))
     assert [each["id"] for each in alone] == ["a", "b", "c", None]
     for whole, mine in zip(told[:2], alone[:2], strict=True):
@@ -76,5 +76,5 @@ def test_every_stance_of_a_route_is_asked_alike():
     request = {"v": 1, "stance": stance, "moves": [move]}
     for explain in (True, False):
         asked = decode_request(msgspec.json.encode(request | {"explain": explain}), RouteRequest)
-        asked_of = [each.question for each in stages(questions.route(asked))]
+        asked_of = [each.question for each in stages(questions.route_of(asked))]
         assert [each.explain for each in asked_of] == [explain] * 3

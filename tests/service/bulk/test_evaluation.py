@@ -17,7 +17,7 @@ from hand_models.base import CruxError, InvalidInputError
 from planner.processes import Workers
 from service.answering import dispatch
 from service.bulk import answer_chunk, answered, evaluate
-from service.bulk.chunks import BULK_SETTINGS, About, Setting, about, grouped, own_versions
+from service.bulk.chunks import BULK_SETTINGS, About, Setting, about, grouping_order, own_versions
 from service.bulk.pools import Here
 from service.requests import PlanRequest
 from service.wire import Format
@@ -160,9 +160,9 @@ def test_another_version_is_not_answered():
         setting = pickle.dumps(Setting(versions=own_versions() | {name: "0.0.none"}))
         with pytest.raises(CruxError) as caught:
             answer_chunk(setting, [])
-        there, here = caught.value.message.split(", and where it is asked ")
+        there, here = caught.value.message.split(", and the client ")
         assert there.endswith(f" {name} {own_versions()[name]}")
-        assert here.startswith(f"{name} 0.0.none;")
+        assert here.startswith(f"{name} 0.0.none: ")
 
 
 @given(st.lists(st.integers(0, 9), max_size=60), st.integers(1, 3))
@@ -182,7 +182,7 @@ def test_answers_are_in_order_however_chunks_come_back(picks, width):
 @given(st.lists(st.tuples(st.sampled_from("ab"), st.sampled_from("xy"))))
 def test_groups_stand_together_and_keep_their_order(pairs):
     abouts = [About(rock.encode(), hands.encode()) for rock, hands in pairs]
-    order = grouped(abouts)
+    order = grouping_order(abouts)
     assert sorted(order) == list(range(len(pairs)))
     for keys in ([abouts[i].rock for i in order], [abouts[i] for i in order]):
         runs = [key for key, _ in itertools.groupby(keys)]

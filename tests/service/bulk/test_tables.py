@@ -16,7 +16,7 @@ from hand_models.base import InvalidInputError
 from service.answering import dispatch
 from service.bulk import chosen_columns, columns_of, row_of
 from service.bulk.chunks import BulkSettings
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from tests.service.commands.test_interruption import limited
 from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint
 from tests.suite.helpers.processes import begun, ended, until, watched
@@ -65,13 +65,13 @@ def whole_rows(path: Path) -> int:
 def test_rows_tell_what_replies_do(ending, lines, tmp_path, capfd):
     needs(ending)
     path = tmp_path / f"table{ending}"
-    assert run(["batch", str(lines), "-o", str(path), "--json"]) == BAD_INPUT
+    assert run_command_line(["batch", str(lines), "-o", str(path), "--json"]) == BAD_INPUT
     out, err = capfd.readouterr()
     assert json.loads(out)["overloaded"] == COUNT - 1
     assert err.startswith("crux: line 11: stance: ")
     rows = content(path)
     assert [int(row["index"]) for row in rows] == list(range(COUNT))
-    plan = dispatch.plan(plan_request(wall_request(HEAVY + 1) | {"id": "r1"}))
+    plan = dispatch.answer_plan(plan_request(wall_request(HEAVY + 1) | {"id": "r1"}))
     row = rows[1]
     assert (row["id"], row["status"]) == ("r1", "overloaded")
     assert float(row["utilisation"]) == plan.utilisation
@@ -94,7 +94,7 @@ def test_units_are_in_the_schema_of_parquet(lines, tmp_path, capfd):
     from pyarrow import parquet
 
     path = tmp_path / "table.parquet"
-    run(["batch", str(lines), "-o", str(path), "--json"])
+    run_command_line(["batch", str(lines), "-o", str(path), "--json"])
     schema = parquet.read_schema(path)
     for column in columns_of(LIMBS):
         told = {
@@ -120,18 +120,18 @@ def test_columns_are_chosen_by_name_and_pattern():
 def test_explanations_are_in_a_table_if_they_are_asked_for(lines, tmp_path, capfd):
     path = tmp_path / "table.csv"
     asked = ["batch", str(lines), "-o", str(path), "--json"]
-    run([*asked, "--explain", "--columns", "irreducible,sufficient"])
+    run_command_line([*asked, "--explain", "--columns", "irreducible,sufficient"])
     row = content(path)[0]
-    plan = dispatch.plan(plan_request(wall_request(HEAVY)))
+    plan = dispatch.answer_plan(plan_request(wall_request(HEAVY)))
     assert len(row["irreducible"].split("; ")) == len(plan.certificate.irreducible)
     assert plan.certificate.irreducible[0].limb in row["irreducible"]
-    run(asked)
+    run_command_line(asked)
     assert "irreducible" not in content(path)[0]
     capfd.readouterr()
-    assert run([*asked, "--columns", "sufficient"]) == BAD_INPUT
+    assert run_command_line([*asked, "--columns", "sufficient"]) == BAD_INPUT
     assert "it needs --explain" in complaint(capfd)
-    assert run(["batch", str(lines), "--columns", "id"]) == BAD_INPUT
-    assert "needs a table" in complaint(capfd)
+    assert run_command_line(["batch", str(lines), "--columns", "id"]) == BAD_INPUT
+    assert "requires a table" in complaint(capfd)
 
 
 @watched
@@ -144,7 +144,7 @@ def test_what_is_ended_by_a_signal_goes_on_and_is_the_same_table(
 ):
     needs(ending)
     whole, path = tmp_path / f"whole{ending}", tmp_path / f"table{ending}"
-    assert run(["batch", str(lines), "-o", str(whole), "--json"]) == BAD_INPUT
+    assert run_command_line(["batch", str(lines), "-o", str(whole), "--json"]) == BAD_INPUT
     summary = json.loads(capfd.readouterr().out)
     process = begun("batch", str(lines), "-o", str(path), "--workers", "2")
     until(lambda: whole_rows(path) >= 2, process)
@@ -157,12 +157,12 @@ def test_what_is_ended_by_a_signal_goes_on_and_is_the_same_table(
     assert not path.exists()
     # what there is can be looked at
     asked = ["batch", str(lines), "-o", str(path), "--json"]
-    run([*asked, "--export"])
+    run_command_line([*asked, "--export"])
     assert content(path) == content(whole)[:rows]
-    assert run([*asked, "--resume"]) == BAD_INPUT
+    assert run_command_line([*asked, "--resume"]) == BAD_INPUT
     assert content(path) == content(whole)
     # nothing is left to do, and the status is that of all
-    assert run([*asked, "--resume"]) == BAD_INPUT
+    assert run_command_line([*asked, "--resume"]) == BAD_INPUT
     said = json.loads(capfd.readouterr().out.splitlines()[-1])
     assert {**said, "time": 0, "file": 0} == {**summary, "time": 0, "file": 0}
     assert content(path) == content(whole)
@@ -172,12 +172,14 @@ def test_what_is_ended_by_a_signal_goes_on_and_is_the_same_table(
 def test_what_a_kill_has_left_half_done_is_done_again(cut, lines, tmp_path, capfd):
     whole, path = tmp_path / "whole.csv", tmp_path / "table.csv"
     for each in (whole, path):
-        run(["batch", str(lines), "-o", str(each), "--json"])
+        run_command_line(["batch", str(lines), "-o", str(each), "--json"])
     data = state(path).read_bytes().splitlines(keepends=True)
     in_row = b"".join(data[:7]) + data[7][:20]
     state(path).write_bytes(in_row if cut == "in a row" else data[0][:30])
     capfd.readouterr()
-    assert run(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
+    assert (
+        run_command_line(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
+    )
     assert json.loads(capfd.readouterr().out)["requests"] == COUNT
     assert path.read_bytes() == whole.read_bytes()
     assert state(path).read_bytes() == state(whole).read_bytes()
@@ -187,7 +189,7 @@ def test_a_table_does_not_go_on_with_other_work(lines, tmp_path, capfd):
     path, hand = tmp_path / "table.csv", tmp_path / "hand.toml"
     hand.write_text("[hand]\nmass = { value = 2.0, unit = 'kg', source = 'measured' }\n")
     asked = ["batch", str(lines), "-o", str(path), "--json"]
-    run(asked)
+    run_command_line(asked)
     before = path.read_bytes()
     for more, words in (
         (["--columns", "id"], "another columns"),
@@ -195,7 +197,7 @@ def test_a_table_does_not_go_on_with_other_work(lines, tmp_path, capfd):
         (["--hand", str(hand)], "another hand"),
     ):
         capfd.readouterr()
-        assert run([*asked, "--resume", *more]) == BAD_INPUT
+        assert run_command_line([*asked, "--resume", *more]) == BAD_INPUT
         assert words in complaint(capfd)
     text = lines.read_text()
     for other, words in (
@@ -203,11 +205,11 @@ def test_a_table_does_not_go_on_with_other_work(lines, tmp_path, capfd):
         (text[: len(text) // 2], f"has {COUNT} replies"),
     ):
         lines.write_text(other)
-        assert run([*asked, "--resume"]) == BAD_INPUT
+        assert run_command_line([*asked, "--resume"]) == BAD_INPUT
         assert words in complaint(capfd)
     # more requests after those that are answered are the same work
     lines.write_text(text + json.dumps(wall_request() | {"id": "more"}) + "\n")
-    assert run([*asked, "--resume"]) == BAD_INPUT
+    assert run_command_line([*asked, "--resume"]) == BAD_INPUT
     assert json.loads(capfd.readouterr().out)["optimal"] == 1
     assert path.read_bytes().startswith(before)
     assert [row["id"] for row in content(path)][-1] == "more"
@@ -216,22 +218,22 @@ def test_a_table_does_not_go_on_with_other_work(lines, tmp_path, capfd):
 def test_a_table_does_not_write_over_what_is_none(lines, tmp_path, capfd):
     notes, folder = tmp_path / "notes.csv", tmp_path / "notes.parquet"
     notes.write_text("notes")
-    assert run(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
-    assert "no table that a batch has written" in complaint(capfd)
+    assert run_command_line(["batch", str(lines), "-o", str(notes), "--resume"]) == BAD_INPUT
+    assert "not a table of crux batch or crux sweep" in complaint(capfd)
     assert notes.read_text() == "notes"
     beside = notes.with_name("notes.csv.jsonl")
     for text in ("notes\n", "notes", lines.read_text()):
         beside.write_text(text)
         # the requests themselves, too
         for asked, more in ((lines, ["--resume"]), (lines, []), (beside, [])):
-            assert run(["batch", str(asked), "-o", str(notes), *more]) == BAD_INPUT
-            assert "no table that a batch has written" in complaint(capfd)
+            assert run_command_line(["batch", str(asked), "-o", str(notes), *more]) == BAD_INPUT
+            assert "not a table of crux batch or crux sweep" in complaint(capfd)
         assert beside.read_text() == text
     folder.mkdir()
     (folder / "notes").write_text("notes")
     needs(".parquet")
     for more in ([], ["--resume"]):
-        assert run(["batch", str(lines), "-o", str(folder), *more]) == BAD_INPUT
+        assert run_command_line(["batch", str(lines), "-o", str(folder), *more]) == BAD_INPUT
         assert "is a folder; remove it" in complaint(capfd)
     assert [path.name for path in folder.iterdir()] == ["notes"]
 
@@ -241,10 +243,10 @@ def test_a_table_of_an_older_version_is_begun_anew(lines, tmp_path, capfd):
     path.write_text("index,id\n")
     path.with_name("table.csv.manifest.json").write_text("{}")
     for more in (["--resume"], ["--export"]):
-        assert run(["batch", str(lines), "-o", str(path), *more]) == BAD_INPUT
-        assert "was begun by an older version" in complaint(capfd)
+        assert run_command_line(["batch", str(lines), "-o", str(path), *more]) == BAD_INPUT
+        assert "was started by an older version" in complaint(capfd)
     assert path.read_text() == "index,id\n"
-    assert run(["batch", str(lines), "-o", str(path)]) == BAD_INPUT
+    assert run_command_line(["batch", str(lines), "-o", str(path)]) == BAD_INPUT
     assert len(content(path)) == COUNT
 
 
@@ -255,7 +257,9 @@ def test_a_full_disk_leaves_whole_rows(lines, tmp_path, capfd):
     expected = f"crux: cannot write {path}: File too large; {kept}; --resume goes on\n"
     assert (status, error) == (FAILED, expected)
     assert 0 < whole_rows(path) < COUNT
-    assert run(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
+    assert (
+        run_command_line(["batch", str(lines), "-o", str(path), "--json", "--resume"]) == BAD_INPUT
+    )
     assert [int(row["index"]) for row in content(path)] == list(range(COUNT))
 
 
@@ -272,15 +276,17 @@ def test_what_is_not_installed_is_told_in_one_line(
     for name in [module, *(name for name in sys.modules if name.startswith(f"{module}."))]:
         monkeypatch.setitem(sys.modules, name, None)
     given = [part.replace("FOLDER", str(tmp_path)) for part in more]
-    assert run(["batch", str(lines), *given]) == BAD_INPUT
+    assert run_command_line(["batch", str(lines), *given]) == BAD_INPUT
     assert words in complaint(capfd)
 
 
 def test_a_batch_without_errors_is_overloaded_at_worst(tmp_path, capfd):
     path, table = tmp_path / "requests.jsonl", tmp_path / "table.csv"
     path.write_text(json.dumps(wall_request(HEAVY)))
-    assert run(["batch", str(path), "-o", str(table), "--json"]) == OVERLOADED
-    assert run(["batch", str(path), "-o", str(table), "--json", "--resume"]) == OVERLOADED
+    assert run_command_line(["batch", str(path), "-o", str(table), "--json"]) == OVERLOADED
+    assert (
+        run_command_line(["batch", str(path), "-o", str(table), "--json", "--resume"]) == OVERLOADED
+    )
 
 
 @pytest.mark.parametrize("name", ["keep.jsonl", "keep.csv"])
@@ -300,7 +306,7 @@ def test_answers_stay_where_no_others_take_their_place(
     monkeypatch.setattr("service.bulk.pools.BULK_SETTINGS", settings)
     path = tmp_path / name
     path.write_text("answers\n")
-    assert run(["batch", str(lines), "-o", str(path), "--dask", address]) == status
+    assert run_command_line(["batch", str(lines), "-o", str(path), "--dask", address]) == status
     assert told in capfd.readouterr().err
     assert path.read_text() == "answers\n"
 
@@ -315,19 +321,19 @@ def test_a_table_that_a_full_disk_kept_from_being_written_is_exported_later(
 
     with monkeypatch.context() as there:
         there.setattr("csv.writer", full)
-        assert run(["batch", str(lines), "-o", str(path)]) == FAILED
+        assert run_command_line(["batch", str(lines), "-o", str(path)]) == FAILED
     assert "--resume goes on" in complaint(capfd)
     assert not path.exists()
-    run(["batch", str(lines), "-o", str(path), "--export"])
+    run_command_line(["batch", str(lines), "-o", str(path), "--export"])
     assert len(content(path)) == COUNT
     capfd.readouterr()
-    assert run(["batch", str(lines), "--export"]) == BAD_INPUT
-    assert "--export: needs a table" in complaint(capfd)
+    assert run_command_line(["batch", str(lines), "--export"]) == BAD_INPUT
+    assert "--export: requires a table" in complaint(capfd)
 
 
 def test_less_is_said_of_a_batch(lines, tmp_path, capfd):
     for quiet in ([], ["-q"]):
-        run(["batch", str(lines), "-o", str(tmp_path / "t.csv"), *quiet])
+        run_command_line(["batch", str(lines), "-o", str(tmp_path / "t.csv"), *quiet])
         out = capfd.readouterr().out
         assert ("error: invalid" in out) == (not quiet)
         assert f"{COUNT} requests in" in out

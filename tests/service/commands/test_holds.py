@@ -18,7 +18,7 @@ from hand_models.parameters import hand_table
 from hand_models.rock import Mesh, read_mesh
 from hand_models.tile import Surface
 from service import processes
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.processes import Interrupted
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
@@ -40,7 +40,7 @@ def test_holds_are_written_sorted_told_and_drawn(rock, tmp_path, capfd):
     output, picture = tmp_path / "holds.json", tmp_path / "holds.png"
     twice = ["--outer-rotation", "0"]  # which is no other hand
     options = ["-o", str(output), *COARSE, *twice, "--robust", "1", "--workers", "1"]
-    assert run(["holds", str(rock), *options, "--plot", str(picture)]) == DONE
+    assert run_command_line(["holds", str(rock), *options, "--plot", str(picture)]) == DONE
     out, _ = capfd.readouterr()
     assert max(map(len, out.splitlines()[:-1])) <= 80
     assert "16 trials at 16 points" in out
@@ -75,7 +75,7 @@ def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
     """At the rim of a wall fingers reach over its border; each trial is tried again."""
     output = tmp_path / "holds.json"
     options = [*COARSE, "--robust", "0", "--workers", "1"]
-    assert run(["holds", str(rock), "-o", str(output), *options]) == DONE
+    assert run_command_line(["holds", str(rock), "-o", str(output), *options]) == DONE
     told = json.loads(output.read_text(encoding="utf-8"))
     check_refusals(told)
     assert 0 < told["reasons"][AT_BORDER] < told["trials"] == told["tried"]
@@ -101,7 +101,7 @@ def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
 def test_a_plan_is_made_with_a_hold_that_was_proposed(rock, tmp_path, capfd):
     output = tmp_path / "holds.json"
     options = ["-o", str(output), *COARSE, "--robust", "0", "--workers", "1", "--json"]
-    assert run(["holds", str(rock), *options]) == DONE
+    assert run_command_line(["holds", str(rock), *options]) == DONE
     told = result(capfd)
     best = json.loads(output.read_text(encoding="utf-8"))["holds"][0]
     assert told["file"] == str(output)
@@ -116,7 +116,7 @@ def test_a_plan_is_made_with_a_hold_that_was_proposed(rock, tmp_path, capfd):
     del hand["pose"]
     stance = tmp_path / "stance.json"
     stance.write_text(json.dumps(request), encoding="utf-8")
-    run(["plan", str(stance), "--json"])
+    run_command_line(["plan", str(stance), "--json"])
     reply = result(capfd)
     seating = reply["hands"][0]["seating"]
     assert seating["rule"] == best["seating"]["rule"]
@@ -135,7 +135,7 @@ def test_what_was_tried_is_kept_when_the_rest_is_broken_off(rock, tmp_path, monk
 
     monkeypatch.setattr(processes.HoldTrials, "each", broken)
     with pytest.raises(Interrupted, match="8 of 16 places were tried, 0 of the best scattered; "):
-        run(["holds", str(rock), "-o", str(output), *COARSE])
+        run_command_line(["holds", str(rock), "-o", str(output), *COARSE])
     told = json.loads(output.read_text(encoding="utf-8"))
     assert (told["trials"], told["tried"]) == (16, 8)
     reaches = [hold["support"]["-fz"] for hold in told["holds"]]
@@ -159,7 +159,7 @@ def test_holds_are_the_same_wherever_hands_are_tried(more, rock, tmp_path, capfd
     for where in (["--workers", "1"], more):
         output = tmp_path / f"{len(found)}.json"
         options = ["-o", str(output), *COARSE, "--robust", "2", "--json", *where]
-        assert run(["holds", str(rock), *options]) == DONE
+        assert run_command_line(["holds", str(rock), *options]) == DONE
         assert capfd.readouterr().err == ""
         found.append(output.read_bytes())
     assert found[0] == found[1]
@@ -174,7 +174,10 @@ def test_what_was_tried_is_kept_when_the_cluster_is_gone(rock, tmp_path, capfd, 
         raise CruxError("the Dask scheduler is gone")
 
     monkeypatch.setattr(processes.HoldTrials, "each", broken)
-    assert run(["holds", str(rock), "-o", str(output), *COARSE, "--workers", "1"]) == FAILED
+    assert (
+        run_command_line(["holds", str(rock), "-o", str(output), *COARSE, "--workers", "1"])
+        == FAILED
+    )
     kept = "1 of 16 places were tried, 0 of the best scattered; what they hold is in"
     assert f"the Dask scheduler is gone; {kept}" in complaint(capfd)
     assert json.loads(output.read_text(encoding="utf-8"))["tried"] == 1
@@ -202,11 +205,11 @@ def test_what_cannot_be_is_told_in_a_line(rock, tmp_path, capfd):
         ([str(rock), "-o", output, "--spacing", "nan"], "spacing: must be at least 0.001 m"),
         (
             [str(rock), "-o", output, "--spacing", "0.001"],
-            "up to 2,008,008 places to try (a grid of 501 by 501 points, 8 at each), and at most "
-            "100,000 are tried",
+            "up to 2,008,008 places to try (a grid of 501 by 501 points, 8 at each); the "
+            "maximum is 100,000",
         ),
         ([str(rock), "-o", str(tmp_path / "x" / "holds.json")], "no such folder"),
         ([str(rock), "-o", str(tmp_path / "holds.txt")], "must end in .json"),
     ):
-        assert run(["holds", *arguments]) == BAD_INPUT
+        assert run_command_line(["holds", *arguments]) == BAD_INPUT
         assert words in complaint(capfd)

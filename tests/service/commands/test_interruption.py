@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hand_models.base import whole_file
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.processes import Interrupted
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, result
@@ -100,14 +100,17 @@ def test_a_batch_that_was_killed_goes_on_where_it_ended(lines, tmp_path, capfd):
     # a line that is cut off is done again
     output.write_bytes(first[: first.rfind(b"\n") + 1] + b'{"v":1,"id":"r')
     more = ["--resume", "--json", "--workers", "1"]
-    assert run(["batch", str(lines), "-o", str(output), *more]) == OVERLOADED
+    assert run_command_line(["batch", str(lines), "-o", str(output), *more]) == OVERLOADED
     assert result(capfd)["overloaded"] == COUNT
     assert output.read_bytes().startswith(first[: first.rfind(b"\n") + 1])
-    assert run(["batch", str(lines), "-o", str(whole), "--json", "--workers", "1"]) == OVERLOADED
+    assert (
+        run_command_line(["batch", str(lines), "-o", str(whole), "--json", "--workers", "1"])
+        == OVERLOADED
+    )
     result(capfd)
     assert told(output) == told(whole)
     # there is nothing left to do
-    assert run(["batch", str(lines), "-o", str(output), *more]) == OVERLOADED
+    assert run_command_line(["batch", str(lines), "-o", str(output), *more]) == OVERLOADED
     assert result(capfd)["overloaded"] == COUNT
     assert told(output) == told(whole)
 
@@ -116,17 +119,17 @@ def test_a_batch_does_not_go_on_with_the_replies_of_another_or_what_is_none(line
     output = tmp_path / "replies.jsonl"
     for content, words in (
         (b'{"v": 1, "id": "other"}\n{"v"', "answers 'other', and the request is 'r0'"),
-        (b"x\n", "line 1: no reply"),
-        (b"notes", "no reply"),
-        (b'{"vx', "no reply"),
+        (b"x\n", "line 1: not a reply"),
+        (b"notes", "not a reply"),
+        (b'{"vx', "not a reply"),
         (b"{}\n" * (COUNT + 1), f"has {COUNT + 1} replies, and there are {COUNT} requests"),
     ):
         output.write_bytes(content)
-        assert run(["batch", str(lines), "-o", str(output), "--resume"]) == BAD_INPUT
+        assert run_command_line(["batch", str(lines), "-o", str(output), "--resume"]) == BAD_INPUT
         assert words in complaint(capfd)
         assert output.read_bytes() == content
-    assert run(["batch", str(lines), "--resume"]) == BAD_INPUT
-    assert "needs the FILE of -o" in complaint(capfd)
+    assert run_command_line(["batch", str(lines), "--resume"]) == BAD_INPUT
+    assert "requires -o FILE" in complaint(capfd)
 
 
 def limited(*arguments: str, size: int) -> tuple[int, str]:
@@ -146,11 +149,14 @@ def test_a_full_disk_leaves_whole_lines_of_a_batch(lines, tmp_path):
 def test_a_batch_does_not_write_where_its_requests_come_from(lines, capfd):
     before = lines.read_bytes()
     for more in ([], ["--resume"]):
-        assert run(["batch", str(lines), "-o", str(lines), *more]) == BAD_INPUT
-        assert "the requests are there" in complaint(capfd)
+        assert run_command_line(["batch", str(lines), "-o", str(lines), *more]) == BAD_INPUT
+        assert "is the file of the requests" in complaint(capfd)
     with lines.open("rb") as given:
         status, error = ended(begun("batch", "-", "-o", str(lines), stdin=given))
-    assert (status, error) == (BAD_INPUT, f"crux: -o: {lines}: the requests are there\n")
+    assert (status, error) == (
+        BAD_INPUT,
+        f"crux: -o: {lines}: is the file of the requests; give another output\n",
+    )
     assert lines.read_bytes() == before
 
 

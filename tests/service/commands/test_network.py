@@ -16,7 +16,7 @@ import zenoh
 
 from hand_models import InvalidInputError
 from service import CruxClient, NoServiceError
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.commands import (
@@ -62,7 +62,7 @@ def test_query_and_serve(served, stance_file):
 def test_a_query_from_standard_input(served, capfd, monkeypatch):
     heavy = io.BytesIO(json.dumps(wall_request(HEAVY)).encode())
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=heavy))
-    assert run(["query", "-", *flags_to(served.endpoint)]) == OVERLOADED
+    assert run_command_line(["query", "-", *flags_to(served.endpoint)]) == OVERLOADED
     out, err = capfd.readouterr()
     assert err == ""
     assert out.startswith("OVERLOADED")
@@ -71,7 +71,7 @@ def test_a_query_from_standard_input(served, capfd, monkeypatch):
 def test_what_the_service_refuses_is_bad_input(served, stance_file, capfd):
     twice = put(wall_request(), ("stance", "hands", 1, "limb"), "front_right")
     flags = flags_to(served.endpoint)
-    assert run(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
+    assert run_command_line(["query", stance_file(twice), *flags, "--json"]) == BAD_INPUT
     assert complaint(capfd).startswith("crux: stance.hands[1].limb: limb 'front_right' appears")
 
 
@@ -82,13 +82,16 @@ def no_session(capfd: pytest.CaptureFixture[str]) -> bool:
 
 
 def test_an_endpoint_that_is_taken_is_not_served(served, capfd):
-    assert run(["serve", "-l", served.endpoint, "--no-multicast-scouting", "--json"]) == FAILED
+    assert (
+        run_command_line(["serve", "-l", served.endpoint, "--no-multicast-scouting", "--json"])
+        == FAILED
+    )
     assert no_session(capfd)
 
 
 def test_a_query_where_nobody_listens(stance_file, capfd):
     flags = flags_to(free_endpoint())
-    assert run(["query", stance_file(wall_request()), *flags, "--json"]) == FAILED
+    assert run_command_line(["query", stance_file(wall_request()), *flags, "--json"]) == FAILED
     out, err = capfd.readouterr()
     assert out == ""
     assert err.splitlines()[-1].startswith("crux: no zenoh session: ")
@@ -138,7 +141,7 @@ def test_a_query_waits_for_a_service_that_is_not_there_yet(mode, stance_file):
 @pytest.mark.parametrize("mode", ["client", "peer"])
 def test_a_service_that_does_not_come_is_waited_for_no_longer(mode, stance_file, capfd):
     flags = ["-m", mode, "-e", free_endpoint(), "--no-multicast-scouting", "--wait", "0.3"]
-    assert run(["query", stance_file(wall_request()), *flags]) == FAILED
+    assert run_command_line(["query", stance_file(wall_request()), *flags]) == FAILED
     told = complaint(capfd)
     assert told.startswith("crux: no service of robosimian within 0.3 s")
     assert "start one with `crux serve`" in told
@@ -146,7 +149,7 @@ def test_a_service_that_does_not_come_is_waited_for_no_longer(mode, stance_file,
 
 @pytest.mark.parametrize("wait", ["-1", "nan", "soon", "1e7"])
 def test_how_long_is_waited_is_a_number_of_seconds(wait, capfd):
-    assert run(["query", "wall-300", "--wait", wait]) == BAD_INPUT
+    assert run_command_line(["query", "wall-300", "--wait", wait]) == BAD_INPUT
     assert "--wait" in complaint(capfd)
 
 
@@ -174,7 +177,7 @@ def test_a_configuration_stays_as_it_was():
     assert str(config) == before
 
 
-VALID = "valid is such as tcp/127.0.0.1:7447"
+VALID = "valid is, for example, tcp/127.0.0.1:7447"
 
 
 @pytest.mark.parametrize(
@@ -186,10 +189,16 @@ VALID = "valid is such as tcp/127.0.0.1:7447"
         (["--cfg", "mode"], "crux: --cfg: KEY:VALUE is needed, such as mode:'client', got 'mode'"),
         (["-c", "/nowhere.json5"], "crux: --config: /nowhere.json5: No such file or directory"),
         (["-c", "/"], "crux: --config: /: Is a directory"),
-        (["-l", "foo"], f"crux: --listen: 'foo' is no endpoint (no protocol/address); {VALID}"),
-        (["-e", "foo"], f"crux: --connect: 'foo' is no endpoint (no protocol/address); {VALID}"),
-        (["-l", "tcp/foo"], f"crux: --listen: 'tcp/foo' is no endpoint (no port); {VALID}"),
-        (["-e", "tcp/[::1]:y"], "crux: --connect: 'tcp/[::1]:y' is no endpoint ('y' is no port); "),
+        (["-l", "foo"], f"crux: --listen: 'foo' is not an endpoint (no protocol/address); {VALID}"),
+        (
+            ["-e", "foo"],
+            f"crux: --connect: 'foo' is not an endpoint (no protocol/address); {VALID}",
+        ),
+        (["-l", "tcp/foo"], f"crux: --listen: 'tcp/foo' is not an endpoint (no port); {VALID}"),
+        (
+            ["-e", "tcp/[::1]:y"],
+            "crux: --connect: 'tcp/[::1]:y' is not an endpoint ('y' is no port)",
+        ),
         (["-m", "boss"], "crux: Invalid value for '-m' / '--mode': 'boss' is not one of"),
         *(
             (["--timeout", value], f"crux: Invalid value for '--timeout': {value} is not in the")
@@ -198,7 +207,7 @@ VALID = "valid is such as tcp/127.0.0.1:7447"
     ],
 )
 def test_bad_flags(flags, line, stance_file, capfd):
-    assert run(["query", stance_file(wall_request()), *flags]) == BAD_INPUT
+    assert run_command_line(["query", stance_file(wall_request()), *flags]) == BAD_INPUT
     assert complaint(capfd).startswith(line)
 
 

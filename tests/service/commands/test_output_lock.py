@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint
 from tests.suite.helpers.processes import begun, until, watched
 from tests.suite.helpers.requests import wall_request
@@ -81,7 +81,7 @@ def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(name, lines
     first = begun("batch", str(lines), "-o", str(output), "--workers", "2", stderr=None)
     until(lambda: lock.exists() and lock.read_text().strip() and lines_there(output), first)
     for more in ([], ["--resume"]):
-        assert run(["batch", str(lines), "-o", str(output), *more]) == BAD_INPUT
+        assert run_command_line(["batch", str(lines), "-o", str(output), *more]) == BAD_INPUT
         assert complaint(capfd) == (
             f"crux: -o: {output}: another run (process {first.pid}) is writing there; wait until "
             "it has ended, or give another output\n"
@@ -92,7 +92,7 @@ def test_the_second_of_two_runs_is_refused_until_the_first_is_killed(name, lines
     assert lock.exists()
     few = lines.with_name("few.jsonl")
     few.write_text(lines.read_text("utf-8").partition("\n")[0] + "\n", encoding="utf-8")
-    assert run(["batch", str(few), "-o", str(output)]) == OVERLOADED
+    assert run_command_line(["batch", str(few), "-o", str(output)]) == OVERLOADED
     assert not lock.exists()
 
 
@@ -135,14 +135,14 @@ def test_every_command_that_fills_an_output_has_it_alone(
     lock.parent.mkdir(exist_ok=True)
     there = {*lock.parent.iterdir()}
     holder = hold_lock(lock)
-    assert run(words) == BAD_INPUT
+    assert run_command_line(words) == BAD_INPUT
     assert f"another run (process {holder.pid}) is writing there" in complaint(capfd)
     assert {*lock.parent.iterdir()} == {*there, lock}  # nothing was written
     if name in LONG:
         return
     holder.kill()
     holder.wait()
-    assert run(words) == DONE
+    assert run_command_line(words) == DONE
     assert not lock.exists()
 
 
@@ -150,7 +150,7 @@ def test_another_name_of_the_file_is_the_same_output(few, tmp_path, hold_lock, c
     (tmp_path / "real.jsonl").touch()
     (tmp_path / "link.jsonl").symlink_to("real.jsonl")
     hold_lock(tmp_path / ".real.jsonl.lock")
-    assert run(["batch", str(few), "-o", str(tmp_path / "link.jsonl")]) == BAD_INPUT
+    assert run_command_line(["batch", str(few), "-o", str(tmp_path / "link.jsonl")]) == BAD_INPUT
     assert "another run" in complaint(capfd)
 
 
@@ -160,7 +160,7 @@ def test_other_outputs_in_the_folder_are_free_and_what_a_killed_run_left_is_no_l
     hold_lock(tmp_path / ".a.jsonl.lock")
     lock = tmp_path / ".b.jsonl.lock"
     lock.write_text("1\n")
-    assert run(["batch", str(few), "-o", str(tmp_path / "b.jsonl")]) == DONE
+    assert run_command_line(["batch", str(few), "-o", str(tmp_path / "b.jsonl")]) == DONE
     assert not lock.exists()
 
 
@@ -169,13 +169,13 @@ def test_a_run_that_fails_leaves_no_lock(few, tmp_path, monkeypatch):
         raise OSError(5, "no more", "here")
 
     monkeypatch.setattr("service.commands.batch.answer_rest", broken)
-    assert run(["batch", str(few), "-o", str(tmp_path / "a.jsonl")]) == 1
+    assert run_command_line(["batch", str(few), "-o", str(tmp_path / "a.jsonl")]) == 1
     assert [*tmp_path.glob(".*.lock")] == []
 
 
 @pytest.mark.skipif(not Path("/dev/null").exists(), reason="no /dev/null")
 def test_a_device_is_not_locked(few, capfd):
-    assert run(["batch", str(few), "-o", "/dev/null"]) == DONE
+    assert run_command_line(["batch", str(few), "-o", "/dev/null"]) == DONE
     assert not Path("/dev/.null.lock").exists()
     capfd.readouterr()
 
@@ -183,7 +183,7 @@ def test_a_device_is_not_locked(few, capfd):
 def test_a_system_without_locks_says_so(few, tmp_path, monkeypatch, capfd):
     monkeypatch.setitem(sys.modules, "fcntl", None)
     output = tmp_path / "a.jsonl"
-    assert run(["batch", str(few), "-o", str(output)]) == DONE
+    assert run_command_line(["batch", str(few), "-o", str(output)]) == DONE
     told = f"crux: this system has no locks: no other run may write {output} now\n"
     assert capfd.readouterr().err == told
     assert len(output.read_text("utf-8").splitlines()) == 1

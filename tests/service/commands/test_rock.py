@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
 from tests.suite.helpers.replies import refusal
 from tests.suite.helpers.requests import put, wall_request
@@ -31,16 +31,16 @@ def test_it_is_said_which_axis_was_taken_for_up(tmp_path, capfd):
     x, y, z = wall(0.01, 0.2, 0.0).T
     cloud = str(write_cloud(tmp_path / "cloud.xyz", np.column_stack([x, z, y])))
     output = ["-o", str(tmp_path / "rock.ply")]
-    assert run(["rock", cloud, *output]) == DONE
+    assert run_command_line(["rock", cloud, *output]) == DONE
     out = " ".join(capfd.readouterr().out.split())
     assert "up z of the file's axes, assumed" in out
     assert "warning: with z up this is ground, or a roof;" in out
-    assert run(["rock", cloud, *output, "--up", "y"]) == DONE
+    assert run_command_line(["rock", cloud, *output, "--up", "y"]) == DONE
     out = " ".join(capfd.readouterr().out.split())
     assert "up y of the file's axes view" in out
     assert "ground" not in out
     for more, up, assumed in (([], "z", True), (["--up", "z"], "z", False)):
-        assert run(["rock", cloud, *output, *more, "--json"]) == DONE
+        assert run_command_line(["rock", cloud, *output, *more, "--json"]) == DONE
         told = result(capfd)
         assert (told["up"], told["up_assumed"]) == (up, assumed)
 
@@ -48,7 +48,7 @@ def test_it_is_said_which_axis_was_taken_for_up(tmp_path, capfd):
 def test_the_table_tells_what_was_read_and_what_is_open(tmp_path, capfd):
     output, picture = tmp_path / "rock.ply", tmp_path / "rock.png"
     arguments = [scanned(tmp_path), "-o", str(output), "--unit", "mm", "--plot", str(picture)]
-    assert run(["rock", *arguments]) == DONE
+    assert run_command_line(["rock", *arguments]) == DONE
     out, err = capfd.readouterr()
     assert err == ""
     assert str(output) in out
@@ -67,7 +67,7 @@ def test_the_table_tells_what_was_read_and_what_is_open(tmp_path, capfd):
 def test_the_same_as_json(tmp_path, capfd):
     output = tmp_path / "rock.ply"
     options = ["--unit", "mm", "--view", "0,1,0", "--hole", "0.1", "--spacing", "0.01", "--json"]
-    assert run(["rock", scanned(tmp_path), "-o", str(output), *options]) == DONE
+    assert run_command_line(["rock", scanned(tmp_path), "-o", str(output), *options]) == DONE
     told = result(capfd)
     assert told["dropped"] == 1
     assert told["holes"] == []
@@ -78,7 +78,9 @@ def test_the_same_as_json(tmp_path, capfd):
 
 def test_a_plan_is_made_on_scanned_terrain(tmp_path, stance_file, capfd):
     options = ["--cell", "90", "--width", "1", "--up", "y", "--spacing", "0.005", "--json"]
-    assert run(["rock", str(TERRAIN), "-o", str(tmp_path / "rock.ply"), *options]) == DONE
+    assert (
+        run_command_line(["rock", str(TERRAIN), "-o", str(tmp_path / "rock.ply"), *options]) == DONE
+    )
     told = result(capfd)
     assert told["extent"][1] == pytest.approx(1.0, abs=0.01)
     assert told["filled"] == []
@@ -87,7 +89,7 @@ def test_a_plan_is_made_on_scanned_terrain(tmp_path, stance_file, capfd):
         request = put(
             request, ("stance", "hands", i, "hold"), {"shape": "mesh", "file": "rock.ply"}
         )
-    assert run(["plan", stance_file(request), "--json"]) in (0, 3)
+    assert run_command_line(["plan", stance_file(request), "--json"]) in (0, 3)
     reply = json.loads(capfd.readouterr().out)
     assert reply["verified"] is True
 
@@ -95,14 +97,16 @@ def test_a_plan_is_made_on_scanned_terrain(tmp_path, stance_file, capfd):
 @pytest.mark.parametrize(
     ("text", "more", "words"),
     [
-        ("0 0 0\n1 0 0\n0 1 1\n", ["--cell", "2"], "cell: is of grids of heights, "),
-        ("0 0 0\n1e200 0 0\n0 1e200 1\n", [], "file: numbers up to 1e+200 are no lengths"),
+        ("0 0 0\n1 0 0\n0 1 1\n", ["--cell", "2"], "cell: is for grids of heights, "),
+        ("0 0 0\n1e200 0 0\n0 1e200 1\n", [], "file: coordinates up to 1e+200 are too large"),
     ],
 )
 def test_points_have_no_cells_and_are_near(text, more, words, tmp_path, capfd):
     file = tmp_path / "wall.xyz"
     file.write_text(text)
-    assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), *more]) == BAD_INPUT
+    assert (
+        run_command_line(["rock", str(file), "-o", str(tmp_path / "rock.ply"), *more]) == BAD_INPUT
+    )
     assert words in complaint(capfd)
 
 
@@ -112,7 +116,9 @@ def test_rock_is_not_written_over_its_scan(tmp_path, capfd):
     before = scan.read_bytes()
     link.symlink_to(scan)
     for output in (scan, link):
-        assert run(["rock", str(scan), "-o", str(output), "--view", "0,0,1"]) == BAD_INPUT
+        assert (
+            run_command_line(["rock", str(scan), "-o", str(output), "--view", "0,0,1"]) == BAD_INPUT
+        )
         assert f"{output} is the scan itself" in complaint(capfd)
     assert scan.read_bytes() == before
 
@@ -129,7 +135,7 @@ def test_rock_is_not_written_over_its_scan(tmp_path, capfd):
         (["none.pcd", "-o", "rock.ply", "--plot", "rock.txt"], "valid endings are"),
         (["none.pcd", "-o", "rock.ply", "--unit", "inch"], "'m', 'cm', 'mm'"),
         (["none.pcd", "-o", "rock.ply", "--up", "w"], "--up"),
-        (["none.pcd", "-o", "rock.ply", "--view", "0,1"], "three numbers with commas"),
+        (["none.pcd", "-o", "rock.ply", "--view", "0,1"], "three numbers separated by commas"),
         (
             ["none.pcd", "-o", "rock.ply", "--view", "0,1,0", "--viewpoint", "0,0,0"],
             "view: give a view or a viewpoint",
@@ -140,17 +146,23 @@ def test_rock_is_not_written_over_its_scan(tmp_path, capfd):
 def test_what_is_wrong_is_told_in_one_line(arguments, words, tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there.ply").write_text("")
-    assert run(["rock", *arguments]) == BAD_INPUT
+    assert run_command_line(["rock", *arguments]) == BAD_INPUT
     assert words in complaint(capfd)
     assert not (tmp_path / "rock.ply").exists()
 
 
 def test_a_file_in_the_wrong_unit_is_warned_of(tmp_path, capfd):
     file = write_cloud(tmp_path / "wall.xyz", 100.0 * wall(0.01))
-    assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--hole", "3"]) == DONE
+    assert (
+        run_command_line(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--hole", "3"])
+        == DONE
+    )
     assert "m across, and a hold may be 10 m" in capfd.readouterr().out
     file = write_cloud(tmp_path / "wall.xyz", wall(0.004))
-    assert run(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--unit", "mm"]) == DONE
+    assert (
+        run_command_line(["rock", str(file), "-o", str(tmp_path / "rock.ply"), "--unit", "mm"])
+        == DONE
+    )
     said = " ".join(capfd.readouterr().out.split())
     assert " m across, less than a palm is long; is it in m (--unit)" in said
 
@@ -163,10 +175,10 @@ def test_a_grid_whose_holes_are_filled_with_zeros_is_warned_of(up, tmp_path, cap
     for holes, told in ((0, []), (20, [{"axis": up, "value": 0.0, "points": 400}])):
         heights[50 : 50 + holes, 70 : 70 + holes] = 0.0
         np.save(tmp_path / "heights.npy", heights)
-        assert run(["rock", *options, "--up", up, "--json"]) == DONE
+        assert run_command_line(["rock", *options, "--up", up, "--json"]) == DONE
         found = result(capfd)["filled"]
         assert found == told
-        assert run(["rock", *options, "--up", up]) == DONE
+        assert run_command_line(["rock", *options, "--up", up]) == DONE
         said = "400 points are at exactly 0 m" in " ".join(capfd.readouterr().out.split())
         assert said == bool(holes)
 
@@ -177,21 +189,21 @@ def test_a_scan_that_is_a_sieve_is_told_to_be_one(tmp_path, capfd):
     cloud, rock = tmp_path / "cloud.xyz", tmp_path / "rock.ply"
     np.savetxt(cloud, np.c_[x, 0.02 * np.sin(x / 0.07) * np.cos(z / 0.09), z])
     asked = ["rock", str(cloud), "-o", str(rock), "--view", "0,1,0"]
-    assert run([*asked, "--hole", "0.02"]) == DONE
+    assert run_command_line([*asked, "--hole", "0.02"]) == DONE
     said = " ".join(capfd.readouterr().out.split())
     told = re.search(r"warning: (\d+) holes .*: with --hole ([\d.]+), (\d+) holes .* left", said)
     assert told is not None
     looked = ["holds", str(rock), "-o", str(tmp_path / "h.json"), "--spacing", "0.3"]
-    assert run([*looked, "--workers", "1"]) == DONE
+    assert run_command_line([*looked, "--workers", "1"]) == DONE
     said = " ".join(capfd.readouterr().out.split())
     assert "nothing holds: is the scan full of holes? `crux rock` says what helps" in said
-    assert run([*asked, "--hole", told[2], "--json"]) == DONE
+    assert run_command_line([*asked, "--hole", told[2], "--json"]) == DONE
     made = result(capfd)
     assert len(made["holes"]) + len(made["steps"]) == int(told[3]) <= 0.1 * int(told[1])
 
 
 def printed(arguments: list[str], capfd: pytest.CaptureFixture[str]) -> str:
-    assert run(["rock", *arguments]) == DONE
+    assert run_command_line(["rock", *arguments]) == DONE
     return " ".join(capfd.readouterr().out.split())
 
 
@@ -199,12 +211,12 @@ def test_a_printed_pose_has_the_digits_that_a_millimetre_needs(tmp_path, capfd):
     points = wall(0.01) + np.array([402117.25, 5310842.75, 812.5])
     cloud, output = str(tmp_path / "wall.xyz"), ["-o", str(tmp_path / "rock.ply")]
     np.savetxt(cloud, points, fmt="%.4f")
-    assert run(["rock", cloud, *output]) == BAD_INPUT
-    assert "view: the file does not say from where" in complaint(capfd)
+    assert run_command_line(["rock", cloud, *output]) == BAD_INPUT
+    assert "view: the scanner's position is unknown" in complaint(capfd)
     view = ["--view", "0,1,0"]
     out = printed([cloud, *output, *view], capfd)
     pose = json.loads(re.findall(r"pose (\{.*?\})", out)[0])
-    assert run(["rock", cloud, *output, *view, "--json"]) == DONE
+    assert run_command_line(["rock", cloud, *output, *view, "--json"]) == DONE
     told = result(capfd)
     assert told["view_assumed"] is False
     for name, within in (("position", 1e-6), ("orientation", 1e-7)):
@@ -236,16 +248,19 @@ def test_stray_points_are_told_and_dropped(tmp_path, capfd):
     assert re.search(r"outliers \d+ dropped, far from their neighbours", out)
     assert "holes 0 wider than 20 mm steps 0 higher than 20 mm" in out
     assert "warning" not in out
-    assert run(["rock", *asked, "--std-ratio", "2", "--neighbours", "8", "--json"]) == DONE
+    assert (
+        run_command_line(["rock", *asked, "--std-ratio", "2", "--neighbours", "8", "--json"])
+        == DONE
+    )
     told = result(capfd)
     assert told["outliers"] >= 90
     assert told["covered"] > 0.95
     assert told["warnings"] == []
     for more, words in (
-        (["--neighbours", "8"], "neighbours: is of outliers"),
+        (["--neighbours", "8"], "neighbours: requires --std-ratio"),
         (["--std-ratio", "0"], "std_ratio: must be finite and above zero"),
     ):
-        assert run(["rock", *asked, *more]) == BAD_INPUT
+        assert run_command_line(["rock", *asked, *more]) == BAD_INPUT
         assert words in complaint(capfd)
 
 

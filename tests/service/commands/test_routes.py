@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from service.bulk import evaluate
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.commands.stances import read_route
 from service.replies import RouteReply
 from service.wire import ServiceName
@@ -51,7 +51,7 @@ def rows(file: Path) -> list[dict]:
 
 def test_routes_of_a_folder_are_answered_in_order_as_each_is_alone(climbs, tmp_path, capfd):
     file = tmp_path / "routes.jsonl"
-    assert run(["route", str(climbs), BUNDLED, "--json", "-o", str(file)]) == BAD_INPUT
+    assert run_command_line(["route", str(climbs), BUNDLED, "--json", "-o", str(file)]) == BAD_INPUT
     out, err = capfd.readouterr()
     told = json.loads(out)
     assert (told["routes"], told["errors"]) == (4, {"invalid": 1})
@@ -62,7 +62,7 @@ def test_routes_of_a_folder_are_answered_in_order_as_each_is_alone(climbs, tmp_p
     assert wrong["error"]["field"] == "stance"
     for reply, source in ((first, ids[0]), (heavy, str(climbs / "c.json")), (bundled, BUNDLED)):
         alone = tmp_path / reply["name"]
-        run(["route", source, "-o", str(alone), "--json"])
+        run_command_line(["route", source, "-o", str(alone), "--json"])
         summary = result(capfd)
         stages = rows(alone / "stages.csv")
         assert reply["name"] == summary["route"]
@@ -79,7 +79,7 @@ def test_tables_of_routes_tell_what_replies_do(ending, climbs, tmp_path, capfd):
         pytest.importorskip("pyarrow.parquet")
     file, table = tmp_path / "routes.jsonl", tmp_path / f"routes{ending}"
     for each in (file, table):
-        assert run(["route", str(climbs), "-o", str(each)]) == BAD_INPUT
+        assert run_command_line(["route", str(climbs), "-o", str(each)]) == BAD_INPUT
         shown = capfd.readouterr().out
         assert "error: invalid" in shown
         assert "overloaded" in shown
@@ -103,16 +103,18 @@ def test_tables_of_routes_tell_what_replies_do(ending, climbs, tmp_path, capfd):
 def test_routes_go_on_where_they_were_broken_off(ending, climbs, tmp_path, capfd):
     whole, file = tmp_path / f"whole{ending}", tmp_path / f"routes{ending}"
     asked = [str(climbs / "a.json"), str(climbs / "b.json"), str(climbs / "c.json")]
-    run(["route", *asked, "-o", str(whole)])
-    run(["route", *asked[:2], "-o", str(file)])
+    run_command_line(["route", *asked, "-o", str(whole)])
+    run_command_line(["route", *asked[:2], "-o", str(file)])
     capfd.readouterr()
     with file.open("ab") as stream:
         stream.write(whole.read_bytes()[file.stat().st_size :][:5])
-    assert run(["route", *asked, "-o", str(file), "--resume"]) == BAD_INPUT
+    assert run_command_line(["route", *asked, "-o", str(file), "--resume"]) == BAD_INPUT
     assert "1 routes in" in capfd.readouterr().out.replace("2 were answered", "")
     assert file.read_bytes() == whole.read_bytes()
     # other routes are no work to go on with
-    assert run(["route", asked[2], *asked[:2], "-o", str(file), "--resume"]) == BAD_INPUT
+    assert (
+        run_command_line(["route", asked[2], *asked[:2], "-o", str(file), "--resume"]) == BAD_INPUT
+    )
     assert "--resume" in complaint(capfd)
 
 
@@ -121,21 +123,21 @@ def test_many_routes_need_a_file_and_one_a_folder(climbs, tmp_path, capfd):
     for asked, told in (
         (["route", BUNDLED, BUNDLED, "-o", out], "many routes need a file that ends in .jsonl"),
         (["route", str(climbs), "-o", out], "many routes need a file"),
-        (["route", BUNDLED, "-o", out, "--resume"], "--resume: needs -o FILE"),
-        (["route", BUNDLED, "-o", out, "--dask", "local"], "--dask: needs -o FILE"),
+        (["route", BUNDLED, "-o", out, "--resume"], "--resume: requires -o FILE"),
+        (["route", BUNDLED, "-o", out, "--dask", "local"], "--dask: requires -o FILE"),
         (["route", "-", BUNDLED, "-o", f"{out}.csv"], "standard input is one route"),
         (["route", str(tmp_path), "-o", f"{out}.csv"], "no file in it ends in .json"),
-        (["route", BUNDLED, "-o", str(climbs / "notes.txt")], "is no folder"),
+        (["route", BUNDLED, "-o", str(climbs / "notes.txt")], "is not a folder"),
     ):
-        assert run(asked) == BAD_INPUT
+        assert run_command_line(asked) == BAD_INPUT
         assert told in complaint(capfd)
     assert not any(tmp_path.iterdir())
 
 
 def test_the_worst_route_is_the_exit_status(climbs, tmp_path):
     good, heavy, file = str(climbs / "a.json"), str(climbs / "c.json"), tmp_path / "routes.csv"
-    assert run(["route", good, good, "-o", str(file), "--no-explain"]) == 0
-    assert run(["route", good, heavy, "-o", str(file), "--no-explain"]) == OVERLOADED
+    assert run_command_line(["route", good, good, "-o", str(file), "--no-explain"]) == 0
+    assert run_command_line(["route", good, heavy, "-o", str(file), "--no-explain"]) == OVERLOADED
 
 
 @watched

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from hand_models.fixed_wrist import named_row
 from hand_models.wrench_spaces import Row
-from service.commands.cli import crux, run
+from service.commands.cli import crux, run_command_line
 from service.tables import console
 from service.tables.hands import print_failures
 
@@ -80,9 +80,9 @@ def test_counts_are_by_finger_and_tile(capsys):
 
 def test_a_floating_set_without_zero_shows_least_and_most(capsys):
     arguments = ["wrench-space", STANCE, "--hand", "rear_left"]
-    assert run([*arguments, "--json"]) == 0
+    assert run_command_line([*arguments, "--json"]) == 0
     reply = json.loads(capsys.readouterr().out)
-    assert run(arguments) == 0
+    assert run_command_line(arguments) == 0
     shown = capsys.readouterr().out
     forces = np.array(reply["vertices"])[:, 0]
     line = next(line.split() for line in shown.splitlines() if line.strip().startswith("fx N"))
@@ -94,7 +94,7 @@ def test_a_floating_set_without_zero_shows_least_and_most(capsys):
 
 
 def test_a_set_with_zero_in_it_shows_what_is_carried_alone(capsys):
-    assert run(["wrench-space", "wall-300", "--hand", "front_left"]) == 0
+    assert run_command_line(["wrench-space", "wall-300", "--hand", "front_left"]) == 0
     shown = capsys.readouterr().out
     line = next(line.split() for line in shown.splitlines() if line.strip().startswith("fz N"))
     least, most, pure_least, pure_most = (float(cell) for cell in line[2:])
@@ -103,6 +103,6 @@ def test_a_set_with_zero_in_it_shows_what_is_carried_alone(capsys):
 
 
 def test_a_fixed_hand_has_nothing_to_search(capsys):
-    status = run(["wrench-space", STANCE, "--hand", "front_left", "--search", "5"])
+    status = run_command_line(["wrench-space", STANCE, "--hand", "front_left", "--search", "5"])
     assert status == 2
-    assert "floating is needed" in capsys.readouterr().err
+    assert "must be floating" in capsys.readouterr().err

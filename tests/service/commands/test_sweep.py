@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from service.bulk import evaluate
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.processes import Interrupted
 from service.wire import LostError, encode_error
 from tests.service.commands.test_interruption import limited
@@ -24,7 +24,10 @@ def test_a_sweep_writes_a_table_and_a_picture(tmp_path, capfd):
     folder = tmp_path / "new" / "there"
     for _ in range(2):
         # a folder that is there is written again
-        assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(folder), "--json"]) == DONE
+        assert (
+            run_command_line(["sweep", "wall-300", "--vary", MASS, "-o", str(folder), "--json"])
+            == DONE
+        )
         told = result(capfd)
         assert told["points"] == told["answered"] == 4
         assert told["statuses"]["optimal"] == 3
@@ -63,7 +66,7 @@ def test_a_sweep_writes_a_table_and_a_picture(tmp_path, capfd):
 )
 def test_what_is_printed_fits_a_terminal(arguments, words, tmp_path, capfd, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    assert run(["sweep", "wall-300", *arguments, "-o", str(tmp_path)]) == DONE
+    assert run_command_line(["sweep", "wall-300", *arguments, "-o", str(tmp_path)]) == DONE
     out, err = capfd.readouterr()
     assert err == ""
     for each in words:
@@ -79,12 +82,12 @@ def test_what_is_printed_fits_a_terminal(arguments, words, tmp_path, capfd, monk
         (["--vary", "load.mas=1:2:3"], "--vary load.mas: load has no 'mas'; known are mass, com"),
         (["--vary", "load.mass=2:1:3"], "--vary load.mass: LOW must be below HIGH"),
         (["--vary", "load.mass=1:2:1"], "COUNT must be from 2"),
-        (["--vary", MASS, "--seed", "1"], "--seed: is of samples"),
+        (["--vary", MASS, "--seed", "1"], "--seed: requires --samples"),
         (["--vary", MASS, "--samples", "0"], "--samples"),
         (["--vary", MASS, "--tolerance", "nan"], "--tolerance"),
         (
             ["--vary", MASS, "--vary", "limits.tendon_tension=40,50", "--tolerance", "0.1"],
-            "--tolerance: is of one number that varies alone",
+            "--tolerance: requires exactly one varied number",
         ),
         (["--vary", MASS, "--over", "load.mass,x"], "--over: two different ones of load.mass"),
         ([], "--vary"),
@@ -93,7 +96,7 @@ def test_what_is_printed_fits_a_terminal(arguments, words, tmp_path, capfd, monk
 )
 def test_bad_input_is_a_line(arguments, words, tmp_path, capfd):
     given = ["sweep", "wall-300", *arguments, "-o", str(tmp_path / "out"), "--json"]
-    assert run(given) == BAD_INPUT
+    assert run_command_line(given) == BAD_INPUT
     err = capfd.readouterr().err
     assert err.count("\n") == 1
     assert words in err
@@ -102,7 +105,7 @@ def test_bad_input_is_a_line(arguments, words, tmp_path, capfd):
 def test_a_file_is_no_folder(tmp_path, capfd):
     file = tmp_path / "file"
     file.write_text("mine", encoding="utf-8")
-    assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(file)]) == BAD_INPUT
+    assert run_command_line(["sweep", "wall-300", "--vary", MASS, "-o", str(file)]) == BAD_INPUT
     assert "is a file" in complaint(capfd)
     assert file.read_text(encoding="utf-8") == "mine"
 
@@ -113,7 +116,7 @@ def test_numbers_of_a_hand_of_ones_own_count(tmp_path, capfd):
     used = []
     for more in ([], ["--hand", str(weak)]):
         given = ["sweep", "wall-300", "--vary", "load.mass=100,110", "-o", str(tmp_path / "out")]
-        assert run([*given, "--json", *more]) == DONE
+        assert run_command_line([*given, "--json", *more]) == DONE
         used.append(result(capfd)["most_utilisation"]["utilisation"])
     assert used[1] > used[0]
 
@@ -127,7 +130,10 @@ def test_a_point_that_is_lost_is_a_failure(tmp_path, capfd, monkeypatch):
 
     monkeypatch.setattr("service.sweeping.rows.evaluate", losing)
     values = "load.mass=60,80,100"
-    assert run(["sweep", "wall-300", "--vary", values, "-o", str(tmp_path), "--json"]) == FAILED
+    assert (
+        run_command_line(["sweep", "wall-300", "--vary", values, "-o", str(tmp_path), "--json"])
+        == FAILED
+    )
     told = result(capfd)
     assert told["errors"] == {"lost": 1}
     assert (told["points"], told["answered"]) == (3, 2)
@@ -141,7 +147,7 @@ def test_what_is_answered_is_kept(tmp_path, capfd, monkeypatch):
 
     monkeypatch.setattr("service.sweeping.rows.evaluate", interrupted)
     with pytest.raises(Interrupted) as caught:
-        run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
+        run_command_line(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path)])
     table = tmp_path / "sweep.csv"
     assert str(caught.value) == f"1 of 4 points are answered in {table}.jsonl; --resume goes on"
     assert whole_rows(tmp_path) == 1
@@ -188,7 +194,7 @@ def whole_rows(folder: Path) -> int:
 @watched
 def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(tmp_path, capfd, monkeypatch):
     whole, folder = tmp_path / "whole", tmp_path / "broken"
-    assert run(["sweep", "wall-300", *WIDE, "-o", str(whole), "--json"]) == DONE
+    assert run_command_line(["sweep", "wall-300", *WIDE, "-o", str(whole), "--json"]) == DONE
     summary = result(capfd)
     process = begun(
         "sweep", "wall-300", *WIDE, "-o", str(folder), "--workers", "2", before=STOPPING
@@ -212,7 +218,7 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(tmp_path, ca
 
     monkeypatch.setattr("service.sweeping.rows.evaluate", counting)
     again = ["sweep", "wall-300", *WIDE, "-o", str(folder), "--json", "--resume"]
-    assert run(again) == DONE
+    assert run_command_line(again) == DONE
     assert len(asked) == 1200 - done
     told = result(capfd)
     assert told | {"files": 0} == summary | {"files": 0}
@@ -220,7 +226,7 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(tmp_path, ca
     assert whole_rows(folder) == 1200
     assert (folder / "sweep.png").exists()
     # nothing is left to do
-    assert run(again) == DONE
+    assert run_command_line(again) == DONE
     assert len(asked) == 1200 - done
     assert (folder / "sweep.csv").read_bytes() == (whole / "sweep.csv").read_bytes()
 
@@ -231,11 +237,13 @@ def test_a_sweep_that_is_killed_goes_on_and_no_point_is_asked_twice(tmp_path, ca
 )
 def test_what_is_read_again_is_told_as_before(values, tmp_path, capfd):
     given = ["sweep", "wall-300", "--vary", values, "-o", str(tmp_path)]
-    assert run(given) == DONE
+    assert run_command_line(given) == DONE
     printed = capfd.readouterr().out
-    assert run([*given, "--resume"]) == DONE
+    assert run_command_line([*given, "--resume"]) == DONE
     assert capfd.readouterr().out == printed
-    tables = [run([*given, "--json", *more]) or result(capfd) for more in ([], ["--resume"])]
+    tables = [
+        run_command_line([*given, "--json", *more]) or result(capfd) for more in ([], ["--resume"])
+    ]
     assert tables[0] == tables[1]
 
 
@@ -256,29 +264,37 @@ def test_what_is_read_again_is_told_as_before(values, tmp_path, capfd):
 def test_a_sweep_does_not_go_on_as_another(began, now, words, tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("weak.toml").write_text(WEAK, encoding="utf-8")
-    assert run(["sweep", "wall-300", "--vary", *began, "-o", "out", "--json"]) == DONE
+    assert run_command_line(["sweep", "wall-300", "--vary", *began, "-o", "out", "--json"]) == DONE
     before = Path("out/sweep.csv").read_bytes()
     capfd.readouterr()
-    assert run(["sweep", "wall-300", "--vary", *now, "-o", "out", "--resume"]) == BAD_INPUT
+    assert (
+        run_command_line(["sweep", "wall-300", "--vary", *now, "-o", "out", "--resume"])
+        == BAD_INPUT
+    )
     assert words in complaint(capfd)
     assert Path("out/sweep.csv").read_bytes() == before
 
 
 def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(tmp_path, capfd):
     given = ["--vary", MASS, "-o", str(tmp_path)]
-    assert run(["sweep", "wall-300", *given, "--json"]) == DONE
+    assert run_command_line(["sweep", "wall-300", *given, "--json"]) == DONE
     capfd.readouterr()
-    assert run(["sweep", "wall-700", *given, "--resume"]) == BAD_INPUT
-    assert "was begun with another stance; begin anew without it" in complaint(capfd)
+    assert run_command_line(["sweep", "wall-700", *given, "--resume"]) == BAD_INPUT
+    assert "was started with another stance; start again without --resume" in complaint(capfd)
     lines = tmp_path / "sweep.csv.jsonl"
     lines.write_text(lines.read_text().replace('"optimal",', ""))
-    assert run(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
-    assert "no row of this table" in complaint(capfd)
+    assert run_command_line(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
+    assert "not a row of this table" in complaint(capfd)
     lines.unlink()
-    assert run(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
-    assert "no table that a batch has written, or a sweep" in complaint(capfd)
+    assert run_command_line(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT
+    assert "not a table of crux batch or crux sweep" in complaint(capfd)
     # one that never began begins
-    assert run(["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path / "new"), "--resume"]) == 0
+    assert (
+        run_command_line(
+            ["sweep", "wall-300", "--vary", MASS, "-o", str(tmp_path / "new"), "--resume"]
+        )
+        == 0
+    )
 
 
 def test_a_sweep_goes_on_after_a_full_disk(tmp_path, capfd):
@@ -290,7 +306,7 @@ def test_a_sweep_goes_on_after_a_full_disk(tmp_path, capfd):
     kept = f"{done} of 40 points are answered in {table}.jsonl; --resume goes on"
     assert 0 < done < 40
     assert (status, error) == (FAILED, f"crux: cannot write {table}: File too large; {kept}\n")
-    assert run(["sweep", "wall-300", *varied, "--json", "--resume"]) == DONE
+    assert run_command_line(["sweep", "wall-300", *varied, "--json", "--resume"]) == DONE
     assert result(capfd)["answered"] == 40
     with table.open(encoding="utf-8", newline="") as file:
         masses = [float(line["load.mass [kg]"]) for line in csv.DictReader(file)]

@@ -20,7 +20,7 @@ from hand_models.base import InvalidInputError
 from hand_models.rock import read_mesh
 from planner.processes import cores
 from service.answering import dispatch, mesh_files
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.processes import Planners, plan_many, worth
 from service.replies import ErrorReply, PlanReply
 from service.requests import PlanRequest
@@ -95,7 +95,7 @@ def test_errors_are_in_their_places_and_replies_in_their_order():
 def test_each_reply_is_what_it_would_be_alone(two):
     requests = [asked(mass, str(i)) for i, mass in enumerate(MASSES)]
     for reply, request in zip(two.plan_many(requests), requests, strict=True):
-        alone = dispatch.plan(request)
+        alone = dispatch.answer_plan(request)
         assert (reply.id, reply.status, reply.verified) == (request.id, alone.status, True)
         assert reply.utilisation == pytest.approx(alone.utilisation, rel=1e-9)
 
@@ -246,7 +246,7 @@ BAD = {"v": 1}
     ],
 )
 def test_the_exit_status_of_a_batch_is_that_of_its_worst_request(lines, code, batch_file, capfd):
-    assert run(["batch", batch_file(*lines), "--workers", "1", "--json"]) == code
+    assert run_command_line(["batch", batch_file(*lines), "--workers", "1", "--json"]) == code
     out, err = capfd.readouterr()
     assert len(out.splitlines()) == len(lines)
     assert err.count("\n") == (BAD in lines)
@@ -254,7 +254,7 @@ def test_the_exit_status_of_a_batch_is_that_of_its_worst_request(lines, code, ba
 
 def test_lines_are_replies_or_errors_in_order(batch_file, capfd):
     path = batch_file(GOOD, "", "{", " ", BAD | {"id": "c"}, OVERLOADED)
-    assert run(["batch", path, "--workers", "1", "--json"]) == 2
+    assert run_command_line(["batch", path, "--workers", "1", "--json"]) == 2
     out, err = capfd.readouterr()
     replies = [json.loads(line) for line in out.splitlines()]
     assert [reply.get("status", reply.get("error", {}).get("kind")) for reply in replies] == [
@@ -267,20 +267,20 @@ def test_lines_are_replies_or_errors_in_order(batch_file, capfd):
     assert err == (
         "crux: line 3: not json: Input data was truncated; 1 more lines are bad input: line 5\n"
     )
-    alone = dispatch.plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
+    alone = dispatch.answer_plan(decode_request(msgspec.json.encode(GOOD), PlanRequest))
     assert replies[0]["utilisation"] == pytest.approx(alone.utilisation, rel=1e-9)
 
 
 def test_with_a_file_the_summary_is_what_is_printed(batch_file, tmp_path, capfd):
     kept = tmp_path / "replies.jsonl"
     path = batch_file(GOOD, OVERLOADED, GOOD, LATE)
-    assert run(["batch", path, "-o", str(kept), "--workers", "1", "--json"]) == 1
+    assert run_command_line(["batch", path, "-o", str(kept), "--workers", "1", "--json"]) == 1
     told = json.loads(capfd.readouterr().out)
     assert len(kept.read_text().splitlines()) == told["requests"] == 4
     assert (told["optimal"], told["overloaded"], told["infeasible"], told["failed"]) == (2, 1, 0, 0)
     assert told["errors"] == {"deadline": 1}
     assert 0.0 < told["time"]["median"] <= told["time"]["longest"] <= told["time"]["elapsed"]
-    assert run(["batch", path, "-o", str(kept), "--workers", "1"]) == 1
+    assert run_command_line(["batch", path, "-o", str(kept), "--workers", "1"]) == 1
     out, err = capfd.readouterr()
     assert err == ""
     assert max(len(line) for line in out.splitlines() if "written:" not in line) <= 80
@@ -308,7 +308,7 @@ def test_a_batch_from_standard_input_goes_through_processes_of_its_own():
 @pytest.mark.parametrize("more", [["nowhere.jsonl"], ["FILE", "-o", "no/such/folder/file"]])
 def test_files_that_cannot_be_read_or_written_are_bad_input(more, batch_file, capfd):
     path = batch_file(GOOD)
-    assert run(["batch", *(path if part == "FILE" else part for part in more)]) == 2
+    assert run_command_line(["batch", *(path if part == "FILE" else part for part in more)]) == 2
     out, err = capfd.readouterr()
     assert out == ""
     assert err.startswith("crux: ")
@@ -341,7 +341,7 @@ def test_lines_name_mesh_files_which_are_read_once(batch_file, log_file, capfd, 
     for hand in rocks["stance"]["hands"]:
         hand["hold"] = {"shape": "rock", "rock": "log"}
     path = batch_file(on_file(), rocks, *[on_file()] * 5, on_file("no.ply"))
-    assert run(["batch", path, "--workers", "1", "--json"]) == 2
+    assert run_command_line(["batch", path, "--workers", "1", "--json"]) == 2
     out, err = capfd.readouterr()
     *replies, refused = (json.loads(line) for line in out.splitlines())
     assert len({reply["utilisation"] for reply in replies}) == 1

@@ -119,12 +119,12 @@ def test_moves_of_a_route_refer_to_the_rocks_of_its_stance() -> None:
     del request["id"]
     route = request | {"moves": [move]}
     assert not departures("RouteRequest", route)
-    asked = questions.route(decode_request(msgspec.json.encode(route), RouteRequest))
+    asked = questions.route_of(decode_request(msgspec.json.encode(route), RouteRequest))
     assert asked.moves[0].hand.hold is asked.start.hands[0].hold
     assert isinstance(asked.moves[0].hand.hold, Mesh)
     move["hold"]["rock"] = "roof"
     with pytest.raises(InvalidInputError, match=r"moves\[0\].hold.rock: unknown rock 'roof'"):
-        questions.route(decode_request(msgspec.json.encode(route), RouteRequest))
+        questions.route_of(decode_request(msgspec.json.encode(route), RouteRequest))
 
 
 HOLD = ("stance", "hands", 2, "hold")

@@ -157,7 +157,7 @@ def test_who_says_that_he_has_gone_is_told_so() -> None:
                 leaving.client._here.undeclare()
                 told = result(waiting[0])
                 assert kind(told) == "lost"
-                assert "its client has gone" in told["error"]["message"]
+                assert "the client disconnected" in told["error"]["message"]
             assert result(waiting[1])["echo"] == 1
             assert all("pid" in result(each) for each in held)
     finally:

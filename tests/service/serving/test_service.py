@@ -239,7 +239,7 @@ def test_a_reply_that_is_none(alone: zenoh.Session, payload: bytes) -> None:
 
     with (
         alone.declare_queryable(PLAN, nonsense),
-        pytest.raises(ServiceError, match="a reply that is no PlanReply"),
+        pytest.raises(ServiceError, match="the reply is not a PlanReply"),
     ):
         CruxClient(alone, timeout=PATIENCE).plan(plan_request())
 

@@ -16,7 +16,7 @@ from planner.result import SetPoints
 from planner.streaming import WrenchStream
 from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
 from service.answering import Streams, dispatch, streams
-from service.commands.cli import run
+from service.commands.cli import run_command_line
 from service.replies import SetPointsReply, StreamReply
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import Format, ServiceError, ServiceName, decode_request, service_key
@@ -317,7 +317,7 @@ HEAVIER = [9.81 * HEAVY, 0.0, 0.0, 0.0, 0.0, 0.0]
 def test_each_line_gives_a_line(wrenches, statuses, code, stance_file, monkeypatch, capfd) -> None:
     given(monkeypatch, *wrenches, "")
     path = stance_file(wall_request(LIGHT))
-    assert run(["stream", path, "--json"]) == code
+    assert run_command_line(["stream", path, "--json"]) == code
     out, err = capfd.readouterr()
     assert err == ""
     replies = [json.loads(line) for line in out.splitlines()]
@@ -327,7 +327,7 @@ def test_each_line_gives_a_line(wrenches, statuses, code, stance_file, monkeypat
         [4] * 4 * len(wrenches)
     )
     given(monkeypatch, *wrenches)
-    assert run(["stream", path]) == code
+    assert run_command_line(["stream", path]) == code
     out, err = capfd.readouterr()
     header, *lines = out.splitlines()
     assert err.count("\n") == 1
@@ -352,7 +352,7 @@ def test_a_failure_is_worse_than_an_overload(stance_file, monkeypatch, capfd) ->
         return answers(self, wrench)
 
     monkeypatch.setattr(WrenchStream, "set_points", failing)
-    assert run(["stream", stance_file(wall_request())]) == FAILED
+    assert run_command_line(["stream", stance_file(wall_request())]) == FAILED
     assert capfd.readouterr().out.splitlines()[-1].endswith("a reason")
 
 
@@ -362,7 +362,7 @@ def test_a_line_that_is_no_wrench_is_told_by_its_number(
 ) -> None:
     path = stance_file(wall_request())
     given(monkeypatch, "", line, WRENCH)
-    assert run(["stream", path, "--json"]) == BAD_INPUT
+    assert run_command_line(["stream", path, "--json"]) == BAD_INPUT
     out, err = capfd.readouterr()
     error, reply = map(json.loads, out.splitlines())
     assert err == ""
@@ -371,7 +371,7 @@ def test_a_line_that_is_no_wrench_is_told_by_its_number(
     assert error["error"]["message"].startswith("six finite numbers")
     assert reply["body_wrench"] == WRENCH
     given(monkeypatch, "", line, WRENCH)
-    assert run(["stream", path]) == BAD_INPUT
+    assert run_command_line(["stream", path]) == BAD_INPUT
     out, err = capfd.readouterr()
     assert len(out.splitlines()) == 2
     assert err.splitlines()[1].startswith("crux: line 2: six finite numbers")
@@ -388,14 +388,17 @@ def test_a_line_that_is_no_wrench_is_told_by_its_number(
 )
 def test_what_cannot_be_streamed_is_bad_input(arguments, field, monkeypatch, capfd) -> None:
     given(monkeypatch, WRENCH)
-    assert run(["stream", *arguments]) == BAD_INPUT
+    assert run_command_line(["stream", *arguments]) == BAD_INPUT
     assert field in complaint(capfd)
 
 
 def test_another_objective_is_refused(stance_file, monkeypatch, capfd) -> None:
     given(monkeypatch, WRENCH)
-    assert run(["stream", stance_file(wall_request() | {"objective": "min_effort"})]) == BAD_INPUT
-    assert "objective: min_effort is not for streams" in complaint(capfd)
+    assert (
+        run_command_line(["stream", stance_file(wall_request() | {"objective": "min_effort"})])
+        == BAD_INPUT
+    )
+    assert "objective: min_effort is not available for streams" in complaint(capfd)
 
 
 def test_a_line_is_answered_before_the_next_is_there() -> None:

@@ -15,8 +15,8 @@ from planner.processes import PriorityLane, WorkerHandle
 from planner.processes.worker_handles import SETTINGS as PROCESS_SETTINGS, _send_parts
 from service.processes import Job
 from service.serving.dispatcher import Dispatcher
-from service.serving.names import Names, digest
-from service.serving.question import Question, take
+from service.serving.names import ClientNames, digest
+from service.serving.question import PendingQuestion, received_question
 from service.serving.settings import SERVING_SETTINGS as SETTINGS
 from service.serving.shares import Shares
 from service.serving.waiting import Costs, Kind, Waiting
@@ -27,10 +27,10 @@ from tests.suite.helpers.checkout import ROOT
 
 def question(
     place: str = "a", size: int = 10, seconds: float = 60.0, client: str | None = None
-) -> Question:
+) -> PendingQuestion:
     now, payload, query = time.perf_counter(), bytes(size), SimpleNamespace()
     name = place if client is None else client
-    return Question(query, "key", "plan", name, now, payload, "", seconds, place=place)  # type: ignore[arg-type]
+    return PendingQuestion(query, "key", "plan", name, now, payload, "", seconds, place=place)  # type: ignore[arg-type]
 
 
 # Room ---------------------------------------------------------------------------------------------
@@ -39,7 +39,7 @@ def question(
 def test_large_questions_of_one_client_leave_room_for_all_others():
     waiting = Waiting(Shares())
 
-    def has_room(asked: Question, kind: Kind = Kind.OTHER) -> bool:
+    def has_room(asked: PendingQuestion, kind: Kind = Kind.OTHER) -> bool:
         return waiting.put(kind, asked) is None
 
     assert has_room(question("greedy", SETTINGS.waiting_bytes_of_place))
@@ -251,7 +251,7 @@ def test_a_stance_that_was_dear_where_it_was_new_has_the_lane_once_it_is_not():
 
 
 def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
-    names = Names()
+    names = ClientNames()
     names.linked.add("victim")
     assert names.place("victim", b"") == "victim"
     for made_up in ("x", "y", "", "victim "):
@@ -276,7 +276,7 @@ def test_only_who_is_linked_or_has_proven_a_name_has_its_place():
 
 
 def test_nothing_grows_with_names_that_are_made_up():
-    names, shares = Names(), Shares()
+    names, shares = ClientNames(), Shares()
     for i in range(10_000):
         names.is_to_prove(str(i), b"x")
         names.proven(str(i), b"x")
@@ -344,14 +344,14 @@ class Payload(bytes):
         return bytes(self)
 
 
-def taken_of(payload: bytes, encoding: str, attached: bytes | None = None) -> Question:
+def taken_of(payload: bytes, encoding: str, attached: bytes | None = None) -> PendingQuestion:
     query = SimpleNamespace(
         payload=Payload(payload),
         encoding=encoding,
         source_info=None,
         attachment=None if attached is None else Payload(attached),
     )
-    return take(query, "crux/robosimian/plan", 0.0, 10.0)  # type: ignore[arg-type]
+    return received_question(query, "crux/robosimian/plan", 0.0, 10.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -389,7 +389,7 @@ def test_an_attachment_counts_too():
     assert refused.fault is not None
     assert refused.fault.field == "attachment"
     assert (
-        f"{SETTINGS.most_attached + 1} bytes; {SETTINGS.most_attached} at most"
+        f"{SETTINGS.most_attached + 1} bytes; the maximum is {SETTINGS.most_attached}"
         in refused.fault.message
     )
     assert (refused.secret, refused.payload) == (b"", b"")

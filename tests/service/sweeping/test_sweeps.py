@@ -13,10 +13,10 @@ import pytest
 
 import service
 from hand_models.base import InvalidInputError
-from service.answering import plan
+from service.answering import answer_plan
 from service.commands.stances import read_request
 from service.requests import PlanRequest
-from service.sweeping import Design, Held, Row, Sweep, held, plot_sweep
+from service.sweeping import Design, Held, Sweep, SweepRow, held, plot_sweep
 from tests.suite.helpers.checkout import ROOT
 from tests.suite.helpers.requests import wall_request
 
@@ -32,7 +32,7 @@ def planned(mass: float, limbs: dict[str, dict] | None = None) -> service.PlanRe
     request = wall_request(mass) | {"want": ["load_factor"], "explain": False}
     for hand in request["stance"]["hands"]:
         hand |= (limbs or {}).get(hand["limb"], {})
-    return plan(asked(request))
+    return answer_plan(asked(request))
 
 
 WALL = asked(wall_request())
@@ -108,8 +108,8 @@ def test_a_whole_number_has_its_border_between_neighbours() -> None:
         assert row.status == status
 
 
-def row_at(value: float, status: str, used: float | None) -> Row:
-    return Row((value,), status, used)
+def row_at(value: float, status: str, used: float | None) -> SweepRow:
+    return SweepRow((value,), status, used)
 
 
 def test_where_points_hold_is_interpolated_between_them() -> None:
@@ -190,7 +190,7 @@ def test_a_picture_is_over_the_chosen_pair(tmp_path: Path) -> None:
 
 def test_a_sweep_that_is_broken_off_has_a_table(tmp_path: Path) -> None:
     design = Design.of(WALL, [service.Variation.over("load.mass", 50.0, 100.0, 3)])
-    done = Sweep(design, (Row((50.0,), "optimal", 0.5, 2.0),))
+    done = Sweep(design, (SweepRow((50.0,), "optimal", 0.5, 2.0),))
     done.write_table(tmp_path / "sweep.csv")
     lines = list(csv.reader(io.StringIO((tmp_path / "sweep.csv").read_text("utf-8"))))
     assert lines[1][:4] == ["50.0", "optimal", "0.5", "2.0"]

@@ -148,7 +148,7 @@ INVALID = [
     (("id",), "x" * 257, "id", "length <= 256"),
     (("stance", "joints"), "guess", "stance.joints", "'guess' is not known; valid: solve"),
     (("stance", "joints"), 3, "stance.joints", "a string or an object or null"),
-    (("stance", "joints"), {}, "stance.joints", "missing for front_right, which holds on"),
+    (("stance", "joints"), {}, "stance.joints", "missing for front_right, which is on the rock"),
     (("stance", "joints"), {"front_left": []}, "stance.joints.front_left", "length >= 1"),
     (("stance", "joints"), {"front_left": [0.0] * 6}, "stance.joints.front_left", "expected 7"),
     (
@@ -176,9 +176,9 @@ INVALID = [
         ("load", "angular_acceleration"),
         [0.0, 1.0, 0.0],
         "load.angular_acceleration",
-        "needs the stance's joints, and no com",
+        "requires stance.joints, and a load without com",
     ),
-    (("limits",), {"joint_torque": 100.0}, "limits.joint_torque", "nothing of joints"),
+    (("limits",), {"joint_torque": 100.0}, "limits.joint_torque", "requires stance.joints"),
     (
         ("limits",),
         {"joint_torque": {"rear_left": 1.0, "front_left": [1.0, -1.0]}},
@@ -201,7 +201,7 @@ INVALID = [
         ("limits",),
         {"per_hand": {"front_left": {"largest_force": [1.0, [2.0, 5.0], None]}}},
         "limits.per_hand.front_left.largest_force[1]",
-        "from below to above zero is needed, one end of which may be zero; got 2 to 5 N",
+        "must be a range that contains 0, got 2 to 5 N",
     ),
     (
         ("limits",),
@@ -216,7 +216,7 @@ INVALID = [
         "load.payloads[1].link",
         "give link or limb, and not both",
     ),
-    (("limits",), {"tension_change": 9.0}, "limits.tension_change", "present tensions are needed"),
+    (("limits",), {"tension_change": 9.0}, "limits.tension_change", "requires 'present' tensions"),
     (("present",), {"front_left": [9.0, 9.0, 9.0]}, "present.front_left", "length 4"),
     (
         ("present",),
