@@ -10,7 +10,7 @@ __all__ = ["TOLERANCES", "RobotTolerances"]
 
 @dataclass(frozen=True, slots=True)
 class RobotTolerances:
-    """Largest numbers in robots' files, beyond which the unit is wrong; accuracy of solved poses."""
+    """Largest numbers in robots' files, beyond which units are wrong; accuracy of poses."""
 
     frame_distance: float = 100.0  # [m] from a frame to its parent's
     angle: float = 100.0  # [rad] of a URDF

@@ -249,7 +249,8 @@ def _factor_warnings(prepared: PreparedStance, factor: LoadFactor) -> Iterator[s
             yield "no load factor found; with floating wrists there may be one all the same"
         if factor.least:
             yield (
-                "the load factor is a lower bound: beyond it no plan was found, nor proven infeasible"
+                "the load factor is a lower bound: beyond it no plan was found, nor proven "
+                "infeasible"
             )
 
 

@@ -224,8 +224,8 @@ def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
         palm=wrist.palm,
         rounds=wrist.rounds,
         error=finite(wrist.error),
-        pose_target=_listed(wrist.pose_target),
-        least_stiffness=finite(wrist.least_stiffness),
+        pose_target=UNSET if wrist.pose_target is None else wrist.pose_target.tolist(),
+        least_stiffness=UNSET if wrist.least_stiffness is None else wrist.least_stiffness,
     )
 
 

@@ -84,8 +84,8 @@ class Wrist(Struct, kw_only=True):
     palm: str | None = None
     rounds: int | None = None
     error: float | None = None
-    pose_target: Vector | None = None
-    least_stiffness: float | None = None
+    pose_target: Vector | UnsetType = UNSET
+    least_stiffness: float | UnsetType = UNSET
 
 
 class Generator(Struct):
