@@ -183,7 +183,9 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
             high, overloaded = factor, True
         if budget.ended:
             break
-        if abs(used - 1.0) <= CAP_SLACK:
+        # a search for compliant wrists ends within some thousandths of the least
+        near = CAP_SLACK if hands.together is None else 5e-4
+        if 1.0 - near <= used <= 1.0 + CAP_SLACK:
             better = exchanged(hands, now, budget)
             if better is now:
                 sure = True

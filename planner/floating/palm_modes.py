@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
 
+import numpy as np
+
 from hand_models.compliance import PALM_MODES, PalmMode
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from planner import deadline, programs
@@ -19,7 +21,7 @@ from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists
 from planner.floating.goals import LEAST_USE, SETTINGS, Goal
 from planner.floating.wrist_iteration import WristSolution
-from planner.prepare import HandSets
+from planner.prepare import HandSets, LinearisationPoint
 from planner.programs import CAP_SLACK
 
 __all__ = ["exchanged", "first_plan", "starts"]
@@ -35,18 +37,35 @@ def first_plan(
     for palms in choices:
         most = SETTINGS.rounds_nearby if failed else SETTINGS.rounds
         start = replace(hands.at_rest(palms), factor=factor)
-        if hands.springy:
-            # palms on their springs draw the search to where fingers hold little
-            start = find_wrists(hands.without_palms(), start, budget, most).point
-        found = find_wrists(hands, start, budget, most)
-        if found.exact:
-            return found
-        failed.append(found)
+        for begin in _beginnings(hands, start, budget):
+            found = find_wrists(hands, begin, budget, most)
+            if found.exact:
+                return found
+            failed.append(found)
+            if budget.ended:
+                break
         if budget.ended:
             break
     if not failed:
         return find_wrists(hands, replace(hands.at_rest(hands.idle), factor=factor), budget)
     return min(failed, key=lambda found: found.measure.missing)
+
+
+def _beginnings(
+    hands: HandSets, start: LinearisationPoint, budget: Budget
+) -> Iterator[LinearisationPoint]:
+    """Yield points at which a search may begin, the most promising first."""
+    if hands.springy:
+        # palms on their springs draw the search to where fingers hold little
+        yield find_wrists(hands.without_palms(), start, budget, SETTINGS.rounds_nearby).point
+    yield start
+    if hands.together is not None:
+        # closed harder, tiles are farther from being dragged backwards
+        loads = [
+            y if wrist is None or not wrist.driven else np.where(np.arange(len(y)) < 4, 80.0, y)
+            for wrist, y in zip(hands.wrists, start.loads, strict=True)
+        ]
+        yield replace(start, loads=tuple(loads))
 
 
 def starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Palms]:
