@@ -508,7 +508,7 @@ def test_on_the_command_line_the_plan_without_palms_may_come_too_late(tmp_path, 
     assert reply["load_factor_without_palm"] is None
     assert reply["load_factor"] > 1.0
     assert run_command_line(["plan", str(path)]) == 0
-    assert "load factor without the palms" not in capfd.readouterr().out
+    assert "load factor without the palms'" not in capfd.readouterr().out
 
 
 @pytest.mark.slow

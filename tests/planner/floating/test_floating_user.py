@@ -158,7 +158,7 @@ def test_no_raw_warning_leaves(stance_file, capfd):
         warnings.simplefilter("error")
         assert run_command_line(["plan", path]) in (DONE, OVERLOADED)
     out, err = capfd.readouterr()
-    assert "load factor without the palms: " in out
+    assert "load factor without the palms' shear and pressing: " in out
     assert err == ""
 
 
