@@ -10,6 +10,7 @@ from .certificate import (
     certify as certify,
     certify_idle as certify_idle,
 )
+from .moved_hands import changed_contacts as changed_contacts
 from .path_safety import (
     tension_path as tension_path,
     unsafe_sentence as unsafe_sentence,

@@ -19,6 +19,7 @@ from planner.explanation import (
     LimitUse,
     certify,
     certify_idle,
+    changed_contacts,
     far_wrists,
     idle_preloads,
     limit_sentence,
@@ -235,6 +236,7 @@ def _wrist_warnings(prepared: PreparedStance, answer: Answer) -> Iterator[str]:
         yield from strained_preloads(prepared)
         if isinstance(answer, Verified):
             yield from far_wrists(answer.by_hand())
+            yield from changed_contacts(prepared, answer.by_hand())
     if not answer.solution.proven:
         yield (
             "the loads are exact, but the utilisation is not proven minimal: at these poses of the "

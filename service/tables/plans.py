@@ -63,7 +63,9 @@ def print_plan(
     if reply.path is not None:
         out.print(_path_sentence(reply.path))
     if without_palm is not None:
-        out.print(f"load factor without the palms' shear and pressing: {_load_factor(without_palm)}")
+        out.print(
+            f"load factor without the palms' shear and pressing: {_load_factor(without_palm)}"
+        )
     if isinstance(reply.robust, planner.RobustLoadFactor):
         out.print(robust_sentence(reply.robust))
     if isinstance(reply.clearance, planner.Clearance):

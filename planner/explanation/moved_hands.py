@@ -1,0 +1,84 @@
+"""Compare hands whose compliant wrists have moved with hands that close where their wrists are.
+
+A hand of the model closes first; then its wrist moves, and its contact states stay. Where a hand
+that closes at the moved pose has other joints or other contacts, the plan's loads are in doubt.
+"""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError, Pose, turns_about
+from hand_models.finger import PHALANGES
+from hand_models.hand import FINGERS, SettledHand
+from planner.prepare import PreparedStance, settle_each
+from planner.result import HandPlan
+
+__all__ = ["changed_contacts"]
+
+
+def changed_contacts(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[str]:
+    """Yield a sentence for each compliant hand that would close otherwise where its wrist goes.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    hands : sequence of HandPlan
+        A plan's hands, in the order of the stance.
+    """
+    stance = prepared.question.stance
+    moved = [
+        (hand, settled, place)
+        for hand, settled, place in zip(hands, prepared.batch.hands, stance.hands, strict=True)
+        if hand.wrist is not None and hand.wrist.driven
+    ]
+    asked = [
+        replace(
+            place,
+            hold_pose=None,
+            hold_in_hand=_pose(hand.wrist.twist).inverse() @ settled.seating.pose,
+        )
+        for hand, settled, place in moved
+        if hand.wrist is not None
+    ]
+    closed = settle_each(stance.robot.hand, asked) if asked else []
+    for (hand, settled, _), again in zip(moved, closed, strict=True):
+        if isinstance(again, InvalidInputError):
+            yield f"{hand.limb}: no hand closes where the wrist goes; contacts may have changed"
+            continue
+        worst, finger = _largest_change(hand, settled, again)
+        if worst > 5e-3:  # [rad] of a joint
+            yield (
+                f"{hand.limb}: if the hand closed where its wrist goes, joints of {finger} would "
+                f"be {1e3 * worst:.0f} mrad elsewhere: contacts may have changed; a shorter "
+                "wrist_travel is surer"
+            )
+
+
+def _pose(twist: Array) -> Pose:
+    """Return the pose of H after a twist about H at rest [m, rad]."""
+    return Pose(twist[:3], turns_about(twist[3:]))
+
+
+def _largest_change(hand: HandPlan, settled: SettledHand, again: SettledHand) -> tuple[float, str]:
+    """Return how far phalanges are from those of a hand that closed there [rad], and the finger."""
+    assert hand.wrist is not None
+    worst, where = 0.0, FINGERS[0]
+    for i, frame in enumerate(settled.hand.frames(settled.grasp.outer_rotation)):
+        tiles = np.flatnonzero(settled.finger_of == i)[-len(PHALANGES) :]
+        # from x toward z is against the sense of the axis across, z × x
+        turned = -float(hand.wrist.twist[3:] @ frame.across)
+        pairs = zip(tiles, settled.fingers[i].contacts, again.fingers[i].contacts, strict=True)
+        for tile, before, after in pairs:
+            drag = hand.axes[tile, 0]
+            along = complex(-drag @ frame.along, -drag[2]) * cmath.rect(1.0, -before.tilt)
+            off = cmath.phase(along * cmath.rect(1.0, -turned - after.angle))
+            if before.kind != after.kind and "none" in (before.kind, after.kind):
+                off = max(abs(off), 6e-3)
+            if abs(off) > worst:
+                worst, where = abs(off), FINGERS[i]
+    return worst, where
