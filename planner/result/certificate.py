@@ -64,7 +64,7 @@ class CertificateOf(Struct, Generic[AnyVector, SetOfWrenches], frozen=True, kw_o
     sufficient : sequence of LimitName or None
         Those of them without any one of which, all other rows in place, there is a plan: within
         the cap, or at any utilisation. Empty if no single one does. None where that is undecided,
-        or the set has more than 16 members and others alone are not in the way.
+        or the set has more than 24 members and others alone are not in the way.
     wrench_spaces : mapping of str to set, or UNSET
         The hands' sets that are meant, by limb; none where no hand has a part in it. In a reply
         they come with ``"want": ["model"]`` where there is no plan.

@@ -1,0 +1,104 @@
+"""Draw how a hand settles: two fingers in their planes, closed and with a compliant wrist.
+
+``python docs/draw_wrists.py`` plans the bundled stance ``wall-300`` and writes ``docs/wrists.png``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import msgspec
+import numpy as np
+
+from hand_models import Pose
+from hand_models.base import Array, turns_about
+from hand_models.hand import FINGERS, SettledHand
+from planner import plan
+from planner.prepare import settle_hand
+from planner.result import HandPlan
+from service.answering import question
+from service.commands.stances import read_request
+
+PICTURE = Path(__file__).parent / "wrists.png"
+LIMB, SHOWN = "rear_left", ("inner_left", "outer_left")
+
+
+def chain(settled: SettledHand, name: str) -> Array:
+    """Return the joints and the tip of a finger of a closed hand in H, shape (5, 3) [m]."""
+    index = FINGERS.index(name)
+    frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
+    finger, up = settled.fingers[index], np.array([0.0, 0.0, 1.0])
+    places = [
+        frame.joint + x * frame.along + z * up
+        for x, z in (contact.joint for contact in finger.contacts)
+    ]
+    last, length = finger.contacts[-1], finger.model.joint_spacing
+    end = np.cos(last.angle) * frame.along + np.sin(last.angle) * up
+    return np.array([*places, places[-1] + length * end])
+
+
+def draw(axes: Any, settled: SettledHand, hand: HandPlan) -> None:
+    """Draw one hand seen along y of H: in grey closed, in blue where its wrist settles."""
+    assert hand.wrist is not None
+    moved = Pose(hand.wrist.twist[:3], turns_about(hand.wrist.twist[3:]))
+    there = settled.hand.settle(
+        settled.hold,
+        settled.surface,
+        settled.grasp,
+        hold_in_hand=moved.inverse() @ settled.seating.pose,
+    )
+    mm = 1e3
+    for name in SHOWN:
+        rest, after = chain(settled, name), chain(there, name)
+        after = after @ moved.rotation.T + moved.position
+        axes.plot(mm * rest[:, 0], mm * rest[:, 2], "-o", color="0.6", linewidth=2, markersize=3)
+        axes.plot(mm * after[:, 0], mm * after[:, 2], "-o", color="tab:blue", markersize=3)
+    own = np.isin(settled.finger_of, [FINGERS.index(name) for name in SHOWN])
+    for place, force in zip(hand.positions[own], hand.forces[own], strict=True):
+        axes.annotate(
+            "",
+            (mm * place[0] + 0.4 * force[0], mm * place[2] + 0.4 * force[2]),
+            (mm * place[0], mm * place[2]),
+            arrowprops={"arrowstyle": "->", "color": "tab:red"},
+        )
+    palm = settled.hand.palm_tiles
+    axes.plot(mm * palm[:, 0], mm * palm[:, 2], "s", color="0.6", label="closed")
+    shifted = palm @ moved.rotation.T + moved.position
+    axes.plot(mm * shifted[:, 0], mm * shifted[:, 2], "s", color="tab:blue", label="settled")
+
+
+def main() -> None:
+    """Plan the stance and write the picture."""
+    request = read_request("wall-300")
+    hands = [msgspec.structs.replace(each, wrist="compliant") for each in request.stance.hands]
+    stance = msgspec.structs.replace(request.stance, hands=hands)
+    asked = question(msgspec.structs.replace(request, stance=stance))
+    answer = plan(asked)
+    assert answer.hands is not None
+    hand = next(each for each in answer.hands if each.limb == LIMB)
+    place = next(each for each in asked.stance.hands if each.limb == LIMB)
+    settled = settle_hand(place, asked.stance)
+    figure, axes = plt.subplots(figsize=(9.0, 4.6), layout="constrained")
+    crest, radius = settled.seating.pose.position, 0.15
+    turn = np.linspace(np.pi - 1.15, np.pi + 1.15, 200)
+    axes.plot(
+        1e3 * (crest[0] + radius * np.sin(turn)),
+        1e3 * (crest[2] + radius + radius * np.cos(turn)),
+        color="0.3",
+        label="rock, 300 mm",
+    )
+    draw(axes, settled, hand)
+    axes.plot([], [], color="tab:red", label="tile forces, 2.5 N/mm")
+    axes.set_aspect("equal")
+    axes.set_xlabel("x of H [mm]")
+    axes.set_ylabel("z of H, into the rock [mm]")
+    axes.set_title(f"{LIMB} of wall-300: one inner and one outer finger, palm")
+    axes.set_ylim(-25.0, 150.0)
+    axes.legend(loc="upper center", ncols=2)
+    figure.savefig(PICTURE, dpi=150)
+
+
+if __name__ == "__main__":
+    main()
