@@ -1,4 +1,4 @@
-"""Times, counts and sizes by which a service serves many clients."""
+"""Define times, counts and sizes by which a service shares its workers among many clients."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["SERVING_SETTINGS", "ServingSettings"]
 
 @dataclass(frozen=True, slots=True)
 class ServingSettings:
-    """Times, counts and sizes by which a service serves many clients."""
+    """Times [s], counts and sizes [bytes] by which a service shares its workers among clients."""
 
     client_timeout: float = 10.0
     """How long a client waits at least by default [s]."""
