@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 WRENCH_AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
-"""Components of a wrench, and keys of a capability after their signs."""
+"""Names of the six components of a wrench; after a sign, such as ``+fx``, keys of capabilities."""
 
 Vector = list[float]
 

@@ -89,8 +89,9 @@ class Query(Request, frozen=True, kw_only=True):
     """The fields of every request that a client can send over zenoh.
 
     - ``id``: text of the client's choice, which the reply repeats.
-    - ``deadline``: seconds that the answer may take, waiting in the queue included; by default the
-      service's deadline.
+    - ``deadline``: time that the answer may take, waiting in the queue included, at most 600 s [s];
+      then the best verified plan is the answer. By default the service's deadline; none on the
+      command line.
     - ``max_reply_bytes``: largest reply payload that the client accepts [bytes]; without it there
       is no bound.
     """

@@ -31,11 +31,11 @@ class SharedQueue(StrEnum):
     """Names of the queues for messages to clients whose identifiers are not known."""
 
     OPERATORS = "operators"
-    """Who asks how the service is, without a link to it."""
+    """Operators who ask for health or metrics, without a link to the service."""
     UNREAD = "unread"
-    """Whose query could not be read."""
+    """Clients whose query could not be read."""
     INQUIRIES = "inquiries"
-    """Sessions that are asked to prove their names."""
+    """Sessions that are asked to prove their identifiers."""
 
 
 class ReplySender:

@@ -106,7 +106,7 @@ class Shares:
         known.held_until = time.perf_counter() + waits
 
     def gone(self, place: str) -> None:
-        """Record that a place has disconnected: others need not leave it time, nor does it wait."""
+        """Record that a place has disconnected: it is no longer active, and no longer held back."""
         if known := self._places.get(place):
             known.asked = known.held_until = -math.inf
 
