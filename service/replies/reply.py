@@ -212,7 +212,7 @@ class LastFailure(Struct, kw_only=True):
     """Most recent failure of a service.
 
     - ``kind``: kind of the error.
-    - ``about``: key of the question, or the process that ended and how.
+    - ``about``: kind of the question (last part of its key), or the process that ended and how.
     - ``id``: ``id`` of the question; null where the question has none, or a process failed.
     - ``at``: time of the failure [s], Unix time.
     """
