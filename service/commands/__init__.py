@@ -1,4 +1,4 @@
-"""The ``crux`` command."""
+"""Commands of the ``crux`` command line."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""A command that plans many requests from a file, one a line."""
+"""Define ``crux batch``: answer many plan requests from a file of JSON lines."""
 
 from __future__ import annotations
 
@@ -122,7 +122,13 @@ def batch_command(
 
 
 def writing_answers(file: Path | None) -> AbstractContextManager[None]:
-    """Turn what goes wrong in writing answers into one line, if they go to a file."""
+    """Return a context manager that turns errors of writing answers into one line about ``-o``.
+
+    Parameters
+    ----------
+    file : Path or None
+        File of the answers; with None errors are left as they are.
+    """
     return nullcontext() if file is None else tables.writing(file, "-o")
 
 
@@ -136,23 +142,29 @@ def new_run(
     resume: bool,
     shown: bool = False,
 ) -> bulk.Run:
-    """Return where answers go: rows of a table or lines of a file, or lines on standard output.
+    """Return the run that stores answers: rows of a table, lines of a file, or standard output.
 
     Parameters
     ----------
     file : Path or None
+        File of the answers, a table if it ends in ``.csv`` or ``.parquet``; None for no file.
     asked : Asked
         All questions.
     columns : callable
-        Returns the columns of a table.
+        Returns the columns of a table; called for a table only.
     own : Own
-        Hand and robot that a table is about.
+        Hand and robot of the caller, which a table's header records.
     explained : bool
-        True if a table is of explained plans.
+        True if the plans of a table are explained by certificates.
     resume : bool
-        True if answers that the file already has are kept.
+        True to keep answers that the file already has.
     shown : bool, optional
-        True if replies go to standard output where there is no file.
+        True to write replies to standard output if there is no file.
+
+    Returns
+    -------
+    ReplyLines or TableLines
+        Not yet open; its tally counts the answers that are kept.
     """
     with writing_answers(file):
         if file is None or bulk.exporter_at(file) is None:
@@ -170,26 +182,27 @@ def answer_rest(
     title: str,
     noun: str,
 ) -> None:
-    """Write the answers that a sink does not have yet, with progress.
+    """Answer the questions that a run has no answers for yet, and show the progress.
 
     Parameters
     ----------
     asked : Asked
-        All questions, those that are answered among them.
+        All questions, also those that are already answered.
     answers : callable
-        Answers questions in order.
+        Takes an iterator of questions; returns a generator of their answers in order.
     sink : Run
+        Stores each answer at once.
     file : Path or None
-        Where the answers go.
+        File of the answers, for messages.
     title : str
-        Description of the work.
+        Description of the work, for the progress bar.
     noun : str
-        Plural name of the questions.
+        Plural name of the questions, for messages.
 
     Raises
     ------
     Interrupted, CruxError
-        The message says which answers are kept.
+        If a signal or an error ends the work early; the message says which answers are kept.
     """
     begun, before = perf_counter(), sink.tally.count
     due: deque[bytes] = deque()
@@ -268,14 +281,14 @@ def _columns(
 
 
 def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
-    """Name the first question that is bad input, how many more are, and where the next ones are.
+    """Print the first question that is bad input, the number of such questions, and where more are.
 
     Parameters
     ----------
     tally : Tally
-        Of all answers.
+        Counts of all answers.
     where : callable
-        Says which question has an index.
+        Returns the name of the question with an index, such as its line.
     noun : str
         Plural name of the questions.
     """
@@ -290,7 +303,10 @@ def complain(tally: bulk.Tally, where: Callable[[int], str], noun: str) -> None:
 
 
 def exit_status(tally: bulk.Tally) -> int:
-    """Return the worst of what the requests alone would have, by their statuses."""
+    """Return the worst exit status that the requests of all answers would have alone.
+
+    From worst to best: 1 failed or lost, 2 bad input, 3 overloaded or infeasible, 0 done.
+    """
     status = tables.ExitStatus
     found = [status.of(each) for each in tally.statuses]
     found += [

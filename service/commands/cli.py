@@ -1,10 +1,10 @@
-"""The ``crux`` command: what it is called with, and how it ends.
+"""Define the ``crux`` command line: its commands, their options in common, and exit statuses.
 
 Exit status: 0 done and feasible; 3 done, but infeasible or overloaded; 2 bad input, with one line
 on standard error; 1 anything else.
 
-Nothing is loaded here but what ``--help``, ``--version`` and completion need; a command's module is
-loaded when that command is called for.
+This module loads only what ``--help``, ``--version`` and completion need; the module of a command
+is loaded when that command is called (lazy loading).
 """
 
 from __future__ import annotations
@@ -25,7 +25,15 @@ __all__ = ["COMMANDS_BY_NAME", "crux", "run_command_line"]
 
 
 class Entry(NamedTuple):
-    """Module of a command, and the first words of its help."""
+    """Entry of the table of commands.
+
+    Attributes
+    ----------
+    module : str
+        Module of the command in `service.commands`.
+    words : str
+        First sentence of the command's help.
+    """
 
     module: str
     words: str
@@ -106,7 +114,7 @@ def _say_more_or_less(command: click.Command) -> click.Command:
 
 
 class Commands(click.Group):
-    """Group of the commands; each is loaded when it is called."""
+    """Click group that loads the module of a command when the command is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted(COMMANDS_BY_NAME)
@@ -121,7 +129,7 @@ class Commands(click.Group):
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command, and print how long it took with ``--verbose``."""
+        """Run a command; with ``--verbose``, print its duration to standard error."""
         start, used = time.perf_counter(), time.process_time()
         try:
             return super().invoke(ctx)
@@ -133,7 +141,7 @@ class Commands(click.Group):
                 click.echo(f"crux: {times}", err=True)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write what each command does, without loading it."""
+        """Write each command with its summary into the help, without loading the command."""
         limit = formatter.width - 6 - max(map(len, COMMANDS_BY_NAME))
         with formatter.section("Commands"):
             formatter.write_dl(
@@ -151,7 +159,7 @@ class Commands(click.Group):
     def shell_complete(
         self, ctx: click.Context, incomplete: str
     ) -> list[click.shell_completion.CompletionItem]:
-        """Return commands and options with this beginning, without loading the commands."""
+        """Return completions for a beginning: names of commands with their help, and options."""
         from click.shell_completion import CompletionItem
 
         names = [name for name in self.list_commands(ctx) if name.startswith(incomplete)]
@@ -160,7 +168,18 @@ class Commands(click.Group):
 
 
 def run_command_line(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line, and return its exit status."""
+    """Run a command line, print errors as one line on standard error, and return the exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Arguments after ``crux``; by default those of this process.
+
+    Returns
+    -------
+    int
+        0, 1, 2 or 3, as the module describes. An unexpected error, no `CruxError`, is raised.
+    """
     try:
         status = crux.main(args=arguments, prog_name="crux", standalone_mode=False)
         sys.stdout.flush()

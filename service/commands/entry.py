@@ -1,4 +1,4 @@
-"""Start the process of a ``crux`` command.
+"""Start the process of a ``crux`` command: the entry point of the installed program.
 
 This module imports little, so that signals are handled while the commands are imported.
 """
@@ -14,7 +14,7 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Run the command line of this process, and exit."""
+    """Run the command line with this process's arguments, and exit with its status."""
     _open_what_is_closed()
     with interruptible():
         from service.commands.cli import run_command_line

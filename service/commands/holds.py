@@ -1,4 +1,4 @@
-"""Propose holds on a scan: close a hand at a grid of places, and compare what it can hold."""
+"""Define ``crux holds``: try a hand at a grid of places on a scan, and sort the holds found."""
 
 from __future__ import annotations
 

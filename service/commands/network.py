@@ -1,4 +1,4 @@
-"""Commands that answer and ask over zenoh."""
+"""Define the commands that serve and ask over zenoh: serve, query, demo and schema."""
 
 from __future__ import annotations
 
@@ -23,7 +23,13 @@ __all__ = ["demo_command", "query_command", "schema_command", "serve_command"]
 
 
 def zenoh_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a click command zenoh's flags, and pass it their ``config``."""
+    """Add zenoh's flags to a click command; the command gets them as one ``config`` argument.
+
+    Parameters
+    ----------
+    command : callable
+        Function of the command, with a keyword argument ``config`` of type `zenoh.Config`.
+    """
 
     @click.option(
         "-m", "--mode", type=click.Choice(serving.SESSION_MODES), help="Zenoh session mode."

@@ -1,4 +1,4 @@
-"""Options that commands share, as typed values: files that are read, and options of one purpose."""
+"""Define options that several commands share, and turn their values into typed objects."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ PICTURE_ENDINGS: Final = (".png", ".pdf", ".svg")
 
 
 class FiniteRange(click.FloatRange):
-    """Range of numbers, without nan."""
+    """Click type of a number within a range; not a number (nan) is refused."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Return the number, or refuse it."""
+        """Return the number of an option's text, or end the command with a usage error."""
         number = float(super().convert(value, param, ctx))
         if math.isnan(number):
             self.fail(f"{number} is not in the range {self._describe_range()}.", param, ctx)
@@ -68,12 +68,12 @@ class FiniteRange(click.FloatRange):
 
 
 class OutputFile(click.Path):
-    """Output file; refused before any work is done if it cannot be written.
+    """Click type of an output file; an impossible path is refused before any work is done.
 
     Parameters
     ----------
     *endings : str
-        Valid file endings.
+        Valid file endings, such as ``.png``.
     """
 
     def __init__(self, *endings: str) -> None:
@@ -81,7 +81,7 @@ class OutputFile(click.Path):
         self._endings = endings
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Return the path, or refuse it."""
+        """Return the path of an option's text, or end the command with a usage error."""
         path = Path(str(super().convert(value, param, ctx)))
         if path.suffix.lower() not in self._endings:
             several = f"valid endings are {', '.join(self._endings)}"
@@ -93,12 +93,12 @@ class OutputFile(click.Path):
 
 
 class InputFile(click.Path):
-    """Input file that a function of `service.answering` reads while options are parsed.
+    """Click type of an input file that is read while options are parsed.
 
     Parameters
     ----------
     reader : str
-        The function of that room that reads it.
+        Name of the function of `service.answering` that reads the file.
     """
 
     def __init__(self, reader: str) -> None:
@@ -106,7 +106,7 @@ class InputFile(click.Path):
         self._reader = reader
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return what the file says."""
+        """Return the content of the file; raise the errors of the reader."""
         return getattr(answering, self._reader)(super().convert(value, param, ctx))
 
 
@@ -116,16 +116,16 @@ class InputFile(click.Path):
 def asked_for(
     kind: Any, name: str, *options: Callable[[Command], Command]
 ) -> Callable[[Command], Command]:
-    """Return a decorator that adds options to a command, and passes them as one value.
+    """Return a decorator that adds options to a command and passes their values as a named tuple.
 
     Parameters
     ----------
     kind : type
-        Of the value, a named tuple; its fields are named as the options.
+        Named tuple; its fields have the names of the options' parameters.
     name : str
-        Of the command's parameter.
+        Command's parameter that gets the named tuple.
     *options : callable
-        In the order in which help shows them.
+        Click option decorators, in the order in which help shows them.
     """
 
     def decorate(command: Command) -> Command:
@@ -143,29 +143,41 @@ def asked_for(
 
 
 class Own(NamedTuple):
-    """Numbers of the caller's own hand and robot; None for the bundled ones."""
+    """Hand (``--hand``) and robot (``--robot``) of the caller; None stands for the bundled ones."""
 
     hand: ParameterTable | None
     robot: planner.RobotFile | None
 
     def asked(self, request: RequestT) -> RequestT:
-        """Return a request for this hand and this robot."""
+        """Return a copy of a plan or route request for this hand and this robot."""
         return answering.with_robot(answering.with_hand(request, self.hand), self.robot)
 
     @property
     def robots(self) -> answering.Robots:
-        """The robots that may be asked about."""
+        """Builders of the robots that a request may be about, by the robots' names."""
         return answering.robots_of(self.robot)
 
 
 class WorkersOption(NamedTuple):
-    """Place where many questions are answered: this process, local workers or Dask."""
+    """Choice of the workers for many questions: local processes or a Dask cluster.
+
+    ``workers``: number of processes, None for as many as are worth it; ``dask``: address of the
+    scheduler, None without Dask.
+    """
 
     workers: int | None
     dask: str | None
 
     def place(self, plans: int) -> tuple[str, int | None]:
-        """Return where work of so many plans is done, and the number of workers."""
+        """Return where an amount of work is done that takes as long as a number of ``plans``.
+
+        Returns
+        -------
+        on : str
+            ``here``, ``processes``, or a Dask cluster, for `service.bulk.evaluate`.
+        workers : int or None
+            Number of worker processes; None for the default.
+        """
         if self.dask is not None:
             return (bulk.LOCAL_CLUSTER if self.dask == "local" else self.dask), self.workers
         count = processes.worth(plans, self.workers)
@@ -173,14 +185,19 @@ class WorkersOption(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """Options of a plan: the spread over samples, and no explanation."""
+    """Options of a plan: ``--spread`` over samples, samples (``--draws``), and ``--no-explain``.
+
+    The spread is a Monte Carlo study over uncertain parameters; ``draws`` None means the bundled
+    samples; ``unexplained`` leaves out the certificate of a stance without a plan within its
+    limits.
+    """
 
     spread: bool
     draws: list[requests.Draw] | None
     unexplained: bool
 
     def of(self, request: RequestT) -> RequestT:
-        """Return a request with these options."""
+        """Return a copy of a plan or route request with these options."""
         more: dict[str, Any] = {"draws": self.draws} if self.draws else {}
         if self.spread or self.draws:
             more["want"] = list(dict.fromkeys([*request.want, "spread"]))
@@ -192,9 +209,9 @@ class Wanted(NamedTuple):
 def with_extras(
     request: requests.PlanRequest, *further: planner.Want, whole: bool = True
 ) -> requests.PlanRequest:
-    """Return a request that also wants the command line's extras and the ``further`` ones.
+    """Return a copy of a plan request that also wants the load factor, shadow prices and more.
 
-    ``whole``: true for a reply in full detail, as a person reads it.
+    ``further`` names more results for ``want``; ``whole`` asks for the full reply, of any size.
     """
     want = dict.fromkeys([*request.want, "load_factor", "prices", *further])
     more = {"detail": "full", "max_reply_bytes": None} if whole else {}
@@ -254,7 +271,7 @@ def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
 def beginning_so(
     names: Iterable[str], *, files: bool = False
 ) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
-    """Return a shell completion of these names, and with ``files`` also of paths."""
+    """Return a shell completion for click of names, and with ``files`` also of file paths."""
 
     def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
         found = [CompletionItem(name) for name in names if name.startswith(begun)]
@@ -329,7 +346,7 @@ draws_option = click.option(
     help="TOML with draws of your own, over which the spread is told; --spread is then meant.",
 )
 wanted_options = asked_for(Wanted, "wanted", draws_option, explain_option)
-"""Beside `spread_option`."""
+"""Options of `Wanted` but `spread_option`, which a command adds itself."""
 
 timeout_option = click.option(
     "--timeout",
@@ -362,14 +379,14 @@ workers_options = asked_for(
 
 
 def plot_option(text: str) -> Callable[[Command], Command]:
-    """Return an option that names a picture, which is passed on as ``picture``."""
+    """Return the option ``--plot`` with a help text; the command gets the path as ``picture``."""
     return click.option(
         "--plot", "picture", type=OutputFile(*PICTURE_ENDINGS), metavar="FILE", help=text
     )
 
 
 def folder_option(text: str) -> Callable[[Command], Command]:
-    """Return an option that names where files go, which is passed on as ``folder``."""
+    """Return the option ``--output`` of a folder; the command gets the path as ``folder``."""
     return click.option(
         "-o",
         "--output",

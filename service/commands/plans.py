@@ -1,4 +1,4 @@
-"""A command that plans one stance, without the network."""
+"""Define ``crux plan``: plan one stance in this process, without the network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read, mesh and write a scan on the command line, and print it as a table."""
+"""Define ``crux rock``: make a triangle mesh of a scan, write it, and print its numbers."""
 
 from __future__ import annotations
 

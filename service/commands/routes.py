@@ -1,4 +1,4 @@
-"""A command that evaluates climbs: one with its report, or many as rows or replies."""
+"""Define ``crux route``: plan one climb with a report, or many as table rows or replies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands that show what can be carried: by one hand, and by the whole body."""
+"""Define ``crux wrench-space`` for one hand, and ``crux body-space`` for the whole body."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Read the stance or the route of a command: a file, standard input, or a bundled one.
+"""Read the stance or the route of a command from a file, standard input, or the bundled examples.
 
-Files that its holds name are read here, so that the request is complete.
+Mesh files that holds name are read here, too, so that the request is complete.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ RequestT = TypeVar("RequestT", bound=requests.Request)
 
 
 class Given(NamedTuple, Generic[RequestT]):
-    """A request as it was written.
+    """Request as the user wrote it, with the files that it names.
 
     Attributes
     ----------
     text : bytes
+        JSON text of the request.
     request : Request
-        Content of the text, with the scans of the files that it names.
+        Decoded text, still with the names of its mesh files.
     files : MeshFiles or None
-        Those files; None where they are bundled, and so may be gone.
+        The mesh files that were read; None for a bundled request, whose files may be gone.
     """
 
     text: bytes
@@ -40,39 +41,85 @@ class Given(NamedTuple, Generic[RequestT]):
 
 
 def bundled(kind: type[requests.Request] = requests.PlanRequest) -> tuple[str, ...]:
-    """Return the names of the bundled stances, or of the bundled routes."""
+    """Return the sorted names of the bundled stances or routes.
+
+    Parameters
+    ----------
+    kind : type, optional
+        `PlanRequest` for stances, `RouteRequest` for routes.
+    """
     files = [file.name for file in _folder(kind).iterdir()]
     return tuple(sorted(name.removesuffix(".json") for name in files if name.endswith(".json")))
 
 
 def read_request(source: str) -> requests.PlanRequest:
-    """Return the plan request that a command was given.
+    """Read the plan request that a command was given as STANCE.
 
     Parameters
     ----------
     source : str
         Path of a JSON file, ``-`` for standard input, or the name of a bundled stance.
 
+    Returns
+    -------
+    PlanRequest
+        With the vertices and faces of the mesh files that it names.
+
     Raises
     ------
     InvalidInputError
-        If there is none, or it is not a plan request.
+        If the source does not exist or cannot be read, or is not a valid plan request.
     """
     return read_with_text(source)[0]
 
 
 def read_with_text(source: str) -> tuple[requests.PlanRequest, Given[requests.PlanRequest]]:
-    """Return the plan request as `read_request` does, with its text."""
+    """Read a plan request as `read_request` does, and return its text as well.
+
+    Returns
+    -------
+    request : PlanRequest
+        With the vertices and faces of the mesh files that it names.
+    given : Given
+        The request as the user wrote it.
+    """
     return _read(source, requests.PlanRequest, "STANCE", "stance")
 
 
 def read_route(source: str) -> requests.RouteRequest:
-    """Return the route that a command was given; as `read_request`."""
+    """Read the route request that a command was given as ROUTE.
+
+    Parameters
+    ----------
+    source : str
+        Path of a JSON file, ``-`` for standard input, or the name of a bundled route.
+
+    Returns
+    -------
+    RouteRequest
+        With the vertices and faces of the mesh files that it names.
+
+    Raises
+    ------
+    InvalidInputError
+        If the source does not exist or cannot be read, or is not a valid route request.
+    """
     return _read(source, requests.RouteRequest, "ROUTE", "route")[0]
 
 
 def limbs_of(source: str | None) -> tuple[str, ...]:
-    """Return the limbs whose hands hold in a stance; the bundled robot's if it cannot be read."""
+    """Return the names of the limbs with a hand in a stance, for shell completion.
+
+    Parameters
+    ----------
+    source : str or None
+        Path of a JSON file, or the name of a bundled stance.
+
+    Returns
+    -------
+    tuple of str
+        The limbs of RoboSimian if the stance is None or cannot be read.
+    """
     path = (
         _folder(requests.PlanRequest) / f"{source}.json"
         if source in bundled()

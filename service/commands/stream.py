@@ -1,4 +1,4 @@
-"""The command that turns body wrenches into set-points, line by line."""
+"""Define ``crux stream``: turn body wrenches into set-points of the tendons, line by line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run studies on the command line, and print their claims as a table."""
+"""Define ``crux study``: run a study of the paper, and print its claims as a table."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ STUDY_NAMES: Final = (
     "sweep",
     "measure",
 )
-"""Names of all studies; repeated here so that completion need not load them."""
+"""Names of all studies; repeated here so that shell completion need not load the studies."""
 
 SURFACE_NAMES: Final = ("sandpaper-36", "concrete-fine", "concrete-coarse", "rock")
-"""Names of the bundled surfaces; repeated here for the same reason."""
+"""Names of the bundled surfaces; repeated here so that help need not load the surfaces."""
 
 
 def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:

@@ -1,4 +1,4 @@
-"""A command that plans a stance over varied fields."""
+"""Define ``crux sweep``: plan one stance over ranges of varied fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Work in processes of its own, and what ends them."""
+"""Work in parallel worker processes, and the end of a command on a signal."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Try hands at many places of one rock: bulk work, of which a question is a batch of trials."""
+"""Try a hand at many places of one rock, in batches on parallel worker processes."""
 
 from __future__ import annotations
 
@@ -29,19 +29,30 @@ Found = Generator[tuple[int, "FoundHold | InvalidInputError"], None, None]
 
 
 class HoldTrials:
-    """Trials of hands on a rock, while it is entered.
+    """Workers that try a hand at many places of one rock; they run inside a ``with`` block.
 
     Parameters
     ----------
     rock : Mesh
+        Mesh of the rock.
     surface : str
-        A preset's name.
+        Name of a bundled surface.
     hand : ParameterTable
-        Its numbers.
+        Parameters of the hand.
     seat : {'rest', 'best'}, optional
+        How a hand is seated at a place: as its grasp has it, or at the nearby pose with the
+        strongest grip.
     on : str or distributed.Client, optional
+        Where trials run: ``processes`` of this machine, ``here`` for this process alone,
+        ``tcp://HOST:PORT`` of a Dask scheduler or its client, ``dask:local`` for a Dask cluster on
+        this machine.
     workers : int, optional
-        As of `service.bulk.evaluate`.
+        Number of worker processes of this machine; by default the number of cores.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``on`` or ``workers`` is impossible.
     """
 
     def __init__(
@@ -66,19 +77,23 @@ class HoldTrials:
         self._pool.__exit__(*error)
 
     def each(self, trials: Sequence[HoldTrial], *, robust: bool = False) -> Found:
-        """Yield each place's index, and what a hand holds there, batch by batch.
+        """Yield the index of each place with the outcome of its trial, batch by batch.
 
         Parameters
         ----------
         trials : sequence of HoldTrial
+            Places and grasps to try.
         robust : bool, optional
-            As of `hand_models.fixed_wrist.try_holds`.
+            True to sample places near each one, too (Monte Carlo samples), and add the reach that
+            is left.
 
         Yields
         ------
         index : int
+            Index in ``trials``; not in ascending order.
         found : FoundHold or InvalidInputError
-            An error in place of a hand that cannot be there, or whose process died.
+            What the hand can hold there; an error where the hand cannot be there, or where its
+            worker died.
         """
         # one that is searched for, or scattered, is many already; some fingers take ten times as
         # long as most, and so do the batches that they are in

@@ -1,4 +1,4 @@
-"""End a command on SIGINT or SIGTERM, with one line on standard error, and end its processes."""
+"""End a command and its child processes on SIGINT or SIGTERM, with one line of error."""
 
 from __future__ import annotations
 
@@ -17,12 +17,20 @@ ENDING_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interrupted(BaseException):
-    """SIGINT or SIGTERM has come; the argument says what is kept of the work, if it is reported."""
+    """Exception that SIGINT or SIGTERM raises in the main thread of a command.
+
+    The argument, if there is one, says in words which part of the work is kept; it is printed.
+    """
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Answer signals while the work lasts; afterwards they end this process at once."""
+    """Return a context manager that ends a command cleanly on SIGINT or SIGTERM.
+
+    The first signal raises `Interrupted` in the block, which has 5 s to save its work; then one
+    line is printed and the process exits with status 1. A second signal, or a signal after the
+    block, kills the process and its children at once. Signals that are ignored stay ignored.
+    """
     for number in ENDING_SIGNALS:
         # one that is ignored is not for this process
         if signal.getsignal(number) != signal.SIG_IGN:
@@ -75,7 +83,7 @@ def _end(number: int = 0, frame: FrameType | None = None) -> None:
 
 
 def kill_children() -> None:
-    """Kill all processes that were started."""
+    """Kill all child processes that `multiprocessing` has started."""
     # it may be half imported, and then there are none
     children = getattr(sys.modules.get("multiprocessing"), "active_children", None)
     for process in children() if children is not None else ():

@@ -1,6 +1,6 @@
-"""Many plan requests at once: replies in their order, errors in their places, as objects.
+"""Plan many requests at once, on parallel worker processes, with replies as Python objects.
 
-They are bulk work like any other; for more than a list holds, or a cluster, use `service.bulk`.
+For more requests than a list can hold, or for a cluster, use `service.bulk`.
 """
 
 from __future__ import annotations
@@ -26,24 +26,26 @@ __all__ = ["Planners", "plan_many", "worth"]
 
 
 class Planners:
-    """Processes that plan, kept open while it is entered; their start is paid for once.
+    """Pool of worker processes that plan requests; it stays open inside a ``with`` block.
+
+    Several calls of `plan_many` share the processes, whose start takes a second or two.
 
     Parameters
     ----------
     workers : int, optional
-        Processes; as many as there are cores by default. With one, this process plans itself.
+        Number of processes; by default the number of cores. With 1, this process plans itself.
     robot : RobotFile, optional
-        The only robot that is planned for; those that are bundled by default.
+        The only robot that is planned for; by default the bundled robots.
     hand : ParameterTable, optional
-        Entries in which hands are not the bundled one; a request's own go on top.
+        Entries that replace those of the bundled hand; entries in a request override them.
     folder : Path, optional
-        Names of mesh files in requests are relative to it; each process reads a file once. By
-        default requests name none.
+        Folder to which the names of mesh files in requests are relative; each process reads a file
+        once. Without it, requests must not name files.
 
     Raises
     ------
     InvalidInputError
-        If ``workers`` is no whole number of at least 1, or after the end, when it is asked to plan.
+        If ``workers`` is not a whole number of at least 1.
     """
 
     def __init__(
@@ -69,7 +71,7 @@ class Planners:
         self._pool.__exit__(*error)
 
     def wait(self) -> None:
-        """Wait until all processes have started, if that is not to be timed."""
+        """Wait until all processes have started; useful before a time measurement."""
         if isinstance(self._pool, Workers):
             self._pool.wait()
 
@@ -78,7 +80,27 @@ class Planners:
         requests: Sequence[PlanRequest],
         progress: Callable[[int, int], None] | None = None,
     ) -> list[PlanReply | BriefPlanReply | ErrorReply]:
-        """Return the reply to each request, or the error in its place; as `plan_many`."""
+        """Return the reply to each request, or an error reply in its place.
+
+        Parameters
+        ----------
+        requests : sequence of PlanRequest
+            The requests.
+        progress : callable, optional
+            Called after each answer with (number of requests done, number of requests).
+
+        Returns
+        -------
+        list of PlanReply, BriefPlanReply or ErrorReply
+            In the order of the requests; errors of single requests are not raised.
+
+        Raises
+        ------
+        InvalidInputError
+            After the end of the ``with`` block.
+        CruxError
+            If processes cannot be started.
+        """
         if self._closed:
             raise InvalidInputError("is closed; use it inside a with block", field="planners")
         answers = []
@@ -101,27 +123,28 @@ def plan_many(
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[PlanReply | BriefPlanReply | ErrorReply]:
-    """Return the reply to each request, or the error in its place.
+    """Plan many requests in parallel; return the reply to each, or an error reply in its place.
 
     Parameters
     ----------
     requests : sequence of PlanRequest
+        The requests.
     workers : int, optional
-        Processes; as many as there are cores where the requests are enough to be worth it. With
-        one, this process plans itself. A program that starts processes needs its
-        ``if __name__ == "__main__":``.
+        Number of worker processes; by default the number of cores for 500 requests or more, else 1.
+        With 1, this process plans itself. A program that starts processes needs its ``if __name__
+        == "__main__":``.
     progress : callable, optional
-        Called with (requests done, requests in all).
+        Called after each answer with (number of requests done, number of requests).
 
     Returns
     -------
     list of PlanReply, BriefPlanReply or ErrorReply
-        In the order of the requests. Nothing that is wrong with one of them is raised.
+        In the order of the requests; errors of single requests are not raised.
 
     Raises
     ------
     InvalidInputError
-        If ``workers`` is no whole number of at least 1.
+        If ``workers`` is not a whole number of at least 1.
     CruxError
         If processes cannot be started.
     """
@@ -130,12 +153,25 @@ def plan_many(
 
 
 def worth(count: int, workers: int | None = None) -> int:
-    """Return how many processes so many requests are worth: no more than are wanted.
+    """Return the number of worker processes that is worth starting for a number of requests.
+
+    Parameters
+    ----------
+    count : int
+        Number of plan requests.
+    workers : int, optional
+        Number of processes that the caller wants.
+
+    Returns
+    -------
+    int
+        ``workers``, but at most one per request; by default the number of cores for 500 requests or
+        more, else 1.
 
     Raises
     ------
     InvalidInputError
-        If ``workers`` is no whole number of at least 1.
+        If ``workers`` is not a whole number of at least 1.
     """
     if workers is not None:
         return min(whole_number(workers), max(1, count))

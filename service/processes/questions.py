@@ -1,4 +1,4 @@
-"""Answer queries in worker processes: a query's bytes in, the bytes of its answer out."""
+"""Answer queries in a service's worker processes: encoded request in, encoded answer out."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ __all__ = ["Job", "answering"]
 
 
 class Job(NamedTuple):
-    """A query for a process.
+    """Query for a worker process.
 
     Attributes
     ----------
     name : str
-        The last part of its key.
+        Kind of question: the last part of the query's key.
     payload : bytes
+        Encoded request.
     encoding : str
-        Zenoh's name of it.
+        Zenoh's name of the payload's encoding.
     waited : float
-        How long ago it came [s].
+        Time since the query's arrival [s].
     seconds : float or None
-        The service's own deadline, from where it came [s].
+        Deadline by the service, from the query's arrival [s]; None without one.
     rehearsal : bool
-        Whether what is declared is let go again.
+        True if a stream that the query declares must be released again.
     client : str
-        Who asks: streams are shared out by it.
+        Client that asks; each client owns the streams that it declares.
     """
 
     name: str
@@ -47,14 +48,21 @@ class Job(NamedTuple):
 
 
 def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[[Job], Answer]:
-    """Return the function that answers; here the planner is imported, in each process.
+    """Return the function with which a worker process answers jobs.
+
+    The planner and its libraries are imported by this call, so that no question waits for them.
 
     Parameters
     ----------
     robot : RobotFile or None
-        The only robot that is planned for; those that are bundled by default.
+        The only robot that is planned for; by default the bundled robots.
     hand : ParameterTable or None
-        Entries in which its hands are not the bundled one; a request's own go on top.
+        Entries that replace those of the bundled hand; entries in a request override them.
+
+    Returns
+    -------
+    callable
+        Takes a `Job` and returns its `Answer`; keeps declared streams from call to call.
     """
     from planner import deadline
     from service.answering import Streams, handle, robots_of

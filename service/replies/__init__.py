@@ -1,4 +1,4 @@
-"""Replies of the service; readers accept unknown fields."""
+"""Replies of the service; readers must accept unknown fields."""
 
 import lazy_loader
 

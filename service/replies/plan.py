@@ -1,4 +1,4 @@
-"""Define replies with plans: whole and brief ones, climbs, and set-points of a stream."""
+"""Define replies with plans: whole and brief plans, climbs, and the set-points of a stream."""
 
 from __future__ import annotations
 
@@ -37,26 +37,55 @@ __all__ = [
 
 
 class CertificateReply(CertificateOf[Vector, WrenchSet], frozen=True, kw_only=True, eq=False):
-    """Why nothing balances the body: at any ``utilisation`` (null), or up to that cap on it.
+    """Proof that no plan balances the body, or none within a cap on the utilisation.
 
-    Every body wrench w that the hands can supply with loads up to 10⁶ N, and their wrenches v on
-    the rock with which they do, have direction · w + Σ held · v ≤ supremum (``held`` by limb, for
-    hands that are given a wrench); what is asked for has ``needed``, which is more. ``nearest`` can
-    be supplied, ``shortfall`` is what is missing; both are null where hands have no loads, whatever
-    the body needs, and where a deadline came before. ``irreducible``: limits, hard rows and given
-    wrenches (``held_wrench``) that by themselves leave no balance, each of them needed for that;
-    others may be in the way, too. Empty where loads of any sign do not balance, null where rounding
-    or a deadline leaves it undecided. ``irreducible_up_to``: loads up to which they are proven to
-    leave no balance [N], at least 10⁶; null where that is so for loads of any size. ``sufficient``:
-    those of them of which any one, taken away alone, would let the stance be held; empty if no
-    single one would, null where that is not known. In all of these the caller's own limits come
-    first, then other limits, then hard rows. ``wrench_spaces``, by limb, come with ``"want":
-    ["model"]`` where there is no plan.
+    This is an infeasibility certificate (Farkas certificate). Notation: w is a body wrench that the
+    hands can supply with loads up to 10⁶ N, in B; v are the wrenches that the hands then exert on
+    the rock, each in its H. The proof is direction · w + Σ held · v ≤ ``supremum`` < ``needed`` for
+    every such w and v. Lists of limits begin with the caller's limits; other limits follow, then
+    hard rows.
+
+    - ``utilisation``: the cap on the utilisation that no plan keeps to; null where no plan exists
+      at any utilisation.
+    - ``direction``: six numbers in B [1/N, 1/(N·m)]: the direction of the body wrench in which the
+      hands give less than the body needs.
+    - ``held``: six numbers in H [1/N, 1/(N·m)] by limb, for hands whose wrench the request gives;
+      zero for free components.
+    - ``supremum``: largest value of the left side of the proof over all loads.
+    - ``needed``: value of the left side for what the request asks; larger than ``supremum``.
+    - ``nearest``: nearest body wrench that the hands can supply, in B [N, N·m]; null where the
+      hands have no admissible loads at all, whatever the body needs, or where a deadline came
+      before.
+    - ``shortfall``: the body wrench asked for minus ``nearest``, in B [N, N·m]; null where
+      ``nearest`` is null.
+    - ``blocking``: limits and hard rows that keep the hands from giving more in the direction;
+      empty where no hand can give anything.
+    - ``irreducible``: an irreducible infeasible subset: limits, hard rows and given wrenches
+      (``held_wrench``) that by themselves leave no balance; each of them is needed for that. Other
+      limits may be in the way, too. Empty where loads of any sign do not balance the body; null
+      where rounding or a deadline leaves the subset undecided.
+    - ``irreducible_up_to``: loads up to which ``irreducible`` is proven to leave no balance [N], at
+      least 10⁶; null where the proof covers loads of any size, or where there is no subset.
+    - ``sufficient``: members of ``irreducible`` of which any one, taken away alone, would make the
+      stance feasible; empty if no single one would, null where that is not known.
+    - ``wrench_spaces``: wrench space of each hand by limb; only with ``"want": ["model"]``, where
+      there is no plan.
     """
 
 
 class HandReply(Struct, kw_only=True):
-    """One hand of a plan. Its wrench space comes with ``"want": ["model"]``."""
+    """One hand of a plan: its loads, its utilisation, its pose on the hold and its wrist.
+
+    - ``limb``: name of the limb that carries the hand.
+    - ``wrench``: force and moment of the hand on the rock, in H, about H's origin [N, N·m].
+    - ``fingers``: tension and tile loads of each of the four fingers.
+    - ``palm``: load of the palm.
+    - ``utilisation``: largest load over capacity of the hand's limits.
+    - ``seating``: pose of the hold in H.
+    - ``wrist``: state of the wrist.
+    - ``wrench_space``: linear description of the wrenches that the hand can exert; only with
+      ``"want": ["model"]``.
+    """
 
     limb: str
     wrench: Vector
@@ -69,26 +98,61 @@ class HandReply(Struct, kw_only=True):
 
 
 class PlanReply(StanceReply, kw_only=True):
-    """Who carries what, and what margin is left.
+    """Plan of a stance: loads of all hands, tensions of all tendons, and the margin that is left.
 
-    ``load_factor_status``: ``found``; ``at_least``, where floating hands may hold more; or why it
-    is null: ``unbounded``, ``none`` where no multiple can be held, ``not_asked``, ``not_finished``
-    by the deadline. ``utilisation``: up to 0.1 % above the least, where that saves tension;
-    ``prices`` are of the least. ``effort``: the sum of squared relative tendon tensions and joint
-    torques; where it is the objective, palms, lateral reactions and wrists count a little, too, so
-    that there is one plan: it may so be a few tenths of a percent above the least. ``joints``: the
-    angles planned for [rad], by limb, from the body outward; so are ``joint_torque`` and what the
-    joints bear, ``joint_torque_limit`` [N·m]. ``effort_prices``: what one more unit of a limit
-    would take off the effort, where the objective is ``min_effort``. ``certificate`` is null where
-    there is a plan within the limits, and where the request says ``"explain": false``.
-    ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (that
-    no plan uses less is not proven), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
-    ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``, ``advice``. ``robust`` comes
-    with ``"want": ["robust"]``, but not for a body wrench of zero; ``spread``, ``clearance`` and
-    ``advice`` with ``"want"`` of their names; changes that let the stance hold come first, the
-    smallest first; then the others, by their gain for their size. ``findings``: what is odd about
-    the stance, each with its ``field`` in the request and what was measured; ``warnings`` has their
-    messages, too.
+    - ``status``: ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
+    - ``reason``: one sentence that says what limits the plan, or why there is none.
+    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
+    - ``utilisation``: load over capacity of the limit that is used most; up to 0.1 % above the
+      least possible, where that saves tension. Null without a plan.
+    - ``effort``: sum of squared relative tendon tensions and joint torques. Where effort is the
+      objective, palms, lateral reactions and wrists count a little, too, so that the plan is
+      unique; the effort may then be a few tenths of a percent above the least. Null without a plan.
+    - ``load_factor``: largest multiple of the body wrench that can be held at utilisation 1; null
+      for the reasons in ``load_factor_status``.
+    - ``load_factor_unbounded``: true where every multiple of the body wrench can be held.
+    - ``load_factor_status``: ``found``; ``at_least``, where floating hands may hold more; or why
+      ``load_factor`` is null: ``unbounded``, ``none`` where no multiple can be held, ``not_asked``,
+      ``not_finished`` by the deadline.
+    - ``survival_probability``: always null in this version.
+    - ``limiting``: the limit that is used most; null without a plan.
+    - ``hands``: one entry for each hand; null where nothing balances the body.
+    - ``joints``: joint angles planned for, by limb, from the body outward [rad]; [m] for joints
+      that slide. Null where the request has no joints.
+    - ``joint_torque``: torques of these joints, by limb, from the body outward [N·m]; [N] for
+      joints that slide. Null without joints or without a plan.
+    - ``joint_torque_limit``: largest torques that the joints can carry, in the same order and
+      units; null where the request has no joints.
+    - ``prices``: shadow prices of the limits that bind: how far the least utilisation falls for one
+      more unit of a limit [1/N, 1/(N·m), 1/A]; null where they were not asked for, or without a
+      plan.
+    - ``effort_prices``: how far the effort falls for one more unit of a limit, where the objective
+      is ``min_effort``; else null.
+    - ``certificate``: proof that there is no plan within the limits; null where there is one, and
+      where the request says ``"explain": false``.
+    - ``residual``: body wrench of the returned loads minus ``body_wrench`` [N, N·m]; null without a
+      plan.
+    - ``path``: whether the straight way from the ``present`` tensions to the plan is safe; null
+      where the request gives no present tensions, or without a plan.
+    - ``verified``: true where the independent check of the answer passed.
+    - ``solver``: name of the solver, how it ended, and its iterations.
+    - ``time``: time that each part of the answer took [s].
+    - ``warnings``: sentences about what is odd or unfinished, the messages of ``findings`` among
+      them.
+    - ``findings``: what is odd about the stance, each with its ``field`` in the request and the
+      measured value.
+    - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
+      proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
+      ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``, ``advice``.
+    - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
+      ["robust"]``, and not for a body wrench of zero.
+    - ``spread``: Monte Carlo statistics over samples of uncertain parameters; only with ``"want":
+      ["spread"]``.
+    - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
+      ["clearance"]``.
+    - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
+      make the stance feasible come first, the smallest first; the rest follow by gain for their
+      size.
     """
 
     status: str
@@ -123,10 +187,18 @@ class PlanReply(StanceReply, kw_only=True):
 
 
 class HandSetPoints(Struct):
-    """Set-points of one hand: tensions [N], motors [N·m, A], its wrench on the rock in H.
+    """Set-points of one hand: what a controller sends to its four tendons.
 
-    ``winch_angle``: from the open finger [rad]. The hand's ``utilisation`` is only of a plan. With
-    ``"detail": "set_points"`` there are tensions and winches alone.
+    With ``"detail": "set_points"`` a reply has ``limb``, ``tensions`` and ``winch_angle`` alone.
+
+    - ``limb``: name of the limb that carries the hand.
+    - ``tensions``: tensions of the four tendons [N].
+    - ``winch_angle``: angles of the four winches from the open finger [rad].
+    - ``motor_torque``: torques of the four motors [N·m].
+    - ``motor_current``: currents of the four motors [A].
+    - ``wrench``: force and moment of the hand on the rock, in H, about H's origin [N, N·m].
+    - ``utilisation``: largest load over capacity of the hand's limits; only in a plan, not in a
+      stream.
     """
 
     limb: str
@@ -139,11 +211,31 @@ class HandSetPoints(Struct):
 
 
 class BriefPlanReply(StanceReply, kw_only=True):
-    """A plan with ``"detail"`` ``set_points`` or ``hands``: fields as of a plan's whole reply.
+    """Plan with less detail: ``"detail"`` is ``set_points`` or ``hands``.
 
-    Those from ``body_wrench`` on, and ``poses``, are left out with ``set_points``; the ``reason``
-    is cut then. Of four hands that is less than 2,000 bytes of JSON, and less than 1,000 of
+    Fields from ``body_wrench`` on, and ``poses``, are left out with ``set_points``. A
+    ``set_points`` reply for four hands has less than 2,000 bytes of JSON, and less than 1,000 of
     MessagePack, whatever the status, beside the request's ``id``.
+
+    - ``status``: ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
+    - ``reason``: one sentence that says what limits the plan, or why there is none; cut to 120
+      bytes with ``set_points``.
+    - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
+    - ``limiting``: the limit that is used most; null without a plan.
+    - ``hands``: set-points of each hand; null where nothing balances the body.
+    - ``verified``: true where the independent check of the answer passed.
+    - ``unfinished``: what a deadline has left out, by name.
+    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
+    - ``load_factor``: largest multiple of the body wrench that can be held at utilisation 1; null
+      for the reasons in ``load_factor_status``.
+    - ``load_factor_unbounded``: true where every multiple of the body wrench can be held.
+    - ``load_factor_status``: ``found``, ``at_least``, ``unbounded``, ``none``, ``not_asked`` or
+      ``not_finished``.
+    - ``joints``: joint angles planned for, by limb, from the body outward [rad]; null where the
+      request has no joints.
+    - ``warnings``: sentences about what is odd or unfinished.
+    - ``findings``: what is odd about the stance, each with its ``field`` in the request.
+    - ``time``: time that each part of the answer took [s].
     """
 
     status: str
@@ -164,18 +256,33 @@ class BriefPlanReply(StanceReply, kw_only=True):
 
 
 class HandColumns(Struct, kw_only=True):
-    """One hand of a stream, and the names of its set's loads."""
+    """One hand of a stream, with the names of its loads.
+
+    - ``limb``: name of the limb that carries the hand.
+    - ``columns``: names of the loads of the hand's wrench space, in order.
+    """
 
     limb: str
     columns: list[str]
 
 
 class StreamReply(StanceReply, kw_only=True):
-    """A stream that is declared. It is there until many others are, or the service ends.
+    """Confirmation that a stance is declared as a stream, with the identifier to ask it by.
 
-    ``radius``: within which of ``body_wrench``, the first centre, set-points are interpolated, null
-    where they are solved one by one. ``status``, ``utilisation``, ``gap``: at that centre.
-    ``took``: the time of it [s].
+    The service keeps a stream until many others are declared, or until the service ends.
+
+    - ``stream``: identifier of the stream, for requests of set-points.
+    - ``radius``: distance from ``body_wrench`` within which set-points are interpolated between
+      plans [N], along a moment a tenth of it per metre [N·m]; null where each set-point is solved
+      for.
+    - ``status``: status of the plan at ``body_wrench``.
+    - ``reason``: why there is no plan at ``body_wrench``; null where there is one.
+    - ``body_wrench``: centre of the first interpolation, in B [N, N·m].
+    - ``utilisation``: utilisation of the plan at ``body_wrench``; null without a plan.
+    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``;
+      null without a plan.
+    - ``hands``: the hands in order, with the names of their loads.
+    - ``took``: time that the declaration took [s].
     """
 
     stream: str
@@ -190,12 +297,21 @@ class StreamReply(StanceReply, kw_only=True):
 
 
 class SetPointsReply(Reply, kw_only=True):
-    """Set-points of one body wrench.
+    """Set-points of all hands for one body wrench.
 
-    ``status``, ``utilisation``, ``verified``: as of a plan. ``gap``: the least utilisation of any
-    plan is no more than this below, which is proven. ``source``: ``interpolated`` from plans known
-    before, ``solved`` for this wrench, or ``blended`` of both. ``reason``: why there is no plan;
-    then ``utilisation``, ``gap`` and ``hands`` are null. ``took``: the time of it [s].
+    - ``stream``: identifier of the stream that was asked.
+    - ``status``: ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
+    - ``reason``: why there is no plan; null where there is one.
+    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
+    - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
+    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``;
+      null without a plan.
+    - ``hands``: set-points of each hand; null without a plan.
+    - ``verified``: true where the independent check of the set-points, or of the proof that there
+      is no plan, passed.
+    - ``source``: ``interpolated`` between plans known before, ``solved`` for this wrench, or
+      ``blended`` from both.
+    - ``took``: time that the answer took [s].
     """
 
     stream: str
@@ -211,9 +327,22 @@ class SetPointsReply(Reply, kw_only=True):
 
 
 class RouteStageReply(Struct, kw_only=True):
-    """A stance of a climb. ``move``: from one, zero for the start; ``phase``: of the move.
+    """One stance of a climb, with the outcome of its plan.
 
-    ``limb``: the one that moves. ``reason``: what limits the plan, or why there is none.
+    - ``move``: number of the move, from one; zero for the start stance.
+    - ``phase``: part of the move: ``start``, ``shift`` of the body, ``lift`` of the limb, or
+      ``place`` of the hand on its next hold.
+    - ``limb``: name of the limb that moves; null where none does.
+    - ``status``: status of the stage's plan, or ``unreachable``.
+    - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
+    - ``load_factor``: largest multiple of the body wrench that can be held at utilisation 1; null
+      for the reasons in ``load_factor_status``.
+    - ``load_factor_unbounded``: true where every multiple of the body wrench can be held.
+    - ``load_factor_status``: ``found``, ``at_least``, ``unbounded``, ``none``, ``not_asked`` or
+      ``not_finished``.
+    - ``joint_utilisation``: largest joint torque over its limit; null where torques are not known.
+    - ``limiting``: the limit that is used most; null without a plan.
+    - ``reason``: one sentence that says what limits the plan, or why there is none.
     """
 
     move: int
@@ -232,9 +361,19 @@ class RouteStageReply(Struct, kw_only=True):
 class RouteReply(Reply, kw_only=True):
     """A climb, planned stage by stage.
 
-    ``status``: of the stage that is worst off. ``crux``: the index of the hardest stage, whose
-    ``utilisation`` and ``limiting`` these are. ``load_factor``: the least of all stages;
-    ``load_factor_status``, here and there: as of a plan.
+    - ``name``: name of the route.
+    - ``status``: status of the stage that is worst off: ``optimal``, ``overloaded``,
+      ``infeasible``, ``unreachable`` or ``failed``, in this order.
+    - ``crux``: index of the hardest stage in ``stages``, from zero.
+    - ``utilisation``: utilisation of the hardest stage; null where that stage has no plan.
+    - ``load_factor``: least load factor of all stages; null where a stage has none, or where all
+      are unbounded.
+    - ``load_factor_unbounded``: true where the load factor of every stage is unbounded.
+    - ``load_factor_status``: status of the least load factor, in the words of a stage's.
+    - ``limiting``: the limit that is used most at the hardest stage; null where that stage has no
+      plan.
+    - ``stages``: all stances in climbing order.
+    - ``warnings``: sentences about what is odd about any stage, each once.
     """
 
     name: str

@@ -1,8 +1,9 @@
-"""Define the shared parts of replies, the error reply, and the state for an operator.
+"""Define the shared parts of replies, the error reply, and the health of a service.
 
-Replies are lenient, so that they may gain fields. Poses and vectors as in the requests; forces and
-moments are on the rock and in H unless said otherwise. A value that does not exist is null; what
-was not asked for with ``want`` is left out.
+Readers of replies must accept unknown fields, so that replies can gain fields. A pose is a position
+[m] and a quaternion [x, y, z, w]; a wrench is [fx, fy, fz, mx, my, mz] [N, N·m]. Forces and moments
+act on the rock and are given in the hand's frame H, unless a field says otherwise. A value that
+does not exist is null; a result that the request does not name in ``want`` is left out.
 """
 
 from __future__ import annotations
@@ -30,36 +31,50 @@ __all__ = [
 ]
 
 WRENCH_AXES: Final = ("fx", "fy", "fz", "mx", "my", "mz")
-"""Components of a wrench, and keys of a capability after their signs."""
+"""Names of the six components of a wrench; after a sign, such as ``+fx``, keys of capabilities."""
 
 Vector = list[float]
 
 
 class Reply(Struct, kw_only=True):
-    """The fields of every reply. ``id``: the request's, where there was one that could be read."""
+    """The fields of every reply.
+
+    - ``v``: version of the messages, 1.
+    - ``id``: the request's ``id``; null where the request has none, or could not be read.
+    """
 
     v: int = 1
     id: str | None = None
 
 
 class PlacedFrame(Struct):
-    """A frame in another, the quaternion as [x, y, z, w]."""
+    """Pose of a frame in another frame.
+
+    - ``position``: origin of the frame [m].
+    - ``orientation``: unit quaternion as [x, y, z, w].
+    """
 
     position: Vector
     orientation: Vector
 
 
 class StanceReply(Reply, kw_only=True):
-    """A reply about a stance; ``poses``: H in W of hands that were given by a place on a rock."""
+    """The fields of every reply about a stance.
+
+    - ``poses``: pose of H in W by limb, of hands that the request gives by a ``place`` on a rock;
+      left out where there are none.
+    """
 
     poses: dict[str, PlacedFrame] | UnsetType = UNSET
 
 
 class SeatingReply(Struct):
-    """The place of the hold in H, and the rule by which it was found.
+    """Pose of the hold in H, and the rule by which the pose was found.
 
-    ``backed_off``: how far the hand moved off the rock along -z of H, so that its open fingers
-    are clear [m].
+    - ``rule``: ``given``, ``pinch``, ``palm_on_rock``, ``palm_on_rock_centred`` or ``flat``.
+    - ``pose``: pose of the hold's frame in H.
+    - ``backed_off``: distance by which the hand moved off the rock along -z of H, so that its open
+      fingers are clear of the rock [m].
     """
 
     rule: str
@@ -68,15 +83,23 @@ class SeatingReply(Struct):
 
 
 class Wrist(Struct, kw_only=True):
-    """The state of a hand's wrist; all but ``mode`` are null where it is fixed.
+    """State of a hand's wrist: how the wrist moves under the loads of a plan.
 
-    ``twist``: where it goes from the pose that was given, about that pose [m, rad]. ``palm``:
-    ``off``, ``drags``, ``presses`` or ``drags_and_presses``. ``rounds``: how often the hands' sets
-    were linearised. ``error``: how far the set of the last step was off at its end [N, moments over
-    0.1 m]; the plan is exact. Of a wrench space, how far it is off at most where it reaches
-    farthest along the axes. ``pose_target``: where a limb of the stance's ``limb_stiffness`` is to
-    aim, as ``twist`` [m, rad]. ``least_stiffness``: of the hand on its rock and that limb together,
-    turns over 0.1 m [N/m]; where it is not positive the wrist does not stay.
+    All fields but ``mode`` are null or left out where the wrist is fixed.
+
+    - ``mode``: ``fixed``, ``floating`` or ``compliant``.
+    - ``twist``: small displacement and rotation of H from its given pose, about that pose [m, rad].
+    - ``palm``: contact of the palm: ``off``, ``drags``, ``presses`` or ``drags_and_presses``.
+    - ``rounds``: number of times that the wrench spaces of the hands were linearised.
+    - ``error``: in a plan, how far the wrench space linearised in the step before the last is from
+      the exact model where the wrist went; the plan itself is exact. In a reply about a wrench
+      space, the largest such error at the points where the set reaches farthest along the axes.
+      Forces in newtons, moments divided by 0.1 m [N].
+    - ``pose_target``: pose at which the controller of a limb with a given ``limb_stiffness`` must
+      aim, as a twist like ``twist`` [m, rad]; left out without that stiffness.
+    - ``least_stiffness``: least stiffness of hand, rock and limb together, turns counted over 0.1 m
+      [N/m]; the wrist is unstable where the value is not positive. Left out without
+      ``limb_stiffness``.
     """
 
     mode: str
@@ -89,9 +112,12 @@ class Wrist(Struct, kw_only=True):
 
 
 class Generator(Struct):
-    """A column of a hand's wrench space: a load, and the wrench per newton of it.
+    """Column of a hand's wrench space: a variable, and the wrench per unit of the variable.
 
-    Of a floating hand a component of its wrist's twist, and the wrench per metre or radian.
+    - ``name``: name of the variable: a load of the hand; of a floating hand a component of the
+      wrist's twist.
+    - ``wrench``: wrench on the rock, in H, per newton of the load; per metre or radian of the
+      twist.
     """
 
     name: str
@@ -99,11 +125,23 @@ class Generator(Struct):
 
 
 class RowReply(Struct, kw_only=True):
-    """An inequality of a hand's wrench space.
+    """Linear inequality of a hand's wrench space: a limit or a hard row.
 
-    ``limit`` rows: load = coefficients · y + constant, at most utilisation · capacity; in newtons,
-    for ``motor_torque`` and ``joint_torque`` in newton-metres, for ``motor_current`` in amperes.
-    ``hard`` rows: coefficients · y at most capacity, whatever the utilisation.
+    No strength can change a hard row. With y, the variables of the ``generators`` in order, a
+    ``limit`` row is coefficients · y + constant ≤ utilisation · capacity. A ``hard`` row is
+    coefficients · y ≤ capacity, whatever the utilisation. Capacities are in newtons; those of
+    ``motor_torque`` and ``joint_torque`` in newton-metres, those of ``motor_current`` in amperes.
+
+    - ``name``: name of the row, unique in its set.
+    - ``kind``: ``limit`` or ``hard``.
+    - ``finger``: the finger that the row limits; null where the row limits the palm or the whole
+      hand.
+    - ``phalanx``: the phalanx whose tile the row limits; null where the row limits no single tile.
+    - ``limit``: name of the limit.
+    - ``joint``: the joint of the limb that the row limits; null for other rows.
+    - ``coefficients``: one number for each variable in y.
+    - ``constant``: load at y = 0; zero for a hard row.
+    - ``capacity``: largest load at utilisation 1; right side of a hard row.
     """
 
     name: str
@@ -118,7 +156,12 @@ class RowReply(Struct, kw_only=True):
 
 
 class WrenchSet(Struct, kw_only=True):
-    """A hand's wrenches, origin + Σ y · generator, for the loads y that the rows allow."""
+    """Wrench space of a hand: all wrenches origin + Σ y · generator whose y obeys the rows.
+
+    - ``origin``: wrench on the rock at y = 0, in H [N, N·m].
+    - ``generators``: one column for each variable in y.
+    - ``rows``: linear inequalities on y: limits first, then hard rows.
+    """
 
     origin: Vector
     generators: list[Generator]
@@ -126,7 +169,13 @@ class WrenchSet(Struct, kw_only=True):
 
 
 class ErrorDetail(Struct):
-    """The fault, and the field to blame; ``retry_after``: when to ask again [s]."""
+    """Cause of an error, and the field of the request that caused it.
+
+    - ``kind``: kind of the error.
+    - ``field``: path of the field in the request; null where no field is to blame.
+    - ``message``: one sentence for a person.
+    - ``retry_after``: time after which a retry makes sense [s]; only where the service is busy.
+    """
 
     kind: str
     field: str | None
@@ -135,15 +184,22 @@ class ErrorDetail(Struct):
 
 
 class ErrorReply(Reply, kw_only=True):
-    """A request that could not be understood, or a service that failed on it."""
+    """Reply to a request that could not be understood, or on which the service failed.
+
+    - ``error``: cause of the error.
+    """
 
     error: ErrorDetail
 
 
 class ProcessHealth(Struct, kw_only=True):
-    """One of a service's processes; ``resident``: its memory [bytes], where the system tells it.
+    """State of one worker process of a service.
 
-    ``purpose``: a ``spare`` one stands ready to take the place of one that ends.
+    - ``pid``: process identifier; null where the process has none.
+    - ``purpose``: ``questions``; ``streams`` for the process that keeps all streams; ``spare`` for
+      a process that is ready to replace one that ends.
+    - ``state``: ``starting``, ``idle`` or ``working``.
+    - ``resident``: memory in use [bytes]; null where the system does not report it.
     """
 
     pid: int | None
@@ -153,9 +209,12 @@ class ProcessHealth(Struct, kw_only=True):
 
 
 class LastFailure(Struct, kw_only=True):
-    """The last failure: the kind of error, of which key or process, and when (Unix time).
+    """Most recent failure of a service.
 
-    ``id``: the question's.
+    - ``kind``: kind of the error.
+    - ``about``: kind of the question (last part of its key), or the process that ended and how.
+    - ``id``: ``id`` of the question; null where the question has none, or a process failed.
+    - ``at``: time of the failure [s], Unix time.
     """
 
     kind: str
@@ -165,9 +224,15 @@ class LastFailure(Struct, kw_only=True):
 
 
 class HealthReply(Reply, kw_only=True):
-    """The state of a service.
+    """Health of a service, for an operator.
 
-    ``uptime``: [s]; ``replied``: questions so far; ``waiting``: questions, by the kind of queue.
+    - ``robot``: name of the robot that the service plans for.
+    - ``version``: version of the installed package; null where it is not known.
+    - ``uptime``: time since the start [s].
+    - ``replied``: number of questions that were answered or refused since the start.
+    - ``waiting``: number of questions that wait for a worker, by the kind of their queue.
+    - ``processes``: state of every worker process.
+    - ``last_failure``: most recent failure; null where there was none.
     """
 
     robot: str

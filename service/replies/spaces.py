@@ -25,10 +25,18 @@ __all__ = [
 
 
 class ContactReply(Struct):
-    """The place where a finger tile meets the rock, and the axes of its loads.
+    """Place where a finger tile meets the rock, and the axes of the tile's loads, in H.
 
-    ``stop``: the limit at which its phalanx's joint stands (``upper``, ``lower``), or ``balance``
-    where tendon and springs hold it without contact; null where contacts hold it.
+    - ``finger``: name of the finger.
+    - ``phalanx``: name of the phalanx that carries the tile.
+    - ``contact``: contact state of the phalanx: ``face``, ``edge``, ``frame`` or ``none``.
+    - ``stop``: limit at which the phalanx's joint rests (``upper``, ``lower``), or ``balance``
+      where tendon and springs keep the joint without contact; null where contacts keep it, or where
+      the tile is on no phalanx.
+    - ``position``: point of contact in H [m].
+    - ``shear_axis``: unit force of the shear load on the rock, in H.
+    - ``normal_axis``: unit force of the normal load on the rock, in H.
+    - ``lateral_axis``: unit force of the lateral load on the rock, in H.
     """
 
     finger: str
@@ -42,7 +50,12 @@ class ContactReply(Struct):
 
 
 class ClosingStageReply(Struct):
-    """One part of a closing finger: from which tension it moves, at which it is at rest [N]."""
+    """One part of a closing finger, and the tendon tensions between which the part moves.
+
+    - ``part``: ``nail``, the phalanx whose joint turns, or ``tiles``.
+    - ``starts``: tension at which the part begins to move [N].
+    - ``ends``: tension at which the part is at rest [N].
+    """
 
     part: str
     starts: float
@@ -50,12 +63,16 @@ class ClosingStageReply(Struct):
 
 
 class ClosingSequenceReply(Struct):
-    """The way a finger has closed: its nail, its joints from the base outward, its tiles.
+    """Way in which a finger has closed on its hold, stage by stage.
 
-    ``in_order``: whether nail and joints move one after the other. ``closure``: how it has ended:
-    ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped`` or ``straight``. ``nearby``: how else
-    it would end if the rock were 0.1 mm elsewhere, ``refused`` if the hand could not be there;
-    ``nearby_turn``: by how much a joint would end elsewhere [rad].
+    - ``finger``: name of the finger.
+    - ``stages``: the finger's nail, its joints from the base outward, its tiles.
+    - ``in_order``: true where nail and joints move one after the other.
+    - ``closure``: how the finger has ended: ``laid``, ``hooked``, ``wedged``, ``curled``,
+      ``stopped`` or ``straight``.
+    - ``nearby``: other closures in which the finger would end if the rock were 0.1 mm elsewhere;
+      ``refused`` among them if the hand could not be there.
+    - ``nearby_turn``: largest change of a joint's angle for these places of the rock [rad].
     """
 
     finger: str
@@ -67,7 +84,12 @@ class ClosingSequenceReply(Struct):
 
 
 class TensionLimitReply(Struct):
-    """The tension at which a finger's first tile lets go [N]; null where none ever does."""
+    """Tendon tension at which the first tile of a finger reaches its limit.
+
+    - ``finger``: name of the finger.
+    - ``tension``: the tension [N]; null where no tile ever reaches its limit.
+    - ``phalanx``: phalanx of that tile; null where ``tension`` is null.
+    """
 
     finger: str
     tension: float | None
@@ -75,14 +97,23 @@ class TensionLimitReply(Struct):
 
 
 class HalfSpaceEquations(Struct):
-    """``normals · w = offsets``."""
+    """Equations of a flat set of wrenches w: normals · w = offsets.
+
+    - ``normals``: one list of six numbers for each equation.
+    - ``offsets``: one number for each equation.
+    """
 
     normals: list[Vector]
     offsets: Vector
 
 
 class HalfSpacesReply(Struct):
-    """``normals · w ≤ offsets``, and what holds with equality where the set is flat."""
+    """Half-spaces whose intersection is a set of wrenches w: normals · w ≤ offsets.
+
+    - ``normals``: one list of six numbers for each half-space.
+    - ``offsets``: one number for each half-space.
+    - ``equations``: equations that hold besides, where the set has less than six dimensions.
+    """
 
     normals: list[Vector]
     offsets: Vector
@@ -90,10 +121,13 @@ class HalfSpacesReply(Struct):
 
 
 class AxisCapability(Struct):
-    """The reach of a set along an axis.
+    """Largest wrench component of a set along an axis [N, N·m].
 
-    ``pure``: the most of it with every other component zero, null where there is none. ``extent``:
-    the most of it with whatever else. Below zero, so much of the opposite is always there.
+    A negative value means that every wrench of the set has at least this much of the opposite
+    component.
+
+    - ``pure``: largest component with the other five zero; null where the set has no such wrench.
+    - ``extent``: largest component whatever the other five (support function of the set).
     """
 
     pure: float | None
@@ -101,12 +135,22 @@ class AxisCapability(Struct):
 
 
 class RobustCapability(Struct, kw_only=True):
-    """The reach of a set along each axis where the hand is not quite where it was put.
+    """Reach of a wrench space along each axis, if the hand is not exactly where it was put.
 
-    Closed anew at so many ``draws`` of its place, to either side by at most ``position`` along each
-    axis of H [m] and ``angle`` about each [rad]; ``without``: at so many of them it cannot be, or
-    holds nothing, which counts as reaching zero far. ``tenth``, ``hundredth``: the ``extent`` that
-    it exceeds at nine in ten places, and at 99 in a hundred. ``worst``, deprecated, is the latter.
+    The hand is closed anew at sampled places (Monte Carlo samples) near the given one. A place
+    where the hand cannot be, or where it holds nothing, counts as a reach of zero. Reaches are by
+    sign and axis, such as ``+fx`` [N, N·m].
+
+    - ``draws``: number of sampled places.
+    - ``without``: number of these places where the hand cannot be, or holds nothing.
+    - ``position``: largest shift to either side along each axis of H [m].
+    - ``angle``: largest turn to either side about each axis of H [rad].
+    - ``seed``: seed of the samples.
+    - ``worst``: deprecated, the same as ``hundredth``.
+    - ``tenth``: ``extent`` that the hand exceeds at nine in ten places; null where it is not
+      finite.
+    - ``hundredth``: ``extent`` that the hand exceeds at 99 in a hundred places; null where it is
+      not finite.
     """
 
     draws: int
@@ -120,11 +164,28 @@ class RobustCapability(Struct, kw_only=True):
 
 
 class WrenchSpaceReply(StanceReply, kw_only=True):
-    """The wrenches that one hand can carry, at utilisation 1: if none, ``capability`` is null.
+    """Wrench space of one hand: all wrenches that the hand can exert on its hold at utilisation 1.
 
-    ``vertices`` and ``half_spaces`` are null where they were not asked for, or where they were left
-    out; ``warnings`` then say so. ``dimension`` is null where nothing is left, or where even that
-    would cost too much.
+    - ``robot``: name of the robot.
+    - ``limb``: name of the limb that carries the hand.
+    - ``wrist``: state of the hand's wrist.
+    - ``seating``: pose of the hold in H.
+    - ``contacts``: contact of each tile with the rock.
+    - ``closing``: stages in which each finger has closed.
+    - ``tension_limits``: largest tendon tension of each finger.
+    - ``origin``: wrench on the rock where all variables y are zero, in H [N, N·m].
+    - ``generators``: one column for each variable: the wrench is origin + Σ y · generator.
+    - ``rows``: linear inequalities on y.
+    - ``vertices``: corners of the set, in H [N, N·m]; null where they were not asked for or cost
+      too much (``warnings`` then say so), an empty list where the hand can exert no wrench.
+    - ``half_spaces``: half-spaces of the set; null where they were not asked for, cost too much, or
+      the hand can exert no wrench.
+    - ``dimension``: dimension of the set, 0 to 6; null where the hand can exert no wrench, or where
+      the count would cost too much.
+    - ``capability``: reach along each axis, by sign and axis such as ``+fx``; null where the hand
+      can exert no wrench.
+    - ``warnings``: sentences about what was left out.
+    - ``robust``: reach over places near the given one; only with ``"want": ["robust"]``.
     """
 
     robot: str
@@ -146,11 +207,16 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
 
 
 class BodyCapability(Struct, kw_only=True):
-    """The reach of body wrenches that are held along an axis of B; null where there are none.
+    """Reach of the body wrenches that a stance can hold, along an axis of B [N, N·m].
 
-    ``more``: beyond the body wrench asked for, which has to be held. ``pure``: with every other
-    component zero. ``extent``: with whatever else. Below zero, so much of the opposite is always
-    there. ``limiting``: the limit that ends ``more``, or else ``extent``.
+    A negative value means that every such wrench has at least this much of the opposite component.
+
+    - ``more``: largest addition along the axis to the body wrench asked for; null where that body
+      wrench cannot be held.
+    - ``pure``: largest component with the other five zero; null where no such wrench can be held.
+    - ``extent``: largest component whatever the other five; null where no wrench can be held.
+    - ``limiting``: the limit that ends ``more``; where ``more`` is null, the limit that ends
+      ``extent``.
     """
 
     more: float | None
@@ -160,12 +226,20 @@ class BodyCapability(Struct, kw_only=True):
 
 
 class BodySectionReply(Struct, kw_only=True):
-    """The body wrenches that are held in the plane of two axes, between two polygons [N, N·m].
+    """Plane section of the body space: body wrenches in the plane of two axes [N, N·m].
 
-    Every point of the inner polygon is held, and none outside the outer one. Corners go
-    counterclockwise: two of a segment, one of a point, none where the plane holds nothing. ``gap``:
-    how far the two are apart at most [N, moments over 0.1 m]. ``limiting``: what ends the way at
-    each corner of the inner one.
+    Every point of the inner polygon can be held, and no point outside the outer polygon. Corners go
+    counterclockwise: two of a segment, one of a point, none where nothing in the plane can be held.
+
+    - ``axes``: names of the two components.
+    - ``others``: the other four components: ``needed`` as asked for, ``zero``, or ``free``, which
+      makes the section a projection.
+    - ``inner``: corners of the inner polygon.
+    - ``outer``: corners of the outer polygon.
+    - ``gap``: largest distance between the polygons, moments divided by 0.1 m [N]; null without
+      corners.
+    - ``limiting``: the limit that is reached at each corner of the inner polygon; null where there
+      is none.
     """
 
     axes: list[str]
@@ -177,7 +251,12 @@ class BodySectionReply(Struct, kw_only=True):
 
 
 class Acceleration(Struct, kw_only=True):
-    """The largest acceleration from rest that is held along a direction in W [m/s², rad/s²]."""
+    """Largest acceleration of the body from rest that a stance can hold along a direction in W.
+
+    - ``direction``: unit vector in W; the axis of rotation for an angular acceleration.
+    - ``acceleration``: the largest acceleration [m/s²], or [rad/s²] if angular.
+    - ``limiting``: the limit that ends the acceleration; null where there is none.
+    """
 
     direction: Vector
     acceleration: float
@@ -185,14 +264,28 @@ class Acceleration(Struct, kw_only=True):
 
 
 class BodySpaceReply(StanceReply, kw_only=True):
-    """The body wrenches that a stance can hold within the utilisation asked for.
+    """Body space of a stance: the body wrenches and accelerations within the utilisation asked for.
 
-    ``status``, ``reason``, ``utilisation``: of the plan for the body wrench asked for.
-    ``acceleration``: by axis of W; null where the body cannot be held at rest or its wrench was
-    given instead of a load. ``angular_acceleration``: about B's origin, for the robot's own load at
-    known joints. ``along``: in the directions asked for. ``exact``: false where a wrist floats; its
-    hand's set is then linearised, and at the extents it is off by up to ``linearisation_error``, in
-    newtons with moments over 0.1 m. ``error``: its old name, for one more version.
+    - ``robot``: name of the robot.
+    - ``status``: status of the plan for the body wrench asked for.
+    - ``reason``: one sentence that says what limits that plan, or why there is none.
+    - ``body_wrench``: the body wrench asked for, in B [N, N·m].
+    - ``utilisation``: utilisation of that plan; null without a plan.
+    - ``exact``: false where a wrist floats; the wrench space of its hand is then linearised.
+    - ``linearisation_error``: largest error of the linearised wrench spaces at the extents, moments
+      divided by 0.1 m [N]; zero where ``exact`` is true.
+    - ``error``: deprecated, the same as ``linearisation_error``; there for one more version.
+    - ``capability``: reach along each axis of B, by sign and axis such as ``+fx``.
+    - ``section``: the section of the body space that was asked for.
+    - ``acceleration``: largest acceleration by signed axis of W, such as ``+x``; null where the
+      body cannot be held at rest, or where the request gives a body wrench instead of a load.
+    - ``angular_acceleration``: largest angular acceleration about B's origin, by signed axis of W;
+      null unless joints are known and the load is the robot's own, without ``com``.
+    - ``along``: largest accelerations in the directions asked for; null where ``acceleration`` is
+      null.
+    - ``time``: time that each part of the answer took [s].
+    - ``warnings``: sentences about what is odd or left out.
+    - ``findings``: what is odd about the stance, each with its ``field`` in the request.
     """
 
     robot: str

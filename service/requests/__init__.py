@@ -1,4 +1,4 @@
-"""Requests to the service; unknown fields are refused."""
+"""Requests to the service; unknown fields are an error."""
 
 import lazy_loader
 

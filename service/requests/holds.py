@@ -1,4 +1,4 @@
-"""Define the holds of requests: rock of every shape, and its surface."""
+"""Define the holds of requests: rock of every shape, its pose, and its surface."""
 
 from __future__ import annotations
 
@@ -67,37 +67,56 @@ Count = Annotated[int, Meta(ge=1, le=64)]
 
 
 class Placed(Strict, frozen=True, kw_only=True, tag_field="shape"):
-    """A hold, placed by one pose or none; with none the hand is seated on it."""
+    """Pose of a hold: in the world, in the hand, or neither.
+
+    At most one of the two poses is given. With neither, ``crux`` chooses a seat for the hand.
+
+    - ``pose``: pose of the hold's frame in W.
+    - ``pose_in_hand``: pose of the hold's frame in H.
+    """
 
     pose: Annotated[Pose | None, Meta(description="in W")] = None
     pose_in_hand: Annotated[Pose | None, Meta(description="in H")] = None
 
 
 class Plane(Placed, frozen=True, kw_only=True, tag="plane"):
-    """A flat wall."""
+    """Flat wall; z of its frame points into the rock."""
 
 
 class Cylinder(Placed, frozen=True, kw_only=True, tag="cylinder"):
-    """A round log of rock along y of its frame."""
+    """Round log of rock along y of its frame.
+
+    - ``diameter``: diameter of the log [m].
+    """
 
     diameter: Diameter
 
 
 class Sphere(Placed, frozen=True, kw_only=True, tag="sphere"):
-    """A ball of rock."""
+    """Ball of rock.
+
+    - ``diameter``: diameter of the ball [m].
+    """
 
     diameter: Diameter
 
 
 class Edge(Placed, frozen=True, kw_only=True, tag="edge"):
-    """Two flat faces that meet in a fillet along y of its frame."""
+    """Two flat faces that meet in a rounded edge (fillet) along y of its frame.
+
+    - ``fillet_radius``: radius of the fillet [m].
+    - ``angle``: angle of the rock between the faces [rad].
+    """
 
     fillet_radius: FilletRadius
     angle: EdgeAngle
 
 
 class Ellipsoid(Placed, frozen=True, kw_only=True, tag="ellipsoid"):
-    """A rounded boulder; the crest is an end of its last semi-axis."""
+    """Rounded boulder; its crest is an end of the last semi-axis.
+
+    - ``semi_axes``: half the lengths of the boulder along x, y and z of its frame [m].
+    """
 
     semi_axes: Annotated[
         tuple[SemiAxis, SemiAxis, SemiAxis], Meta(description="along x, y, z of its frame [m]")
@@ -105,7 +124,15 @@ class Ellipsoid(Placed, frozen=True, kw_only=True, tag="ellipsoid"):
 
 
 class Strips(Strict, frozen=True, kw_only=True):
-    """The rock under each finger; the strips meet at y = 0 and half-way between two fingers."""
+    """Outlines of the rock under each of the four fingers, as lists of points [x, z] [m].
+
+    Two strips meet at y = 0 of the hold's frame, the others half-way between two fingers.
+
+    - ``outer_left``: rock under the outer left finger.
+    - ``inner_left``: rock under the inner left finger.
+    - ``inner_right``: rock under the inner right finger.
+    - ``outer_right``: rock under the outer right finger.
+    """
 
     outer_left: Outline
     inner_left: Outline
@@ -114,14 +141,28 @@ class Strips(Strict, frozen=True, kw_only=True):
 
 
 class Profile(Placed, frozen=True, kw_only=True, tag="profile"):
-    """Rock drawn out along y of its frame, smoothed to the scale of a tile; points or profiles."""
+    """Rock with one cross-section, an outline in x and z, drawn out along y of its frame.
+
+    Outlines are smoothed to the scale of a tile. Either ``points`` or ``profiles`` is given.
+
+    - ``points``: one outline for all fingers, as points [x, z] [m].
+    - ``profiles``: one outline for each finger.
+    """
 
     points: Outline | None = None
     profiles: Strips | None = None
 
 
 class Mesh(Placed, frozen=True, kw_only=True, tag="mesh"):
-    """Triangles of rock, open or closed; vertices and faces, or a file for the command line."""
+    """Triangle mesh of rock, open or closed.
+
+    Either ``vertices`` and ``faces`` are given, or ``file``, which only the command line accepts.
+
+    - ``vertices``: points in the hold's frame [m].
+    - ``faces``: three vertex indices for each triangle, counterclockwise seen from outside the
+      rock.
+    - ``file``: path of an STL, PLY, OBJ or OFF file in metres.
+    """
 
     vertices: Vertices | None = None
     faces: Faces | None = None
@@ -132,7 +173,12 @@ Rock = Plane | Cylinder | Sphere | Edge | Ellipsoid | Profile | Mesh
 
 
 class RockReference(Placed, frozen=True, kw_only=True, tag="rock"):
-    """One of the stance's rocks, which hands share; it is at its own pose if none is given here."""
+    """Reference to one of the stance's rocks, which several hands can share.
+
+    The rock is at the pose in ``stance.rocks`` if no pose is given here.
+
+    - ``rock``: name of the rock in ``stance.rocks``.
+    """
 
     rock: Annotated[Name, Meta(description="of stance.rocks")]
 
@@ -141,7 +187,26 @@ Hold = Rock | RockReference
 
 
 class Surface(Strict, frozen=True, kw_only=True):
-    """A surface of the caller's own; what is left out follows from the shear limit."""
+    """Strength of the rock's surface under a spine tile, in the caller's numbers.
+
+    Only ``shear_limit`` is needed; fields that are left out follow from the shear limit.
+
+    - ``shear_limit``: strength of one tile in pure shear along the rock [N].
+    - ``pull_off_limit``: strength of one tile at ``pull_off_angle`` [N].
+    - ``pull_off_angle``: largest angle of the load away from the rock that the tile can carry, at
+      most π/2 [rad].
+    - ``lateral_limit``: strength of one tile along the rock straight sideways [N].
+    - ``compression_gain``: shear strength gained per newton of pressing [N/N].
+    - ``half_planes``: number of half-planes that approximate the limit curve from pure shear to
+      ``pull_off_angle``.
+    - ``lateral_pull_off_ratio``: share of the lateral strength, relative to shear, that is left at
+      ``pull_off_angle``, above 0 and at most 1.
+    - ``shear_scatter``: standard deviation of ``shear_limit`` from place to place, of one tile [N].
+    - ``friction``: Coulomb friction coefficient of a tile that is dragged backwards, away from the
+      finger's base.
+    - ``pull_off_exponent``: exponent of the fall of strength from ``shear_limit`` to
+      ``pull_off_limit``; 1 is a straight line over the angle.
+    """
 
     shear_limit: TileForce
     pull_off_limit: TileForce | None = None

@@ -1,7 +1,7 @@
 """Define the requests for plans, wrench and body spaces, set-points and climbs.
 
-Fields that the contract knows but this version does not are declared, so that they are refused by
-name (`service.wire.codec`) and not as unknown.
+Fields that later versions will support are declared already, so that the service refuses them by
+name (`service.wire.codec`) and not as unknown fields.
 """
 
 from __future__ import annotations
@@ -61,7 +61,11 @@ Radius = Annotated[
 
 
 class Draw(Strict, frozen=True, kw_only=True):
-    """One set of numbers that hand and rock may have; what it leaves open stays as it is."""
+    """One sample of uncertain parameters of hand and rock; the rest keep their nominal values.
+
+    - ``hand``: numbers of the hand, by section and entry of ``hand.toml``.
+    - ``surfaces``: numbers of the surface presets, by section and entry of ``surfaces.toml``.
+    """
 
     hand: HandEntries | None = None
     surfaces: Annotated[
@@ -84,7 +88,27 @@ Draws = Annotated[
 
 
 class PlanRequest(Query, frozen=True, kw_only=True):
-    """Asks who carries what in a stance."""
+    """Request for a plan of one stance: loads of all hands and tensions of all tendons.
+
+    - ``stance``: poses of body and hands, and their holds.
+    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m]; give it or
+      ``load``, not both.
+    - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
+      robot's weight at rest.
+    - ``objective``: ``max_margin`` for the least utilisation, ``min_effort`` for the least effort
+      within ``limits.utilisation``.
+    - ``limits``: the cap on the utilisation, and the caller's own limits.
+    - ``present``: present tensions of the four tendons [N], by limb; the reply's ``path`` says
+      whether the straight way from them is safe.
+    - ``confidence``: not supported in this version.
+    - ``detail``: how much the reply contains: ``set_points``, ``hands`` or ``full``; by default
+      ``full``, or as much as fits in ``max_reply_bytes``.
+    - ``want``: names of further results.
+    - ``draws``: samples of uncertain parameters for ``"want": ["spread"]``; by default the bundled
+      samples.
+    - ``explain``: false leaves out the certificate of a stance that is overloaded or infeasible.
+    - ``body_range``: how far advice may move the body.
+    """
 
     stance: Stance
     body_wrench: Annotated[
@@ -114,7 +138,13 @@ class PlanRequest(Query, frozen=True, kw_only=True):
 
 
 class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
-    """Asks what one hand of a stance can carry."""
+    """Request for the wrench space of one hand of a stance: all wrenches that the hand can exert.
+
+    - ``stance``: poses of body and hands, and their holds.
+    - ``limb``: name of the limb that carries the hand.
+    - ``want``: names of further results; by default ``vertices`` and ``half_spaces`` where they are
+      cheap.
+    """
 
     stance: Stance
     limb: Name
@@ -131,7 +161,21 @@ class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
 
 
 class BodySpaceRequest(Query, frozen=True, kw_only=True):
-    """Asks what a stance can hold: body wrenches, a plane of them, and accelerations."""
+    """Request for the body space of a stance: body wrenches and accelerations that can be held.
+
+    - ``stance``: poses of body and hands, and their holds.
+    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m]; give it or
+      ``load``, not both.
+    - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
+      robot's weight at rest.
+    - ``limits``: the cap on the utilisation, and the caller's own limits.
+    - ``present``: present tensions of the four tendons [N], by limb.
+    - ``axes``: two components of the body wrench, which span the plane of the section.
+    - ``others``: the other four components in this plane: ``needed`` as asked for, ``zero``, or
+      ``free``.
+    - ``directions``: directions in W along which the largest acceleration is computed; not zero, of
+      any length.
+    """
 
     stance: Stance
     body_wrench: Annotated[
@@ -161,7 +205,19 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
 
 
 class StreamRequest(Query, frozen=True, kw_only=True):
-    """Declares a stance, whose wrists are fixed, for set-points of many body wrenches."""
+    """Request that declares a stance as a stream, for set-points of many body wrenches.
+
+    All wrists of the stance must be fixed.
+
+    - ``stance``: poses of body and hands, and their holds.
+    - ``body_wrench``: centre of the first interpolation, in B [N, N·m]; give it or ``load``, not
+      both.
+    - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
+      robot's weight at rest.
+    - ``limits``: the cap on the utilisation, and the caller's own limits.
+    - ``radius``: distance from the centre within which set-points are interpolated between plans
+      [N]; along a moment a tenth of it per metre [N·m].
+    """
 
     stance: Stance
     body_wrench: Annotated[Wrench | None, Meta(description="the first centre, in B; or load")] = (
@@ -173,7 +229,13 @@ class StreamRequest(Query, frozen=True, kw_only=True):
 
 
 class SetPointsRequest(Query, frozen=True, kw_only=True):
-    """Asks a stream for the set-points of a body wrench."""
+    """Request for the set-points of one body wrench, from a declared stream.
+
+    - ``stream``: identifier in the reply to the stream's declaration.
+    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
+    - ``detail``: ``set_points`` leaves out torques, currents and wrenches; ``hands`` and ``full``
+      are the same.
+    """
 
     stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
     body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
@@ -181,7 +243,15 @@ class SetPointsRequest(Query, frozen=True, kw_only=True):
 
 
 class Move(Hand, frozen=True, kw_only=True):
-    """One limb to its next hold."""
+    """Move of one limb to its next hold, as part of a climb.
+
+    Besides the fields of a hand on its new hold:
+
+    - ``body``: pose of B in W to which the body shifts before the limb lifts; without it the body
+      does not shift.
+    - ``joints``: joint angles by limb [rad], or ``"solve"`` for inverse kinematics, of a climb
+      whose start stance has joints.
+    """
 
     body: Annotated[
         Pose | None, Meta(description="of B in W: where the body shifts to before the limb lifts")
@@ -197,7 +267,20 @@ class Move(Hand, frozen=True, kw_only=True):
 
 
 class RouteRequest(Request, frozen=True, kw_only=True):
-    """A climb: a start stance, and moves. Not asked over zenoh, but in bulk work."""
+    """Request for a climb: a start stance, and moves; for bulk work, not over zenoh.
+
+    - ``id``: text of the client's choice, which the reply repeats.
+    - ``name``: name of the route.
+    - ``stance``: the start stance.
+    - ``load``: mass and payloads from which the body wrench of every stance follows.
+    - ``objective``: ``max_margin`` or ``min_effort``, for every stance.
+    - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
+    - ``moves``: the moves in climbing order.
+    - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.
+    - ``want``: names of further results for every stance.
+    - ``draws``: samples of uncertain parameters for ``"want": ["spread"]``; by default the bundled
+      samples.
+    """
 
     id: Identifier | None = None
     name: Identifier = "route"

@@ -1,6 +1,6 @@
 """Define the parts of all requests: strict structs, names, and numbers within bounds.
 
-Bounds are far beyond any climbing robot; they keep arithmetic finite.
+The bounds are far beyond any climbing robot; they keep arithmetic finite.
 """
 
 from __future__ import annotations
@@ -66,20 +66,35 @@ Later = Annotated[Any, Meta(description="not supported in this version; leave it
 
 
 class Pose(Strict, frozen=True, kw_only=True):
-    """A frame in another."""
+    """Pose of a frame in another frame.
+
+    - ``position``: origin of the frame [m].
+    - ``orientation``: unit quaternion as [x, y, z, w].
+    """
 
     position: Position
     orientation: Quaternion
 
 
 class Request(Strict, frozen=True, kw_only=True):
-    """The fields of every request."""
+    """The fields of every request.
+
+    - ``v``: version of the messages, 1.
+    """
 
     v: Literal[1]
 
 
 class Query(Request, frozen=True, kw_only=True):
-    """The fields of every request that is asked over zenoh."""
+    """The fields of every request that a client can send over zenoh.
+
+    - ``id``: text of the client's choice, which the reply repeats.
+    - ``deadline``: time that the answer may take, waiting in the queue included, at most 600 s [s];
+      then the best verified plan is the answer. By default the service's deadline; none on the
+      command line.
+    - ``max_reply_bytes``: largest reply payload that the client accepts [bytes]; without it there
+      is no bound.
+    """
 
     id: Identifier | None = None
     deadline: Annotated[

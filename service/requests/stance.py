@@ -58,7 +58,16 @@ HandEntries = Annotated[
 
 
 class Place(Strict, frozen=True, kw_only=True):
-    """A point of rock that stands still, at which a hand is seated."""
+    """Point on a rock at which a hand is seated, with the direction of its approach.
+
+    - ``point``: point on the rock where the hold's crest would be [m].
+    - ``approach``: direction into the rock, of any length: z of the hand.
+    - ``wrist_angle``: angle by which the hand is turned about its approach, from where its x is
+      nearest to ``up`` [rad].
+    - ``frame``: frame of ``point``, ``approach`` and ``up``: ``world``, or ``rock`` for the frame
+      of the rock.
+    - ``up``: direction that counts as up; by default z of the world, or x of the rock's frame.
+    """
 
     point: Annotated[Position, Meta(description="on the rock, where the hold's crest would be [m]")]
     approach: Annotated[Direction, Meta(description="into the rock, of any length: z of the hand")]
@@ -79,7 +88,26 @@ class Place(Strict, frozen=True, kw_only=True):
 
 
 class Hand(Strict, frozen=True, kw_only=True):
-    """One hand on its hold, by its pose or by its place."""
+    """One hand on its hold; the hand is given by its pose, or by a place on the rock.
+
+    - ``limb``: name of the limb that carries the hand.
+    - ``pose``: pose of H in W.
+    - ``place``: place on the rock, instead of ``pose``; the reply then contains the pose.
+    - ``hold``: the rock under the hand.
+    - ``surface``: name of a bundled surface, or numbers of a surface of the caller's own.
+    - ``grasp``: how the hand closes: fingers, palm and fingernails.
+    - ``wrist``: ``fixed``; ``floating``, a compliant wrist with motors that stand still; or
+      ``compliant``, a compliant wrist with driven tendons.
+    - ``wrist_travel``: range in which a compliant wrist may come to rest.
+    - ``tendon_preload``: tensions of the four tendons of a floating hand at rest [N]; by default
+      the closing tension.
+    - ``wrench``: wrench that the hand must exert on the rock, in H [N, N·m]; the plan chooses
+      components that are null.
+    - ``seat``: how a hand without a pose is seated: ``rest`` as its grasp has it, ``best`` at the
+      nearby pose with the strongest grip.
+    - ``seat_direction``: wrench on the rock, in H, in which the ``best`` seat is strongest; by
+      default the pull-off.
+    """
 
     limb: Name
     pose: Annotated[Pose | None, Meta(description="of H in W")] = None
@@ -128,7 +156,22 @@ class Hand(Strict, frozen=True, kw_only=True):
 
 
 class Stance(Strict, frozen=True, kw_only=True):
-    """The places of the body and the hands."""
+    """Stance of the robot: pose of the body, and all hands on their holds.
+
+    - ``robot``: name of the robot; by default the robot that is served or given by ``--robot``, or
+      ``robosimian``.
+    - ``hand``: numbers of the hand that replace the service's, by section and entry of
+      ``hand.toml``.
+    - ``gravity``: acceleration of gravity in W [m/s²]; by default the Earth's.
+    - ``body``: pose of B in W.
+    - ``joints``: joint angles by limb from the body outward [rad], or ``"solve"`` for inverse
+      kinematics; with joints their torques count as limits. Hands may be 10 mm and 0.05 rad off the
+      pose that the angles give.
+    - ``limb_stiffness``: stiffness with which limbs carry floating or compliant wrists; replies
+      then have pose targets.
+    - ``rocks``: rocks by name, for holds that refer to them.
+    - ``hands``: the hands, at most 16.
+    """
 
     robot: Annotated[
         Name | None,

@@ -1,4 +1,4 @@
-"""The zenoh service, and a client for it."""
+"""Plan service on zenoh, with its queues and workers, and a client for it."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""A typed client of the service."""
+"""Define a typed client of the plan service: one method for each kind of request."""
 
 from __future__ import annotations
 
@@ -55,28 +55,39 @@ ReplyT = TypeVar("ReplyT", bound=Reply)
 
 
 class CruxClient:
-    """Asks a robot's plan service.
+    """Client of a robot's plan service: sends requests over zenoh and returns typed replies.
+
+    Use the client in a ``with`` block, or call `close`. If nobody answers a request, the client
+    retries it once, after 0.3 s.
 
     Parameters
     ----------
     where : zenoh.Session or zenoh.Config
-        A session, which stays open, or the configuration of one that the client opens and closes.
+        An open session, which the client leaves open, or a configuration from which the client
+        opens a session that `close` closes.
     robot : str, optional
+        Name of the robot whose service is asked.
     timeout : float, optional
-        How long each question is waited for [s]; one that names no deadline has nine tenths of it.
-        By default 10 s, and longer for a question whose own deadline is.
+        Longest wait for each reply [s]. By default 10 s, or 1/0.9 of the request's ``deadline`` if
+        that is longer. A request without ``deadline`` is sent with a deadline of nine tenths of the
+        timeout.
     form : Format, optional
-        How messages travel.
+        Encoding of the messages: MessagePack or JSON.
     wait : float, optional
-        How long a service is waited for, from now on [s]; by default it has to be there when it is
-        asked.
+        Longest wait for a service to appear, counted from this call [s]. Without it, the service
+        must already run when the first request is sent.
+
+    Attributes
+    ----------
+    robot, timeout, form
+        The parameters of the same names.
 
     Raises
     ------
     InvalidInputError
-        If the time to wait is no such time.
+        If ``wait`` is negative, not a number, or longer than `threading.TIMEOUT_MAX`.
     NoServiceError
-        If no session can be opened, or no service comes in that time.
+        If no session can be opened, or no service appears within ``wait``.
     """
 
     def __init__(
@@ -160,7 +171,7 @@ class CruxClient:
         self.close()
 
     def close(self) -> None:
-        """Close the session, if it is the client's own."""
+        """Withdraw the client's zenoh declarations; close the session if the client opened it."""
         if not self._session.is_closed():
             self._here.undeclare()
             self._proof.undeclare()
@@ -169,21 +180,24 @@ class CruxClient:
             self._owned.close()
 
     def plan(self, request: PlanRequest) -> PlanReply | BriefPlanReply:
-        """Return the service's plan; a `BriefPlanReply` where the request wants less detail.
+        """Send a plan request and return the service's plan.
 
-        So it is where the whole plan takes more than ``max_reply_bytes`` of a request that names no
-        detail.
+        Returns
+        -------
+        PlanReply or BriefPlanReply
+            A `BriefPlanReply` where the request asks for less ``detail``, or where the whole plan
+            is larger than the request's ``max_reply_bytes`` and the request names no ``detail``.
 
         Raises
         ------
         ServiceError
-            If the service refuses the request or fails on it.
+            If the service refuses the request or fails on it; a busy service sets ``retry_after``.
         NoServiceError
-            If nobody answers.
+            If nobody answers, not even the retry.
         ServiceTimeout
-            If nobody answers in time.
+            If no reply comes within the timeout.
         LimitError
-            If the request has too many bytes.
+            If the encoded request has too many bytes.
         """
         received = self._ask(ServiceName.PLAN, request)
         if Format.is_labelled(str(received.encoding), BriefPlanReply):
@@ -191,19 +205,31 @@ class CruxClient:
         return _read(received, PlanReply)
 
     def wrench_space(self, request: WrenchSpaceRequest) -> WrenchSpaceReply:
-        """Return one hand's wrench space; raises what `plan` raises."""
+        """Send a request for one hand's wrench space and return the reply.
+
+        Raises the errors that `plan` raises.
+        """
         return _read(self._ask(ServiceName.WRENCH_SPACE, request), WrenchSpaceReply)
 
     def body_space(self, request: BodySpaceRequest) -> BodySpaceReply:
-        """Return what a stance can hold; raises what `plan` raises."""
+        """Send a request for a stance's body space and return the reply.
+
+        Raises the errors that `plan` raises.
+        """
         return _read(self._ask(ServiceName.BODY_SPACE, request), BodySpaceReply)
 
     def stream(self, request: StreamRequest) -> StreamReply:
-        """Declare a stance for set-points; raises what `plan` raises."""
+        """Declare a stance as a stream of body wrenches; the reply has the stream's identifier.
+
+        Raises the errors that `plan` raises.
+        """
         return _read(self._ask(ServiceName.STREAM, request), StreamReply)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
-        """Return a stream's set-points for a body wrench; raises what `plan` raises."""
+        """Ask a declared stream for the set-points of one body wrench and return the reply.
+
+        Raises the errors that `plan` raises.
+        """
         return _read(self._ask(ServiceName.SET_POINTS, request), SetPointsReply)
 
     def _ask(self, name: str, request: Query) -> zenoh.Sample:

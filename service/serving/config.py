@@ -1,4 +1,4 @@
-"""Zenoh's own command-line flags, and the configuration they stand for."""
+"""Make zenoh configurations from command-line flags, and open and close zenoh sessions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,14 @@ SESSION_MODES: Final = ("peer", "client", "router")
 
 
 def own_settings() -> dict[str, object]:
-    """Return the settings that are not zenoh's own, where a file does not say otherwise."""
+    """Return the zenoh settings that ``crux`` changes unless a configuration file sets them.
+
+    Returns
+    -------
+    dict of str to object
+        Value by zenoh key: largest message, what happens to replies on a full link, and for how
+        long a message waits for a client that does not read.
+    """
     queue = "transport/link/tx/queue/congestion_control"
     # [µs] a message waits so long for a client that takes nothing; then a reply is given up, and
     # for what cannot be given up, such as a declaration, the link is closed. In it a link of
@@ -77,24 +84,26 @@ def zenoh_config(
     settings: Sequence[str] = (),
     multicast: bool = True,
 ) -> zenoh.Config:
-    """Return a zenoh configuration.
+    """Return a zenoh configuration made of a file, ``crux``'s defaults and command-line flags.
 
     Parameters
     ----------
     mode : {'peer', 'client', 'router'}, optional
+        Mode of the session; by default the file's, or zenoh's.
     connect, listen : sequence of str, optional
-        Endpoints, such as ``tcp/127.0.0.1:7447``.
+        Endpoints to connect to and to listen on, such as ``tcp/127.0.0.1:7447``.
     file : Path, optional
-        A JSON5 configuration to begin with; otherwise that of ``ZENOH_CONFIG``, if it is set.
+        JSON5 configuration to start from; by default the file that the environment variable
+        ``ZENOH_CONFIG`` names, if it is set.
     settings : sequence of str, optional
-        ``KEY:VALUE`` with JSON5 values; they have the last word.
+        Settings as ``KEY:VALUE``, with JSON5 values; these override all other sources.
     multicast : bool, optional
-        Whether to look for others by multicast.
+        True to let zenoh search for other sessions by multicast, if the file allows multicast.
 
     Raises
     ------
     InvalidInputError
-        If zenoh does not accept a part of it.
+        If the file cannot be read, or zenoh does not accept a value; ``field`` names the flag.
     """
     config, plain = _read(file), zenoh.Config()
     for key, own in own_settings().items():
@@ -125,13 +134,17 @@ def zenoh_config(
 
 
 def patient(config: zenoh.Config, seconds: float) -> zenoh.Config:
-    """Return a configuration as it is, but that a session looks so long for whom it connects to.
+    """Return a copy of a zenoh configuration whose session keeps trying to connect (retry).
+
+    In client mode, opening the session gives up after the timeout. In other modes, the open session
+    retries in the background.
 
     Parameters
     ----------
     config : zenoh.Config
+        Configuration to copy; left unchanged.
     seconds : float
-        [s]
+        Timeout of connecting and of searching, in client mode [s].
     """
     copy = zenoh.Config.from_json5(str(config))
     if msgspec.json.decode(copy.get_json("connect/retry")) is None:
@@ -145,12 +158,12 @@ def patient(config: zenoh.Config, seconds: float) -> zenoh.Config:
 
 
 def open_session(config: zenoh.Config) -> zenoh.Session:
-    """Open a session.
+    """Open a zenoh session from a configuration.
 
     Raises
     ------
     NoServiceError
-        If zenoh cannot: nobody to connect to, or an address that is taken.
+        If zenoh cannot open the session: nobody to connect to, or an address that is in use.
     """
     try:
         return zenoh.open(config)
@@ -160,9 +173,10 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
 
 @contextmanager
 def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
-    """Close a session afterwards; if that takes long, end this process, whose work is done.
+    """Return a context manager that closes a session at its end, within half a second.
 
-    Zenoh waits for links whose other ends take nothing.
+    Zenoh waits for links whose other ends read nothing. If the session is not closed in time and
+    the block raised no error, this process ends at once, with exit status 0.
     """
     done = False
     try:
@@ -187,11 +201,11 @@ def ended_in_time(session: zenoh.Session) -> Iterator[zenoh.Session]:
 
 
 def close_at_once() -> None:
-    """Let every TCP connection of this process be closed without waiting for its other end.
+    """Disable the linger time of this process's TCP connections, so that closing does not wait.
 
-    Zenoh lets closing wait for 10 s (`SO_LINGER`) until what is left has been taken, in a thread
-    and under locks that all its links need (zenoh issues 1101 and 2718). Without that the system
-    goes on sending what is left, and nobody waits.
+    By default, zenoh's sockets wait for 10 s (`SO_LINGER`) until the other end has read what is
+    left, in a thread and under locks that all of zenoh's links need (zenoh issues 1101 and 2718).
+    Without the linger time the operating system sends what is left in the background.
     """
     no_linger = struct.pack("ii", 0, 0)
     # the numbers of this process's open files
@@ -208,7 +222,13 @@ def close_at_once() -> None:
 
 
 def listening(config: zenoh.Config) -> list[str]:
-    """Return the endpoints on which a session of a configuration listens."""
+    """Return the endpoints on which a session with a configuration would listen.
+
+    Returns
+    -------
+    list of str
+        Endpoints of the configuration's mode, such as ``tcp/127.0.0.1:7447``.
+    """
     endpoints = msgspec.json.decode(config.get_json("listen/endpoints"))
     if isinstance(endpoints, dict):
         mode = msgspec.json.decode(config.get_json("mode"))
@@ -217,10 +237,21 @@ def listening(config: zenoh.Config) -> list[str]:
 
 
 def closed(config: zenoh.Config) -> None:
-    """Make a configuration that names no endpoint listen for programs on this machine alone.
+    """Restrict a configuration that names no endpoint to programs on this machine, in place.
 
-    These find it by multicast as ever, which does not leave the machine either. Ports that are left
-    to the system are chosen here, so that they can be shown.
+    The session then listens on the loopback address alone, and searches by multicast on the
+    loopback interface alone. In client mode nothing changes. A port 0, which leaves the choice to
+    the system, is replaced by a free port, so that the port can be printed.
+
+    Parameters
+    ----------
+    config : zenoh.Config
+        Changed in place.
+
+    Raises
+    ------
+    InvalidInputError
+        If zenoh does not accept the endpoints.
     """
     unsaid = config.get_json("listen/endpoints") == zenoh.Config().get_json("listen/endpoints")
     mode = msgspec.json.decode(config.get_json("mode"))
@@ -237,7 +268,13 @@ def closed(config: zenoh.Config) -> None:
 
 
 def exposed(config: zenoh.Config) -> list[str]:
-    """Return the endpoints of a configuration that programs on other machines may reach."""
+    """Return the endpoints of a configuration that programs on other machines can reach.
+
+    Returns
+    -------
+    list of str
+        Endpoints whose address is not a loopback address.
+    """
     return [each for each in listening(config) if not _is_loopback(each)]
 
 
@@ -263,10 +300,11 @@ def _is_loopback(endpoint: str) -> bool:
 
 
 def start_zenoh_log() -> None:
-    """Let zenoh say its errors, or what ``RUST_LOG`` asks for, on standard error.
+    """Start zenoh's log on standard error: errors, or the levels in the variable ``RUST_LOG``.
 
-    It writes to the process's standard output, which is for results: so that becomes another name
-    of standard error, and only Python goes on writing to the real one.
+    Zenoh writes its log to file descriptor 1, standard output, which is for results. Descriptor 1
+    therefore becomes a copy of standard error, and `sys.stdout` writes to the original standard
+    output.
     """
     sys.stdout.flush()
     standard_output, standard_error = 1, 2

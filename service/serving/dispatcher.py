@@ -1,9 +1,10 @@
-"""Decide when and by which process a question is answered: one thread, which waits for none.
+"""Schedule questions on worker processes: one thread, which never blocks on a worker or a client.
 
-Questions wait by their kind: set-points; those about known stances, which are short; others; and
-those that may take long, which leave one process to the others. In each queue, who has had least of
-the processes' time is next. One more process has the streams and a lane for what is short, so that
-nothing delays these. What is over its deadline ends, with its process if it must be.
+Questions wait in queues by their kind (scheduling with priority queues): set-points; short
+questions about known stances; other questions; and questions that may take long. The last kind
+leaves one worker to the others. In each queue, the client that has used least of the workers' time
+is next. A separate worker has the streams and a lane for short questions. A question past its
+deadline is ended, and its worker killed if need be.
 """
 
 from __future__ import annotations
@@ -40,23 +41,27 @@ log = logging.getLogger(__name__)
 
 
 class Dispatcher:
-    """Hands questions to processes, and their answers to clients, in a thread of its own.
+    """Dispatcher of a service: gives questions to workers and sends their answers to clients.
+
+    Runs in a thread of its own; public methods can be called from any thread.
 
     Parameters
     ----------
     pool : WorkerPool
-        With 2 processes or more, questions that may take long leave one to others.
+        Workers that answer. With 2 or more, questions that may take long leave one worker to other
+        questions.
     seconds : float
-        The deadline of a question that names none [s].
+        Deadline of a question that names none [s].
     robot : str
-        Whose service it is.
+        Name of the robot, for the health reply.
     inquire : callable, optional
-        Asks the session of a name for its digest, which `proven` is given.
+        Called with a client's session identifier; asks that session for the digest of its secret,
+        which must then be passed to `proven`.
 
     Attributes
     ----------
     monitor : ServiceMonitor
-        Records what happens.
+        Counts and logs questions, and reports the health of the service.
     """
 
     def __init__(
@@ -82,12 +87,12 @@ class Dispatcher:
         self._thread = threading.Thread(target=self._run, name="crux-dispatcher", daemon=True)
 
     def start(self) -> None:
-        """Start the processes and the thread, and wait until questions can be answered.
+        """Start the workers and the dispatcher's thread; return when questions can be answered.
 
         Raises
         ------
         LostError
-            If processes die before they are ready.
+            If three workers in a row die before they are ready.
         """
         self._thread.start()
         # now and then awake for signals, which may come in another thread
@@ -99,42 +104,51 @@ class Dispatcher:
             raise LostError("no worker starts; see the log")
 
     def ask(self, query: zenoh.Query, key: str) -> None:
-        """Take a query at a key; returns at once, whatever the thread."""
+        """Put a query, which arrived at a key, into its queue; returns at once."""
         self._post(partial(self._admit, query, key, time.perf_counter()))
 
     def look(self, make_answer: Callable[[], Answer], query: zenoh.Query, key: str) -> None:
-        """Take an operator's query; returns at once."""
+        """Answer an operator's query, such as for health, in the background; returns at once.
+
+        ``make_answer`` is called in the thread that sends the reply; ``key`` is where the query
+        arrived.
+        """
         client = client_of(query)
         known = client if client in self._names.linked else SharedQueue.OPERATORS
         self._replies.later(known, partial(reply_to, query, key, make_answer))
 
     def linked(self, client: str) -> None:
-        """Say that a session has a link to the service's own."""
+        """Record that a client's session has a link to the service's own session."""
         self._post(partial(self._names.linked.add, client))
 
     def proven(self, client: str, proof: bytes) -> None:
-        """Hand in the digest that the session of a name has sent itself."""
+        """Record the digest that a client's session has sent as proof of its identifier.
+
+        Waiting questions with that identifier are put into their queues anew.
+        """
         self._post(partial(self._prove, client, proof))
 
     def gone(self, client: str, *, token: bool = False) -> None:
-        """Say that a client has gone: what it asked is not answered unless it is in work.
+        """Drop the waiting questions of a client that has disconnected; those in work go on.
 
         Parameters
         ----------
         client : str
+            Identifier of the client's session.
         token : bool, optional
-            Whether its liveliness token says so, and not its link. That is believed only of who has
-            proven its name, and has no link.
+            True if the disconnection is known from the client's liveliness token, false if from its
+            link. A token is believed only for a client that has proven its identifier and has no
+            link.
         """
         self._post(partial(self._drop, client, token))
 
     def stop(self) -> None:
-        """Refuse what waits and what still comes, and wait a little for what is in work."""
+        """Refuse waiting and new questions, wait up to 2 s for those in work, end the workers."""
         self._post(self._end)
         self._thread.join()
 
     def close(self) -> None:
-        """Refuse what has come since the stop, and wait a little for replies on their way."""
+        """Refuse questions that came after `stop`; wait up to 1 s for replies to be sent."""
         while not self._inbox.empty():
             self._take_in()
         self._replies.close()

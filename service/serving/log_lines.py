@@ -1,4 +1,4 @@
-"""A service's log, written by a thread of its own: the service waits for nobody who reads it."""
+"""Write a service's log in a separate thread, so that a reader that is slow blocks nothing else."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ __all__ = ["JsonLines", "LogThread"]
 
 
 class LogThread(logging.Handler):
-    """Writes lines on standard error, in the background.
+    """Logging handler that writes lines to standard error in a background thread.
 
-    A terminal that is stopped, or a pipe that nobody reads, blocks its thread alone.
+    A stopped terminal, or a pipe that nobody reads, blocks that thread alone. At most 10,000 lines
+    wait; further lines are dropped, and their number is logged.
     """
 
     def __init__(self) -> None:
@@ -33,7 +34,7 @@ class LogThread(logging.Handler):
             self._left_out += 1
 
     def close(self) -> None:
-        """Wait a little for the lines that are left."""
+        """Stop the thread; wait up to half a second until the lines that are left are written."""
         with suppress(Full):
             self._lines.put_nowait(None)
         self._thread.join(timeout=0.5)
@@ -56,7 +57,11 @@ class LogThread(logging.Handler):
 
 
 class JsonLines(logging.Formatter):
-    """Log lines as JSON objects: time, level, message, and all of a question's fields."""
+    """Logging formatter that turns each record into one line of JSON.
+
+    A line has ``time`` (Unix time [s]) and ``level``; then ``message``, or for an answered question
+    its fields (key, id, client, times [s], status); and ``traceback`` where there is an exception.
+    """
 
     def format(self, record: logging.LogRecord) -> str:
         line: dict[str, object] = {"time": record.created, "level": record.levelname.lower()}

@@ -1,4 +1,4 @@
-"""Show a service to its operator: a line a question, its health, and counts for Prometheus."""
+"""Monitor a service: one log line for each question, its health, and metrics for Prometheus."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ log = logging.getLogger(__name__)
 
 
 class ServiceState(NamedTuple):
-    """State of a service at this moment.
+    """Snapshot of a service: its worker processes and its queues.
 
     Attributes
     ----------
     processes : list of ProcessHealth
+        One entry for each worker process.
     waiting : dict of str to int
-        Questions by the kind of their queue.
+        Number of waiting questions, by the kind of their queue.
     """
 
     processes: list[ProcessHealth]
@@ -44,13 +45,19 @@ class ServiceState(NamedTuple):
 
 
 class ServiceMonitor:
-    """Count and log what happens in a service; for its dispatcher's thread.
+    """Counter and log of what happens in a service; to be called from the dispatcher's thread.
 
     Parameters
     ----------
     robot : str
+        Name of the robot.
     state : callable
-        Returns what the service does at this moment.
+        Returns the current `ServiceState`.
+
+    Attributes
+    ----------
+    registry : prometheus_client.CollectorRegistry
+        All metrics of the service.
     """
 
     def __init__(self, robot: str, state: Callable[[], ServiceState]) -> None:
@@ -83,25 +90,31 @@ class ServiceMonitor:
         self.registry.register(_Now(state, self._started))
 
     def serve(self, port: int) -> None:
-        """Give Prometheus its text over HTTP, on this machine alone.
+        """Serve the metrics to Prometheus over HTTP on 127.0.0.1, in a thread of its own.
+
+        Parameters
+        ----------
+        port : int
+            TCP port.
 
         Raises
         ------
         OSError
-            If the port is taken.
+            If the port is in use.
         """
         start_http_server(port, addr="127.0.0.1", registry=self.registry)
 
     def count(self, question: PendingQuestion, status: str, worked: float) -> None:
-        """Count a reply.
+        """Count and log the reply to a question; remember failures of the service for `health`.
 
         Parameters
         ----------
         question : PendingQuestion
+            The question that gets the reply.
         status : str
-            Of the reply, or the kind of an error.
+            Status of the reply, or the kind of an error.
         worked : float
-            How long a process took for it [s].
+            Time that a worker took for the answer [s]; zero if no worker answered.
         """
         self._replied += 1
         now = time.perf_counter()
@@ -137,13 +150,21 @@ class ServiceMonitor:
             )
 
     def ended(self, pid: int | None, how: str) -> None:
-        """Count a process that is replaced."""
+        """Count and log a worker process that has ended and is replaced.
+
+        Parameters
+        ----------
+        pid : int or None
+            Process identifier.
+        how : str
+            How the process ended, in words.
+        """
         self._ended.inc()
         self._failure = LastFailure(kind="lost", about=f"process {pid} {how}", at=time.time())
         log.warning("process %s %s; another takes its place", pid, how)
 
     def health(self) -> Answer:
-        """Return the service's health as a reply."""
+        """Return the service's health, a `HealthReply` encoded as JSON."""
         state = self._state()
         reply = HealthReply(
             robot=self._robot,
@@ -157,7 +178,7 @@ class ServiceMonitor:
         return Answer(Format.JSON.encode(reply), Format.JSON.label(reply))
 
     def metrics(self) -> Answer:
-        """Return what has been counted, as Prometheus reads it."""
+        """Return all metrics in the text format of Prometheus."""
         return Answer(generate_latest(self.registry), CONTENT_TYPE_LATEST)
 
 

@@ -1,9 +1,10 @@
-"""Identify clients: anybody can send any name, so a name counts only as far as it is known.
+"""Identify clients: any session can send any identifier, so an identifier must be proven.
 
-A query does not say by which link it came. Zenoh reports which sessions are linked, and which one
-replies to a query. So a client may prove its name: its queries carry a secret as their attachment,
-and it replies at ``crux/<robot>/clients/<name>`` with the secret's digest. Whoever sends another's
-name without the secret, or a name that nobody has, shares one place with all others who do.
+A query does not say over which link it came. Zenoh reports which sessions are linked, and which
+session replies to a query. Therefore a client can prove its identifier: its queries carry a secret
+as attachment, and it answers queries at ``crux/<robot>/clients/<name>`` with the digest of that
+secret. All queries with an identifier but without the right secret, or with an identifier that no
+known session has, share one anonymous place.
 """
 
 from __future__ import annotations
@@ -19,17 +20,19 @@ __all__ = ["ClientNames", "digest"]
 
 
 def digest(secret: bytes) -> bytes:
-    """Return the digest that a client sends of its secret."""
+    """Return the SHA-256 digest of a client's secret, 32 bytes."""
     return hashlib.sha256(secret).digest()
 
 
 class ClientNames:
-    """Links and proofs that are known of the sessions that ask. For one thread.
+    """Record of the sessions that ask questions: their links, and proofs of their identifiers.
+
+    For use in one thread. Proofs are in an LRU cache of 4096 sessions.
 
     Attributes
     ----------
     linked : set of str
-        Sessions with a link to the service's own.
+        Identifiers of the sessions with a link to the service's own session.
     """
 
     def __init__(self) -> None:
@@ -40,9 +43,20 @@ class ClientNames:
         self._asked: TTLCache[str, bool] = TTLCache(most, ttl=1.0, timer=time.perf_counter)
 
     def place(self, name: str, secret: bytes) -> str:
-        """Return the place of a query that carries a name, and perhaps a secret.
+        """Return the place that a query counts for when workers' time is shared.
 
-        All clients that cannot be distinguished share the place ``""``.
+        Parameters
+        ----------
+        name : str
+            Identifier in the query; empty if there is none.
+        secret : bytes
+            Attachment of the query; empty if there is none.
+
+        Returns
+        -------
+        str
+            The identifier, if it is proven by the secret, or if no proof is known and its session
+            is linked. Otherwise ``""``, the place of all clients that cannot be distinguished.
         """
         proofs = self._proofs.get(name)
         if proofs is not None:
@@ -50,7 +64,11 @@ class ClientNames:
         return name if name in self.linked else ""
 
     def is_to_prove(self, name: str, secret: bytes) -> bool:
-        """Return whether the session of a name is to be asked for its digest now."""
+        """Return whether a session must now be asked for the digest of its secret.
+
+        The answer is true at most once a second for each identifier, and false where the secret is
+        already proven, or where identifier or secret is empty.
+        """
         if not name or not secret or digest(secret) in self._proofs.get(name, ()):
             return False
         if name in self._asked:
@@ -59,18 +77,18 @@ class ClientNames:
         return True
 
     def proven(self, name: str, proof: bytes) -> None:
-        """Take a digest that the session of a name has sent."""
+        """Store a digest that a session has sent as proof; up to 16 of each session."""
         proofs = self._proofs.setdefault(name, set())
         # a session may have several clients
         if len(proofs) < 16:
             proofs.add(proof)
 
     def has_proof(self, name: str) -> bool:
-        """Return whether the session of a name has sent a digest."""
+        """Return whether a digest of the session with an identifier is stored."""
         return name in self._proofs
 
     def gone(self, name: str) -> None:
-        """Forget a session."""
+        """Forget the link and the digests of a session that has disconnected."""
         self.linked.discard(name)
         self._proofs.pop(name, None)
         self._asked.pop(name, None)

@@ -1,4 +1,4 @@
-"""Query that a service has taken, and the fields that are read before its turn comes."""
+"""Describe a query that waits for a worker, with the few fields that are read before its turn."""
 
 from __future__ import annotations
 
@@ -38,40 +38,49 @@ class _Head(msgspec.Struct):
 
 @dataclass(eq=False, slots=True)
 class PendingQuestion:
-    """A query on its way.
+    """Query that has arrived at a service and is not yet answered.
+
+    All times are on the clock of `time.perf_counter` [s].
 
     Attributes
     ----------
-    query : Query
-        To be answered once, and let go then.
-    key, name : str
-        Of the service; the name is its last part.
+    query : zenoh.Query
+        The zenoh query, which gets exactly one reply.
+    key : str
+        Key at which the query arrived.
+    name : str
+        Last part of the key: the kind of question.
     client : str
-        Its session's identifier, as it says; empty for clients that do not.
+        Identifier of the client's session, as the query gives it; empty without one.
     place : str
-        Whose share of the processes it takes, as far as that is known.
+        Client for which the question counts when workers' time is shared; empty for clients that
+        cannot be distinguished.
     secret : bytes
-        By which a client proves its identifier; empty without one.
+        Secret by which the client proves its identifier; empty without one.
     arrived : float
-        On the clock of `time.perf_counter`.
+        Time of arrival.
     payload : bytes
+        Encoded request; emptied after the reply.
     encoding : str
+        Zenoh's name of the payload's encoding.
     seconds : float
-        Its deadline [s].
+        Deadline, from the arrival [s].
     id : str or None
+        The request's ``id``.
     most : int
-        Bytes that an error reply may take.
+        Largest size of an error reply [bytes].
     stance : int or None
-        A hash of its stance, where it could be read.
+        Hash of the request's stance; None where the stance could not be read.
     dear : bool
-        Whether it may take long.
+        True if the question may take long.
     rehearsed : bool
-        Whether it declares a stream that another process has found to be possible.
+        True for the declaration of a stream that another worker has already found to be possible.
     fault : LimitError or None
-        If it has too many bytes, or its attachment; they are not taken then.
+        Error for a payload or an attachment with too many bytes, whose bytes are then not kept.
     replied : bool
+        True after the reply.
     begun : float
-        When a process was given it, on the same clock; negative before.
+        Time at which a worker got the question; negative before.
     """
 
     query: zenoh.Query
@@ -95,30 +104,38 @@ class PendingQuestion:
 
     @property
     def deadline(self) -> float:
-        """When its time is over, on the same clock."""
+        """Time at which the question's deadline ends, on the clock of `time.perf_counter` [s]."""
         return self.arrived + self.seconds
 
     @property
     def form(self) -> Format:
-        """Its encoding; JSON where that is none."""
+        """Format of the payload; JSON where the encoding is unknown."""
         try:
             return Format.named(self.encoding)
         except MalformedError:
             return Format.JSON
 
     def refusal(self, error: CruxError) -> Answer:
-        """Return an error as its answer."""
+        """Return an error as an encoded answer, in the question's format and with its ``id``."""
         return encode_error(error, self.form, self.id, most=self.most)
 
     def job(self, now: float, rehearsal: bool) -> Job:
-        """Return it for a process."""
+        """Return the question as a job for a worker.
+
+        Parameters
+        ----------
+        now : float
+            Present time on the clock of `time.perf_counter` [s].
+        rehearsal : bool
+            True if the worker must release a stream again that it has declared.
+        """
         waited = now - self.arrived
         encoding, seconds = self.encoding, self.seconds
         return Job(self.name, self.payload, encoding, waited, seconds, rehearsal, self.place)
 
 
 def client_of(query: zenoh.Query) -> str:
-    """Return the identifier of who asks; empty where the query has none."""
+    """Return the session identifier of a query's client; empty where the query has none."""
     source = query.source_info
     return "" if source is None else str(source.source_id.zid)
 
@@ -126,15 +143,21 @@ def client_of(query: zenoh.Query) -> str:
 def received_question(
     query: zenoh.Query, key: str, arrived: float, longest: float
 ) -> PendingQuestion:
-    """Return a query as a question.
+    """Return a query as a pending question, with its payload copied and its main fields read.
+
+    Payloads above 1 MiB are not decoded here; a worker reads them. A payload or attachment with too
+    many bytes is not copied, and the question's ``fault`` is set.
 
     Parameters
     ----------
-    query : Query
+    query : zenoh.Query
+        The query.
     key : str
+        Key at which the query arrived.
     arrived : float
+        Time of arrival on the clock of `time.perf_counter` [s].
     longest : float
-        The deadline of one that names none [s].
+        Deadline of a question that names none [s].
     """
     given, attached = query.payload, query.attachment
     fault, payload, secret = None, b"", b""

@@ -1,7 +1,8 @@
-"""Send replies in threads, so that a client that takes none keeps nobody else waiting.
+"""Send replies in background threads, so that a client that does not read delays nobody else.
 
-Zenoh's reply waits for a client whose link is full, for 5 s, after which the link is closed. So the
-replies to one client go one after another, and those to others go meanwhile.
+Zenoh's reply call blocks while the client's link is full, for up to 5 s, after which zenoh closes
+the link. Therefore the replies to one client are sent one after another, and those to other clients
+meanwhile.
 """
 
 from __future__ import annotations
@@ -27,23 +28,23 @@ log = logging.getLogger(__name__)
 
 
 class SharedQueue(StrEnum):
-    """Queues of what is sent to no known client."""
+    """Names of the queues for messages to clients whose identifiers are not known."""
 
     OPERATORS = "operators"
-    """Who asks how the service is, without a link to it."""
+    """Operators who ask for health or metrics, without a link to the service."""
     UNREAD = "unread"
-    """Whose query could not be read."""
+    """Clients whose query could not be read."""
     INQUIRIES = "inquiries"
-    """Sessions that are asked to prove their names."""
+    """Sessions that are asked to prove their identifiers."""
 
 
 class ReplySender:
-    """Sends replies in the background. Safe to use from several threads.
+    """Sender of replies in background threads, one queue for each client. Thread-safe.
 
     Parameters
     ----------
     threads : int, optional
-        Clients that can be waited for at a time.
+        Number of threads: as many clients can block at a time without delaying others.
     """
 
     def __init__(self, threads: int = 32) -> None:
@@ -55,7 +56,15 @@ class ReplySender:
             threading.Thread(target=self._run, name="crux-replies", daemon=True).start()
 
     def send(self, client: str, reply: Callable[[], None]) -> None:
-        """Let a reply be sent after those to the same client that have been handed in before."""
+        """Queue a reply, to be sent after earlier replies to the same client; returns at once.
+
+        Parameters
+        ----------
+        client : str
+            Identifier of the client, or name of a shared queue.
+        reply : callable
+            Sends the reply; called without arguments in a background thread.
+        """
         with self._sent:
             waiting = self._to.get(client)
             if waiting is not None:
@@ -65,7 +74,13 @@ class ReplySender:
         self._clients.put(client)
 
     def close(self, seconds: float) -> None:
-        """Wait until all that was handed in has been sent, but no longer than some seconds."""
+        """Wait until all queued replies are sent, or until the timeout; then end the threads.
+
+        Parameters
+        ----------
+        seconds : float
+            Timeout [s].
+        """
         with self._sent:
             self._sent.wait_for(lambda: not self._to, seconds)
         for _ in range(self._threads):
@@ -89,7 +104,17 @@ class ReplySender:
 
 
 def reply_to(query: zenoh.Query, key: str, make_answer: Callable[[], Answer]) -> None:
-    """Reply to a query, and let it go."""
+    """Send the reply to a query, and drop the query.
+
+    Parameters
+    ----------
+    query : zenoh.Query
+        The query.
+    key : str
+        Key under which the reply is sent.
+    make_answer : callable
+        Returns the answer; an error is sent as zenoh's error reply.
+    """
     with query:
         answer = make_answer()
         if answer.good:
@@ -99,11 +124,12 @@ def reply_to(query: zenoh.Query, key: str, make_answer: Callable[[], Answer]) ->
 
 
 class Replies:
-    """Reply to each question once, and report every reply to a monitor.
+    """Replies of a service: one for each question, sent in the background and counted by a monitor.
 
     Parameters
     ----------
     monitor : ServiceMonitor
+        Counts and logs each reply.
     """
 
     def __init__(self, monitor: ServiceMonitor) -> None:
@@ -116,28 +142,56 @@ class Replies:
         self._longest_retry = 10.0
 
     def later(self, client: str, work: Callable[[], None]) -> None:
-        """Let work that may wait for a client be done, after what was handed in for it before."""
+        """Run a task that may block on a client in the background, after its earlier tasks.
+
+        Parameters
+        ----------
+        client : str
+            Identifier of the client, or name of a shared queue.
+        work : callable
+            The task; called without arguments.
+        """
         self._sender.send(client, work)
 
     def refuse(
         self, question: PendingQuestion, error: CruxError, status: str | None = None
     ) -> None:
-        """Reply with an error; the status is its kind, unless another is given."""
+        """Reply to a question with an error.
+
+        Parameters
+        ----------
+        question : PendingQuestion
+            The question.
+        error : CruxError
+            The error in the reply.
+        status : str, optional
+            Status for the monitor; by default the kind of the error.
+        """
         answer = question.refusal(error)
         self.reply(question, answer if status is None else answer._replace(status=status))
 
     def busy(self, question: PendingQuestion, ahead: float) -> None:
-        """Refuse a question that has no room, for now; ``ahead``: questions for each process."""
+        """Refuse a question because its queue is full, with a time to retry after.
+
+        The time is the mean duration of an answer times ``ahead``, from 0.05 s to 10 s.
+
+        Parameters
+        ----------
+        question : PendingQuestion
+            The question.
+        ahead : float
+            Waiting questions per worker.
+        """
         again = round(min(max(self._mean * ahead, 0.05), self._longest_retry), 3)
         busy = f"the service has too many questions; ask again in {again:g} s"
         self.refuse(question, BusyError(busy, again))
 
     def ending(self, question: PendingQuestion) -> None:
-        """Refuse a question because the service is ending."""
+        """Refuse a question as busy because the service is shutting down; retry after 10 s."""
         self.refuse(question, BusyError("the service is shutting down", self._longest_retry))
 
     def reply(self, question: PendingQuestion, answer: Answer) -> None:
-        """Reply with an answer."""
+        """Send an answer to a question in the background, and count the answer."""
         if answer.seconds > 0.0:
             # a mean over about 20 questions
             self._mean += (answer.seconds - self._mean) / 20
@@ -149,6 +203,6 @@ class Replies:
         self._sender.send(question.place or str(self._unnamed), send)
 
     def close(self) -> None:
-        """Wait a little for replies that are on their way."""
+        """Wait up to 1 s for replies that are being sent, and end the sender's threads."""
         # clients that do not read keep some from leaving
         self._sender.close(seconds=1.0)

@@ -1,6 +1,6 @@
-"""The service on zenoh: a queryable a key, whose queries go to a dispatcher at once.
+"""Offer the service on zenoh: one queryable for each key, which passes queries to a dispatcher.
 
-Nothing is worked out on zenoh's threads, and none of them ever waits.
+Nothing is computed in zenoh's threads, and none of them ever blocks.
 """
 
 from __future__ import annotations
@@ -29,41 +29,45 @@ __all__ = ["PlanService"]
 
 
 class PlanService:
-    """A robot's plan service while it is entered.
+    """Plan service of one robot on a zenoh session; it answers inside its ``with`` block.
 
-    Questions are answered in processes, which are spawned: a program that serves needs its
+    Questions are answered in worker processes, which are spawned: a program that serves needs its
     ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     session : zenoh.Session
-        Not closed by the service.
+        Open session; the service does not close it.
     robot : RobotFile, optional
         The robot that is planned for; RoboSimian by default.
     hand : ParameterTable, optional
-        Entries in which its hands are not the bundled one; a request's own go on top.
+        Entries that replace those of the bundled hand; entries in a request override them.
     workers : int, optional
-        Processes that answer; one a core by default, but at least 2. One more has the streams.
+        Number of workers that answer questions; by default the number of cores, but at least 2. One
+        more worker keeps the streams.
     seconds : float, optional
         Deadline of a question that names none [s].
     memory : int, optional
-        Bytes that each process may have, where the system can keep it to them.
+        Largest memory of each worker [bytes], where the operating system can limit it.
     make : callable, optional
-        What answers in each process, in place of the planner; it is pickled.
+        Called once in each worker; returns the function that answers a `Job`. Pickled. By default
+        the planner answers.
 
     Attributes
     ----------
     robot : str
-        Its name.
+        Name of the robot.
     keys : tuple of str
-        Keys that it answers at.
+        Zenoh keys of the questions that the service answers.
     operators : tuple of str
-        Keys of what an operator asks for: its health, and its counts.
+        Zenoh keys of the service's health and of its metrics.
 
     Raises
     ------
     InvalidInputError
-        If there would be no worker, or no time.
+        If ``workers`` is below 1, or ``seconds`` is not above 0 and at most 600 s.
+    LostError
+        On entering, if no worker starts.
     """
 
     def __init__(
@@ -100,19 +104,27 @@ class PlanService:
         self._open = ExitStack()
 
     def has_rival(self) -> bool:
-        """Say whether another service answers for the robot; to be asked before entering."""
+        """Return whether another service already answers for the robot; call it before entering.
+
+        The search takes up to 1 s.
+        """
         replies = self._session.liveliness().get(
             self._alive, timeout=SERVING_SETTINGS.search_timeout
         )
         return any(reply.ok is not None for reply in replies)
 
     def serve_metrics(self, port: int) -> None:
-        """Give Prometheus what is counted over HTTP, on this machine alone.
+        """Serve the metrics to Prometheus over HTTP, on this machine alone.
+
+        Parameters
+        ----------
+        port : int
+            TCP port on 127.0.0.1.
 
         Raises
         ------
         InvalidInputError
-            If the port cannot be had.
+            If the port cannot be opened.
         """
         try:
             self._monitor.serve(port)

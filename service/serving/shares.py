@@ -1,8 +1,8 @@
-"""Share the processes' time among places: time that each has had, and so whose turn it is.
+"""Share the workers' time fairly among clients: record the time that each used, and who is next.
 
-A place is one client, or all clients that cannot be distinguished. The one that has had least is
-next. A place that comes back after a while begins with as much as the one whose turn it is: time
-that nobody asked for is not saved up.
+A *place* is one client, or all clients that cannot be distinguished. The place that has used least
+time is next (fair scheduling). A place that returns after a pause starts with as much used time as
+the place that is next: unused time is not saved up.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ class _Place:
 
 
 class Shares:
-    """Processes' time by place.
+    """Record of the workers' time that each place has used.
 
     Attributes
     ----------
     start : float
-        How long a process takes to start [s].
+        Time that a worker takes to start [s].
     """
 
     def __init__(self) -> None:
@@ -66,26 +66,38 @@ class Shares:
         return found
 
     def asks(self, place: str) -> None:
-        """Take note of a question."""
+        """Record that a place has sent a question now."""
         known = self._of(place)
         known.spent = max(known.spent, self._level)
         known.asked = time.perf_counter()
         self._places.move_to_end(place)
 
     def charge(self, place: str, seconds: float) -> None:
-        """Take off time that an answer to a place has cost [s]."""
+        """Add the time of an answer to the time that a place has used.
+
+        Parameters
+        ----------
+        place : str
+            The place.
+        seconds : float
+            Processor time of the answer [s].
+        """
         known = self._of(place)
         known.spent += seconds
         known.costs.append(seconds)
 
     def ended_process(self, place: str, seconds: float) -> None:
-        """Charge a question that has ended its process, and the start of another.
+        """Charge a place for a question that ended its worker: for the work, and for a new worker.
+
+        Questions of the place then wait for four times the start of a worker, while other clients
+        ask.
 
         Parameters
         ----------
         place : str
+            The place.
         seconds : float
-            How long its process has worked on it [s].
+            Time that the worker spent on the question [s].
         """
         self.charge(place, seconds)
         known = self._of(place)
@@ -94,12 +106,23 @@ class Shares:
         known.held_until = time.perf_counter() + waits
 
     def gone(self, place: str) -> None:
-        """Take note that a place will not ask again soon."""
+        """Record that a place has disconnected: it is no longer active, and no longer held back."""
         if known := self._places.get(place):
             known.asked = known.held_until = -math.inf
 
     def next(self, places: Sequence[str]) -> str | None:
-        """Return which of some places with a question is next, the first of equals."""
+        """Return the place that has used least time, the first of equals.
+
+        Parameters
+        ----------
+        places : sequence of str
+            Places with a waiting question.
+
+        Returns
+        -------
+        str or None
+            None where ``places`` is empty.
+        """
         if not places:
             return None
         place = min(places, key=self._spent)
@@ -111,7 +134,13 @@ class Shares:
         return self._level if known is None else known.spent
 
     def waits(self, place: str) -> float:
-        """Return how long a place has to wait because it has ended a process [s]."""
+        """Return for how long a place must still wait because it has ended a worker.
+
+        Returns
+        -------
+        float
+            Time [s]; zero where the place need not wait, or where no other place has asked lately.
+        """
         known, now = self._places.get(place), time.perf_counter()
         if known is None or known.held_until <= now:
             return 0.0
@@ -121,7 +150,7 @@ class Shares:
         return max(min(known.held_until, active_until) - now, 0.0)
 
     def is_dear(self, place: str) -> bool:
-        """Return whether a place's questions cost much."""
+        """Return whether the median processor time of a place's last answers is above 0.1 s."""
         known = self._places.get(place)
         if known is None or not known.costs:
             return False

@@ -1,9 +1,9 @@
-"""Questions that wait: in queues by their kind, in which each client has its turn.
+"""Queue questions that wait for a worker: one queue for each kind, in which clients take turns.
 
-The past cost of questions about its stance, and of its client, decides in which queue a question
-waits. That is only an expectation, and never decides whether one is answered. It is the median of
-the last costs, in processor time: neither one costly question nor a loaded machine decides it, and
-a client that asks for less gets to the faster queue again.
+The past cost of questions about a stance, and of the client's questions, decides in which queue a
+question waits. The cost is only an expectation: it never decides whether a question is answered. It
+is the median processor time of the last answers, so that neither one costly question nor a loaded
+machine decides it, and a client that asks for less gets back to the faster queue.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ __all__ = ["Costs", "Kind", "Waiting"]
 
 
 class Kind(Enum):
-    """Queues, and what their questions are."""
+    """Kinds of questions, each with a queue of its own."""
 
     SET_POINTS = "set_points"
-    """Set-points of streams."""
+    """Questions for set-points of streams."""
     DECLARED = "declared"
-    """Streams that a process has found to be possible."""
+    """Declarations of streams that a worker has already found to be possible."""
     SHORT = "short"
-    """Questions about stances that are known."""
+    """Questions about known stances, which are answered soon."""
     OTHER = "other"
     DEAR = "dear"
     """Questions that may take long."""
@@ -51,12 +51,12 @@ class _Stance:
 
 
 class Costs:
-    """Observed costs of stances, by their hashes.
+    """Observed processor times of questions by their stance, in an LRU cache of stance hashes.
 
     Parameters
     ----------
     shares : Shares
-        Has what questions of a place have cost.
+        Record of the costs of each client's questions.
     """
 
     def __init__(self, shares: Shares) -> None:
@@ -64,13 +64,23 @@ class Costs:
         self._stances: LRUCache[int | None, _Stance] = LRUCache(SERVING_SETTINGS.remembered)
 
     def took(self, stance: int, process: object, seconds: float) -> None:
-        """Remember what an answer about a stance has cost in a process [s]."""
+        """Record what an answer about a stance has cost.
+
+        Parameters
+        ----------
+        stance : int
+            Hash of the stance.
+        process : object
+            Worker that answered; from then on it knows the stance.
+        seconds : float
+            Processor time [s].
+        """
         seen = self._stances.setdefault(stance, _Stance())
         (seen.again if process in seen.known_to else seen.new).append(seconds)
         seen.known_to.add(process)
 
     def kind(self, question: PendingQuestion) -> Kind:
-        """Return the queue in which a question is to wait."""
+        """Return the kind of queue in which a question must wait."""
         if question.name == ServiceName.SET_POINTS:
             return Kind.SET_POINTS
         if question.dear:
@@ -81,7 +91,11 @@ class Costs:
         return Kind.DEAR if dear else Kind.OTHER
 
     def is_short(self, stance: int | None) -> bool:
-        """Return whether a question about a stance is sure to be answered soon."""
+        """Return whether a question about a stance is expected to be short.
+
+        True where the stance has been asked about again by a worker that knew it, with a median
+        cost of at most 0.05 s, and a median cost of at most 0.3 s where a worker did not know it.
+        """
         seen = self._stances.get(stance)
         if seen is None or not seen.again:
             return False
@@ -97,20 +111,22 @@ class Costs:
         return statistics.median(seen.again or seen.new) <= SERVING_SETTINGS.dear_cost
 
     def knows(self, process: object, stance: int | None) -> bool:
-        """Return whether a process knows a stance."""
+        """Return whether a worker has answered a question about a stance before."""
         seen = self._stances.get(stance)
         return seen is not None and process in seen.known_to
 
 
 class Waiting:
-    """All questions that wait, by kind.
+    """All waiting questions, in one queue for each kind.
 
-    The place that has had least of the processes' time is next, and there clients have their turns;
-    first in, first out among a client's.
+    In a queue, the place (client, or all clients that cannot be distinguished) that has used least
+    of the workers' time is next. Clients within one place take turns. The questions of one client
+    are served first in, first out.
 
     Parameters
     ----------
     shares : Shares
+        Record of the workers' time that each place has used.
     """
 
     def __init__(self, shares: Shares) -> None:
@@ -125,7 +141,7 @@ class Waiting:
         return sum(map(len, self._queues.values()))
 
     def counts(self) -> dict[str, int]:
-        """Return how many there are, by kind."""
+        """Return the number of waiting questions, by the kind of their queue."""
         return {kind.value: len(queue) for kind, queue in self._queues.items()}
 
     def _fits(self, question: PendingQuestion) -> bool:
@@ -143,7 +159,21 @@ class Waiting:
         return not held or (fits_own and fits)
 
     def put(self, kind: Kind, question: PendingQuestion) -> PendingQuestion | None:
-        """Let a question wait; return the one that has no room then: this one, or another's."""
+        """Put a question into a queue, if there is room.
+
+        Parameters
+        ----------
+        kind : Kind
+            The queue.
+        question : PendingQuestion
+            The question.
+
+        Returns
+        -------
+        PendingQuestion or None
+            The question that must be refused as busy: the given one; or, where a full queue takes
+            it, the last question of the place with most questions. None if there was room.
+        """
         queue = self._queues[kind]
         clients = Counter((each.place, each.client) for each in queue)
         own_count = clients[question.place, question.client]
@@ -163,9 +193,20 @@ class Waiting:
         return removed
 
     def take(self, *kinds: Kind) -> PendingQuestion | None:
-        """Return the next question of the first of some kinds that has one that need not wait.
+        """Remove and return the next question from the first of the given queues that has one.
 
-        Its place and its client come last among equals of its queue from then on.
+        Places that must wait because they have ended a worker are passed over. The question's place
+        and client then come last among equals in that queue.
+
+        Parameters
+        ----------
+        *kinds : Kind
+            Queues in order of priority.
+
+        Returns
+        -------
+        PendingQuestion or None
+            None where no queue has a question whose turn it is.
         """
         for kind in kinds:
             queue = self._queues[kind]
@@ -184,12 +225,17 @@ class Waiting:
         return 0.0 if kind is Kind.SET_POINTS else self._shares.waits(place)
 
     def next(self, *, dear: bool) -> PendingQuestion | None:
-        """Return the next question of those kinds that have their turns one after another.
+        """Remove and return the next question; short, other and long ones take turns (round robin).
 
         Parameters
         ----------
         dear : bool
-            Whether it may be one that takes long.
+            True if a question that may take long is allowed.
+
+        Returns
+        -------
+        PendingQuestion or None
+            None where there is no such question. Its ``dear`` is set by the queue it comes from.
         """
         for _ in range(len(self._turns)):
             kind = self._turns[0]
@@ -205,18 +251,41 @@ class Waiting:
     def take_out(
         self, wanted: Callable[[PendingQuestion], bool]
     ) -> list[tuple[Kind, PendingQuestion]]:
-        """Take some questions out, wherever they wait; return them with their queues."""
+        """Remove questions from all queues.
+
+        Parameters
+        ----------
+        wanted : callable
+            Returns whether to remove a question.
+
+        Returns
+        -------
+        list of (Kind, PendingQuestion)
+            The removed questions, each with its queue.
+        """
         found = [(kind, each) for kind, own in self._queues.items() for each in own if wanted(each)]
         for kind, question in found:
             self._queues[kind].remove(question)
         return found
 
     def remove(self, unwanted: Callable[[PendingQuestion], bool]) -> list[PendingQuestion]:
-        """Take some questions out, wherever they wait; return them."""
+        """Remove questions from all queues, and return them without their queues.
+
+        Parameters
+        ----------
+        unwanted : callable
+            Returns whether to remove a question.
+        """
         return [question for _, question in self.take_out(unwanted)]
 
     def held(self) -> float:
-        """Return how long it is until a place that has to wait is next [s]; infinity without."""
+        """Return how soon a place that is held back for having ended a worker may be served again.
+
+        Returns
+        -------
+        float
+            Time from now [s]; infinity where no place with a waiting question is held back.
+        """
         waits = (
             self._waits(kind, place)
             for kind, queue in self._queues.items()
@@ -225,7 +294,13 @@ class Waiting:
         return min((each for each in waits if each > 0.0), default=math.inf)
 
     def first_deadline(self) -> float:
-        """Return when the first question's time is over; infinity where none waits."""
+        """Return the earliest deadline of all waiting questions.
+
+        Returns
+        -------
+        float
+            Time on the clock of `time.perf_counter` [s]; infinity where no question waits.
+        """
         return min((each.deadline for each in self), default=math.inf)
 
 

@@ -1,4 +1,4 @@
-"""Start the processes of a service, give each a purpose, and replace them."""
+"""Start the worker processes of a service, assign each a purpose, and replace those that end."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ Purpose = Literal["questions", "streams", "spare"]
 
 
 class WorkerPool:
-    """Processes that answer questions, one that has the streams, and a spare for an empty place.
+    """Workers of a service: some for questions, one for streams, and a spare as replacement.
 
     Parameters
     ----------
     make : callable
-        What answers, in each process.
+        Called once in each worker process; returns the function that answers a `Job`.
     workers : int
-        Processes that answer.
+        Number of workers that answer questions.
     memory : int
-        Bytes that each may have.
+        Largest memory of each worker [bytes].
 
     Attributes
     ----------
     workers : int
-    work : dict of PriorityLane to Question or None
-        What each lane does.
+        Number of workers that answer questions.
+    work : dict of PriorityLane to PendingQuestion or None
+        Question that each lane of a worker is answering; None for an idle lane.
     rests_until : float
-        When processes are started again, on the clock of `time.perf_counter`.
+        Time before which no worker is started, on the clock of `time.perf_counter` [s].
     failed_starts : int
-        Processes in a row that could not be started, or died before they were ready.
+        Number of workers in a row that could not be started, or died before they were ready.
     start : float
-        How long the last process took to be ready [s]; zero before there is any.
+        Time that the last worker took to become ready [s]; zero before there is any.
     """
 
     def __init__(self, make: Make[Job, Answer], workers: int, memory: int) -> None:
@@ -57,17 +58,17 @@ class WorkerPool:
 
     @property
     def handles(self) -> list[WorkerHandle[Job, Answer]]:
-        """The processes."""
+        """All worker processes."""
         return list(self._purposes)
 
     @property
     def pipes(self) -> dict[Connection, PriorityLane[Job, Answer]]:
-        """The lanes of all processes, by their pipes."""
+        """The lanes of all workers, by the pipes over which they send answers."""
         return {lane.pipe: lane for handle in self._purposes for lane in handle.lanes}
 
     @property
     def up(self) -> bool:
-        """True if questions of all kinds can be answered."""
+        """True if at least one worker for questions and the one for streams are ready."""
         return bool(self._ready("streams") and self._ready("questions"))
 
     def _all(self, purpose: Purpose) -> list[WorkerHandle[Job, Answer]]:
@@ -77,9 +78,10 @@ class WorkerPool:
         return [each for each in self._all(purpose) if each.ready]
 
     def start_worker(self) -> None:
-        """Fill empty places with the spare process, or with new ones.
+        """Start missing workers, or use the spare; then start a new spare if all others are ready.
 
-        Where the system refuses a process, none is started for a while.
+        Where the operating system refuses a process, a warning is logged and no worker is started
+        for a while.
         """
         wanted: list[Purpose] = [] if self._all("streams") else ["streams"]
         wanted += ["questions"] * (self.workers - len(self._all("questions")))
@@ -96,7 +98,7 @@ class WorkerPool:
             log.warning("no process can be started, again in %g s: %s", rest, error)
 
     def put(self, handle: WorkerHandle[Job, Answer], purpose: Purpose) -> None:
-        """Give a process its purpose from now on."""
+        """Assign a worker its purpose: ``questions``, ``streams`` or ``spare``."""
         self._purposes[handle] = purpose
         # with the streams, one lane for set-points, and one for what else is short
         lanes: dict[Purpose, int] = {"streams": 2, "questions": 1, "spare": 0}
@@ -111,7 +113,7 @@ class WorkerPool:
         return handle
 
     def came_up(self, handle: WorkerHandle[Job, Answer]) -> None:
-        """Take note of how long a process took to be ready, if it has just become so."""
+        """Record how long a worker took to become ready, if it has just become ready."""
         if handle.ready and (begun := self._starting.pop(handle, None)) is not None:
             self.start = time.perf_counter() - begun
 
@@ -124,16 +126,16 @@ class WorkerPool:
         return rest
 
     def has_streams(self, lane: PriorityLane[Job, Answer]) -> bool:
-        """Return whether a lane is of the process that has the streams."""
+        """Return whether a lane belongs to the worker that keeps the streams."""
         return self._purposes.get(lane.handle) == "streams"
 
     def is_for_set_points(self, lane: PriorityLane[Job, Answer]) -> bool:
-        """Return whether a lane is kept for set-points."""
+        """Return whether a lane is reserved for set-points: the first of the streams' worker."""
         # the first of two
         return self.has_streams(lane) and lane.number == 0
 
     def idle(self) -> list[PriorityLane[Job, Answer]]:
-        """Return the lanes that have nothing to do."""
+        """Return the lanes of ready workers that have no question to answer."""
         return [
             lane
             for lane, asked in self.work.items()
@@ -142,13 +144,24 @@ class WorkerPool:
         ]
 
     def takes_dear(self) -> bool:
-        """Return whether a question that may take long leaves a ready process to the others."""
+        """Return whether one more question that may take long leaves a worker free for others.
+
+        A pool with one worker takes one such question at a time.
+        """
         asked = [each for lane, each in self.work.items() if not self.has_streams(lane)]
         dear = sum(each is not None and each.dear for each in asked)
         return dear < (1 if self.workers == 1 else len(self._ready("questions")) - 1)
 
     def ends(self, lane: PriorityLane[Job, Answer]) -> tuple[float, float]:
-        """Return when the question that a lane works on, and then its process, are given up."""
+        """Return the times at which the question of a lane, and then its worker, are given up.
+
+        Returns
+        -------
+        late : float
+            Half a second after the question's deadline, on the clock of `time.perf_counter` [s].
+        ends : float
+            The same time; for the worker that keeps the streams, 30 s after the deadline [s].
+        """
         question = self.work[lane]
         assert question is not None
         # [s] beyond its deadline, a process may take so long to say that it is over
@@ -157,7 +170,10 @@ class WorkerPool:
         return late, question.deadline + 30.0 if self.has_streams(lane) else late
 
     def has_grown(self, lane: PriorityLane[Job, Answer]) -> bool:
-        """Return whether a lane's process uses so much memory that it is to be replaced."""
+        """Return whether a lane's worker uses more than 700 MiB of memory, and must be replaced.
+
+        Always false for the worker that keeps the streams.
+        """
         size = None if self.has_streams(lane) else resident(lane.handle.process.pid)
         # [bytes] of resident memory
         return size is not None and size > 700 * 2**20
@@ -165,14 +181,21 @@ class WorkerPool:
     def stop_worker(
         self, handle: WorkerHandle[Job, Answer], *, dead: bool = False
     ) -> tuple[str, list[PendingQuestion]]:
-        """End a process; parameters as for `WorkerHandle.kill`.
+        """Kill a worker, and remove it from the pool.
+
+        Parameters
+        ----------
+        handle : WorkerHandle
+            The worker.
+        dead : bool, optional
+            True if the worker has already ended by itself.
 
         Returns
         -------
         how : str
-            How it ended.
+            How the worker ended, in words.
         left : list of PendingQuestion
-            Questions that it had, and nobody has replied to.
+            Questions that the worker had and that have no reply yet.
         """
         asked = [self.work.pop(lane, None) for lane in handle.lanes]
         self._starting.pop(handle, None)
@@ -185,18 +208,18 @@ class WorkerPool:
         return handle.kill(dead=dead), left
 
     def left(self) -> list[PendingQuestion]:
-        """Return the questions in work that nobody has replied to."""
+        """Return the questions that workers are answering and that have no reply yet."""
         return [each for each in self.work.values() if each is not None and not each.replied]
 
     def end(self) -> None:
-        """End all processes."""
+        """Kill all workers."""
         for handle in self.handles:
             handle.kill()
         self.work.clear()
         self._purposes.clear()
 
     def states(self) -> list[ProcessHealth]:
-        """Return what each process does."""
+        """Return the state of each worker: its purpose, what it does, and its memory."""
         found = []
         for handle, purpose in self._purposes.items():
             busy = any(self.work.get(lane) is not None for lane in handle.lanes)
