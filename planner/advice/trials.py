@@ -141,7 +141,7 @@ class Trials:
 
     @property
     def helped(self) -> bool:
-        """True if some change found so far is feasible, not counting changes of mass or strength."""
+        """True if some change found is feasible, not counting changes of mass or strength."""
         return any(
             self.holds(each.utilisation)
             for each in self.found
@@ -250,8 +250,9 @@ class Trials:
 def direction(trial: StanceTrial) -> Array | None:
     """Return the direction of body wrenches in which a stance lacks most.
 
-    With a plan: the gradient of the least utilisation with respect to the body wrench (multipliers
-    of the balance). Without: the part of the body wrench that the hands cannot exert, scaled.
+    If the least utilisation was found: its gradient with respect to the body wrench, from the
+    multipliers of the balance. Otherwise the part of the body wrench that the hands cannot exert,
+    each component divided twice by its unit.
 
     Returns
     -------

@@ -129,7 +129,7 @@ class BodyPrograms:
 
     @cached_property
     def cap_at_needed(self) -> float | None:
-        """Utilisation cap for searches that start at the question's body wrench; None if infeasible.
+        """Utilisation cap for searches from the question's body wrench; None if infeasible.
 
         The question's cap, or slightly more where the least utilisation equals that cap.
         """
@@ -137,7 +137,10 @@ class BodyPrograms:
 
     @cached_property
     def at_rest(self) -> tuple[StanceData, float] | None:
-        """Scaled rows of the hands with the body at rest, and the utilisation cap; None if infeasible."""
+        """Scaled rows of the hands with the body at rest, and utilisation cap.
+
+        None if the body is infeasible at rest. Requires ``motion``.
+        """
         assert self.motion is not None
         cap = self._cap_of(self.motion.rest)
         return None if cap is None else (self.motion.rest, cap)
@@ -221,7 +224,7 @@ class BodyPrograms:
         return _solved(data, goal, columns, cap, [each @ ways for each in self.motion.torques])
 
     def wrench(self, found: Reached) -> Array:
-        """Return the body wrench that the loads of a solved program exert, in B, shape (6,) [N, N·m]."""
+        """Return the body wrench that a solved program's loads exert, in B, shape (6,) [N, N·m]."""
         return np.asarray(programs.body_wrench(self.data, found.outcome.loads)[:6] * WRENCH_UNIT)
 
     def limiting(self, outcome: Outcome) -> LimitName | None:

@@ -165,7 +165,7 @@ def check(missing: str) -> None:
 
 
 def late(name: Unfinished) -> tuple[Unfinished, ...]:
-    """Return an unfinished result's name as a tuple if the deadline has expired, else an empty tuple.
+    """Return a tuple with an unfinished result's name if the deadline has expired, else ().
 
     Parameters
     ----------
