@@ -38,6 +38,11 @@ def advise(
         Ten at most, the best first, each with a lower utilisation than the stance has.
     whole : bool
         Whether all changes were tried before the deadline.
+
+    Raises
+    ------
+    InvalidInputError
+        If the question is invalid.
     """
     # changes that are returned are planned again for least effort, where that is the objective
     plain = question.bare()

@@ -55,7 +55,7 @@ def slope(trial: StanceTrial) -> Array:
     Returns
     -------
     ndarray, shape (3,)
-        In the axes of B [1/m].
+        In the axes of body frame B [1/m].
     """
     lacking = direction(trial)
     assert lacking is not None
@@ -104,7 +104,10 @@ class BodySearch:
         self._allowed = -math.inf if now is None else min(now.distance, 0.0)
 
     def run(self) -> None:
-        """Plan shifts where the cuts are lowest, until the gap closes or the budget is used up."""
+        """Plan the shifts with the least lower bound, until this equals the best utilisation.
+
+        The bound comes from the cutting planes. Stops, too, once the budget of plans is used up.
+        """
         self._keep(np.zeros(3), self.trials.base)
         for _ in range(14):  # plans
             shift, bound = self._next(LEVEL_TILT)
@@ -176,7 +179,7 @@ class BodySearch:
         Returns
         -------
         ndarray, shape (s, 3)
-            In the axes of B [m]; the first is zero.
+            In the axes of body frame B [m]; the first is zero.
         """
         steps = np.linspace(-self.range.shift, self.range.shift, 7)  # along each axis
         shifts = np.array([(x, y, z) for x in steps for y in steps for z in steps])
@@ -313,7 +316,7 @@ class BodySearch:
         Parameters
         ----------
         shift : ndarray, shape (3,)
-            In the axes of B [m].
+            In the axes of body frame B [m].
         tilt : _Tilt, optional
             Rotation about the centre of mass.
         """

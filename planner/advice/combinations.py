@@ -89,8 +89,9 @@ class Choice(NamedTuple):
 class CombinationSearch:
     """Search for changes of several hands and the body that together make a stance feasible.
 
-    There are k directions, v variants of all limbs, and s shifts of the body. Floating wrists count
-    as fixed where variants are chosen; plans treat them exactly.
+    There are k directions of body wrenches in which some plan lacked most, v variants of all limbs,
+    and s shifts of the body. Directions are scaled so that 1 is needed along each. Floating wrists
+    count as fixed where variants are chosen; plans treat them exactly.
 
     Parameters
     ----------
@@ -100,9 +101,9 @@ class CombinationSearch:
     Attributes
     ----------
     gives : ndarray, shape (k, v)
-        Largest share of the need that each variant can contribute in each direction.
+        Largest wrench component along each direction that each variant can exert.
     needs : ndarray, shape (k, s)
-        Share that is needed in each direction with each shift, minus one.
+        Needed wrench component along each direction with each shift, minus 1.
     sizes : ndarray, shape (v,)
         Size of each variant's change, as in `planner.result.Advice`.
     shift_sizes : ndarray, shape (s,)
@@ -187,7 +188,7 @@ class CombinationSearch:
             yield Choice(hands, int(self._random.integers(len(self._shifts))))
 
     def part(self, choice: Choice) -> float:
-        """Return the share of the needed wrench that a choice can contribute, over all directions.
+        """Return the share of the needed wrench that a choice can exert, in the worst direction.
 
         Below 1, the choice is infeasible.
         """
@@ -235,7 +236,7 @@ class CombinationSearch:
         return slot[np.argsort(-worth, kind="stable")[:few]]
 
     def learn(self, trial: StanceTrial, shift: int) -> None:
-        """Add the direction in which a plan lacks most, if there is one.
+        """Add the direction of body wrenches in which an infeasible plan lacks most, if any.
 
         Parameters
         ----------

@@ -81,7 +81,8 @@ def _other_grasps(hand: HandOnHold) -> list[float]:
 def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
     """Yield changes of one hand: other grasps, and moves and rotations along its palm.
 
-    Rotations, all around z of H, come with each grasp. The rock keeps its pose in W.
+    Rotations are multiples of 30° about z of hand frame H, each alone and with every other grasp.
+    The rock keeps its pose in world frame W.
 
     Parameters
     ----------
@@ -163,7 +164,7 @@ def placed(prepared: PreparedStance, index: int, motions: Sequence[_Motion]) -> 
     index : int
         Index of the hand.
     motions : sequence of (float, float, float)
-        Shift along x and y [m] and rotation about z [rad], in H.
+        Shift along x and y [m] and rotation about z [rad], in hand frame H.
     """
     hand = prepared.question.stance.hands[index]
     for x, y, turn in motions:

@@ -60,7 +60,7 @@ class NewHold:
     best : tuple of (Tried, hold) or None
         Change with the lowest utilisation so far, and its hold.
     places : list of ndarray, shape (3,)
-        Candidate places of H in W [m].
+        Candidate places of hand frame H in world frame W [m].
     """
 
     def __init__(self, trials: Trials, limb: str) -> None:
@@ -85,7 +85,7 @@ class NewHold:
         Parameters
         ----------
         turns : sequence of float
-            Rotations about z of H relative to the copied hand [rad].
+            Rotations about z of hand frame H relative to the copied hand [rad].
         """
         if self.places:
             self._try([_Hold(i, self.places[0], turn) for i in self.likes for turn in turns])
@@ -171,7 +171,12 @@ class NewHold:
 def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
     """Yield changes that put a limb at each candidate place, in steps of 45° about z of H.
 
-    Each hand that may be copied is copied.
+    Each hand whose rock is not shared is copied in turn.
+
+    Parameters
+    ----------
+    trials : Trials
+    limb : str
     """
     search = NewHold(trials, limb)
     turns = [math.radians(turn) for turn in range(-135, 181, 45)]  # [rad] all around

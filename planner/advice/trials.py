@@ -73,6 +73,11 @@ class Attempt(Protocol):
             Use of joint torque by limbs without a hand, where it is known already.
         near : object, optional
             Solution of a similar stance, from which the search starts.
+
+        Returns
+        -------
+        StanceTrial
+            Its utilisation is infinite if the stance has no plan.
         """
 
 
@@ -126,6 +131,8 @@ class Trials:
     ------
     DeadlineError
         If the deadline has expired before the unchanged stance is planned.
+    InvalidInputError
+        If the question is invalid.
     """
 
     def __init__(self, question: Question, attempt: Attempt, plans: int = SETTINGS.plans) -> None:
@@ -173,18 +180,18 @@ class Trials:
         Returns
         -------
         StanceTrial or None
-            Its utilisation is infinite if the stance has no plan. None if the changed question is
-            invalid, or its stance is odder than the unchanged one (see `possible`).
+            Its utilisation is infinite if the stance has no plan. None if the change is not
+            `possible`.
         """
         for each, question in self._asked([change]):
             return self._tried(each, question)
         return None
 
     def possible(self, change: Change) -> bool:
-        """Return whether a change gives a valid stance, without planning it.
+        """Return whether a change gives a valid stance, without planning the stance.
 
-        Invalid, too, is a stance with a finding, such as a hand out of reach or a body in rock,
-        that the unchanged stance has not, or has by less.
+        A change is not possible, either, if it causes or worsens a finding, such as a hand out of
+        reach or a body in rock.
         """
         return any(self._prepared(question) for _, question in self._asked([change]))
 
@@ -218,12 +225,25 @@ class Trials:
         Parameters
         ----------
         wrench : ndarray, shape (6,)
-            Body wrench in B [N, N·m].
+            Body wrench in body frame B [N, N·m].
         """
         return self._try(self.base.prepared.turned(wrench))
 
     def again(self, question: Question, objective: Objective | OwnObjective) -> StanceTrial:
-        """Plan a question for another objective, and return the result."""
+        """Plan a question for another objective.
+
+        Parameters
+        ----------
+        question : Question
+            For example the changed question of a `Tried`.
+        objective : str or OwnObjective
+            Replaces the question's objective.
+
+        Returns
+        -------
+        StanceTrial
+            Its utilisation is infinite if the stance has no plan.
+        """
         return self._try(prepare_stance(replace(question, objective=objective)))
 
     def _asked(self, candidates: Sequence[Change]) -> list[tuple[Change, Question]]:
@@ -248,16 +268,20 @@ class Trials:
 
 
 def direction(trial: StanceTrial) -> Array | None:
-    """Return the direction of body wrenches in which a stance lacks most.
+    """Return the direction of body wrenches along which a stance's hands lack most.
 
-    If the least utilisation was found: its gradient with respect to the body wrench, from the
-    multipliers of the balance. Otherwise the part of the body wrench that the hands cannot exert,
-    each component divided twice by its unit.
+    If the least utilisation was found: the gradient of that utilisation with respect to the body
+    wrench, from the multipliers of the balance. Otherwise the part of the body wrench that the
+    hands cannot exert, each component divided twice by its unit.
+
+    Parameters
+    ----------
+    trial : StanceTrial
 
     Returns
     -------
     ndarray, shape (6,), or None
-        In B [1/N, 1/(N·m)]; of any length. None if no program was solved.
+        In body frame B [1/N, 1/(N·m)]; of any length. None if no program was solved.
     """
     outcome, data = trial.outcome, trial.data
     if outcome.solved and outcome.balance_dual is not None:

@@ -40,16 +40,16 @@ MISSING_RESULT: Final = "it was known what the stance can hold"
 class Motion(NamedTuple):
     """Effect of the body's acceleration on the stance's programs.
 
-    The acceleration has k components in W: three linear and, if known, three angular. With joints
-    at rest, the wrench that accelerates the robot and the joints' torques are affine in the
-    acceleration: one column for each component describes them.
+    The acceleration has k components in world frame W: three linear and, if known, three angular.
+    With joints at rest, the wrench that accelerates the robot and the joints' torques are affine in
+    the acceleration: one column for each component describes them.
 
     Attributes
     ----------
     rest : StanceData
         Scaled rows of the hands with the body at rest.
     wrench : ndarray, shape (6, k)
-        Body wrench in B for one unit of each component [kg, kg·m, kg·m²].
+        Body wrench in body frame B for one unit of each component [kg, kg·m, kg·m²].
     torques : tuple of ndarray, shape (nl, k)
         For each hand, the change of utilisation of its limit rows for one unit of each component.
     """
@@ -68,7 +68,7 @@ class End(NamedTuple):
         Distance along the direction: largest d · W, or largest multiple of the direction; for a
         unit direction in N, N·m, m/s² or rad/s².
     wrench : ndarray, shape (6,)
-        Body wrench at that point, in B [N, N·m].
+        Body wrench at that point, in body frame B [N, N·m].
     limiting : LimitName or None
         Limit with the largest shadow price at that point; None if no limit binds.
     loads : tuple of ndarray
@@ -168,7 +168,7 @@ class BodyPrograms:
         goal : ndarray, shape (n,)
             Not zero.
         columns : ndarray, shape (6, n)
-            Directions of body wrenches in B, over `WRENCH_UNIT`; not zero.
+            Directions of body wrenches in body frame B, over `WRENCH_UNIT`; not zero.
         start : ndarray, shape (6,)
             Body wrench in B at t = 0 [N, N·m].
         cap : float, optional
@@ -203,7 +203,7 @@ class BodyPrograms:
         goal : ndarray, shape (n,)
             Not zero.
         ways : ndarray, shape (k, n)
-            Directions of the k acceleration components of `Motion`, in W.
+            Directions of the k acceleration components of `Motion`, in world frame W.
 
         Returns
         -------

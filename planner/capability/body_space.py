@@ -89,23 +89,23 @@ class BodySpace(BodyPrograms):
 
     @property
     def needed(self) -> Array:
-        """Body wrench of the question, in B, shape (6,) [N, N·m]."""
+        """Body wrench of the question, in body frame B, shape (6,) [N, N·m]."""
         return self.plan.body_wrench
 
     # Wrenches -----------------------------------------------------------------------------------
 
     def support(self, direction: ArrayLike) -> End | None:
-        """Return the feasible body wrench W that maximises d · W: the support function.
+        """Return the feasible body wrench w that maximises d · w: the support function.
 
         Parameters
         ----------
         direction : array_like, shape (6,)
-            d, in B; not zero.
+            d, in body frame B; not zero.
 
         Returns
         -------
         End or None
-            ``reach`` is d · W. None if no body wrench is feasible.
+            ``reach`` is d · w. None if no body wrench is feasible.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class BodySpace(BodyPrograms):
         Parameters
         ----------
         direction : array_like, shape (6,)
-            d, in B [N, N·m]; not zero.
+            d, in body frame B [N, N·m]; not zero.
 
         Returns
         -------
@@ -134,17 +134,17 @@ class BodySpace(BodyPrograms):
         return self._along(np.zeros(6), direction)
 
     def more(self, direction: ArrayLike) -> End | None:
-        """Return the largest t for which W + t d is feasible, W being the question's body wrench.
+        """Return the largest t for which w + t d is feasible, w being the question's body wrench.
 
         Parameters
         ----------
         direction : array_like, shape (6,)
-            d, in B [N, N·m]; not zero.
+            d, in body frame B [N, N·m]; not zero.
 
         Returns
         -------
         End or None
-            ``reach`` is t. None if W is not feasible.
+            ``reach`` is t. None if w is not feasible.
         """
         cap = self.cap_at_needed
         return None if cap is None else self._along(self.needed, direction, cap)
@@ -225,8 +225,8 @@ class BodySpace(BodyPrograms):
         Parameters
         ----------
         direction : array_like, shape (3,) or (6,)
-            Linear and, with length 6, angular part in W, about the origin of B. Accelerations
-            across the direction are zero.
+            Linear and, with length 6, angular part in world frame W, about the origin of body frame
+            B. Accelerations across the direction are zero.
 
         Returns
         -------
@@ -255,7 +255,7 @@ class BodySpace(BodyPrograms):
         Parameters
         ----------
         one, two : array_like, shape (3,)
-            Unit vectors in W that span the plane.
+            Unit vectors in world frame W that span the plane.
         most : int, optional
             Largest number of directions that are solved for.
 

@@ -29,9 +29,9 @@ class Survey:
     found : WristSearch
         Feasible wrist poses and extreme wrenches.
     ends : tuple of (Farthest or None), length 12
-        Pose and wrench at which a limit is exceeded, along +x, −x, +y, … of H, forces before
-        moments: the farthest of the local maxima that start at the search's farthest wrenches. None
-        if no search from there finds a feasible pose.
+        Pose and wrench at which a limit is exceeded, along +x, −x, +y, … of hand frame H, forces
+        before moments: the farthest of the local maxima that start at the search's farthest
+        wrenches. None if no search from there finds a feasible pose.
     """
 
     found: WristSearch

@@ -334,7 +334,7 @@ class HardRowSystem:
         Returns
         -------
         dict of LimitName to float
-            Sum of |multipliers| over a constraint's rows; constraints with negligible sums are left
+            Sum of a constraint's absolute multipliers; constraints with negligible sums are left
             out.
         """
         shares = np.append(multipliers, np.abs(direction[BODY_ROWS:]))

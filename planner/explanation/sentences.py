@@ -246,7 +246,7 @@ def _missing(shortfall: Array) -> str:
 
 
 def blocking_sentence(names: Sequence[LimitName]) -> str:
-    """Return a list in words of what two constraints forbid, and how many more there are.
+    """Return words for what the first two of some constraints forbid, and how many follow.
 
     Parameters
     ----------

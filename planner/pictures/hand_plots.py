@@ -267,7 +267,7 @@ def direction_in_words(along: Array) -> str:
     Parameters
     ----------
     along : ndarray, shape (3,)
-        Direction in H; its z component is ignored.
+        Direction in hand frame H; its z component is ignored.
     """
     angle = math.degrees(math.atan2(float(along[1]), float(along[0])))
     for name, where in (("x", 0.0), ("y", 90.0), ("−y", -90.0)):

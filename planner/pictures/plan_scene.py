@@ -60,7 +60,7 @@ class DrawnSurface(NamedTuple):
 
     @property
     def triangles(self) -> Array:
-        """Corners of the triangles in W, shape (m, 3, 3) [m]."""
+        """Corners of the triangles in world frame W, shape (m, 3, 3) [m]."""
         return np.asarray(self.vertices[self.faces])
 
 
@@ -103,7 +103,7 @@ class Arrow(NamedTuple):
     kind : {'force', 'load'}
         ``force``: of the rock on a hand; ``load``: weight or other load that the hands hold.
     start : ndarray, shape (3,)
-        In W [m].
+        In world frame W [m].
     force : ndarray, shape (3,)
         In W [N].
     text : str
@@ -141,7 +141,7 @@ class DrawnScene:
     Attributes
     ----------
     origin : ndarray, shape (3,)
-        Origin of B in W [m].
+        Origin of body frame B in world frame W [m].
     surfaces : tuple of DrawnSurface
     lines : tuple of Line
     dots : tuple of Dots
@@ -177,12 +177,12 @@ class ViewDirections(NamedTuple):
     Attributes
     ----------
     ahead : ndarray, shape (3,)
-        Horizontal unit vector in W, toward the rock if ``toward``.
+        Horizontal unit vector in world frame W, toward the rock if ``toward``.
     into : ndarray, shape (3,)
         Unit vector in W into the rock: the mean of the hands' z axes; ``ahead`` where these cancel.
     toward : bool
         Whether the rock is ahead. If not (under a ceiling, on a floor, between walls), ``ahead`` is
-        the horizontal part of −z or x of B.
+        the horizontal part of −z or x of body frame B.
     steep : bool
         Whether the rock is a ceiling or a floor.
     """

@@ -68,7 +68,8 @@ class View:
     ----------
     axes : Axes or Axes3D
     place : callable
-        Maps points in W, shape (n, 3), to coordinates of the axes, shape (n, 2) or (n, 3).
+        Maps points in world frame W, shape (n, 3), to coordinates of the axes, shape (n, 2) or (n,
+        3).
     flat : callable
         Maps points in W, shape (n, 3), to their projection in the picture, shape (n, 2), for arrows
         and notes.
@@ -93,7 +94,7 @@ class View:
         Parameters
         ----------
         points : ndarray, shape (n, 3)
-            In W [m].
+            In world frame W [m].
         **style
             Line properties of matplotlib.
         """
@@ -106,7 +107,7 @@ class View:
         Parameters
         ----------
         points : ndarray, shape (n, 3)
-            In W [m].
+            In world frame W [m].
         **style
             Line properties of matplotlib.
         """
@@ -120,7 +121,7 @@ class View:
         Parameters
         ----------
         polygons : ndarray, shape (n, k, 3)
-            k corners of each of n polygons, in W [m].
+            k corners of each of n polygons, in world frame W [m].
         **style
             Properties of matplotlib's polygon collections.
         """
@@ -135,7 +136,7 @@ class View:
         Parameters
         ----------
         triangles : ndarray, shape (n, 3, 3)
-            Corners in W [m].
+            Corners in world frame W [m].
         """
         if not self.deep:
             triangles = triangles[np.argsort(-(triangles @ self.look).mean(axis=1))]
@@ -154,7 +155,7 @@ class View:
         Parameters
         ----------
         start : ndarray, shape (3,)
-            In W [m].
+            In world frame W [m].
         step : ndarray, shape (3,)
             From start to tip, in W [m].
         colour : colour of matplotlib

@@ -25,8 +25,8 @@ def rock_patch(settled: SettledHand, beside: Array | None = None) -> Array:
     ----------
     settled : SettledHand
     beside : ndarray, shape (n, 3), optional
-        Origins in H of all hands on this rock [m]; the box extends by `PictureSettings.rock_around`
-        beyond all of them. By default this hand alone.
+        Origins in hand frame H of all hands on this rock [m]; the box extends by
+        `PictureSettings.rock_around` beyond all of them. By default this hand alone.
 
     Returns
     -------
