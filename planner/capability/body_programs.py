@@ -65,12 +65,13 @@ class End(NamedTuple):
     Attributes
     ----------
     reach : float
-        Distance along the direction: largest d · W, or largest multiple of the direction; for a
-        unit direction in N, N·m, m/s² or rad/s².
+        Largest t for which t times the direction is feasible; from `BodySpace.support`, largest
+        product of direction and body wrench. For a unit direction in N, N·m, m/s² or rad/s².
     wrench : ndarray, shape (6,)
         Body wrench at that point, in body frame B [N, N·m].
     limiting : LimitName or None
-        Limit with the largest shadow price at that point; None if no limit binds.
+        Limit with the largest multiplier at that point: one per cent more of this limit would
+        extend the reach most. None if no limit binds.
     loads : tuple of ndarray
         Loads y of each hand [N]; of a floating hand the wrist's twist [m, rad].
     """
@@ -228,9 +229,18 @@ class BodyPrograms:
         return np.asarray(programs.body_wrench(self.data, found.outcome.loads)[:6] * WRENCH_UNIT)
 
     def limiting(self, outcome: Outcome) -> LimitName | None:
-        """Return the limit with the largest shadow price, from the multipliers of a program.
+        """Return the limit with the largest dual value (multiplier) in a solved program.
 
-        Multipliers of all rows of a limit are added. None if no limit binds.
+        Multipliers of all rows of a limit are added.
+
+        Parameters
+        ----------
+        outcome : Outcome
+
+        Returns
+        -------
+        LimitName or None
+            None if no limit binds.
         """
         worth: dict[LimitName, float] = {}
         for names, duals in zip(self._names, outcome.limit_duals, strict=True):

@@ -130,6 +130,13 @@ class BodySpace(BodyPrograms):
         -------
         End or None
             ``reach`` is t. None if no multiple of d is feasible.
+
+        Raises
+        ------
+        InvalidInputError
+            If the direction is zero.
+        SolverError
+            If the program is not solved.
         """
         return self._along(np.zeros(6), direction)
 
@@ -145,6 +152,13 @@ class BodySpace(BodyPrograms):
         -------
         End or None
             ``reach`` is t. None if w is not feasible.
+
+        Raises
+        ------
+        InvalidInputError
+            If the direction is zero.
+        SolverError
+            If the program is not solved.
         """
         cap = self.cap_at_needed
         return None if cap is None else self._along(self.needed, direction, cap)
@@ -226,7 +240,7 @@ class BodySpace(BodyPrograms):
         ----------
         direction : array_like, shape (3,) or (6,)
             Linear and, with length 6, angular part in world frame W, about the origin of body frame
-            B. Accelerations across the direction are zero.
+            B. With length 3, the angular acceleration is zero.
 
         Returns
         -------

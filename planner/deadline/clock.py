@@ -70,7 +70,7 @@ UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
 
 
 class DeadlineError(CruxError):
-    """Deadline (timeout given by the client) that expired before any verified plan or proof.
+    """Error: the client's deadline expired before a plan was verified or infeasibility proven.
 
     Parameters
     ----------
@@ -109,6 +109,12 @@ def within(seconds: float | None, *, started: float | None = None) -> Iterator[N
         Duration until the deadline [s]; None sets no deadline.
     started : float, optional
         Start of that duration, in seconds of `time.perf_counter`; now by default.
+
+    Raises
+    ------
+    DeadlineError
+        From the closing of hands and the computation of wrench spaces inside the block, once the
+        deadline has expired. Other code inside calls `check` or `expired`.
     """
     if seconds is None:
         yield
@@ -193,7 +199,7 @@ def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:
 
 
 class Budget:
-    """Number of solver programs that a search may still solve; an expired deadline ends it, too.
+    """Number of solver programs that a search may still solve; the deadline ends it, too.
 
     A search checks ``ended`` before each step, so the last step may overdraw the budget.
 

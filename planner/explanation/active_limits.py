@@ -63,7 +63,14 @@ def limit_unit(limit: str) -> str:
 
 
 def limit_name(limb: str, row: Row) -> LimitName:
-    """Return the name of the limit or hard row that a row of a hand's wrench space stands for."""
+    """Return the name of the limit or hard row that a row of a wrench space stands for.
+
+    Parameters
+    ----------
+    limb : str
+        Limb of the hand that has the wrench space.
+    row : Row
+    """
     return LimitName(limb, row.finger, row.phalanx, row.limit, row.joint)
 
 

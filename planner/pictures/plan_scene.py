@@ -39,7 +39,7 @@ WORLD_UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 class DrawnSurface(NamedTuple):
-    """Triangles of one object in W.
+    """Triangles of one object in world frame W.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class DrawnSurface(NamedTuple):
 
 
 class Line(NamedTuple):
-    """Polyline in W.
+    """Polyline in world frame W.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Line(NamedTuple):
 
 
 class Dots(NamedTuple):
-    """Marked points in W.
+    """Marked points in world frame W.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Arrow(NamedTuple):
 
 
 class Label(NamedTuple):
-    """Text at a point in W.
+    """Text at a point in world frame W.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ class ViewDirections(NamedTuple):
         Unit vector in W into the rock: the mean of the hands' z axes; ``ahead`` where these cancel.
     toward : bool
         Whether the rock is ahead. If not (under a ceiling, on a floor, between walls), ``ahead`` is
-        the horizontal part of −z or x of body frame B.
+        the horizontal part of −z or x of body frame B, or x of W.
     steep : bool
         Whether the rock is a ceiling or a floor.
     """
@@ -194,7 +194,7 @@ class ViewDirections(NamedTuple):
 
 
 def view_directions(stance: Stance) -> ViewDirections:
-    """Return the directions in which a stance is viewed."""
+    """Return the directions in which a stance is viewed: ahead, and into the rock."""
     into = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
     x, _, z = stance.body.rotation.T
     level = [

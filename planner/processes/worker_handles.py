@@ -302,10 +302,11 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def starting_children(*signals: signal.Signals) -> Iterator[None]:
-    """Context manager in which worker processes are started safely with respect to signals.
+    """Context manager in which worker processes are started: no signal interrupts a start.
 
-    Signals that arrive in the block are handled here at its end. A child receives them only once it
-    calls `_begin_child`, never if it does not. Children run their linear algebra on one thread.
+    Signals that arrive are handled in this process when the block ends. A child receives them only
+    once it calls `_begin_child`, never if it does not. Children run their linear algebra on one
+    thread.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def cores() -> int:
 
 
 class Workers(Generic[Input, Output]):
-    """Pool of worker processes that turn items into results; a context manager, for one thread.
+    """Process pool that turns items into results; a context manager, for one thread.
 
     An item goes to a ready worker with few items; of several items, the worker gets one of a
     subject it has worked on before (an LRU cache keeps the last 256 subjects).
