@@ -1,4 +1,4 @@
-"""Suggest changes that would make a stance hold, each planned and verified."""
+"""Suggest changes that would make a stance feasible, each planned and verified."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

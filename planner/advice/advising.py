@@ -1,4 +1,4 @@
-"""Suggest changes that would make a stance hold: single ones, several together if none does."""
+"""Suggest changes that would make a stance feasible: single ones, or several if none does."""
 
 from __future__ import annotations
 
@@ -22,22 +22,27 @@ __all__ = ["advise"]
 def advise(
     question: Question, attempt: Attempt, plans: int = SETTINGS.plans
 ) -> tuple[tuple[Advice, ...], bool]:
-    """Return what would make a question's stance hold, or hold more.
+    """Return changes that would make a question's stance feasible, or lower its utilisation.
 
     Parameters
     ----------
     question : Question
     attempt : callable
-        Plans a stance that is only tried.
+        Plans a candidate stance; see `planner.advice.trials.Attempt`.
     plans : int, optional
-        That may be made for it, in all.
+        Largest number of plans in all.
 
     Returns
     -------
     advice : tuple of Advice
-        As of `planner.result.Plan`, ten at most, each with less utilisation than the stance has.
+        Ten at most, the best first, each with a lower utilisation than the stance has.
     whole : bool
-        Whether there was time to try all.
+        Whether all changes were tried before the deadline.
+
+    Raises
+    ------
+    InvalidInputError
+        If the question is invalid.
     """
     # changes that are returned are planned again for least effort, where that is the objective
     plain = question.bare()

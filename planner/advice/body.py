@@ -1,16 +1,16 @@
-"""Search for a better place of the body, its hands staying, by cutting planes.
+"""Search for a better place of the body, with fixed hands, by cutting planes.
 
-The hands stay in W, and a shift d of the body, in B's axes, carries its centre of mass along: what
-is needed of the hands is the same force f and, about the point where B's origin was, the moment
+The hands stay in W. A shift d of the body, in the axes of B, moves its centre of mass: the hands
+then have to exert the same force f and, about the former origin of B, the moment
 
     m(d) = m₀ + d × f.
 
-The least utilisation u of hands that stay is a convex function of the body wrench, so of d, and the
-multipliers ν of the balance give a slope of it: u(d') ≥ u(d) + (f × ν_m)·(d' − d). So each plan for
-a shift is a cut (Kelley 1960), and a small linear program over all cuts says where to look next,
-and how low u can still be. A tilt about the centre of mass leaves force and moment as they are: it
-changes how far the limbs reach, and what their joints bear. With joints, whose angles follow the
-body, the slope is that of the joints as they are; a shift that is returned is planned with its own.
+The least utilisation u is a convex function of the body wrench, hence of d. The multipliers ν of
+the balance give a subgradient: u(d') ≥ u(d) + (f × ν_m)·(d' − d). So each plan for a shift adds a
+cut (Kelley 1960), and a small linear program over all cuts gives the next shift to plan, and a
+lower bound on u. A tilt about the centre of mass changes neither force nor moment, only how far the
+limbs reach and the torques of their joints. Joint angles follow the body: the subgradient assumes
+the present angles, but a returned shift is planned with its own.
 """
 
 from __future__ import annotations
@@ -36,13 +36,27 @@ __all__ = ["BodySearch", "can_move", "slope"]
 
 
 def can_move(prepared: PreparedStance) -> bool:
-    """Return whether the load on the hands depends on the body's place."""
+    """Return whether a shift of the body changes the load on the hands.
+
+    False if the question gives a body wrench, or the load exerts no force.
+    """
     question = prepared.question
     return question.body_wrench is None and float(np.abs(prepared.wrench[:3]).max()) > 0.0
 
 
 def slope(trial: StanceTrial) -> Array:
-    """Return how the least utilisation grows with a shift of the body, in B's axes (3,) [1/m]."""
+    """Return the gradient of the least utilisation with respect to a shift of the body.
+
+    Parameters
+    ----------
+    trial : StanceTrial
+        Plan at the present place of the body.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        In the axes of body frame B [1/m].
+    """
     lacking = direction(trial)
     assert lacking is not None
     return np.cross(trial.prepared.wrench[:3], lacking[3:])
@@ -71,12 +85,12 @@ LEVEL_TILT: Final = _Tilt()
 
 
 class BodySearch:
-    """The search for the best shift of the body of one stance, whose body may be anywhere in reach.
+    """Search for the shift of the body, within the limbs' reach, that lowers the utilisation most.
 
     Parameters
     ----------
     trials : Trials
-        Of that stance; pays for its plans.
+        Budget of plans; its unchanged stance is the start.
     """
 
     def __init__(self, trials: Trials) -> None:
@@ -90,7 +104,10 @@ class BodySearch:
         self._allowed = -math.inf if now is None else min(now.distance, 0.0)
 
     def run(self) -> None:
-        """Look for the best shift."""
+        """Plan the shifts with the least lower bound, until this equals the best utilisation.
+
+        The bound comes from the cutting planes. Stops, too, once the budget of plans is used up.
+        """
         self._keep(np.zeros(3), self.trials.base)
         for _ in range(14):  # plans
             shift, bound = self._next(LEVEL_TILT)
@@ -102,7 +119,13 @@ class BodySearch:
             self._look(shift)
 
     def changes(self) -> list[Change]:
-        """Return the best shift, the least of those that hold, and what a tilt adds in reach."""
+        """Return the best shift found, and the smallest shift that should be feasible.
+
+        Returns
+        -------
+        list of Change
+            Two at most; empty if no shift was planned, or all are negligible.
+        """
         best = self._best
         if not math.isfinite(best):
             return []
@@ -117,7 +140,14 @@ class BodySearch:
         return [each for each in found if each.size > SETTINGS.least_shift / SETTINGS.shift_unit]
 
     def tilts(self) -> list[Change]:
-        """Return the best shift with tilts: all if joints count, else the one that reaches most."""
+        """Return the best shift combined with tilts of the body.
+
+        Returns
+        -------
+        list of Change
+            With known joints, one for each tilt. Otherwise the tilt whose reach gives the lowest
+            bound on the utilisation, if that bound is well below the best utilisation.
+        """
         if not self._known or self.range.tilt == 0.0:
             return []
         tilts = [
@@ -144,7 +174,13 @@ class BodySearch:
         )
 
     def grid(self) -> Array:
-        """Return shifts in reach, the body clear of the palms, shape (s, 3); none comes first."""
+        """Return shifts on a grid for which all hands are in reach and the body is clear of rock.
+
+        Returns
+        -------
+        ndarray, shape (s, 3)
+            In the axes of body frame B [m]; the first is zero.
+        """
         steps = np.linspace(-self.range.shift, self.range.shift, 7)  # along each axis
         shifts = np.array([(x, y, z) for x in steps for y in steps for z in steps])
         centres, radii = self._reaches(LEVEL_TILT)
@@ -275,7 +311,15 @@ class BodySearch:
         return question.stance.robot.com if where is None else where.weights.com
 
     def change(self, shift: Array, tilt: _Tilt = LEVEL_TILT) -> Change:
-        """Return a shift of the body, in its axes, with a tilt."""
+        """Return the change of a question that shifts and tilts its body.
+
+        Parameters
+        ----------
+        shift : ndarray, shape (3,)
+            In the axes of body frame B [m].
+        tilt : _Tilt, optional
+            Rotation about the centre of mass.
+        """
         stance = self.stance
         if np.linalg.norm(shift) < SETTINGS.least_shift:
             shift = np.zeros(3)

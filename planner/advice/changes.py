@@ -1,4 +1,4 @@
-"""Changes of a question, in the words of its message: what an advice says, and what it does."""
+"""Changes of a question that an advice proposes, by paths of the request message and new values."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ __all__ = [
 ]
 
 HAND_PATH: Final = re.compile(r"stance\.hands\[(\d+)\](?:\.(.+))?")
-"""The path of a hand of a question, or of one of its fields: groups are its number and that."""
+"""Pattern of the path of a hand, or of a hand's field; groups: index of the hand, field."""
 
 
 @dataclass(frozen=True, slots=True)
 class AdviceSettings:
-    """Changes that are tried for advice, and the size of each that counts as 1."""
+    """Changes that are tried for advice, and the size of each kind of change that counts as 1."""
 
     plans: int = 100  # for the advice about a question, at most
     worse_tolerance: float = 1e-3  # [m], or without a unit: by how much what is odd may grow
@@ -51,7 +51,7 @@ class AdviceSettings:
     most_given: float = 1e3  # in parts of what is needed: more than any direction needs
     hands_apart: float = 0.25  # [m] of a new hold from other hands, at least
     quarter_turns: tuple[float, ...] = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
-    """First turns of a new hand from the one that it is like [rad]."""
+    """Rotations of a new hand relative to the hand that it copies, tried first [rad]."""
     strongest: float = 4.0  # times a hold's strength, at most
     share_step: float = 0.01  # [1] resolution of the factors of strength and mass
     strength_plans: int = 4  # to find a factor of strength, at most
@@ -69,7 +69,21 @@ SETTINGS: Final = AdviceSettings()
 
 
 class Change(NamedTuple):
-    """Something to be done about a stance; see `planner.result.Advice`."""
+    """Proposed change of a question; `planner.result.Advice` describes all fields.
+
+    Attributes
+    ----------
+    kind : str
+        Such as ``body`` or ``grasp``.
+    limbs : tuple of str
+        Limbs whose hands change.
+    words : str
+        What to do.
+    changes : mapping of str to object
+        New values of fields, by path in the request; None removes a field or a hand.
+    size : float
+        Size of the change, with `AdviceSettings` as units.
+    """
 
     kind: AdviceKind
     limbs: tuple[str, ...]
@@ -94,7 +108,18 @@ def _joined(first: Change, second: Change) -> Change | None:
 
 
 def combined(changes: Sequence[Change]) -> Change | None:
-    """Return several changes as one; None of none, or where they say different things."""
+    """Return several changes as one.
+
+    Parameters
+    ----------
+    changes : sequence of Change
+
+    Returns
+    -------
+    Change or None
+        A single change as given; of kind ``pair`` for two, ``combination`` for more. None if there
+        are no changes, or two give different values to one field.
+    """
     if not changes:
         return None
     free = [each for each in changes if each.kind == "free_hand"]
@@ -117,12 +142,20 @@ def _further(change: Change, count: int) -> Change:
 
 
 def pose_message(pose: Pose) -> dict[str, list[float]]:
-    """Return a pose as a message has it."""
+    """Return a pose as in a request: ``position`` [m] and ``orientation`` (quaternion)."""
     return {"position": pose.position.tolist(), "orientation": pose.quaternion().tolist()}
 
 
 def hand_path(index: int, field: str | None = None) -> str:
-    """Return the path of a hand, or of one of its fields."""
+    """Return the path in a request of a hand, or of one of that hand's fields.
+
+    Parameters
+    ----------
+    index : int
+        Index of the hand.
+    field : str, optional
+        Field of the hand, such as ``grasp.outer_rotation``.
+    """
     path = f"stance.hands[{index}]"
     return path if field is None else f"{path}.{field}"
 
@@ -133,13 +166,13 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
     Parameters
     ----------
     question : Question
-    changes : mapping of str to any
-        Of `planner.result.Advice`.
+    changes : mapping of str to object
+        New values by path, as in `planner.result.Advice`.
 
     Raises
     ------
     InvalidInputError
-        If that is no possible question, or a path leads to nothing that advice is about.
+        If the changed question is invalid, or a path is not one that advice can change.
     """
     hands: dict[int, dict[str | None, Any]] = {}
     stance: dict[str, Any] = {}

@@ -1,15 +1,15 @@
-"""Search for changes of several hands and of the body that together make a stance hold.
+"""Search for changes of several hands and of the body that together make a stance feasible.
 
-With the hands' sets at the utilisation that is asked for, a stance holds where its hands can give
-as much as is needed in all directions d of body wrenches (Farkas):
+With the hands' wrench spaces at the utilisation cap, a stance is feasible if its hands can exert
+enough in each direction d of body wrenches W (Farkas):
 
     Σ_h s_h(d) ≥ d·W,   s_h(d) = max { d·w : w of hand h }.
 
-The multipliers of the balance of a plan that does not hold give a direction in which most is
-missing. What a changed hand can give in a direction is known without a plan, and so is what a shift
-of the body needs. So one variant of each hand, and a shift, are chosen that may hold by the
-directions found so far; if their plan does not hold, it gives one direction more (as Benders' cuts,
-1962).
+The balance multipliers of an infeasible or overloaded plan give the direction in which most is
+missing. The support function s_h of a changed hand is known without a plan, and so is the effect of
+a body shift on W. So the search chooses one variant of each hand, and a shift, that satisfy all
+directions found so far, and plans them; if that plan is not feasible, it adds a direction (as
+Benders' cuts, 1962).
 """
 
 from __future__ import annotations
@@ -72,35 +72,48 @@ class _Variant(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """A variant of each limb, and a shift of the body, by their indices."""
+    """One variant for each limb, and a shift of the body.
+
+    Attributes
+    ----------
+    hands : tuple of int
+        Index of each limb's variant.
+    shift : int
+        Index of the shift; 0 for none.
+    """
 
     hands: tuple[int, ...]
     shift: int
 
 
 class CombinationSearch:
-    """The search for changes of one stance that together make it hold.
+    """Search for changes of several hands and the body that together make a stance feasible.
 
-    Directions are k, variants of all limbs v, shifts of the body s.
+    There are k directions of body wrenches in which some plan lacked most, v variants of all limbs,
+    and s shifts of the body. Directions are scaled so that 1 is needed along each. Floating wrists
+    count as fixed where variants are chosen; plans treat them exactly.
 
     Parameters
     ----------
     trials : Trials
-        That pays for its plans. Of floating wrists hands are chosen as if they were fixed.
+        Budget of plans; its unchanged stance is the start.
 
     Attributes
     ----------
     gives : ndarray, shape (k, v)
-        Of what is needed, the part that each variant gives at most.
+        Largest wrench component along each direction that each variant can exert.
     needs : ndarray, shape (k, s)
-        The part that is needed with each shift, less one.
-    sizes, shift_sizes : ndarray, shapes (v,), (s,)
+        Needed wrench component along each direction with each shift, minus 1.
+    sizes : ndarray, shape (v,)
+        Size of each variant's change, as in `planner.result.Advice`.
+    shift_sizes : ndarray, shape (s,)
+        Size of each shift.
     reached : ndarray of bool, shape (v, s)
         Whether a variant is in its limb's reach with a shift.
     together : ndarray of bool, shape (v, v)
-        Whether two variants go together.
+        Whether two variants are compatible.
     slots : list of ndarray
-        Variants of each limb.
+        Indices of the variants of each limb.
     """
 
     def __init__(self, trials: Trials) -> None:
@@ -120,24 +133,25 @@ class CombinationSearch:
         self.learn(trials.base, 0)
 
     def run(self) -> None:
-        """Look for changes that hold, then for smaller ones, with the plans that are left."""
+        """Search for feasible changes, then for smaller ones, within the budget of plans."""
         if self.find(0, smallest=False) is not None:
             # plans for smaller changes, once some hold
             self.find(max(self.trials.left - 12, 0), smallest=True)
 
     def find(self, last: int, *, smallest: bool) -> Choice | None:
-        """Plan for one choice after the other, until one holds or so many plans are left.
+        """Plan one choice after another until one is feasible.
 
         Parameters
         ----------
         last : int
+            Number of plans to leave in the budget.
         smallest : bool
-            Whether to begin with the smallest choices that may hold, not with those that give most.
+            Whether to try the smallest choices first, not those that contribute most.
 
         Returns
         -------
         Choice or None
-            What holds.
+            The feasible choice; None if none was found.
         """
         as_it_is = Choice(tuple(int(slot[self.sizes[slot].argmin()]) for slot in self.slots), 0)
         seen, forbidden = [as_it_is], 0
@@ -168,13 +182,16 @@ class CombinationSearch:
         return None
 
     def anywhere(self) -> Iterator[Choice]:
-        """Yield choices to begin at."""
+        """Yield random choices at which the local search starts."""
         for _ in range(8):  # random choices to begin at
             hands = tuple(int(self._random.choice(slot)) for slot in self.slots)
             yield Choice(hands, int(self._random.integers(len(self._shifts))))
 
     def part(self, choice: Choice) -> float:
-        """Return the part of what is needed that a choice gives at most."""
+        """Return the share of the needed wrench that a choice can exert, in the worst direction.
+
+        Below 1, the choice is infeasible.
+        """
         given = self.gives[:, list(choice.hands)].sum(axis=1)
         return float((given - self.needs[:, choice.shift]).min())
 
@@ -219,7 +236,15 @@ class CombinationSearch:
         return slot[np.argsort(-worth, kind="stable")[:few]]
 
     def learn(self, trial: StanceTrial, shift: int) -> None:
-        """Keep the direction in which most is missing by a plan's multipliers, if there is one."""
+        """Add the direction of body wrenches in which an infeasible plan lacks most, if any.
+
+        Parameters
+        ----------
+        trial : StanceTrial
+            Plan that is not feasible.
+        shift : int
+            Index of the shift with which it was planned.
+        """
         found = direction(trial)
         needs = 0.0 if found is None else float(found @ trial.prepared.wrench)
         if found is None or not needs > 0.0:
@@ -253,7 +278,10 @@ class CombinationSearch:
             self.together[[i, j], [j, i]] = False
 
     def change(self, choice: Choice) -> Change | None:
-        """Return all that is changed, as one."""
+        """Return a choice as one change of the question; None if it changes nothing.
+
+        None, too, if two of its changes contradict each other.
+        """
         changes = [each for i in choice.hands if (each := self._variants[i].change) is not None]
         moved = self._moved(choice.shift)
         return combined(changes if moved is None else [*changes, moved])

@@ -1,4 +1,7 @@
-"""Propose changes of the hands of a stance, whose rock stays where it is in W."""
+"""Propose changes of a stance's hands: release, another grasp, another place or tension.
+
+The rock under a hand keeps its pose in W.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,7 @@ _Motion = tuple[float, float, float]
 
 
 def lettings(question: Question) -> Iterator[Change]:
-    """Yield each hand in turn as let go; none of a single one."""
+    """Yield, for each hand, the change that releases this hand; nothing for a single hand."""
     hands = question.stance.hands
     for i, hand in enumerate(hands if len(hands) > 1 else ()):
         changes: dict[str, Any] = {hand_path(i): None}
@@ -44,7 +47,16 @@ def lettings(question: Question) -> Iterator[Change]:
 
 
 def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
-    """Yield other grasps of one hand, and of all; one that is seated goes where they seat it."""
+    """Yield changes of the outer fingers' rotation, for single hands and for all hands together.
+
+    A hand that is seated automatically moves to the seat of its new grasp.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    order : sequence of int
+        Indices of the hands to change, in this order.
+    """
     hands = prepared.question.stance.hands
     found: dict[float, list[Change]] = {turn: [] for turn in SETTINGS.outer_turns}
     for i in order:
@@ -67,7 +79,17 @@ def _other_grasps(hand: HandOnHold) -> list[float]:
 
 
 def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
-    """Yield one hand moved, turned all around and with other grasps, its rock staying."""
+    """Yield changes of one hand: other grasps, and moves and rotations along its palm.
+
+    Rotations are multiples of 30° about z of hand frame H, each alone and with every other grasp.
+    The rock keeps its pose in world frame W.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    index : int
+        Index of the hand.
+    """
     hand = prepared.question.stance.hands[index]
     yield from grasps(prepared, [index])
     yield from placed(prepared, index, way_motions())
@@ -86,7 +108,7 @@ def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
 
 
 def closings(prepared: PreparedStance) -> Iterator[Change]:
-    """Yield all hands closed with another tension."""
+    """Yield changes that close all hands with a closing tension of 20 N, and of 50 N."""
     stance = prepared.question.stance
     known = [hand.closing_tension for hand in prepared.batch.hands]
     for tension in (20.0, 50.0):  # [N] of all hands
@@ -97,7 +119,13 @@ def closings(prepared: PreparedStance) -> Iterator[Change]:
 
 
 def fingers(turn: float) -> str:
-    """Say where the outer fingers are, turned so far [rad]."""
+    """Return words for a rotation of the outer fingers.
+
+    Parameters
+    ----------
+    turn : float
+        Rotation [rad].
+    """
     return f"the outer fingers at {math.degrees(turn):.0f}°"
 
 
@@ -126,7 +154,18 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
 
 
 def placed(prepared: PreparedStance, index: int, motions: Sequence[_Motion]) -> Iterator[Change]:
-    """Yield one hand moved along x and y of its palm [m], and turned about z [rad]."""
+    """Yield changes that move or rotate one hand along its palm; its rock stays.
+
+    Yields nothing where the rock, a scan, has no frame that can be placed.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    index : int
+        Index of the hand.
+    motions : sequence of (float, float, float)
+        Shift along x and y [m] and rotation about z [rad], in hand frame H.
+    """
     hand = prepared.question.stance.hands[index]
     for x, y, turn in motions:
         motion = Pose(np.array([x, y, 0.0]), turns_about([0.0, 0.0, turn]))
@@ -172,21 +211,46 @@ def _moved(
 
 
 def way_motions() -> list[_Motion]:
-    """Return small motions of a hand along its palm, for `placed`."""
+    """Return small shifts of a hand along its palm, as motions for `placed`."""
     return [(x, y, 0.0) for x, y in SETTINGS.palm_ways]
 
 
 def turn_motions(turns: Sequence[float] = SETTINGS.palm_turns) -> list[_Motion]:
-    """Return turns of a hand about z of its palm [deg], for `placed`."""
+    """Return rotations of a hand about z of H, as motions for `placed`.
+
+    Parameters
+    ----------
+    turns : sequence of float, optional
+        Rotations [deg].
+    """
     return [(0.0, 0.0, math.radians(turn)) for turn in turns]
 
 
 def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:
-    """Return that a hand is not seated any more."""
+    """Return the changes that remove a hand's automatic seat from a question.
+
+    Parameters
+    ----------
+    hand : HandOnHold
+    index : int
+        Index of the hand in the question.
+
+    Returns
+    -------
+    dict of str to None
+        Paths of the fields that are removed; see `planner.result.Advice`.
+    """
     said = {"seat": hand.seat != "rest", "seat_direction": hand.seat_direction is not None}
     return {hand_path(index, name): None for name, given in said.items() if given}
 
 
 def rock_pose(prepared: PreparedStance, index: int) -> Pose:
-    """Return where a hand's rock is in W."""
+    """Return the pose in W of the rock under a hand.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    index : int
+        Index of the hand.
+    """
     return prepared.question.stance.hands[index].pose @ prepared.batch.hands[index].seating.pose

@@ -1,8 +1,8 @@
-"""Search for new holds of limbs, free ones first, on condition that there is rock.
+"""Search for new holds of limbs, assuming that there is rock; free limbs come first.
 
-The rock is like that under a hand of the stance, and lies in the hand alike. A rock that hands
-share stands in W once, so that no hold is like one on it. Places are on a plane through the hands,
-whose normal is the mean of their palms', on a grid in the limb's reach.
+The assumed rock equals that under a hand of the stance, and lies in the new hand as in that hand.
+Hands that share one rock are not copied, as that rock has one place in W. Candidate places are a
+grid, within the limb's reach, on a plane through the hands whose normal is the mean of the palms'.
 """
 
 from __future__ import annotations
@@ -45,12 +45,22 @@ class _Hold(NamedTuple):
 
 
 class NewHold:
-    """The search for a hold of one limb.
+    """Search for a new hold of one limb.
 
     Parameters
     ----------
     trials : Trials
+        Budget of plans.
     limb : str
+
+    Attributes
+    ----------
+    index : int
+        Index of the limb's hand in the question; the number of hands for a free limb.
+    best : tuple of (Tried, hold) or None
+        Change with the lowest utilisation so far, and its hold.
+    places : list of ndarray, shape (3,)
+        Candidate places of hand frame H in world frame W [m].
     """
 
     def __init__(self, trials: Trials, limb: str) -> None:
@@ -64,18 +74,24 @@ class NewHold:
 
     @property
     def likes(self) -> list[int]:
-        """Hands that it may be like; on a rock that hands share it is known what is elsewhere."""
+        """Indices of the hands that the new hand may copy with their rock; none on shared rock."""
         limbs, shared = self.prepared.limbs, _sharing(self.prepared)
         likes = [i for i in range(len(limbs)) if i != self.index and i not in shared]
         return sorted(likes, key=limbs.__getitem__)
 
     def probe(self, turns: Sequence[float]) -> None:
-        """Try it like each hand, turned from that, at the first place."""
+        """Plan the new hand at the first place, as a copy of each hand.
+
+        Parameters
+        ----------
+        turns : sequence of float
+            Rotations about z of hand frame H relative to the copied hand [rad].
+        """
         if self.places:
             self._try([_Hold(i, self.places[0], turn) for i in self.likes for turn in turns])
 
     def refine(self) -> None:
-        """Try the best so far turned, with other grasps, then elsewhere."""
+        """Plan variants of the best hold so far: rotated, with other grasps, at other places."""
         if self.best is None:
             return
         quarters = SETTINGS.quarter_turns[1:] if self.best[1].turn == 0.0 else ()
@@ -103,7 +119,13 @@ class NewHold:
                 self.best = tried, holds[tried.change.words]
 
     def change(self, hold: _Hold) -> Change:
-        """Return the limb holding at a place as another hand does, but for its turn and grasp."""
+        """Return the change that puts the limb's hand on a hold.
+
+        Parameters
+        ----------
+        hold : _Hold
+            Index of the hand to copy, place, rotation and grasp.
+        """
         stance, new = self.prepared.question.stance, self.index
         hand = stance.hands[hold.like]
         motion = turns_about([0.0, 0.0, hold.turn])
@@ -147,7 +169,15 @@ class NewHold:
 
 
 def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
-    """Yield a limb at all places, like each other hand, turned all around from it."""
+    """Yield changes that put a limb at each candidate place, in steps of 45° about z of H.
+
+    Each hand whose rock is not shared is copied in turn.
+
+    Parameters
+    ----------
+    trials : Trials
+    limb : str
+    """
     search = NewHold(trials, limb)
     turns = [math.radians(turn) for turn in range(-135, 181, 45)]  # [rad] all around
     for place in search.places:
@@ -157,13 +187,14 @@ def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
 
 
 def try_new_holds(trials: Trials, most: int = 1) -> None:
-    """Try where limbs that hold nothing had better take hold, and where others had better.
+    """Plan new holds for all limbs, and refine the best ones.
 
     Parameters
     ----------
     trials : Trials
+        Budget of plans, which collects the results.
     most : int, optional
-        Limbs whose holds are searched for after a first look.
+        Number of limbs whose holds are refined after a first look.
     """
     limbs = trials.base.prepared.limbs
     searches = []

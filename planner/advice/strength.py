@@ -1,4 +1,4 @@
-"""Find how much stronger holds, or how much lighter a body, make a stance hold."""
+"""Find how much stronger rock, or how much lighter a body, makes a stance feasible."""
 
 from __future__ import annotations
 
@@ -15,7 +15,19 @@ __all__ = ["lighter", "stronger"]
 
 
 def stronger(trials: Trials, order: Sequence[int], most: int) -> None:
-    """Try all holds stronger, then each in order, with so many plans at most."""
+    """Find by how much the rock must be stronger: under all hands, then under single hands.
+
+    Results are kept in ``trials``.
+
+    Parameters
+    ----------
+    trials : Trials
+        Budget of plans.
+    order : sequence of int
+        Indices of single hands, in this order.
+    most : int
+        Largest number of plans.
+    """
     hands, last = trials.question.stance.hands, trials.left - most
     single = [(i,) for i in order] if len(hands) > 1 else []
     for which in [tuple(range(len(hands))), *single]:
@@ -78,9 +90,22 @@ def _surface(hand: HandOnHold, factor: float) -> dict[str, Any]:
 
 
 def lighter(trials: Trials, factor: float | None, most: int) -> list[Tried]:
-    """Try the largest mass that holds, with so many plans at most.
+    """Find the largest mass of the body for which the stance is feasible.
 
-    ``factor``: the load factor, if there is one.
+    Parameters
+    ----------
+    trials : Trials
+        Budget of plans.
+    factor : float or None
+        Load factor of the unchanged stance, where the search starts; None if there is none.
+    most : int
+        Largest number of plans.
+
+    Returns
+    -------
+    list of Tried
+        That mass, if one was found. Empty, too, where a body wrench or an angular acceleration is
+        given.
     """
     question = trials.question
     load = question.load

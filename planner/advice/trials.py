@@ -1,4 +1,4 @@
-"""Changes tried: each is planned and verified as its question would be, within a count of plans."""
+"""Plan and verify candidate changes of a question, within a budget of plans."""
 
 from __future__ import annotations
 
@@ -30,19 +30,22 @@ __all__ = [
 
 
 class StanceTrial(NamedTuple):
-    """Result of a stance that was tried.
+    """Result of planning a candidate stance.
 
     Attributes
     ----------
     prepared : PreparedStance
+        The stance, with its hands settled and its joints found.
     data : StanceData
-        Data of its hands, about its plan.
+        Scaled rows of all hands for the programs; those of floating hands are linearised about the
+        plan.
     outcome : Outcome
-        Outcome of the program of least utilisation.
+        Outcome of the program that minimises the utilisation.
     utilisation : float
         Utilisation of the verified plan; infinite without one.
     load_factor : callable
-        Finds how many times the body wrench could be held.
+        Computes the `LoadFactor`: the largest multiple of the body wrench that can be held at
+        utilisation 1.
     """
 
     prepared: PreparedStance
@@ -53,7 +56,7 @@ class StanceTrial(NamedTuple):
 
 
 class Attempt(Protocol):
-    """Plans a stance that is only tried; see `planner.solving.try_stance`."""
+    """Callable that plans a candidate stance; implemented by `planner.solving.try_stance`."""
 
     def __call__(
         self,
@@ -61,11 +64,33 @@ class Attempt(Protocol):
         idle: Sequence[LimitUse] | None = None,
         near: Any | None = None,
     ) -> StanceTrial:
-        """Return the result of a stance."""
+        """Plan and verify a stance.
+
+        Parameters
+        ----------
+        prepared : PreparedStance
+        idle : sequence of LimitUse, optional
+            Use of joint torque by limbs without a hand, where it is known already.
+        near : object, optional
+            Solution of a similar stance, from which the search starts.
+
+        Returns
+        -------
+        StanceTrial
+            Its utilisation is infinite if the stance has no plan.
+        """
 
 
 class Tried(NamedTuple):
-    """Change of a question, with the result of its stance."""
+    """A change of a question, and the plan of the changed stance.
+
+    Attributes
+    ----------
+    change : Change
+    question : Question
+        The changed question.
+    trial : StanceTrial
+    """
 
     change: Change
     question: Question
@@ -73,36 +98,41 @@ class Tried(NamedTuple):
 
     @property
     def utilisation(self) -> float:
-        """Utilisation of its plan; infinite without a plan."""
+        """Utilisation of the verified plan; infinite without one."""
         return self.trial.utilisation
 
 
 class Trials:
-    """A count of plans, and the changes that were tried with them.
+    """Budget of plans, with all changes that were planned so far.
+
+    All methods that plan raise `DeadlineError` once the deadline has expired.
 
     Parameters
     ----------
     question : Question
-        As it is tried: `Question.bare`.
+        For the least utilisation, without extras: as `Question.bare` returns it.
     attempt : callable
-        Plans a stance.
+        Plans a stance; see `Attempt`.
     plans : int, optional
-        How many may be made.
+        Number of plans that may be made, with that of the unchanged stance.
 
     Attributes
     ----------
     question : Question
+        The unchanged question.
     base : StanceTrial
-        The question as it is.
+        Plan of the unchanged question.
     left : int
-        Plans that may still be made.
+        Number of plans that may still be made.
     found : list of Tried
-        All changes with which there is a plan.
+        All changes whose stance has a plan, feasible or overloaded.
 
     Raises
     ------
     DeadlineError
-        By all that plans, if the time is over.
+        If the deadline has expired before the unchanged stance is planned.
+    InvalidInputError
+        If the question is invalid.
     """
 
     def __init__(self, question: Question, attempt: Attempt, plans: int = SETTINGS.plans) -> None:
@@ -113,12 +143,12 @@ class Trials:
         self._odd = _odd(self.base.prepared)
 
     def holds(self, utilisation: float) -> bool:
-        """Return whether a utilisation is within the question's cap."""
+        """Return whether a utilisation is feasible: within the question's cap on it."""
         return utilisation <= self.question.limits.utilisation + CAP_SLACK
 
     @property
     def helped(self) -> bool:
-        """True if some change makes it hold, not counting lighter bodies and stronger holds."""
+        """True if some change found is feasible, not counting changes of mass or strength."""
         return any(
             self.holds(each.utilisation)
             for each in self.found
@@ -126,7 +156,17 @@ class Trials:
         )
 
     def of(self, candidates: Iterable[Change]) -> list[Tried]:
-        """Try changes as far as plans are left; return those with which there is a plan."""
+        """Plan several changes, in order, until no plan is left in the budget.
+
+        Parameters
+        ----------
+        candidates : iterable of Change
+
+        Returns
+        -------
+        list of Tried
+            The changes whose stance has a plan, feasible or overloaded.
+        """
         asked = self._asked(list(candidates)[: max(self.left, 0)])
         self._settle([question for _, question in asked])
         before = len(self.found)
@@ -135,13 +175,24 @@ class Trials:
         return self.found[before:]
 
     def one(self, change: Change) -> StanceTrial | None:
-        """Try a change; return what came of it, with a plan or without; None if it cannot be."""
+        """Plan one change, whether or not the budget has plans left.
+
+        Returns
+        -------
+        StanceTrial or None
+            Its utilisation is infinite if the stance has no plan. None if the change is not
+            `possible`.
+        """
         for each, question in self._asked([change]):
             return self._tried(each, question)
         return None
 
     def possible(self, change: Change) -> bool:
-        """Return whether a change gives a stance that can be planned; no plan is made."""
+        """Return whether a change gives a valid stance, without planning the stance.
+
+        A change is not possible, either, if it causes or worsens a finding, such as a hand out of
+        reach or a body in rock.
+        """
         return any(self._prepared(question) for _, question in self._asked([change]))
 
     def _tried(self, change: Change, question: Question) -> StanceTrial | None:
@@ -169,11 +220,30 @@ class Trials:
         return None if worse else prepared
 
     def turned(self, wrench: Array) -> StanceTrial:
-        """Try the hands as they are for another body wrench, shape (6,) [N, N·m], in B."""
+        """Plan the unchanged hands for another body wrench.
+
+        Parameters
+        ----------
+        wrench : ndarray, shape (6,)
+            Body wrench in body frame B [N, N·m].
+        """
         return self._try(self.base.prepared.turned(wrench))
 
     def again(self, question: Question, objective: Objective | OwnObjective) -> StanceTrial:
-        """Plan what was tried for another objective."""
+        """Plan a question for another objective.
+
+        Parameters
+        ----------
+        question : Question
+            For example the changed question of a `Tried`.
+        objective : str or OwnObjective
+            Replaces the question's objective.
+
+        Returns
+        -------
+        StanceTrial
+            Its utilisation is infinite if the stance has no plan.
+        """
         return self._try(prepare_stance(replace(question, objective=objective)))
 
     def _asked(self, candidates: Sequence[Change]) -> list[tuple[Change, Question]]:
@@ -198,7 +268,21 @@ class Trials:
 
 
 def direction(trial: StanceTrial) -> Array | None:
-    """Return the body wrenches' direction in which a stance lacks most, shape (6,), if known."""
+    """Return the direction of body wrenches along which a stance's hands lack most.
+
+    If the least utilisation was found: the gradient of that utilisation with respect to the body
+    wrench, from the multipliers of the balance. Otherwise the part of the body wrench that the
+    hands cannot exert, each component divided twice by its unit.
+
+    Parameters
+    ----------
+    trial : StanceTrial
+
+    Returns
+    -------
+    ndarray, shape (6,), or None
+        In body frame B [1/N, 1/(N·m)]; of any length. None if no program was solved.
+    """
     outcome, data = trial.outcome, trial.data
     if outcome.solved and outcome.balance_dual is not None:
         return np.asarray(-outcome.balance_dual[:6] / WRENCH_UNIT)

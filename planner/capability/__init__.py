@@ -1,4 +1,4 @@
-"""Wrenches and accelerations that the body can bear, and wrenches of a floating hand."""
+"""Feasible wrenches and accelerations of the body, and wrenches of a floating hand."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,7 +1,7 @@
-"""The programs of a stance's body space: its hands, how far they reach, and what ends the way.
+"""Conic programs for the body space of a stance: the farthest feasible point in a direction.
 
-Everything that a plan counts is counted: joints, caps, hand wrenches that are given, and what limbs
-without a hand bear of their own weight.
+As in a plan, the programs take joints, force caps, prescribed hand wrenches and the weight of limbs
+without a hand into account.
 """
 
 from __future__ import annotations
@@ -34,23 +34,24 @@ from planner.solving import plan
 __all__ = ["BodyPrograms", "End", "Motion", "size_of"]
 
 MISSING_RESULT: Final = "it was known what the stance can hold"
-"""Result that is missing if a deadline comes first, in words."""
+"""Result that a deadline prevents, in the words of the error."""
 
 
 class Motion(NamedTuple):
-    """Effect of the body's acceleration in W, k components: three linear, and three angular.
+    """Effect of the body's acceleration on the stance's programs.
 
-    Both the wrench that accelerates a robot whose joints stand still and its joints' torques are
-    affine in the acceleration, so that one column for each component describes it fully.
+    The acceleration has k components in world frame W: three linear and, if known, three angular.
+    With joints at rest, the wrench that accelerates the robot and the joints' torques are affine in
+    the acceleration: one column for each component describes them.
 
     Attributes
     ----------
     rest : StanceData
-        Data of the body at rest.
+        Scaled rows of the hands with the body at rest.
     wrench : ndarray, shape (6, k)
-        Body wrench for one unit of each component [kg, kg·m, kg·m²].
+        Body wrench in body frame B for one unit of each component [kg, kg·m, kg·m²].
     torques : tuple of ndarray, shape (nl, k)
-        What one unit of each adds to each hand's limit rows.
+        For each hand, the change of utilisation of its limit rows for one unit of each component.
     """
 
     rest: StanceData
@@ -59,18 +60,20 @@ class Motion(NamedTuple):
 
 
 class End(NamedTuple):
-    """Farthest point that a stance reaches in a direction.
+    """Farthest feasible point of a stance in a direction.
 
     Attributes
     ----------
     reach : float
-        [N, N·m, m/s² or rad/s²]
+        Largest t for which t times the direction is feasible; from `BodySpace.support`, largest
+        product of direction and body wrench. For a unit direction in N, N·m, m/s² or rad/s².
     wrench : ndarray, shape (6,)
-        The body wrench there, in B.
+        Body wrench at that point, in body frame B [N, N·m].
     limiting : LimitName or None
-        The limit that ends the way; of several, the one that more of would help most.
+        Limit with the largest multiplier at that point: one per cent more of this limit would
+        extend the reach most. None if no limit binds.
     loads : tuple of ndarray
-        y of each hand.
+        Loads y of each hand [N]; of a floating hand the wrist's twist [m, rad].
     """
 
     reach: float
@@ -80,7 +83,7 @@ class End(NamedTuple):
 
 
 class BodyPrograms:
-    """Conic programs for what a question's stance can hold, direction by direction.
+    """Conic programs that find the farthest feasible body wrench or acceleration of a stance.
 
     Parameters
     ----------
@@ -89,15 +92,15 @@ class BodyPrograms:
     Attributes
     ----------
     question : Question
-        Without extras and deadline, and for the least utilisation.
+        The question for the least utilisation, without extras and deadline.
     plan : Plan
-        Its answer.
+        Plan of that question.
     data : StanceData
-        Its hands; floating ones where the plan puts them.
+        Scaled rows of the hands; those of floating hands are linearised about the plan.
     motion : Motion or None
-        How the body's acceleration enters; None if the body wrench is given.
+        Effect of the body's acceleration; None if the question gives a body wrench.
     exact : bool
-        Whether no wrist floats.
+        Whether no wrist floats, so that no set is linearised.
     """
 
     def __init__(self, question: Question) -> None:
@@ -122,17 +125,23 @@ class BodyPrograms:
 
     @property
     def cap(self) -> float:
-        """The utilisation to go up to."""
+        """Cap on the utilisation, from the question's limits."""
         return self.question.limits.utilisation
 
     @cached_property
     def cap_at_needed(self) -> float | None:
-        """The cap for ways from the wrench asked for; None if that is not held."""
+        """Utilisation cap for searches from the question's body wrench; None if infeasible.
+
+        The question's cap, or slightly more where the least utilisation equals that cap.
+        """
         return self._cap_of(self.data)
 
     @cached_property
     def at_rest(self) -> tuple[StanceData, float] | None:
-        """The hands while the body is at rest, and the cap; None if it cannot be held so."""
+        """Scaled rows of the hands with the body at rest, and utilisation cap.
+
+        None if the body is infeasible at rest. Requires ``motion``.
+        """
         assert self.motion is not None
         cap = self._cap_of(self.motion.rest)
         return None if cap is None else (self.motion.rest, cap)
@@ -151,18 +160,34 @@ class BodyPrograms:
     def reached(
         self, goal: Array, columns: Array, start: Array, cap: float | None = None
     ) -> Reached | None:
-        """Return the farthest body wrench; None if there is none.
+        """Find the feasible body wrench that is farthest along a goal.
+
+        Maximises goal · t over body wrenches ``start + WRENCH_UNIT * (columns @ t)``.
 
         Parameters
         ----------
         goal : ndarray, shape (n,)
-            Of t.
+            Not zero.
         columns : ndarray, shape (6, n)
-            The body wrenches are the start and `WRENCH_UNIT` times these columns times t.
+            Directions of body wrenches in body frame B, over `WRENCH_UNIT`; not zero.
         start : ndarray, shape (6,)
-            [N, N·m]
+            Body wrench in B at t = 0 [N, N·m].
         cap : float, optional
-            The utilisation to go up to; the question's by default.
+            Cap on the utilisation; the question's by default.
+
+        Returns
+        -------
+        Reached or None
+            Outcome of the program and t, shape (n,). None if no t is feasible.
+
+        Raises
+        ------
+        InvalidInputError
+            If ``goal`` or ``columns`` is zero.
+        SolverError
+            If the program is not solved.
+        UnsupportedError
+            If t is unbounded.
         """
         # after the body wrench come the wrenches of hands that are given, which stay
         of_hands = self.data.wrench[6:]
@@ -170,7 +195,29 @@ class BodyPrograms:
         return _solved(data, goal, columns, self.cap if cap is None else cap)
 
     def accelerated(self, goal: Array, ways: Array) -> Reached | None:
-        """Return the farthest acceleration along columns (k, n) of W, t of each."""
+        """Find the feasible acceleration of the body that is farthest along a goal.
+
+        Maximises goal · t over accelerations ``ways @ t``. Requires ``motion`` and ``at_rest``.
+
+        Parameters
+        ----------
+        goal : ndarray, shape (n,)
+            Not zero.
+        ways : ndarray, shape (k, n)
+            Directions of the k acceleration components of `Motion`, in world frame W.
+
+        Returns
+        -------
+        Reached or None
+            Outcome of the program and t, shape (n,) [m/s², rad/s²]. None if no t is feasible.
+
+        Raises
+        ------
+        SolverError
+            If the program is not solved.
+        UnsupportedError
+            If t is unbounded.
+        """
         assert self.motion is not None
         assert self.at_rest is not None
         data, cap = self.at_rest
@@ -178,11 +225,23 @@ class BodyPrograms:
         return _solved(data, goal, columns, cap, [each @ ways for each in self.motion.torques])
 
     def wrench(self, found: Reached) -> Array:
-        """Return the body wrench that a program's loads give, shape (6,) [N, N·m]."""
+        """Return the body wrench that a solved program's loads exert, in B, shape (6,) [N, N·m]."""
         return np.asarray(programs.body_wrench(self.data, found.outcome.loads)[:6] * WRENCH_UNIT)
 
     def limiting(self, outcome: Outcome) -> LimitName | None:
-        """Return the limit with the largest multiplier, all rows of a name taken together."""
+        """Return the limit with the largest dual value (multiplier) in a solved program.
+
+        Multipliers of all rows of a limit are added.
+
+        Parameters
+        ----------
+        outcome : Outcome
+
+        Returns
+        -------
+        LimitName or None
+            None if no limit binds.
+        """
         worth: dict[LimitName, float] = {}
         for names, duals in zip(self._names, outcome.limit_duals, strict=True):
             for name, multiplier in zip(names, duals, strict=True):
@@ -193,10 +252,22 @@ class BodyPrograms:
         return most if most is not None and worth[most] > TOLERANCES.binding_multiplier else None
 
     def linearisation_error(self, ends: Sequence[End]) -> float:
-        """Return how far floating hands' sets are off at most at some ends [N].
+        """Return the largest linearisation error of floating hands' wrenches at some end points.
 
-        The largest disagreement of a hand's wrench with the exact model there: forces, and moments
-        over 0.1 m. Zero where no wrist floats.
+        Parameters
+        ----------
+        ends : sequence of End
+
+        Returns
+        -------
+        float
+            Largest component of the difference between the linearised and the exact wrench of a
+            hand [N], moments over 0.1 m. Zero where no wrist floats.
+
+        Raises
+        ------
+        DeadlineError
+            If the deadline has expired.
         """
         worst = 0.0
         for end in () if self.exact else ends:
@@ -232,7 +303,13 @@ def _solved(
 
 
 def size_of(direction: Array) -> float:
-    """Return the largest component of a direction, which must not be zero."""
+    """Return the largest absolute component of a direction.
+
+    Raises
+    ------
+    InvalidInputError
+        If the direction is zero.
+    """
     size = float(np.abs(direction).max(initial=0.0))
     if not size > 0.0:
         raise InvalidInputError("a direction that is not zero is needed", field="direction")

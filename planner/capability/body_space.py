@@ -1,15 +1,19 @@
-"""Body wrenches that a stance can hold, and the accelerations: how far, and in which shape.
+"""Body space of a stance: the body wrenches and body accelerations that are feasible.
 
-A body wrench W is held if loads within the limits, at the utilisation asked for, balance it:
+A body wrench W is feasible if loads within the limits, at the utilisation cap u of the question,
+balance it; for each hand h
 
-    Σ_h −Ad(B←H_h) (o_h + V_h y_h) = W,   L_h y_h + l0_h + K_h a ≤ u s_h,   H_h y_h ≤ h_h.
+    Σ_h −Ad(B←H_h) (o_h + V_h y_h) = W,   L_h y_h + l0_h + K_h a ≤ u s_h,   H_h y_h ≤ h_h,
 
-These W are a convex polytope in six dimensions. It is known by its support function, one conic
-program a direction (`program.Reach`), and its sections and projections by `polygon`. An
-acceleration a of the body adds its inertia's wrench to W, and torques K a to the joints.
+with loads y_h, wrench o_h + V_h y_h on the rock in H, limit rows L_h with capacities s_h, and hard
+rows H_h. An acceleration a of the body adds its inertia's wrench to W, and torques K a to the
+joints.
 
-Floating hands count with their sets linearised where a plan for the body wrench asked for puts the
-wrists: what is far from there is approximate.
+These W are a convex polytope in six dimensions. Its support function is one conic program for each
+direction (`program.Reach`); `polygon` computes its sections and projections.
+
+Sets of floating hands are linearised about the wrists' poses in the plan for the question's body
+wrench: far from that wrench the result is approximate.
 """
 
 from __future__ import annotations
@@ -46,19 +50,21 @@ OTHER_COMPONENTS: Final[dict[str, str]] = {
     "zero": "the others zero",
     "free": "whatever the others",
 }
-"""Values that the other components of a body wrench may have, each with its label."""
+"""Values that the other components of a body wrench may have in a section, each with its label."""
 
 
 class BodySection(NamedTuple):
-    """A plane of the body wrenches that are held.
+    """Feasible body wrenches in the plane of two components.
 
     Attributes
     ----------
     axes : tuple of (str, str)
-        Of `WRENCH_COMPONENTS`.
+        Names of the two components, from `WRENCH_COMPONENTS`.
     others : {'needed', 'zero', 'free'}
+        Values of the other four components: those of the question's body wrench, zero, or any.
     polygon : Polygon or None
-        [N, N·m]; its gap in scaled wrenches [N]. None where the plane misses the set.
+        Corners [N, N·m]; the gap between inner and outer polygon in scaled wrenches [N] (moments
+        over 0.1 m). None if the plane does not meet the body space.
     """
 
     axes: tuple[str, str]
@@ -67,63 +73,115 @@ class BodySection(NamedTuple):
 
 
 class BodySpace(BodyPrograms):
-    """Body space of a stance: its largest wrench in a direction, and its sections.
+    """Body space of a stance: feasible body wrenches and accelerations, by directions and sections.
 
     Parameters
     ----------
     question : Question
-        Its limits, joints, caps and given hand wrenches count as in a plan; its objective and its
+        Limits, joints, force caps and prescribed hand wrenches count as in a plan. Objective and
         deadline do not.
 
     Raises
     ------
     InvalidInputError
-        If the question cannot be understood; its ``field`` is relative to the question.
+        If the question is invalid; ``field`` is relative to the question.
     """
 
     @property
     def needed(self) -> Array:
-        """The body wrench asked for, in B, shape (6,) [N, N·m]."""
+        """Body wrench of the question, in body frame B, shape (6,) [N, N·m]."""
         return self.plan.body_wrench
 
     # Wrenches -----------------------------------------------------------------------------------
 
     def support(self, direction: ArrayLike) -> End | None:
-        """Return the wrench that is held and farthest in a direction; None if there is none.
+        """Return the feasible body wrench w that maximises d · w: the support function.
 
         Parameters
         ----------
         direction : array_like, shape (6,)
-            d; the reach is the largest d · W.
+            d, in body frame B; not zero.
+
+        Returns
+        -------
+        End or None
+            ``reach`` is d · w. None if no body wrench is feasible.
+
+        Raises
+        ------
+        InvalidInputError
+            If the direction is zero.
+        SolverError
+            If the program is not solved.
         """
         d = finite_vector(direction, 6, "direction")
         found = self.reached(d * WRENCH_UNIT, np.eye(6), np.zeros(6))
         return None if found is None else self._end(found, float(d @ self.wrench(found)))
 
     def pure(self, direction: ArrayLike) -> End | None:
-        """Return how far t d is held, from zero along a direction d, shape (6,); None if never."""
+        """Return the largest t for which the body wrench t d is feasible.
+
+        Parameters
+        ----------
+        direction : array_like, shape (6,)
+            d, in body frame B [N, N·m]; not zero.
+
+        Returns
+        -------
+        End or None
+            ``reach`` is t. None if no multiple of d is feasible.
+
+        Raises
+        ------
+        InvalidInputError
+            If the direction is zero.
+        SolverError
+            If the program is not solved.
+        """
         return self._along(np.zeros(6), direction)
 
     def more(self, direction: ArrayLike) -> End | None:
-        """Return how far W + t d is held from the wrench W asked for; None if W is not held."""
+        """Return the largest t for which w + t d is feasible, w being the question's body wrench.
+
+        Parameters
+        ----------
+        direction : array_like, shape (6,)
+            d, in body frame B [N, N·m]; not zero.
+
+        Returns
+        -------
+        End or None
+            ``reach`` is t. None if w is not feasible.
+
+        Raises
+        ------
+        InvalidInputError
+            If the direction is zero.
+        SolverError
+            If the program is not solved.
+        """
         cap = self.cap_at_needed
         return None if cap is None else self._along(self.needed, direction, cap)
 
     def section(self, axes: Sequence[str], others: Others = "needed") -> BodySection:
-        """Return the wrenches that are held in the plane of two components.
+        """Return the feasible body wrenches in the plane of two components, as a polygon.
 
         Parameters
         ----------
         axes : sequence of str, length 2
             Two of `WRENCH_COMPONENTS`.
         others : {'needed', 'zero', 'free'}
-            The other components: those of the wrench asked for, zero, or whatever they may be,
-            which makes it a projection.
+            Values of the other components: those of the question's body wrench, zero, or any. The
+            last gives a projection of the body space, the others a section.
+
+        Returns
+        -------
+        BodySection
 
         Raises
         ------
         InvalidInputError
-            If axes are unknown, alike, or not two; or ``others`` is unknown.
+            If axes are unknown, equal, or not two; or ``others`` is unknown.
         SolverError
             If a program is not solved.
         """
@@ -153,7 +211,10 @@ class BodySpace(BodyPrograms):
 
     @property
     def weight(self) -> Array | None:
-        """The body wrench that holds the body at rest, shape (6,); None without a load."""
+        """Body wrench that balances the load at rest, in B, shape (6,) [N, N·m].
+
+        None if the question gives a body wrench instead of a load.
+        """
         motion = self.motion
         return None if motion is None else np.asarray(motion.rest.wrench[:6] * WRENCH_UNIT)
 
@@ -161,32 +222,36 @@ class BodySpace(BodyPrograms):
 
     @property
     def accelerates(self) -> bool:
-        """True where accelerations are known: a load is given, not a body wrench."""
+        """True if accelerations can be computed: the question gives a load, not a body wrench."""
         return self.motion is not None
 
     @property
     def turns(self) -> bool:
-        """True where angular accelerations are known, too: with joints, and no com of a load."""
+        """True if angular accelerations can be computed, too.
+
+        They require known joints, and a load without a centre of mass.
+        """
         return self.motion is not None and self.motion.wrench.shape[1] == 6
 
     def acceleration(self, direction: ArrayLike) -> End | None:
-        """Return the largest acceleration of the body, from rest, that is held along a direction.
+        """Return the largest feasible acceleration of the body, from rest, along a direction.
 
         Parameters
         ----------
         direction : array_like, shape (3,) or (6,)
-            In W; of length 6 with an angular part, about B's origin. The reach is the largest t
-            for which the acceleration t d is held, the others being zero.
+            Linear and, with length 6, angular part in world frame W, about the origin of body frame
+            B. With length 3, the angular acceleration is zero.
 
         Returns
         -------
         End or None
-            None where the body cannot even be held at rest.
+            ``reach`` is the largest t for which t times the direction is feasible. None if the body
+            is not feasible at rest.
 
         Raises
         ------
         InvalidInputError
-            If the direction is none, or accelerations are not known.
+            If the direction is zero or of a wrong length, or accelerations cannot be computed.
         SolverError
             If a program is not solved.
         """
@@ -199,10 +264,26 @@ class BodySpace(BodyPrograms):
     def acceleration_section(
         self, one: ArrayLike, two: ArrayLike, most: int = POLYGON_SETTINGS.most_directions
     ) -> Polygon | None:
-        """Return the accelerations that are held in the plane of two unit vectors of W [m/s²].
+        """Return the feasible linear accelerations of the body, from rest, in a plane.
 
-        Found from so many directions at most. None where the body cannot be held at rest; raises
-        what `acceleration` raises.
+        Parameters
+        ----------
+        one, two : array_like, shape (3,)
+            Unit vectors in world frame W that span the plane.
+        most : int, optional
+            Largest number of directions that are solved for.
+
+        Returns
+        -------
+        Polygon or None
+            Coordinates along ``one`` and ``two`` [m/s²]. None if the body is not feasible at rest.
+
+        Raises
+        ------
+        InvalidInputError
+            If a direction is zero, or accelerations cannot be computed.
+        SolverError
+            If a program is not solved.
         """
         ways = [self._ways(finite_vector(way, 3, "direction")) for way in (one, two)]
         if self.at_rest is None:
@@ -248,12 +329,17 @@ class BodySpace(BodyPrograms):
 
 
 def checked_axes(axes: Sequence[str]) -> tuple[str, str]:
-    """Return two different components of a body wrench.
+    """Return two different component names of a body wrench, checked.
+
+    Parameters
+    ----------
+    axes : sequence of str
+        To be two of `WRENCH_COMPONENTS`.
 
     Raises
     ------
     InvalidInputError
-        If they are not that.
+        If a name is unknown, both are equal, or there are not two.
     """
     if len(axes) != 2:
         raise InvalidInputError(f"two axes are needed, got {len(axes)}", field="axes")

@@ -1,15 +1,16 @@
 """Rank measurements on a real hand by how much they narrow the spread of load factors.
 
-The samples of unknown parameters (`hand_models.parameters.draws`) stand for all possible hands.
-Each sample in turn is taken for the truth: a measurement that gives m* there and m_i in sample i,
-with the standard deviation σ, leaves sample i the weight
+The Monte Carlo samples of uncertain parameters (`hand_models.parameters.draws`) stand for all
+possible hands. Each sample in turn is taken as the truth: a measurement with standard deviation σ
+that gives m* there and m_i in sample i leaves sample i the weight
 
     w_i = exp(−Σ (m_i − m*)² / (2 σ²)),
 
-summed over the numbers that one measurement gives. The narrower the weighted 5 to 95 % of the load
-factor, averaged over the truths, the better the measurement: its *width* is that over the width of
-all samples alike. Weights leave few samples, and few samples are less wide by chance: so a width is
-compared with `chance`, its mean with the measured numbers of other samples (all cyclic shifts).
+summed over the numbers of that measurement. A measurement is better, the narrower the weighted 5 to
+95 % interval of the load factor is, averaged over the truths; its *width* is that average over the
+interval's width with equal weights. Weights leave few samples, whose interval is narrower by
+chance: so each width is compared with `chance`, the mean width with the measured numbers of other
+samples (all cyclic shifts).
 """
 
 from __future__ import annotations
@@ -42,18 +43,20 @@ __all__ = ["MeasurementStudy", "measured", "widths"]
 
 
 def measured(draw: ParameterSample, hand: ParameterTable) -> dict[str, Array]:
-    """Return what each measurement gives on the hand of a draw, exactly, by its name.
+    """Return the exact results of all measurements on the hand of one parameter sample.
 
     Parameters
     ----------
     draw : ParameterSample
+        Sampled parameters.
     hand : ParameterTable
-        All numbers of the hand that the draw changes.
+        All parameters of the hand, of which the sample replaces some.
 
     Returns
     -------
     dict of str to ndarray, shape (k,)
-        In the units of ``[measurements]``; a pull is zero where the gripper holds none.
+        k numbers by measurement, in the units of ``[measurements]`` of the experiments' parameter
+        file; a pull is zero where the gripper cannot grip.
     """
     numbers, surfaces = own_hand(draw.hand, hand), own_surfaces(draw.surfaces)
     tile, rock = (Surface.named(name, surfaces) for name in ("sandpaper-36", "rock"))
@@ -105,21 +108,23 @@ def _on_gripper(draw: ParameterSample, hand: ParameterTable, tile: Surface) -> d
 
 
 def widths(values: Array, factors: Array, accuracy: float) -> tuple[float, float]:
-    """Return how wide a measurement leaves the load factor, and how wide it would by chance.
+    """Return the relative width of the load factor's interval after a measurement, and by chance.
 
     Parameters
     ----------
     values : ndarray, shape (n, k)
-        What it gives in each draw.
+        Results of the measurement, k numbers in each of n samples.
     factors : ndarray, shape (n,)
-        The load factors.
+        Load factor of a stance in each sample [1].
     accuracy : float
-        σ, in the unit of the values.
+        Standard deviation σ of the measurement, in the unit of the values.
 
     Returns
     -------
-    width, chance : float
-        Over the width without any measurement; see the module.
+    width : float
+        Mean width of the weighted 5 to 95 % interval, over the width without a measurement [1].
+    chance : float
+        The same with load factors shifted to other samples [1].
     """
     away = ((values[:, None] - values) ** 2).sum(axis=2)
     weights, count = np.exp(-away / (2.0 * accuracy**2)), len(factors)
@@ -142,18 +147,31 @@ def _weighted_width(weights: Array, factors: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class MeasurementStudy:
-    """The study: over which stances load factors count.
+    """Study that ranks measurements by how much they narrow the load factors of some stances.
 
     Attributes
     ----------
     stances : mapping of str to Question
-        By name; each counts alike.
+        Stances by name; all have the same weight.
     """
 
     stances: Mapping[str, Question]
 
     def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
-        """Plan all stances and make all measurements with each draw, and rank the measurements."""
+        """Plan all stances and compute all measurements with each parameter sample, and rank them.
+
+        Parameters
+        ----------
+        progress : callable
+            Called as the study proceeds.
+        hand : ParameterTable
+            Parameters of the hand.
+
+        Returns
+        -------
+        StudyResult
+            ``data["measurements"]`` has a row for each measurement, the best first.
+        """
         draws = bundled_draws(hand)
         values: list[dict[str, Array]] = []
         factors: dict[str, Array] = {}
@@ -184,7 +202,18 @@ class MeasurementStudy:
         return StudyResult("measure", title, data, ())
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
-        """Draw how wide each measurement leaves the load factors."""
+        """Draw the relative width of the load factor's interval for each measurement.
+
+        Parameters
+        ----------
+        result : StudyResult
+            Result of `run`.
+
+        Returns
+        -------
+        dict of str to Figure
+            With the key ``measure``.
+        """
         rows = result.data["measurements"][::-1]
         places = np.arange(len(rows))
         figure, (axes,) = panels(1, 1, (8.5, 0.38 * len(rows) + 1.8), grid="x")

@@ -1,10 +1,10 @@
-"""Convex sets in a plane, known by how far they reach, between an inner and an outer polygon.
+"""Inner and outer polygons of a convex set in a plane, from its support function.
 
-Each direction that is asked for gives a point of the set, and a half-plane that the set is in. The
-hull of the points is within the set, the intersection of the half-planes around it. Where they are
-farthest apart, the normal of the inner edge is asked for next (Bretl and Lall, Testing static
-equilibrium for legged robots, IEEE Transactions on Robotics 24, 2008). A polygon is found exactly,
-its every edge once asked for; so are segments and points.
+Each queried direction gives a support point of the set and a half-plane that contains the set. The
+convex hull of the points lies within the set, the intersection of the half-planes around it. Where
+these polygons are farthest apart, the normal of the inner edge is queried next (Bretl and Lall,
+Testing static equilibrium for legged robots, IEEE Transactions on Robotics 24, 2008). Polygons are
+found exactly once each edge has been queried, and so are segments and points.
 """
 
 from __future__ import annotations
@@ -25,26 +25,27 @@ __all__ = ["POLYGON_SETTINGS", "Polygon", "SupportPoint", "enclose"]
 
 @dataclass(frozen=True, slots=True)
 class PolygonSettings:
-    """Number of directions of a polygon, and its accuracy."""
+    """Number of directions of a polygon, and the smallest angle between them."""
 
     most_directions: int = 160
     least_turn: float = 1e-7
-    """Between two directions [rad]; nearer, where their half-planes meet is all rounding."""
+    """Least angle between two directions [rad]; below, rounding moves their half-planes' corner."""
 
 
 POLYGON_SETTINGS: Final = PolygonSettings()
 
 
 class SupportPoint(NamedTuple):
-    """A point of a set that is as far as any in a direction.
+    """Point of a convex set that is farthest in a direction.
 
     Attributes
     ----------
     normal : ndarray, shape (2,)
-        The direction, of length 1.
+        Unit vector of the direction.
     point : ndarray, shape (2,)
+        In the unit of the set.
     limiting : LimitName or None
-        What ends the way there.
+        Limit that bounds the set there.
     """
 
     normal: Array
@@ -53,24 +54,24 @@ class SupportPoint(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Distance of the point from the origin along the direction."""
+        """Distance of the point from the origin along the direction, in the unit of the set."""
         return float(self.normal @ self.point)
 
 
 @dataclass(frozen=True, eq=False)
 class Polygon:
-    """A convex set between two polygons, both counterclockwise.
+    """Convex set between an inner and an outer polygon, both counterclockwise.
 
     Attributes
     ----------
     inner : ndarray, shape (n, 2)
         Corners of a polygon within the set: two for a segment, one for a point.
     outer : ndarray, shape (m, 2)
-        Corners of one around it.
+        Corners of a polygon that contains the set.
     gap : float
-        Largest distance of a point of the outer polygon from the inner one.
+        Largest distance of a point of the outer polygon from the inner polygon.
     limiting : tuple of (LimitName or None), length n
-        What ends the way at each inner corner.
+        Limit that bounds the set at each inner corner.
     """
 
     inner: Array
@@ -79,21 +80,32 @@ class Polygon:
     limiting: tuple[LimitName | None, ...] = ()
 
     def scaled(self, units: Array) -> Polygon:
-        """Return the polygons with axes in other units; the gap stays in the old ones."""
+        """Return the polygons in other units; ``gap`` stays in the old ones.
+
+        Parameters
+        ----------
+        units : ndarray, shape (2,)
+            Factor for each axis.
+        """
         return Polygon(self.inner * units, self.outer * units, self.gap, self.limiting)
 
 
 def enclose(
     touching: Callable[[Array], SupportPoint | None], most: int = POLYGON_SETTINGS.most_directions
 ) -> Polygon | None:
-    """Return the polygons of a set; None if it is empty.
+    """Return inner and outer polygons of a convex set, from its support function.
 
     Parameters
     ----------
     touching : callable
-        From a unit direction, shape (2,), to a farthest point of the set; None if it is empty.
-    most : int
-        Directions to ask for at most.
+        Maps a unit direction, shape (2,), to the set's `SupportPoint`; to None if the set is empty.
+    most : int, optional
+        Largest number of directions to query.
+
+    Returns
+    -------
+    Polygon or None
+        None if the set is empty.
 
     Raises
     ------

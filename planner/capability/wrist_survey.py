@@ -1,4 +1,4 @@
-"""Survey of what a floating hand holds: a search over its wrist's poses, and limits by axis."""
+"""Survey of the wrenches of a floating hand: by a search over wrist poses, and limits by axis."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ __all__ = ["Survey", "survey"]
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A floating hand's wrenches, found by search.
+    """Wrenches that a floating hand can exert, found by search.
 
     Attributes
     ----------
     found : WristSearch
+        Feasible wrist poses and extreme wrenches.
     ends : tuple of (Farthest or None), length 12
-        Where the hand lets go along + and − each axis of H in turn: the farthest of local maxima,
-        begun at the search's farthest wrenches; None where no way from there holds.
+        Pose and wrench at which a limit is exceeded, along +x, −x, +y, … of hand frame H, forces
+        before moments: the farthest of the local maxima that start at the search's farthest
+        wrenches. None if no search from there finds a feasible pose.
     """
 
     found: WristSearch
@@ -39,20 +41,24 @@ class Survey:
 def survey(
     wrist: FloatingWrist, per_axis: int, progress: Callable[[int, int], None] | None = None
 ) -> Survey:
-    """Search the poses of a hand's wrist (Fig. 9), and follow its limits along the axes.
+    """Search the poses of a floating hand's wrist (Fig. 9), and find its limits along each axis.
 
     Parameters
     ----------
     wrist : FloatingWrist
     per_axis : int
-        Poses along each of the six axes of the search.
+        Number of grid poses along each of six axes.
     progress : callable, optional
-        Called with the work done and all of it.
+        Called with the number of steps done and the total.
+
+    Returns
+    -------
+    Survey
 
     Raises
     ------
     EmptySetError
-        If no pose near rest holds.
+        If no pose near rest is feasible.
     """
     directions = [sign * axis for axis in np.eye(6) for sign in (1.0, -1.0)]
     poses = per_axis**6

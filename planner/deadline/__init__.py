@@ -1,4 +1,4 @@
-"""The time that an answer may still take: clock, and budget of programs."""
+"""Deadline of an answer, and budgets of solver programs."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

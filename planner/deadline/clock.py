@@ -1,9 +1,8 @@
-"""The time that an answer may still take, and the programs that it may still solve.
+"""Deadline of an answer, and budgets of solver programs.
 
-A clock reaches every solver that is started. It is that of the thread's context, so that nothing on
-the way has to hand it on. Solvers ask it at each of their iterations, searches before each of their
-steps, hands while they close, sets while they are listed, meshes while they are welded. A budget is
-a count of programs, the same on every machine.
+The deadline is kept in a context variable of the thread, so no function has to pass it on. Solvers
+check it at each iteration, searches before each step, and so do the closing of hands, the listing
+of sets and the welding of meshes. A budget counts programs, and ends alike on every machine.
 """
 
 from __future__ import annotations
@@ -67,22 +66,25 @@ UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
     "spread": "a plan was found in all draws of the numbers",
     "advice": "all changes were tried that might make it hold",
 }
-"""Results that were not there yet, in words."""
+"""Results that a deadline can prevent, in words that follow "expired before"."""
 
 
 class DeadlineError(CruxError):
-    """A deadline that came before there was any plan which passes its checks, or a proof of none.
+    """Error: the client's deadline expired before a plan was verified or infeasibility proven.
 
     Parameters
     ----------
     seconds : float
         The deadline [s].
     missing : str
-        What was not there yet: ``the hands' sets were known``.
+        What was not finished, as a clause: ``the hands' sets were known``.
 
     Attributes
     ----------
-    seconds, missing
+    seconds : float
+        The deadline [s].
+    missing : str
+        What was not finished.
     """
 
     kind = "deadline"
@@ -97,14 +99,22 @@ class DeadlineError(CruxError):
 
 @contextmanager
 def within(seconds: float | None, *, started: float | None = None) -> Iterator[None]:
-    """Limit the time of what is done inside; an earlier end outside stays.
+    """Context manager that sets a deadline for the code inside the ``with`` block.
+
+    An earlier deadline of an enclosing block stays in force.
 
     Parameters
     ----------
     seconds : float or None
-        None for as long as it takes.
+        Duration until the deadline [s]; None sets no deadline.
     started : float, optional
-        On the clock of `time.perf_counter`; now by default.
+        Start of that duration, in seconds of `time.perf_counter`; now by default.
+
+    Raises
+    ------
+    DeadlineError
+        From the closing of hands and the computation of wrench spaces inside the block, once the
+        deadline has expired. Other code inside calls `check` or `expired`.
     """
     if seconds is None:
         yield
@@ -124,35 +134,36 @@ def _mind_hands() -> None:
 
 
 def seconds() -> float | None:
-    """Return the deadline [s]; None without one."""
+    """Return the duration of the deadline in force [s]; None without a deadline."""
     clock = _clock.get()
     return None if clock is None else clock.seconds
 
 
 def left() -> float | None:
-    """Return how much time is left [s], not below zero; None without a deadline."""
+    """Return the time until the deadline [s], not below zero; None without a deadline."""
     clock = _clock.get()
     return None if clock is None else max(0.0, clock.end - time.perf_counter())
 
 
 def expired() -> bool:
-    """Return whether the time is over."""
+    """Return whether the deadline has expired; False without a deadline."""
     clock = _clock.get()
     return clock is not None and time.perf_counter() >= clock.end
 
 
 def check(missing: str) -> None:
-    """Go on only if there is time left.
+    """Raise `DeadlineError` if the deadline has expired.
 
     Parameters
     ----------
     missing : str
-        What is not there yet, for the error.
+        Clause for the error's message: what was not finished, such as ``the load factor was
+        found``.
 
     Raises
     ------
     DeadlineError
-        If there is none.
+        If the deadline has expired.
     """
     clock = _clock.get()
     if clock is not None and time.perf_counter() >= clock.end:
@@ -160,12 +171,26 @@ def check(missing: str) -> None:
 
 
 def late(name: Unfinished) -> tuple[Unfinished, ...]:
-    """Return the name of what is not finished, if that is for the time."""
+    """Return a tuple with an unfinished result's name if the deadline has expired, else ().
+
+    Parameters
+    ----------
+    name : str
+        A key of `UNFINISHED_RESULTS`.
+    """
     return (name,) if expired() else ()
 
 
 def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:
-    """Say what came too late for a deadline [s], and what the answer is therefore."""
+    """Return a sentence that names the results which a deadline prevented.
+
+    Parameters
+    ----------
+    seconds : float
+        The deadline [s].
+    names : sequence of str
+        Unfinished results, keys of `UNFINISHED_RESULTS`.
+    """
     missing = ", before ".join(UNFINISHED_RESULTS[name] for name in names)
     sentence = f"the deadline of {seconds:g} s expired before {missing}"
     if "least_effort" in names:
@@ -174,15 +199,16 @@ def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:
 
 
 class Budget:
-    """A count of programs that may still be solved; a deadline, where there is one, ends it, too.
+    """Number of solver programs that a search may still solve; the deadline ends it, too.
 
-    A search asks before each step whether it has ended, so that the last step may overdraw it.
+    A search checks ``ended`` before each step, so the last step may overdraw the budget.
 
     Parameters
     ----------
     programs : int
+        Number of programs.
     whole : Budget, optional
-        Of which this one is a part: what is spent here is spent there.
+        Larger budget of which this budget is a part: `spend` here also spends there.
     """
 
     def __init__(self, programs: int, whole: Budget | None = None) -> None:
@@ -191,17 +217,17 @@ class Budget:
 
     @property
     def ended(self) -> bool:
-        """True where nothing is left, here or of the whole, or the time is over."""
+        """True if this budget or the whole is used up, or the deadline has expired."""
         if self._left <= 0 or expired():
             return True
         return self._whole is not None and self._whole.ended
 
     def spend(self, programs: int = 1) -> None:
-        """Take some programs off."""
+        """Subtract a number of programs from this budget, and from the whole."""
         self._left -= programs
         if self._whole is not None:
             self._whole.spend(programs)
 
     def part(self, programs: int) -> Budget:
-        """Return a part of this budget."""
+        """Return a new budget of some programs that is part of this budget."""
         return Budget(programs, self)

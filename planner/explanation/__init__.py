@@ -1,4 +1,4 @@
-"""Explain answers: active limits, certificates, irreducible infeasible sets, sentences."""
+"""Explanation of answers: active limits, shadow prices, infeasibility certificates, sentences."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,4 +1,4 @@
-"""Limits that bind a plan, how much of each is used, and what more of it would be worth."""
+"""Limits that bind a plan: their utilisation and their shadow prices."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class ExplanationTolerances:
-    """Least size of numbers of a plan, or of an infeasibility certificate, that mean something."""
+    """Thresholds below which numbers of a plan or a certificate count as zero."""
 
     binding_multiplier: float = 1e-6  # of a limit that binds, at least
     ranking_digits: int = 5  # decimals of multipliers; where alike, rows' order counts
@@ -38,34 +38,65 @@ class ExplanationTolerances:
     broken: float = 1e-7  # rows that must be broken by more have no loads, in scaled units
     kept: float = 2e-9  # rows that need not be broken by more have loads: the solver's rounding
     tension_change: float = 1e-3
-    """What hard rows give on the way, and no change of tension [N]: no present tension is known
-    better, and a tendon at rest where it would stick is not slack by a rounding."""
+    """Slack of hard rows along a path of tensions, and largest change that counts as none [N]:
+    no present tension is known better, and rounding must not make a resting tendon slack.
+    """
     com_offset: float = 0.05
-    """From where the centre of mass is taken, without a warning [m]: on a vertical wall 0.12 m
-    changed the load factor of four hands by a sixth."""
+    """Distance of the centre of mass from its assumed place that gives no warning [m]: on a
+    vertical wall 0.12 m changed the load factor of four hands by a sixth.
+    """
 
 
 TOLERANCES: Final = ExplanationTolerances()
 
 
 def limit_unit(limit: str) -> str:
-    """Return the unit of a limit's capacity."""
+    """Return the unit of a limit's load and capacity: ``N``, ``N·m`` or ``A``.
+
+    Parameters
+    ----------
+    limit : str
+        Kind of limit, such as ``motor_torque``; see `planner.result.LimitName`.
+    """
     units = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
     return units.get(limit, "N")
 
 
 def limit_name(limb: str, row: Row) -> LimitName:
-    """Return the name of a row of a limb's hand."""
+    """Return the name of the limit or hard row that a row of a wrench space stands for.
+
+    Parameters
+    ----------
+    limb : str
+        Limb of the hand that has the wrench space.
+    row : Row
+    """
     return LimitName(limb, row.finger, row.phalanx, row.limit, row.joint)
 
 
 def joint_name(limb: str, joint: str, slides: bool) -> LimitName:
-    """Return the name of the load of a limb's joint; ``slides``: whether the joint is prismatic."""
+    """Return the name of the torque or force limit of a limb's joint.
+
+    Parameters
+    ----------
+    limb, joint : str
+    slides : bool
+        Whether the joint is prismatic, so that its load is a force.
+    """
     return LimitName(limb, None, None, JOINT_FORCE if slides else JOINT_TORQUE, joint)
 
 
 class LimitUse(NamedTuple):
-    """The use of a limit: load over capacity of one of its rows."""
+    """Load and capacity of a limit: of its row with the highest utilisation.
+
+    Attributes
+    ----------
+    name : LimitName
+    load : float
+        [N], [N·m] or [A]
+    capacity : float
+        In the unit of the load.
+    """
 
     name: LimitName
     load: float
@@ -78,22 +109,30 @@ class LimitUse(NamedTuple):
 
 
 def close_to(utilisation: float) -> float:
-    """Return the utilisation from which on a limit ties with the most used ones."""
+    """Return the utilisation above which a limit counts as tied with the most used limit.
+
+    Parameters
+    ----------
+    utilisation : float
+        Utilisation of the most used limit.
+    """
     return utilisation - 2.0 * CAP_SLACK * max(1.0, utilisation)
 
 
 class ActiveLimits:
-    """Limits that bind a plan, by the multipliers of its program; rows of one name are one limit.
+    """Limits that bind a plan, ranked by the multipliers (dual values) of the plan's program.
 
-    The dearest come first: of which one per cent more would take most off, so that newtons compare
-    with amperes.
+    Rows of one name are one limit: their multipliers are added. First comes the limit whose
+    increase by one per cent would lower the utilisation most, so that newtons compare with amperes.
 
     Parameters
     ----------
     limbs : sequence of str
+        Limb of each hand.
     spaces : sequence of WrenchSpace
-    multipliers : sequence of ndarray
-        Of each hand's limit rows.
+        Wrench space of each hand.
+    multipliers : sequence of ndarray, shape (nl,)
+        Multipliers of the nl limit rows of each hand.
     """
 
     def __init__(
@@ -117,15 +156,20 @@ class ActiveLimits:
         return round(worth, TOLERANCES.ranking_digits), -int(first)
 
     def prices(self, utilisation: float) -> tuple[Price, ...]:
-        """Return the price of each limit that binds.
+        """Return the shadow price of each limit that binds.
 
-        A limit ``L y + l0 ≤ u s`` with multiplier λ, in units of its capacity, takes λ u / s off
-        the objective for each unit more of s.
+        A limit row ``L y + l0 ≤ u s`` (loads y, utilisation u, capacity s) with multiplier λ, in
+        units of its capacity, lowers the utilisation by λ u / s for each unit more of s.
 
         Parameters
         ----------
         utilisation : float
-            At which the rows stand.
+            Utilisation u of the plan.
+
+        Returns
+        -------
+        tuple of Price
+            The most valuable limit first.
         """
         names = self._names
         dear = sorted(self._worth.nonzero()[0].tolist(), key=self._rank, reverse=True)
@@ -136,18 +180,23 @@ class ActiveLimits:
     def limiting(
         self, used: Array, utilisation: float, idle: Sequence[LimitUse]
     ) -> LimitUse | None:
-        """Return the limit with the largest utilisation; of those that tie, the dearest.
+        """Return the limit with the highest utilisation; of tied limits, the most valuable one.
 
-        The others only follow it.
+        The most valuable limit has the largest multiplier.
 
         Parameters
         ----------
         used : ndarray, shape (sum of nl,)
             Utilisation of every limit row, hand by hand.
         utilisation : float
-            The largest of these and the idle ones.
+            Highest utilisation of ``used`` and ``idle``.
         idle : sequence of LimitUse
-            Limits of limbs without a hand, which have no price.
+            Limits of limbs without a hand, which have no shadow price.
+
+        Returns
+        -------
+        LimitUse or None
+            None if there are no limits.
         """
         rows = (used >= close_to(utilisation)).nonzero()[0]
         most = max(idle, key=lambda each: each.utilisation, default=None)
@@ -173,7 +222,7 @@ class ActiveLimits:
 
 
 Named = tuple[tuple[LimitName, ...], Indices]
-"""Limits of some hands, each name once, and which of them each limit row is, shape (sum of nl,)."""
+"""Distinct limits of some hands, and the index of the limit of each row, shape (sum of nl,)."""
 
 
 @lru_cache(maxsize=KEPT_NAMES)

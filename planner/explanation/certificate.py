@@ -1,8 +1,8 @@
-"""Prove that no loads give a body wrench: at any utilisation, or within a cap on it.
+"""Prove that a body wrench is infeasible: at any utilisation, or within a cap (Farkas certificate).
 
-The limits at a cap are hard rows like any other, so both are one proof. Where a hand's own rows
-already contradict each other, or the wrench that it is given, the direction has no part for the
-body: whatever the body needs, there are no loads.
+Limits at a cap are hard rows like any other, so both cases are one proof. Where the rows of one
+hand contradict each other, or the wrench prescribed for that hand, the certificate's direction is
+zero in the body's components: the stance is infeasible whatever the body needs.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from planner.result import Certificate, LimitName
 __all__ = ["certify", "certify_idle"]
 
 LEAST_DIRECTION: Final = 1e-6
-"""A direction shorter than this, in the body's six components, is none."""
+"""Length, in the body's six components, below which a direction counts as zero."""
 
 
 def certify(
@@ -56,30 +56,31 @@ def certify(
     *,
     nearest: Outcome | None = None,
 ) -> Certificate | None:
-    """Return a checked proof that no loads give the body wrench.
+    """Return a verified infeasibility certificate for a body wrench.
 
-    With the direction d and multipliers λ ≥ 0 of the hard rows, what loads give is bounded by
-    `HardRowSystem.bound`; it must be below d · W. Where a question is not to be explained, only
-    that the irreducible set is empty is found.
+    With a direction d and multipliers λ ≥ 0 of the hard rows, `HardRowSystem.bound` bounds what
+    loads can exert along d; that bound must be below d · W for the body wrench W. If the question
+    asks for no explanation, the irreducible infeasible subset is not searched, only whether it is
+    empty.
 
     Parameters
     ----------
     prepared : PreparedStance
     sets : Sets
-        Of its hands, whose loads do not balance.
+        Wrench spaces of the hands, and their scaled rows.
     known : Outcome
-        Of the program without a plan. Where the nearest loads are too near to prove it, or the time
-        is over, its multipliers are the proof.
+        Outcome of the infeasible program. Its multipliers are the proof where the nearest loads
+        give none, or the deadline has expired.
     cap : float, optional
-        On the utilisation, within which they do not balance; by default at any utilisation.
+        Cap on the utilisation within which the wrench is infeasible; by default at any utilisation.
     nearest : Outcome, optional
-        The loads that come nearest to the body wrench, with given wrenches of hands as they are
-        given; found here by default.
+        Loads whose body wrench is nearest to W, with prescribed hand wrenches met; computed by
+        default.
 
     Returns
     -------
     Certificate or None
-        None if the bound proves nothing.
+        None if no multipliers prove infeasibility.
     """
     (spaces, data), limbs, held = sets, prepared.limbs, prepared.hands.held
     limits, explain = prepared.question.limits, prepared.question.explain
@@ -163,16 +164,16 @@ def _system(
 
 
 def certify_idle(used: LimitUse, cap: float, alone: bool | None) -> Certificate:
-    """Return the proof that a joint of a limb without a hand bears more than a cap allows.
+    """Return the certificate that a joint of a limb without a hand exceeds its limit at a cap.
 
     Parameters
     ----------
     used : LimitUse
-        How much.
+        Load and capacity of the joint.
     cap : float
-        On the utilisation.
+        Cap on the utilisation.
     alone : bool or None
-        Whether everything else is within the cap; None where that is not known.
+        Whether everything else is within the cap; None if unknown.
     """
     return Certificate(
         utilisation=cap,

@@ -1,21 +1,21 @@
-"""The constraints of a stance: all hands' hard rows, by name, and wrenches that hands are given.
+"""Search for Farkas certificates: multipliers that prove that no loads balance the body.
 
-Limit rows at a cap on the utilisation are constraints like any other. All rows of one name are one
-constraint. Whether some of them leave loads that balance the body is a linear program,
+The constraints are the hands' hard rows, and the wrenches that a question prescribes for hands.
+Limit rows at a cap on the utilisation are hard rows like any other. All rows of one name are one
+constraint. With the loads z, some constraints are infeasible if the linear program
 
-    min t  with  |W − Σ g − G z| ≤ t,  H z − h ≤ t,  |z| ≤ X,
+    min t  with  |W − Σ g − G z| ≤ t,  H z − h ≤ t,  |z| ≤ X
 
-whose multipliers d, λ are a proof (Farkas) where t is above zero. The box X of `LOAD_BOX`, far
-beyond any strength, always counts.
+has t > 0; its multipliers d (balance) and λ (hard rows) are the certificate. W is the body wrench,
+Σ g the wrench at zero loads. The box X of `LOAD_BOX`, far above any strength, always applies.
 
-These multipliers are a linear program of as many equations as loads, however many rows, and it is
-kept from one question to the next: with r = W − Σ g there are no loads where they gain something
-(what is left of Gᵀd − Hᵀλ is for the box to pay):
+The dual linear program has as many equations as there are loads, whatever the number of rows. Its
+solver is kept from one question to the next. With r = W − Σ g, infeasibility is proven where
 
     d · r − λ · h − X Σ|Gᵀd − Hᵀλ| > 0.
 
-A row is left out by keeping its multiplier at zero, and the simplex method goes on from where the
-last question ended.
+A row is left out by fixing its multiplier at zero; the simplex method then starts from the basis of
+the last question.
 """
 
 from __future__ import annotations
@@ -47,21 +47,24 @@ __all__ = [
 Chosen = NDArray[np.bool_]
 
 HELD_WRENCH: Final = "held_wrench"
-"""Name of the constraint that a given wrench of a hand is."""
+"""Name of the constraint that a hand exerts the wrench prescribed for it."""
 
 BODY_ROWS: Final = 6
-"""Rows of the balance that are the body's."""
+"""Number of balance rows of the body; rows of prescribed hand wrenches follow them."""
 
 
 class Multipliers(NamedTuple):
-    """A vertex of the multipliers that are allowed.
+    """Optimal multipliers of `FarkasProgram`, nondimensional.
 
     Attributes
     ----------
     gain : float
-        What they gain, in the unit asked for.
-    direction, multipliers : ndarray, shapes (nb,), (n,)
-        d of the balance and λ ≥ 0 of the rows.
+        Smallest violation of the constraints; above zero, they are infeasible. Only as
+        `FarkasProgram.least_violation` returns it, not `FarkasProgram.near`.
+    direction : ndarray, shape (nb,)
+        Multipliers d of the balance rows: six of the body, then those of prescribed hand wrenches.
+    multipliers : ndarray, shape (n,)
+        Multipliers λ ≥ 0 of the hard rows.
     """
 
     gain: float
@@ -70,16 +73,19 @@ class Multipliers(NamedTuple):
 
 
 class FarkasProgram:
-    """The program of a balance and rows. For one caller at a time.
+    """Linear program whose solution is a Farkas certificate; not thread-safe.
 
-    Columns are d⁺ and d⁻ (nb each), which are taken from a start of d, λ (n), and the two signs of
-    the parts of Gᵀd − Hᵀλ (M each). Rows are these parts (M), and below them the sum of d⁺, d⁻, λ.
+    Columns are d⁺ and d⁻ (nb each; d is a start plus d⁺ − d⁻), λ (n), and the positive and negative
+    parts of Gᵀd − Hᵀλ (M each). Rows define these parts (M); the last row sums d⁺, d⁻, λ.
 
     Parameters
     ----------
-    G, goal : ndarray, shapes (nb, M), (nb,)
-        The balance, with r.
+    G : ndarray, shape (nb, M)
+        Balance matrix; M loads z of all hands, nb balance rows. All arrays are nondimensional.
+    goal : ndarray, shape (nb,)
+        Right-hand side r of the balance G z = r.
     H, h : ndarray, shapes (n, M), (n,)
+        Hard rows H z ≤ h.
     """
 
     def __init__(self, G: Array, goal: Array, H: Array, h: Array) -> None:
@@ -92,40 +98,46 @@ class FarkasProgram:
         self._parts = np.zeros(len(leak))
 
     def least_violation(self, tied: Chosen, rows: Chosen) -> Multipliers | None:
-        """Return multipliers Σ|d| + Σλ ≤ 1, of some rows alone, that gain the most.
+        """Return the smallest violation of selected rows, with the multipliers that prove it.
 
-        The gain is by how much these must be broken at least: the least t of loads in the box with
-        |r − G z| ≤ t and H z − h ≤ t.
+        Maximises d · r − λ · h − X Σ|Gᵀd − Hᵀλ| with Σ|d| + Σλ ≤ 1. By duality its value is the
+        least t for which loads in the box have |r − G z| ≤ t and H z − h ≤ t.
 
         Parameters
         ----------
-        tied, rows : ndarray of bool, shapes (nb,), (n,)
-            Which of the balance, and which hard rows.
+        tied : ndarray of bool, shape (nb,)
+            Balance rows that take part.
+        rows : ndarray of bool, shape (n,)
+            Hard rows that take part.
 
         Returns
         -------
         Multipliers or None
-            None if the solver does not say, or the time is over.
+            ``gain`` is the violation t. None if the solver fails or the deadline has expired.
         """
         costs = self._priced(self.goal, -self.goal)
         most = np.where(np.concatenate([tied, tied, rows]), np.inf, 0.0)
         return self._solved(costs, most, np.zeros(len(tied)), 1.0)
 
     def near(self, start: Array, turn: float, unit: float) -> Multipliers | None:
-        """Return multipliers that gain the most, less ``turn`` Σ|d − start|, with |d| ≤ 1.
+        """Return the multipliers that prove most, less a penalty for leaving ``start``.
+
+        Maximises (d · r − λ · h − X Σ|Gᵀd − Hᵀλ| − ``turn`` Σ|d − start|) / ``unit``, where the
+        first k components of d are within ±1.
 
         Parameters
         ----------
         start : ndarray, shape (k,)
-            Of the first k of d. The others are free, of any size.
+            Preferred values of the first k components of d. The other components are unbounded.
         turn : float
+            Penalty for a change of these components by 1.
         unit : float
-            Of the gain.
+            Divisor of the objective, for the solver's scaling.
 
         Returns
         -------
         Multipliers or None
-            None if the solver does not say, or the time is over.
+            None if the solver fails or the deadline has expired.
         """
         bound, free = len(start), len(self.goal) - len(start)
         away = np.concatenate([np.full(bound, turn), np.zeros(free)])
@@ -193,30 +205,34 @@ def _solver_of(A: Array) -> SilentHighs:
 
 
 class HardRowSystem:
-    """The hard rows of all hands, with their names, and the balance; nondimensional.
+    """Named constraints of a stance: balance and hard rows of all hands; nondimensional.
 
     Parameters
     ----------
-    G, g : ndarray, shapes (nb, M), (nb,)
-        What all loads z give the balance, G z + g.
+    G : ndarray, shape (nb, M)
+        Balance matrix: the M loads z of all hands exert G z + g.
+    g : ndarray, shape (nb,)
+        Wrench at zero loads.
     wrench : ndarray, shape (nb,)
-        What they are to give.
+        Wrench W that G z + g must equal: six components of the body, then prescribed components of
+        hand wrenches.
     H, h : ndarray, shapes (n, M), (n,)
-        H z ≤ h
-    names : tuple of LimitName, length n
-    given : tuple of LimitName, length nb − 6
-        Whose given wrench each further row of the balance is.
+        Hard rows H z ≤ h.
+    names : sequence of LimitName, length n
+        Constraint that each hard row belongs to.
+    given : sequence of LimitName, length nb − 6
+        Constraint that each balance row after the sixth belongs to.
 
     Attributes
     ----------
     goal : ndarray, shape (nb,)
-        What G z is to be.
+        Right-hand side W − g of the balance G z = W − g.
     constraints : tuple of LimitName
-        Every name once.
+        All constraints, each once.
     owners : ndarray of int, shape (n + nb − 6,)
-        Which constraint each hard row is, and then each further row of the balance.
+        Index into ``constraints`` of each hard row, then of each balance row after the sixth.
     program : FarkasProgram
-        What finds multipliers that prove.
+        Linear program that searches for certificates.
     """
 
     def __init__(
@@ -241,9 +257,21 @@ class HardRowSystem:
     def rows_of(
         self, constraints: Iterable[LimitName], *, balance: bool = True
     ) -> tuple[Chosen, Chosen]:
-        """Return which rows of the balance (nb,) and which hard rows (n,) constraints are.
+        """Return masks of the rows that belong to some constraints.
 
-        The body's own six are among them if its balance counts.
+        Parameters
+        ----------
+        constraints : iterable of LimitName
+            Names that the system does not have are ignored.
+        balance : bool, optional
+            Whether the six balance rows of the body are selected.
+
+        Returns
+        -------
+        tied : ndarray of bool, shape (nb,)
+            Selected balance rows.
+        rows : ndarray of bool, shape (n,)
+            Selected hard rows.
         """
         chosen = np.zeros(len(self._places), dtype=bool)
         chosen[[self._places[name] for name in constraints if name in self._places]] = True
@@ -251,31 +279,64 @@ class HardRowSystem:
         return np.append(np.full(BODY_ROWS, balance), rows[len(self.h) :]), rows[: len(self.h)]
 
     def bound(self, direction: Array, multipliers: Array) -> float:
-        """Return what d · (G z + g) is at most, for loads in the box |z| ≤ X of `LOAD_BOX`.
+        """Return an upper bound on d · (G z + g) over all loads that keep the hard rows.
 
-        By hand: with H z ≤ h and λ ≥ 0
+        Loads z are in the box |z| ≤ X of `LOAD_BOX`. With H z ≤ h and λ ≥ 0
 
             d · (G z + g) = d · g + (Gᵀd − Hᵀλ) · z + λ · H z ≤ d · g + |Gᵀd − Hᵀλ| · X + λ · h.
+
+        Parameters
+        ----------
+        direction, multipliers : ndarray, shapes (nb,), (n,)
+            Multipliers d of the balance rows, and λ ≥ 0 of the hard rows.
         """
         leak = np.abs(self.G.T @ direction - self.H.T @ multipliers).sum() * LOAD_BOX
         return float(direction @ self.g + multipliers @ self.h + leak)
 
     def proves(self, direction: Array, multipliers: Array) -> bool:
-        """Return whether the multipliers show that no loads balance."""
+        """Return whether multipliers are a Farkas certificate: `bound` is below d · W.
+
+        Parameters
+        ----------
+        direction, multipliers : ndarray, shapes (nb,), (n,)
+            Multipliers d of the balance rows, and λ ≥ 0 of the hard rows.
+        """
         return self.bound(direction, multipliers) < float(direction @ self.wrench)
 
     def proven_up_to(self, direction: Array, multipliers: Array) -> float:
-        """Return the size of loads |z| up to which the multipliers show that none balance.
+        """Return the largest load size |z| for which multipliers prove that no loads balance.
 
-        d · (W − g) − λ · h, by which they prove it, is used up there by Gᵀd − Hᵀλ, which rounding
-        leaves, or the box X: infinite where nothing is left of it.
+        The gain d · (W − g) − λ · h is consumed by the product of that size and the rounding error
+        Σ|Gᵀd − Hᵀλ|. Infinite where that error is zero.
+
+        Parameters
+        ----------
+        direction, multipliers : ndarray, shapes (nb,), (n,)
+            Multipliers d of the balance rows, and λ ≥ 0 of the hard rows.
+
+        Returns
+        -------
+        float
+            Nondimensional; times `LOAD_UNIT` in newtons.
         """
         gain = float(direction @ self.goal - multipliers @ self.h)
         leak = float(np.abs(self.G.T @ direction - self.H.T @ multipliers).sum())
         return gain / leak if leak > 0.0 else math.inf
 
     def weights(self, direction: Array, multipliers: Array) -> dict[LimitName, float]:
-        """Return the weights of constraints by their multipliers, those that count alone."""
+        """Return how much each constraint contributes to a certificate.
+
+        Parameters
+        ----------
+        direction, multipliers : ndarray, shapes (nb,), (n,)
+            Multipliers d of the balance rows, and λ ≥ 0 of the hard rows.
+
+        Returns
+        -------
+        dict of LimitName to float
+            Sum of a constraint's absolute multipliers; constraints with negligible sums are left
+            out.
+        """
         shares = np.append(multipliers, np.abs(direction[BODY_ROWS:]))
         weights = np.bincount(self.owners, shares, len(self.constraints)).tolist()
         pairs = zip(self.constraints, weights, strict=True)
@@ -284,32 +345,42 @@ class HardRowSystem:
     def least_violation(
         self, constraints: Iterable[LimitName], *, balance: bool = True
     ) -> Multipliers | None:
-        """Return by how much constraints must be broken at least, by loads in the box.
+        """Return the smallest violation of the selected constraints over loads in the box.
 
         Parameters
         ----------
         constraints : iterable of LimitName
-        balance : bool
-            Whether the body's balance counts, too.
+        balance : bool, optional
+            Whether the body's balance takes part.
 
         Returns
         -------
         Multipliers or None
-            Their gain is that; None if the solver does not say, or the time is over.
+            ``gain`` is the violation; above zero, the constraints are infeasible. None if the
+            solver fails or the deadline has expired.
         """
         return self.program.least_violation(*self.rows_of(constraints, balance=balance))
 
     def least_violation_without(self, constraints: Iterable[LimitName]) -> Multipliers | None:
-        """Return by how much all constraints but some, and the balance, must be broken at least.
+        """Return the smallest violation of the balance and all constraints but some.
 
-        Parameters and what is returned as for `least_violation`.
+        Parameters
+        ----------
+        constraints : iterable of LimitName
+            Left out.
+
+        Returns
+        -------
+        Multipliers or None
+            ``gain`` is the violation; above zero, the rest is infeasible. None if the solver fails
+            or the deadline has expired.
         """
         tied, rows = self.rows_of(constraints, balance=False)
         return self.program.least_violation(~tied, ~rows)
 
 
 def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitName, float]:
-    """Return the sum of the weights of each name."""
+    """Return, for each distinct name, the sum of its weights."""
     found: dict[LimitName, float] = {}
     for name, weight in zip(names, weights, strict=True):
         found[name] = found.get(name, 0.0) + weight
@@ -317,5 +388,5 @@ def summed(names: Sequence[LimitName], weights: Sequence[float]) -> dict[LimitNa
 
 
 def ranked(weights: dict[LimitName, float]) -> list[LimitName]:
-    """Return constraints, the weightiest first."""
+    """Return constraints in order of decreasing weight."""
     return sorted(weights, key=lambda name: -round(weights[name], TOLERANCES.ranking_digits))

@@ -1,11 +1,11 @@
-"""Find constraints that together leave no loads: an irreducible set of them, by name.
+"""Find an irreducible infeasible subset (IIS) of a stance's constraints, by name.
 
-A set of constraints is irreducible if they and the balance of the body have no loads, and have some
-as soon as any one of them is left out. It is found by a deletion filter over the constraints that a
-proof weighs (Chinneck, Feasibility and Infeasibility in Optimization, ch. 6).
+Constraints form such a subset if they and the body's balance are infeasible, and become feasible as
+soon as any one of them is left out. The subset is found by a deletion filter over the constraints
+that a Farkas certificate weighs (Chinneck, Feasibility and Infeasibility in Optimization, ch. 6).
 
-Other constraints may leave no loads, too: there may be many such sets. A constraint without which
-all the others have loads is in every one of them.
+A stance may have many such subsets. A constraint without which all others are feasible is in every
+one of them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ __all__ = ["balance_alone", "blocks_up_to", "irreducible_set", "sufficient_alone
 
 
 def balance_alone(system: HardRowSystem) -> bool:
-    """Return whether the balance alone has no loads, so that the irreducible set is empty."""
+    """Return whether the body's balance is infeasible even without any other constraint.
+
+    The irreducible infeasible subset is then empty.
+    """
     found = system.least_violation(())
     return found is not None and found.gain > TOLERANCES.broken and _prove_alone(system, found, ())
 
@@ -34,19 +37,20 @@ def balance_alone(system: HardRowSystem) -> bool:
 def irreducible_set(
     system: HardRowSystem, suspects: Collection[LimitName]
 ) -> tuple[LimitName, ...] | None:
-    """Return constraints that have no loads with the balance, and none of which can be left out.
+    """Return constraints that are infeasible together, but feasible without any one of them.
 
     Parameters
     ----------
     system : HardRowSystem
     suspects : collection of LimitName
-        Among which such a set is sought; among all constraints if these have loads.
+        Constraints among which the subset is sought; all constraints if these are feasible.
 
     Returns
     -------
     tuple of LimitName or None
-        The weightiest first; empty if the balance alone has no loads. None if rounding leaves
-        undecided whether some constraints have loads.
+        The constraint with the largest weight first; empty if the balance alone is infeasible. None
+        if rounding leaves the feasibility of some constraints undecided, or the deadline has
+        expired.
     """
     for start in (suspects, system.constraints):
         first = system.least_violation(start)
@@ -79,9 +83,18 @@ def _filtered(system: HardRowSystem, proof: Multipliers) -> tuple[LimitName, ...
 
 
 def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
-    """Return the size of loads |z| up to which constraints without any are proven to have none.
+    """Return the load size |z| up to which infeasible constraints are proven infeasible.
 
-    At least `LOAD_BOX`, the box in which they were found to; infinite where no box is needed.
+    Parameters
+    ----------
+    system : HardRowSystem
+    names : collection of LimitName
+        Infeasible constraints.
+
+    Returns
+    -------
+    float
+        Nondimensional; at least `LOAD_BOX`, infinite if the proof needs no box.
     """
     proof = system.least_violation(names)
     if proof is None:
@@ -93,21 +106,21 @@ def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
 def sufficient_alone(
     system: HardRowSystem, irreducible: tuple[LimitName, ...] | None
 ) -> tuple[LimitName, ...] | None:
-    """Return the constraints without any one of which all the others have loads.
+    """Return the constraints whose removal, one at a time, makes all others feasible.
 
     Parameters
     ----------
     system : HardRowSystem
-        All constraints together have none.
+        Infeasible with all its constraints.
     irreducible : tuple of LimitName or None
-        Some irreducible set: only its members can do. So it is with those of every other set that
-        a trial shows, which soon leaves few to try. They are tried together, and by halves.
+        An irreducible infeasible subset: only its members can suffice. Each proof that turns up
+        narrows them further. They are tried together, then by halves.
 
     Returns
     -------
     tuple of LimitName or None
-        In the order of the set. None without a set, or if rounding leaves undecided whether some
-        constraints have loads, or if a set of more than 24 would have to be tried one by one.
+        In the order of ``irreducible``. None if that is None, if rounding or a deadline leaves the
+        answer undecided, or if more than 24 members would have to be tried one by one.
     """
     if not irreducible:
         return irreducible

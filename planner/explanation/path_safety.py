@@ -1,16 +1,16 @@
-"""The safety of the straight way from the present tensions to the planned ones.
+"""Safety of the straight path from the present tendon tensions to the planned ones.
 
-Along it every tendon that has a present tension goes linearly from that to the planned one, while
-palms, lateral reactions and the tendons without a present tension take whatever balances the body.
-A point of the way is safe if some such loads keep to all hard rows, and to the limits at the cap
-on the utilisation. Safe points are convex: where the plan is safe they are an interval that ends
-there, and its length is one linear program,
+Along the path, each tendon with a present tension changes linearly from that to the planned
+tension. Palms, lateral reactions and tendons without a present tension take any loads that balance
+the body. A point of the path is safe if some such loads keep all hard rows, and the limits at the
+utilisation cap. Safe points are convex: if the plan is safe they are an interval that ends at the
+plan, and its length is one linear program,
 
     max s   with tensions  planned + s (present − planned)   in the balance    (`program.Reach`),
 
-whose multipliers show what ends it.
+whose multipliers show which limits end the interval.
 
-Hands with floating wrists stay as planned: their sets hold about that only.
+Hands with floating wrists keep their planned loads, as their sets are linearised there.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from planner.result import LimitName, TensionPath
 __all__ = ["tension_path", "unsafe_sentence"]
 
 TENSION_COLUMNS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
-"""Columns of a hand with a fixed wrist."""
+"""Names of the tension columns of a hand with a fixed wrist."""
 
 
 def tension_path(
@@ -45,22 +45,22 @@ def tension_path(
     loads: Sequence[Array],
     idle: Sequence[LimitUse] = (),
 ) -> TensionPath | None:
-    """Return the safety of the way from a question's present tensions to a plan.
+    """Return how much of the path from the present tensions to a plan is safe.
 
     Parameters
     ----------
     prepared : PreparedStance
     sets : Sets
-        Of the hands, about the plan.
+        Wrench spaces of the hands, and their scaled rows; linearised about the plan.
     loads : sequence of ndarray
-        The plan's y of each hand.
+        Planned loads y of each hand [N]; of a floating hand the wrist's twist [m, rad].
     idle : sequence of LimitUse, optional
-        What limbs without a hand use of their joints.
+        Use of joint torque by limbs without a hand.
 
     Returns
     -------
     TensionPath or None
-        None if the solver's answer does not pass the check.
+        None if the solver's answer fails the check.
     """
     (spaces, data), limbs, question = sets, prepared.limbs, prepared.question
     cap, present = question.limits.utilisation, question.present
@@ -118,7 +118,7 @@ def tension_path(
 
 
 def unsafe_sentence(path: TensionPath) -> str:
-    """Say how much of an unsafe way is safe, in full per cent, and what ends that part."""
+    """Return a sentence: the safe share of an unsafe path, in full per cent, and what limits it."""
     part = math.floor(100.0 * path.safe_part)
     much = f"only the last {part} %" if part > 0 else "no part"
     sentence = f"{much} of the straight way from the present tensions is safe"

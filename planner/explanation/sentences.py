@@ -1,4 +1,4 @@
-"""Say what a plan's numbers mean, in sentences that a climber understands."""
+"""Sentences about a plan: which limit is used most, and why no plan is feasible."""
 
 from __future__ import annotations
 
@@ -126,19 +126,19 @@ def _spoken_load(limit: str, load: float) -> str:
 
 
 def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
-    """Say how much of a limit is used.
+    """Return a sentence that gives the load and the capacity of a limit.
 
-    A tile's force is given with the force that the tile would hold in that direction, not with the
-    distances to its half-plane; the force of a hand likewise.
+    For a tile, and for a whole hand, load and capacity are given as forces along the present
+    direction, not as distances to the half-plane.
 
     Parameters
     ----------
     used : LimitUse
-        Load and capacity of its row [N], [N·m] or [A].
+        Load and capacity of the limit [N], [N·m] or [A].
     hand : HandPlan or None
-        Whose limit it is; None for a limb without a hand.
+        Planned hand that the limit belongs to; None for a limb without a hand.
     held : bool
-        Whether the plan is within its limits.
+        Whether the plan is feasible: ``carries``, else ``would carry``.
     """
     name, load, capacity = used
     force = 0.0
@@ -159,23 +159,23 @@ def limit_sentence(used: LimitUse, hand: HandPlan | None, *, held: bool) -> str:
 
 
 def constraint_words(name: LimitName) -> str:
-    """Say what a constraint is about and what it forbids: ``palm cannot pull``."""
+    """Return words for a constraint's part and what the part cannot do: ``palm cannot pull``."""
     return f"{_bearer(name)} {_barrier(name.limit)}"
 
 
 def shortfall_sentence(
     certificate: Certificate, touching: bool, *, floating: Collection[str] = ()
 ) -> str:
-    """Say what no plan can supply, and what is in the way.
+    """Return a sentence: which wrench is missing at any utilisation, and which limits block it.
 
     Parameters
     ----------
     certificate : Certificate
-        Of a body wrench that cannot be had at any utilisation.
+        Proof that the body wrench is infeasible at any utilisation.
     touching : bool
         Whether a spine of any hand is on rock.
     floating : collection of str, optional
-        Limbs whose hands float.
+        Limbs whose hands' wrists float.
     """
     names = certificate.irreducible
     constraints = blocking_sentence(_blamed(certificate))
@@ -195,14 +195,14 @@ def shortfall_sentence(
 
 
 def overload_sentence(certificate: Certificate | None, *, floating: Collection[str] = ()) -> str:
-    """Say what would be missing within the limits; nothing without a proof of it.
+    """Return a clause that says which wrench is missing within the limits; empty without a proof.
 
     Parameters
     ----------
     certificate : Certificate or None
-        Of a body wrench that cannot be had within a cap on the utilisation.
+        Proof that the body wrench is infeasible within a cap on the utilisation.
     floating : collection of str, optional
-        Limbs whose hands float.
+        Limbs whose hands' wrists float.
     """
     if certificate is None:
         return ""
@@ -246,7 +246,13 @@ def _missing(shortfall: Array) -> str:
 
 
 def blocking_sentence(names: Sequence[LimitName]) -> str:
-    """Say what is in the way, the foremost first; a limb's name once in a row."""
+    """Return words for what the first two of some constraints forbid, and how many follow.
+
+    Parameters
+    ----------
+    names : sequence of LimitName
+        Constraints, the foremost first.
+    """
     words: list[str] = []
     for i, name in enumerate(names[:2]):  # the rest are counted
         sentence = f"{_spoken(name)} {_barrier(name.limit)}"

@@ -25,12 +25,23 @@ __all__ = [
 
 
 def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
-    """Return what is odd about a stance and its question: findings, and all warnings in words.
+    """Return all findings and warnings about a stance and its question.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+
+    Returns
+    -------
+    findings : tuple of Finding
+        Structured findings.
+    words : tuple of str
+        Sentences of all findings, then further warnings.
 
     Raises
     ------
     InvalidInputError
-        If the stance cannot be; the field is relative to the question.
+        If the stance is invalid; ``field`` is relative to the question.
     """
     question, where = prepared.question, prepared.where
     odd = (*scene_findings(prepared), *unit_findings(question), *_load_findings(question, where))
@@ -44,7 +55,17 @@ def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, 
 
 
 def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
-    """Return what is odd about the hands and rock of a stance that is planned all the same."""
+    """Return warnings about the hands and the rock of a stance, one sentence each.
+
+    Idle fingers and palms, tiles stronger than their spines, rock that ends within a finger's
+    reach, and odd holds are reported.
+
+    Parameters
+    ----------
+    stance : Stance
+    batch : HandBatch
+        Settled hands of the stance, in its order.
+    """
     found: list[str] = []
     settled, holding, count = batch.hands, batch.touch.holding, len(FINGERS)
     reach = settled[0].hand.finger.reach
@@ -74,12 +95,12 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
 
 
 def scene_findings(prepared: PreparedStance) -> tuple[Finding, ...]:
-    """Return what is odd about a stance as a scene, and about its links where joints are known.
+    """Return findings about a stance's geometry, and about its links where the joints are known.
 
     Raises
     ------
     InvalidInputError
-        If the stance cannot be; the field is relative to the question.
+        If the stance is invalid; ``field`` is relative to the question.
     """
     scene, where = scene_of(prepared.question.stance, prepared.batch.hands), prepared.where
     odd = findings(scene)
@@ -194,10 +215,11 @@ def _idle(hand: SettledHand, by_finger: Sequence[int]) -> Iterator[str]:
 
 
 def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
-    """Return one sentence for each floating hand whose preload lets tiles slip backwards at rest.
+    """Return a sentence for each floating hand whose preload lets a tile slip backwards at rest.
 
-    A tile's shear at rest is affine in its tendon's tension; where the springs of the finger push
-    it away from the finger's base, a tension is needed to hold it.
+    A tile's shear at rest is affine in its tendon's tension. Where the finger's springs push the
+    tile away from the finger's base, a least tension is needed to hold the tile. Hands with
+    compliant wrists are left out.
     """
     found = []
     hands, wrists = prepared.batch.hands, prepared.hands.wrists
@@ -224,7 +246,10 @@ def idle_preloads(prepared: PreparedStance) -> tuple[str, ...]:
 
 
 def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
-    """Yield a sentence for each floating hand that its preload alone overloads."""
+    """Yield a sentence for each floating hand whose tendon preload alone exceeds a limit.
+
+    Hands with compliant wrists are left out.
+    """
     tension_limit = prepared.question.limits.tendon_tension
     for limb, wrist in zip(prepared.limbs, prepared.hands.wrists, strict=True):
         if wrist is None or wrist.driven:
@@ -247,7 +272,15 @@ def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
 
 
 def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
-    """Yield a sentence for each wrist of a plan that goes too far to be sure, or does not stay."""
+    """Yield warnings about a plan's floating wrists: moved or turned too far, or unstable.
+
+    Beyond 5 mm or 50 mrad the linear step from rest is uncertain; unstable is a wrist whose least
+    stiffness is not above zero.
+
+    Parameters
+    ----------
+    hands : sequence of HandPlan
+    """
     for hand in hands:
         if hand.wrist is None:
             continue

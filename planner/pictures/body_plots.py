@@ -1,4 +1,4 @@
-"""Pictures of what a stance can hold: a plane of body wrenches, and accelerations in two planes."""
+"""Pictures of a stance's body space: a plane of body wrenches, and accelerations in two planes."""
 
 from __future__ import annotations
 
@@ -38,19 +38,21 @@ ACCELERATION_VIEWS: Final = (
         "toward its belly, along −z of B [m/s²]",
     ),
 )
-"""Views in which accelerations are drawn."""
+"""Planes in which feasible accelerations are drawn."""
 
 
 def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: str) -> None:
-    """Draw a plane of the body wrenches that are held, and the accelerations from rest.
+    """Draw a section of the body space, and the feasible accelerations from rest, to a file.
+
+    Accelerations are left out where they cannot be computed, or the body is infeasible at rest.
 
     Parameters
     ----------
     space : BodySpace
     section : BodySection
-        Of that space.
+        Section of that body space, from `BodySpace.section`.
     path : Path
-        PNG, PDF or SVG.
+        Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
     """
     views = ACCELERATION_VIEWS if space.accelerates else ()
@@ -78,7 +80,13 @@ def _accelerations(space: BodySpace, view: _View) -> Polygon | None:
 
 
 def symbol_of(axis: str) -> tuple[str, str]:
-    """Return how a component of a wrench is written, and its unit."""
+    """Return the mathematical symbol and the unit of a body wrench's component.
+
+    Parameters
+    ----------
+    axis : str
+        One of `WRENCH_COMPONENTS`, such as ``fx``.
+    """
     return f"${axis[0].upper()}_{axis[1]}$", "N" if axis.startswith("f") else "N·m"
 
 

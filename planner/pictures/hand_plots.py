@@ -1,7 +1,7 @@
-"""The picture of one hand on its hold, and of what it can carry.
+"""Pictures of one hand on its hold, and of the wrenches that it can exert.
 
-Every finger is drawn in its own plane, with the rock that the plane cuts; the palm and the planes
-from above; the set of wrenches in three projections.
+Each finger is drawn in its own plane with the rock's section; the palm and these planes are drawn
+from above; the wrench space is drawn in three projections.
 """
 
 from __future__ import annotations
@@ -51,21 +51,22 @@ def plot_wrench_space(
     *,
     outlined: bool = False,
 ) -> None:
-    """Draw a hand on its hold, and three projections of what it can carry.
+    """Draw a hand on its hold, and three projections of its wrench space, to a file.
 
     Parameters
     ----------
     settled : SettledHand
-    space : WrenchSpace, optional
-        Not empty at utilisation 1; without it only the hand is drawn.
+    space : WrenchSpace or None
+        Wrench space, not empty at utilisation 1; None draws the hand only.
     path : Path
-        PNG, PDF or SVG.
+        Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
     preload : ndarray, shape (4,), optional
-        Of a floating hand, the tensions at which its motors stand still [N]; ``space`` is then its
-        set linearised at rest.
+        For a floating hand, the tendon tensions at which its motors are held [N]; ``space`` is then
+        its wrench space linearised at rest.
     outlined : bool, optional
-        Whether projections are drawn by how far the set reaches, as its vertices are too many.
+        Whether projections are computed from the support function, for a space with too many
+        vertices.
     """
     figure = draw_wrench_space(settled, space, title, preload, outlined=outlined)
     with whole_file(path) as part:
@@ -80,7 +81,20 @@ def draw_wrench_space(
     *,
     outlined: bool = False,
 ) -> Figure:
-    """Draw a hand and what it can carry; arguments as of `plot_wrench_space`."""
+    """Draw a hand on its hold, and three projections of its wrench space, as a figure.
+
+    Parameters
+    ----------
+    settled : SettledHand
+    space : WrenchSpace or None
+        Wrench space, not empty at utilisation 1; None draws the hand only.
+    title : str
+    preload : ndarray, shape (4,), optional
+        Preload of a floating hand's tendons [N]; tile forces are then those at this preload, not at
+        the closing tension.
+    outlined : bool, optional
+        Whether projections are computed from the support function, not from vertices.
+    """
     tensions = np.full(len(FINGERS), settled.closing_tension) if preload is None else preload
     figure = Figure(figsize=(15.0, 7.6 if space is None else 12.2), layout="constrained")
     heights = [1.0] if space is None else [1.0, 0.6]
@@ -113,15 +127,15 @@ def draw_wrench_space(
 
 
 def draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> None:
-    """Draw every finger in its own plane, its tiles loaded by the four tensions.
+    """Draw each finger in its own plane, with the forces of its tiles.
 
     Parameters
     ----------
     panels : list of Axes
-        Of inner_left, outer_left, inner_right and outer_right.
+        For inner_left, outer_left, inner_right and outer_right.
     settled : SettledHand
     tensions : ndarray, shape (4,)
-        [N]
+        Tendon tensions that load the tiles, in the order of `FINGERS` [N].
     """
     loads = settled.tile_loads(tensions)
     largest = max(float(np.hypot(loads[:, 0], loads[:, 1]).max()), 1.0)
@@ -248,12 +262,12 @@ def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: fl
 
 
 def direction_in_words(along: Array) -> str:
-    """Return a horizontal direction of H in words.
+    """Return words for a horizontal direction, such as ``along x of H``.
 
     Parameters
     ----------
     along : ndarray, shape (3,)
-        In H.
+        Direction in hand frame H; its z component is ignored.
     """
     angle = math.degrees(math.atan2(float(along[1]), float(along[0])))
     for name, where in (("x", 0.0), ("y", 90.0), ("−y", -90.0)):

@@ -1,6 +1,6 @@
-"""The picture of a plan: the robot on the rock, what its hands carry, and how near each limit is.
+"""Picture of a plan: the robot on the rock, the forces of its hands, and all utilisations.
 
-The robot is drawn from behind in W, and from two sides: its body as the capsules in its file, its
+The robot is drawn from behind in W and from two sides: its body as the capsules of its file, its
 limbs where the joints are known.
 """
 
@@ -37,23 +37,31 @@ __all__ = ["draw_plan", "plot_plan"]
 
 
 def plot_plan(plan: Plan, question: Question, path: Path) -> None:
-    """Write a picture of a plan.
+    """Draw a plan to a file.
 
     Parameters
     ----------
     plan : Plan
         Any status; without loads only hands, holds and limbs are drawn.
     question : Question
-        That it answers.
+        Question that the plan answers.
     path : Path
-        PNG, PDF or SVG.
+        Picture file; its suffix, PNG, PDF or SVG, is the format.
     """
     with whole_file(path) as part:
         draw_plan(plan, question).savefig(part, dpi=130, facecolor="white")
 
 
 def draw_plan(plan: Plan, question: Question) -> Figure:
-    """Draw a plan; arguments as of `plot_plan`."""
+    """Draw a plan as a figure: views of the robot, and tables of utilisations or shortfalls.
+
+    Parameters
+    ----------
+    plan : Plan
+        Any status; without loads only hands, holds and limbs are drawn.
+    question : Question
+        Question that the plan answers.
+    """
     scene, seen = drawn_scene(plan, question), view_directions(question.stance)
     rows = sum(len(hand.fingers) for hand in plan.hands or ())
     joints = joint_utilisations(plan, question.stance)

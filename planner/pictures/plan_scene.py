@@ -1,6 +1,6 @@
-"""Visible parts of a plan, as plain data in W: surfaces, lines, dots, arrows and labels.
+"""Visible parts of a plan as plain data in W: surfaces, lines, dots, arrows and labels.
 
-Each has a kind, from which the renderer chooses its style. Nothing here knows the renderer.
+Each part has a kind, from which a renderer chooses the style. No renderer is imported here.
 """
 
 from __future__ import annotations
@@ -35,21 +35,22 @@ __all__ = [
 ]
 
 WORLD_UP: Final = np.array([0.0, 0.0, 1.0])
-"""Upward direction in W; and z of a hand."""
+"""Unit vector up in W; also the z axis of a hand in H."""
 
 
 class DrawnSurface(NamedTuple):
-    """Triangles of one thing.
+    """Triangles of one object in world frame W.
 
     Attributes
     ----------
     kind : {'rock', 'palm', 'body', 'link'}
         All but rock are convex.
     name : str
-        The limb of rock and of a palm.
+        Limb whose rock or palm is drawn; empty for the body and links.
     vertices : ndarray, shape (n, 3)
         [m]
     faces : ndarray of int, shape (m, 3)
+        Vertex indices of each triangle.
     """
 
     kind: str
@@ -59,19 +60,26 @@ class DrawnSurface(NamedTuple):
 
     @property
     def triangles(self) -> Array:
-        """Corners of the triangles, shape (m, 3, 3) [m]."""
+        """Corners of the triangles in world frame W, shape (m, 3, 3) [m]."""
         return np.asarray(self.vertices[self.faces])
 
 
 class Line(NamedTuple):
-    """Places that are joined, shape (n, 3) [m]; of the kind ``finger`` or ``limb``."""
+    """Polyline in world frame W.
+
+    Attributes
+    ----------
+    kind : {'finger', 'limb'}
+    points : ndarray, shape (n, 3)
+        [m]
+    """
 
     kind: str
     points: Array
 
 
 class Dots(NamedTuple):
-    """Places that are marked.
+    """Marked points in world frame W.
 
     Attributes
     ----------
@@ -79,7 +87,7 @@ class Dots(NamedTuple):
     points : ndarray, shape (n, 3)
         [m]
     utilisations : ndarray, shape (n,), or None
-        Of joints.
+        Utilisation of each joint; None for other kinds, and for joints without known torques.
     """
 
     kind: str
@@ -88,19 +96,19 @@ class Dots(NamedTuple):
 
 
 class Arrow(NamedTuple):
-    """A force at a place, with what is written at its tip.
+    """Force drawn at a point, with a text at the arrow's tip.
 
     Attributes
     ----------
     kind : {'force', 'load'}
-        Of the rock on a hand, or what the hands hold up.
+        ``force``: of the rock on a hand; ``load``: weight or other load that the hands hold.
     start : ndarray, shape (3,)
-        [m]
+        In world frame W [m].
     force : ndarray, shape (3,)
-        [N]
+        In W [N].
     text : str
     utilisation : float or None
-        Of the hand.
+        Utilisation of the hand; None for the load.
     """
 
     kind: str
@@ -111,7 +119,15 @@ class Arrow(NamedTuple):
 
 
 class Label(NamedTuple):
-    """Words at a place, shape (3,) [m]; of the kind ``limb`` or ``origin``."""
+    """Text at a point in world frame W.
+
+    Attributes
+    ----------
+    kind : {'limb', 'origin'}
+    place : ndarray, shape (3,)
+        [m]
+    text : str
+    """
 
     kind: str
     place: Array
@@ -120,14 +136,18 @@ class Label(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class DrawnScene:
-    """All that there is to see of a plan.
+    """All visible parts of a plan.
 
     Attributes
     ----------
     origin : ndarray, shape (3,)
-        Of B [m].
-    surfaces, lines, dots, arrows, labels : tuple
-        Arrows of the hands come first, in their order, and that of the load last.
+        Origin of body frame B in world frame W [m].
+    surfaces : tuple of DrawnSurface
+    lines : tuple of Line
+    dots : tuple of Dots
+    arrows : tuple of Arrow
+        Those of the hands in their order, then that of the load.
+    labels : tuple of Label
     """
 
     origin: Array
@@ -139,7 +159,7 @@ class DrawnScene:
 
     @property
     def points(self) -> Array:
-        """All places, with the tips of arrows, shape (n, 3) [m]."""
+        """All points of the scene, with the arrows' tips, in W, shape (n, 3) [m]."""
         parts = [self.origin, *(arrow.start + self.scale * arrow.force for arrow in self.arrows)]
         parts += [surface.vertices for surface in self.surfaces]
         parts += [line.points for line in self.lines] + [dots.points for dots in self.dots]
@@ -147,22 +167,22 @@ class DrawnScene:
 
     @property
     def scale(self) -> float:
-        """Length of the arrow of a force [m/N]."""
+        """Length of an arrow per newton [m/N]; the longest arrow has 0.5 m at most."""
         return 0.5 / max(1.0, *(float(np.linalg.norm(arrow.force)) for arrow in self.arrows))
 
 
 class ViewDirections(NamedTuple):
-    """Unit directions in W that are seen from the robot: ahead, and into the rock.
+    """Directions in which a stance is viewed.
 
     Attributes
     ----------
     ahead : ndarray, shape (3,)
-        Horizontal.
+        Horizontal unit vector in world frame W, toward the rock if ``toward``.
     into : ndarray, shape (3,)
-        The mean of the hands' z; ahead where they cancel.
+        Unit vector in W into the rock: the mean of the hands' z axes; ``ahead`` where these cancel.
     toward : bool
-        Whether the rock is ahead; if not, under a ceiling, on a floor or between walls, −z or x of
-        B is.
+        Whether the rock is ahead. If not (under a ceiling, on a floor, between walls), ``ahead`` is
+        the horizontal part of −z or x of body frame B, or x of W.
     steep : bool
         Whether the rock is a ceiling or a floor.
     """
@@ -174,7 +194,7 @@ class ViewDirections(NamedTuple):
 
 
 def view_directions(stance: Stance) -> ViewDirections:
-    """Return how a stance is looked at."""
+    """Return the directions in which a stance is viewed: ahead, and into the rock."""
     into = np.mean([hand.pose.rotation[:, 2] for hand in stance.hands], axis=0)
     x, _, z = stance.body.rotation.T
     level = [
@@ -191,7 +211,15 @@ def view_directions(stance: Stance) -> ViewDirections:
 
 
 def drawn_scene(plan: Plan, question: Question) -> DrawnScene:
-    """Return what there is to see of a plan for a question."""
+    """Return all visible parts of a plan, in W.
+
+    Parameters
+    ----------
+    plan : Plan
+        Any status; without loads there are no arrows of hands.
+    question : Question
+        Question that the plan answers.
+    """
     stance = question.stance
     settled = [settle_hand(hand, stance) for hand in stance.hands]
     surfaces = _body(plan, stance)
@@ -246,7 +274,19 @@ def drawn_scene(plan: Plan, question: Question) -> DrawnScene:
 
 
 def joint_utilisations(plan: Plan, stance: Stance) -> dict[str, Array]:
-    """Return each joint's utilisation by limb, shape (n,) each; none for a plan without torques."""
+    """Return the utilisation of each joint of a plan, by limb.
+
+    Parameters
+    ----------
+    plan : Plan
+    stance : Stance
+        Stance of the plan.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        The n joints of a limb, from the body outward. Empty for a plan without joint torques.
+    """
     shares = plan.joint_shares
     if plan.joints is None or shares is None:
         return {}

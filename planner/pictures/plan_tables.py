@@ -1,4 +1,4 @@
-"""Panels beside the views of a plan: how near each limit is, or what is missing, and the spread."""
+"""Panels beside the views of a plan: utilisations, or the missing wrench, and the spread."""
 
 from __future__ import annotations
 
@@ -20,10 +20,18 @@ __all__ = ["draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
 
 
 def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
-    """Draw the utilisation of tiles, tendons with their motors, palms and hands as colours.
+    """Draw a table of utilisations as colours: tiles, tendons with their motors, palms and hands.
 
-    Cells of a palm and of the hand, whichever limit of it is used most, are as high as the rows of
-    the hand's fingers.
+    A tendon's cell has the largest utilisation of tension, motor torque and motor current. The
+    cells of a palm, and of a hand (its most used limit), span the rows of that hand's fingers.
+
+    Parameters
+    ----------
+    axes : Axes
+    plan : Plan
+        With loads.
+    question : Question
+        Question that the plan answers.
     """
     hands = plan.hands or ()
     body, cap = question.stance.robot.hand, question.limits.tendon_tension
@@ -65,7 +73,14 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
 
 
 def draw_joints(axes: Any, used: Mapping[str, Array]) -> None:
-    """Draw the utilisation of every joint, by limb, as a table of colours."""
+    """Draw a table of the joints' utilisations as colours.
+
+    Parameters
+    ----------
+    axes : Axes
+    used : mapping of str to ndarray, shape (n,)
+        Utilisation of the n joints of each limb, from the body outward.
+    """
     values = np.array(list(zip_longest(*used.values(), fillvalue=np.nan))).T
     columns = [str(i + 1) for i in range(values.shape[1])]
     _draw_colours(axes, values, columns, [limb.replace("_", " ") for limb in used])
@@ -101,10 +116,16 @@ def _write_numbers(axes: Any, values: Array, first: tuple[float, float] = (0.0, 
 
 
 def draw_shortfall(axes: Any, plan: Plan) -> None:
-    """Write the body wrench that is missing, and what leaves no balance, where there are no loads.
+    """Write the missing body wrench of an infeasible plan, and which constraints block it.
 
-    The first members of the certificate's irreducible set, or, where that is undecided, of the rows
-    in the way.
+    The constraints are the first of the certificate's irreducible infeasible subset or, where that
+    is undecided, of its blocking rows.
+
+    Parameters
+    ----------
+    axes : Axes
+    plan : Plan
+        Without loads.
     """
     axes.set_axis_off()
     proof = plan.certificate
@@ -176,7 +197,7 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
 
 
 def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
-    """Draw a histogram of the load factors over draws.
+    """Draw a histogram of the load factors over the parameter samples.
 
     Parameters
     ----------
@@ -184,7 +205,7 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     spread : Spread
         With load factors.
     nominal : float or None
-        The plan's own load factor.
+        Load factor of the plan with nominal parameters.
     """
     factors = [factor for factor in spread.load_factors if factor is not None]
     if spread.load_factor is None:

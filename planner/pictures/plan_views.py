@@ -1,4 +1,4 @@
-"""Looks at the scene of a plan by matplotlib: what is drawn alike in two and three dimensions."""
+"""Views of a plan's scene in matplotlib: what two- and three-dimensional pictures share."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ __all__ = ["UTILISATION_COLOURS", "UTILISATION_NORM", "View", "draw_scene", "sil
 UTILISATION_COLOURS: Final = LinearSegmentedColormap.from_list(
     "load", ["#1a9850", "#e6a117", "#d73027"]
 ).with_extremes(over="#7b1fa2")
-"""Colours of a utilisation; another one beyond 1."""
+"""Colour map of utilisations from 0 to 1, with a separate colour above 1."""
 
 UTILISATION_NORM: Final = Normalize(0.0, 1.0)
+"""Range of utilisations that the colour map covers: 0 to 1."""
 
 SCENE_STYLES: Final[dict[str, dict[str, Any]]] = {
     # convex surfaces; hands and rock are seen through the body
@@ -56,26 +57,28 @@ SCENE_STYLES: Final[dict[str, dict[str, Any]]] = {
 """Styles of what a scene has, by kind."""
 
 NOTE_MOVES: Final = np.array([(float(i), float(j)) for i in range(-10, 11) for j in range(-8, 9)])
-"""Moves of a note to the sides and up and down that are tried, shape (n, 2), in steps."""
+"""Shifts of a note that `View.untangle` tries, shape (n, 2), in steps of half a line's height."""
 
 
 @dataclass(frozen=True)
 class View:
-    """One look at a scene: where its axes draw places of W.
+    """Matplotlib axes that show a scene from one direction, with methods that draw into these axes.
 
     Attributes
     ----------
     axes : Axes or Axes3D
     place : callable
-        Coordinates of places (n, 3) in the axes, (n, 2) or (n, 3).
+        Maps points in world frame W, shape (n, 3), to coordinates of the axes, shape (n, 2) or (n,
+        3).
     flat : callable
-        Places as they are seen, (n, 2), for arrows and notes.
+        Maps points in W, shape (n, 3), to their projection in the picture, shape (n, 2), for arrows
+        and notes.
     look : ndarray, shape (3,)
-        Direction in W of looking.
+        Viewing direction in W.
     deep : bool
-        Whether the axes know of depth.
+        Whether the axes are three-dimensional.
     seen : list of ndarray, shape (n, 2)
-        Lines and arrows drawn so far, as they are seen.
+        Projections of the lines, dots and arrows drawn so far; notes avoid them.
     """
 
     axes: Any
@@ -86,23 +89,55 @@ class View:
     seen: list[Array] = field(default_factory=list)
 
     def line(self, points: Array, **style: Any) -> None:
+        """Draw a polyline.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            In world frame W [m].
+        **style
+            Line properties of matplotlib.
+        """
         self.axes.plot(*self.place(points).T, clip_on=False, **style)
         self.seen.append(self.flat(points))
 
     def dots(self, points: Array, **style: Any) -> None:
+        """Draw markers at points.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            In world frame W [m].
+        **style
+            Line properties of matplotlib.
+        """
         if len(points):
             self.axes.plot(*self.place(points).T, clip_on=False, linestyle="none", **style)
             self.seen.extend(self.flat(points)[:, None])
 
     def fill(self, polygons: Array, **style: Any) -> None:
-        """Fill polygons, shape (n, k, 3)."""
+        """Fill polygons.
+
+        Parameters
+        ----------
+        polygons : ndarray, shape (n, k, 3)
+            k corners of each of n polygons, in world frame W [m].
+        **style
+            Properties of matplotlib's polygon collections.
+        """
         if len(polygons):
             corners = self.place(polygons.reshape(-1, 3)).reshape(*polygons.shape[:2], -1)
             collection = Poly3DCollection if self.deep else PolyCollection
             self.axes.add_collection(collection(list(corners), clip_on=False, **style))
 
     def rock(self, triangles: Array) -> None:
-        """Draw lit triangles, shape (n, 3, 3), the farthest first."""
+        """Draw rock triangles, shaded by a light source, the farthest first.
+
+        Parameters
+        ----------
+        triangles : ndarray, shape (n, 3, 3)
+            Corners in world frame W [m].
+        """
         if not self.deep:
             triangles = triangles[np.argsort(-(triangles @ self.look).mean(axis=1))]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -115,7 +150,21 @@ class View:
         self.fill(triangles, facecolors=shades, edgecolors=shades, linewidth=0.8, zorder=1)
 
     def arrow(self, start: Array, step: Array, colour: Any) -> tuple[Array, Array]:
-        """Draw an arrow, and return where it is seen to begin and to end, shape (2,) each."""
+        """Draw an arrow.
+
+        Parameters
+        ----------
+        start : ndarray, shape (3,)
+            In world frame W [m].
+        step : ndarray, shape (3,)
+            From start to tip, in W [m].
+        colour : colour of matplotlib
+
+        Returns
+        -------
+        begin, tip : ndarray, shape (2,)
+            Projections of both ends in the picture.
+        """
         begin, tip = self.flat(np.array([start, start + step]))
         # its head weighs as much as a dozen dots
         self.seen.extend([np.array([begin, tip]), *np.repeat(tip[None, None], 12, axis=0)])
@@ -127,7 +176,23 @@ class View:
     def merged(
         self, spots: Iterable[Array], texts: Iterable[str], between: str, near: float
     ) -> list[tuple[Array, str]]:
-        """Return notes with seen places; from a side, those that are near each other joined."""
+        """Return notes with their positions, in a side view with adjacent notes joined into one.
+
+        Parameters
+        ----------
+        spots : iterable of ndarray, shape (2,)
+            Projected position of each text.
+        texts : iterable of str
+        between : str
+            Separator of joined texts.
+        near : float
+            Distance below which texts are joined, in the coordinates of ``spots``.
+
+        Returns
+        -------
+        list of (ndarray, str)
+            Position, shape (2,), and text of each note.
+        """
         found: list[tuple[Array, str]] = []
         for spot, text in zip(spots, texts, strict=True):
             for i, (known, before) in enumerate(found):
@@ -139,7 +204,18 @@ class View:
         return found
 
     def beyond(self, text: str, tip: Array, step: Array, **style: Any) -> None:
-        """Write beyond the tip of an arrow that is seen as a step (2,)."""
+        """Write a text beyond the tip of an arrow.
+
+        Parameters
+        ----------
+        text : str
+        tip : ndarray, shape (2,)
+            Projection of the tip.
+        step : ndarray, shape (2,)
+            Projected arrow, from start to tip.
+        **style
+            Text properties of matplotlib.
+        """
         size = float(np.linalg.norm(step))
         x, y = step / size if size > 0.0 else (0.0, 1.0)
         ha = "left" if x > 0.5 else "right" if x < -0.5 else "center"
@@ -147,7 +223,18 @@ class View:
         self.note(text, tip, (5.0 * x, 5.0 * y), ha=ha, va=va, **style)
 
     def note(self, text: str, spot: Array, shift: tuple[float, float], **style: Any) -> None:
-        """Write next to a seen place (2,), shifted by so many printer's points."""
+        """Write a text near a point of the picture.
+
+        Parameters
+        ----------
+        text : str
+        spot : ndarray, shape (2,)
+            Projection of the point.
+        shift : (float, float)
+            Offset of the text to the right and up [printer's points].
+        **style
+            Text properties of matplotlib.
+        """
         pad = PICTURE_SETTINGS.note_padding
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": pad}
         style = {"fontsize": 8, "ha": "center", "va": "center", "zorder": 8, "bbox": box, **style}
@@ -156,9 +243,10 @@ class View:
         self.axes.annotate(text, where, **place, **style)
 
     def untangle(self) -> None:
-        """Move notes off each other, and off what is drawn where they can, once all is drawn.
+        """Move notes so that they overlap neither each other nor, if possible, drawn lines.
 
-        They stay near where they were, and from a side within the frame.
+        To be called once everything is drawn. Notes stay near their positions and, in a side view,
+        within the frame.
         """
         self.axes.apply_aspect()
         figure = self.axes.figure
@@ -199,7 +287,7 @@ class View:
 
 
 def draw_scene(view: View, scene: DrawnScene) -> None:
-    """Draw rock, hands, limbs, forces and names."""
+    """Draw rock, hands, limbs, forces and names of a scene into a view."""
     view.rock(np.concatenate([s.triangles for s in scene.surfaces if s.kind == "rock"]))
     for kind in ("palm", "link", "body"):
         drawn = [s.vertices for s in scene.surfaces if s.kind == kind]
@@ -224,19 +312,20 @@ def draw_scene(view: View, scene: DrawnScene) -> None:
 
 
 def silhouette(vertices: Array, look: Array) -> Array:
-    """Return the corners of a convex surface's outline as seen in parallel, in order.
+    """Return the outline of a convex surface in parallel projection.
 
     Parameters
     ----------
     vertices : ndarray, shape (n, 3)
         [m]
     look : ndarray, shape (3,)
-        Unit direction.
+        Unit viewing direction.
 
     Returns
     -------
     ndarray, shape (m, 3)
-        Two ends where it is seen edge-on [m].
+        Those vertices that are corners of the outline (convex hull of the projection), in order
+        [m]; the two end points of a surface seen edge-on.
     """
     flat = vertices @ np.linalg.svd(look[None])[2][1:].T
     try:

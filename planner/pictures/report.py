@@ -1,4 +1,4 @@
-"""Write a climb to disk: a table, a picture and a summary."""
+"""Report of a climb: a table of stages, a picture and a summary."""
 
 from __future__ import annotations
 
@@ -30,12 +30,19 @@ PHASE_COLOURS: Final = {
 def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
     """Write ``stages.csv``, ``margin.png`` and ``summary.json`` into a folder.
 
-    A stage's ``margin`` is the cap on the utilisation minus its utilisation.
+    The margin of a stage is the cap on the utilisation minus the stage's utilisation.
+
+    Parameters
+    ----------
+    result : RouteResult
+        Plans of all stages of the climb.
+    folder : Path
+        Created if missing; files of these names are replaced.
 
     Returns
     -------
     dict of str to Path
-        By the names ``table``, ``picture`` and ``summary``.
+        Files by the names ``table``, ``picture`` and ``summary``.
     """
     folder.mkdir(parents=True, exist_ok=True)
     files = {
@@ -60,7 +67,18 @@ def write_report(result: RouteResult, folder: Path) -> dict[str, Path]:
 
 
 def summary(result: RouteResult) -> dict[str, Any]:
-    """Return a summary of the climb: its status, its crux, and what is odd about its stances."""
+    """Return the summary of a climb: statuses, the crux (its hardest stage), warnings and findings.
+
+    Parameters
+    ----------
+    result : RouteResult
+        Plans of all stages of the climb.
+
+    Returns
+    -------
+    dict of str to object
+        Plain data for JSON.
+    """
     crux = result.crux
     stage, plan = result.stages[crux], result.plans[crux]
     statuses = [p.status for p in result.plans]
@@ -160,7 +178,13 @@ def _spread(stage: RouteStage, plan: Plan | OutOfReach) -> dict[str, Any]:
 
 
 def draw_route(result: RouteResult) -> Figure:
-    """Draw utilisation and load factor along a climb, with its crux, and their spread."""
+    """Draw utilisation and load factor, with their spread, over the stages of a climb.
+
+    Parameters
+    ----------
+    result : RouteResult
+        Plans of all stages of the climb.
+    """
     index = np.arange(len(result.plans))
     stage_width = 0.32  # that a stage needs [inch]
     wide = float(np.clip(stage_width * len(index), *(11.0, 60.0)))

@@ -1,6 +1,6 @@
-"""The rock around a hand as triangles, for pictures.
+"""Triangles of the rock around a hand, for pictures.
 
-Every hold has a surface (`hand_models.rock.Hold.surface`), cut off at a box about the hand.
+The surface of a hold (`hand_models.rock.Hold.surface`) is cut off at a box around the hand.
 """
 
 from __future__ import annotations
@@ -19,16 +19,19 @@ __all__ = ["rock_patch"]
 
 
 def rock_patch(settled: SettledHand, beside: Array | None = None) -> Array:
-    """Return the rock in a box about a hand, shape (n, 3, 3) [m].
-
-    Triangles in H; none where the hold is farther away.
+    """Return the triangles of a hand's rock within a box around that hand.
 
     Parameters
     ----------
     settled : SettledHand
     beside : ndarray, shape (n, 3), optional
-        Places in H of all hands on this rock, which is drawn so far beyond each; by default the
-        hand is alone.
+        Origins in hand frame H of all hands on this rock [m]; the box extends by
+        `PictureSettings.rock_around` beyond all of them. By default this hand alone.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
+        Corners in H [m]; empty where the hold is outside the box.
     """
     beside = np.zeros((1, 3)) if beside is None else beside
     around = PICTURE_SETTINGS.rock_around

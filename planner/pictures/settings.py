@@ -1,4 +1,4 @@
-"""Colours and sizes that several parts of the pictures have in common."""
+"""Colours and sizes that several pictures share."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ __all__ = ["PICTURE_SETTINGS", "PictureSettings"]
 
 @dataclass(frozen=True, slots=True)
 class PictureSettings:
-    """Colours as matplotlib names them, and sizes."""
+    """Colours, by their matplotlib names, and sizes of pictures."""
 
     held: str = "tab:blue"
     gravity: str = "tab:red"
     asked: str = "black"
-    """Colours of body wrenches and accelerations."""
+    """Colours of feasible sets (``held``), of gravity, and of what the question asks for."""
     palm: str = "tab:brown"
     limb: str = "#4a6a8a"
     load: str = "tab:blue"
@@ -24,11 +24,11 @@ class PictureSettings:
     note_padding: float = 1.0
     """Space around a note in a view [printer's points]."""
     rock_around: float = 0.45
-    """Half the side of the box about a hand in which rock is drawn [m]."""
+    """Half the side of the box around a hand in which rock is drawn [m]."""
     rock_triangles: int = 3000
-    """Triangles of a mesh near a hand above which it is drawn coarsely."""
+    """Number of triangles near a hand above which a mesh is drawn coarsely."""
     rock_coarseness: float = 0.02
-    """Size of what is drawn of such a mesh [m]."""
+    """Grid size to which such a mesh is coarsened [m]."""
 
 
 PICTURE_SETTINGS: Final = PictureSettings()

@@ -1,4 +1,4 @@
-"""Worker processes and the work that they are given."""
+"""Worker processes: lanes, retry after a crash, load balancing."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

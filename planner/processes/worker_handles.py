@@ -1,7 +1,7 @@
-"""Processes that answer questions, in order in each of their lanes.
+"""Handles of worker processes that answer questions; each lane of a worker answers them in order.
 
-A process can be killed at any time, which costs the questions in its lanes and nothing else. All
-end with the one that has started them, and leave signals to it.
+A worker can be killed at any time, which loses the questions in its lanes and nothing else. Workers
+end with the process that started them, and leave SIGINT to that process.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ Input = TypeVar("Input")
 Output = TypeVar("Output")
 
 Make = Callable[[], Callable[[Input], Output]]
-"""Called once in a process: returns what answers there."""
+"""Factory that is called once in a worker and returns the function that answers questions."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessSettings:
-    """Numbers that processes share with those that start them."""
+    """Constants of worker processes and of the process that starts them."""
 
     signals: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM)
     thread_variables: tuple[str, ...] = (
@@ -49,7 +49,7 @@ class ProcessSettings:
         "OMP_NUM_THREADS",
         "MKL_NUM_THREADS",
     )
-    """Which keep a library of linear algebra to one thread, set before it is loaded."""
+    """Environment variables that limit a linear-algebra library to one thread, when it loads."""
     part_bytes: int = 2**13  # of an answer, sent at once: no process can be stopped within them
     out_of_memory: int = 77  # exit status of one that may not have the memory it needs
     starts: int = 2  # in a row that may fail, or die before they are ready; then no more are tried
@@ -59,17 +59,18 @@ SETTINGS: Final = ProcessSettings()
 
 
 class PriorityLane(Generic[Input, Output]):
-    """One of a process's lanes, which answers one question after another.
+    """One of a worker's lanes: a pipe and a thread that answers one question after another.
 
     Attributes
     ----------
     handle : WorkerHandle
+        Worker that has this lane.
     number : int
-        Among its process's lanes.
+        Index among the worker's lanes.
     pipe : Connection
-        To it.
+        This end of the pipe to the worker.
     ready : bool
-        Whether it has said that it can work.
+        Whether the worker has reported that this lane can answer.
     """
 
     def __init__(self, handle: WorkerHandle[Input, Output], number: int, pipe: Connection) -> None:
@@ -81,10 +82,10 @@ class PriorityLane(Generic[Input, Output]):
         self._sender: threading.Thread | None = None
 
     def give(self, question: Input) -> None:
-        """Send a question; if the process has died, `take` raises.
+        """Send a question to the worker without waiting.
 
-        One that the pipe may have no room for is sent in the background: its process may be at work
-        on another, or stand still, and take nothing.
+        A question too large for the pipe's buffer is sent by a background thread, as a busy or
+        suspended worker does not read. If the worker has died, `take` raises.
         """
         data, before = pickle.dumps(question, protocol=pickle.HIGHEST_PROTOCOL), self._sender
         # [bytes]: every pipe has room for them
@@ -102,21 +103,25 @@ class PriorityLane(Generic[Input, Output]):
             self.pipe.send_bytes(data)
 
     def close(self) -> None:
-        """Close the pipe; after its process has ended."""
+        """Close the pipe, once the worker has ended."""
         if self._sender is not None:
             self._sender.join()
         self.pipe.close()
 
     def take(self) -> Output | None:
-        """Return what has come; None for the word that the lane is ready, or a part of an answer.
+        """Return the next answer of the worker, if all of it has arrived.
 
-        To be called where something has come; it waits for nothing more, though a process may
-        stand still within its answer.
+        To be called when the pipe has data. Never waits for the rest of an answer.
+
+        Returns
+        -------
+        object or None
+            None if only a part of an answer has arrived, or the report that the lane is ready.
 
         Raises
         ------
         EOFError
-            If the process has died.
+            If the worker has died.
         """
         try:
             self._parts.append(self.pipe.recv_bytes())
@@ -133,19 +138,21 @@ class PriorityLane(Generic[Input, Output]):
 
 
 class WorkerHandle(Generic[Input, Output]):
-    """A process that answers.
+    """Worker process that answers questions in one or several lanes.
 
     Parameters
     ----------
     make : callable
-        Called once in the process; returns what answers a question. It, questions and answers can
-        be pickled. What it raises ends the process.
+        Factory that is called once in the worker and returns the function that answers a question.
+        Factory, questions and answers must be picklable. An exception in the factory ends the
+        worker, and so does one in the first lane's function; in another lane it ends that lane's
+        thread only.
     lanes : int
-        How many questions it has at a time, each in a thread of its own.
+        Number of questions answered at a time, each by a thread of its own.
     memory : int, optional
-        Bytes that it may have, where the system can keep it to them.
+        Limit of the worker's memory [bytes]; enforced on Linux only.
     stays : bool, optional
-        Whether SIGTERM is left to the process that started it.
+        Whether the worker ignores SIGTERM, so that the process that started it handles that signal.
 
     Attributes
     ----------
@@ -179,16 +186,21 @@ class WorkerHandle(Generic[Input, Output]):
 
     @property
     def ready(self) -> bool:
-        """True where the process has reported that it can work."""
+        """True if all lanes have reported that they can answer."""
         return all(lane.ready for lane in self.lanes)
 
     def kill(self, *, dead: bool = False) -> str:
-        """End it, whatever it does; return in words how it ended.
+        """Kill the worker, close its lanes, and return words for how it ended.
 
         Parameters
         ----------
         dead : bool, optional
-            Whether it has ended by itself, as its pipes show a moment earlier than the system.
+            Whether the worker has already died: then wait up to 1 s for its exit status.
+
+        Returns
+        -------
+        str
+            Such as ``was stopped``, ``was killed by signal 9`` or ``ended with status 70``.
         """
         self.process.join(1.0 if dead else 0.0)  # [s] its pipes end a moment earlier
         status = self.process.exitcode
@@ -204,7 +216,7 @@ class WorkerHandle(Generic[Input, Output]):
 
 
 def resident(pid: int | None) -> int | None:
-    """Return a process's resident memory [bytes]; None where the system does not report it."""
+    """Return the resident memory of a process [bytes]; None if the system does not report it."""
     try:
         with open(f"/proc/{pid}/statm") as file:
             return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -290,15 +302,16 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def starting_children(*signals: signal.Signals) -> Iterator[None]:
-    """Start processes that call `_begin_child`: no signal interrupts that on either side.
+    """Context manager in which worker processes are started: no signal interrupts a start.
 
-    One that arrives here meanwhile is answered at the end; there it waits for `_begin_child`, for
-    good where that is not called. They do their linear algebra on one thread.
+    Signals that arrive are handled in this process when the block ends. A child receives them only
+    once it calls `_begin_child`, never if it does not. Children run their linear algebra on one
+    thread.
 
     Parameters
     ----------
     *signals : Signals
-        By default SIGINT and SIGTERM.
+        Signals to hold back; SIGINT and SIGTERM by default.
     """
     signals = signals or SETTINGS.signals
     # or else it is started with the first process, and lets signals in again

@@ -1,8 +1,8 @@
-"""Processes that do one kind of work, kept open; one that dies costs what it had in work at most.
+"""Pool of worker processes for one kind of work, with load balancing and one retry after a crash.
 
-Work goes out ahead and comes back as it is done. What a process had in work when it died is tried
-once more: whatever kills its process then is lost, and nothing else is. (Pools of ``pebble`` do
-no more work once a process has died that had none.)
+Each worker gets its next item before the current item is done. The item on which a worker died is
+retried once; if that kills another worker, the item is lost, and no other. (Pools of ``pebble``
+stop working once an idle process has died.)
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ Output = TypeVar("Output")
 
 
 class Lost:
-    """Placeholder for a result that was lost.
+    """Result of an item that was lost because it killed two workers.
 
     Parameters
     ----------
     reason : str
+        How the second worker ended.
     """
 
     def __init__(self, reason: str) -> None:
@@ -49,32 +50,35 @@ class _Task(NamedTuple, Generic[Input]):
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of processor cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 class Workers(Generic[Input, Output]):
-    """Processes that turn items into results, while it is entered. For one caller at a time.
+    """Process pool that turns items into results; a context manager, for one thread.
+
+    An item goes to a ready worker with few items; of several items, the worker gets one of a
+    subject it has worked on before (an LRU cache keeps the last 256 subjects).
 
     Parameters
     ----------
     make : callable
-        Called once in each process; returns what turns an item into its result, which is not None.
-        It, items and results can be pickled. What it raises ends its process.
+        Factory that is called once in each worker and returns the function from an item to its
+        result, which must not be None. Factory, items and results must be picklable. An exception
+        in the worker ends it.
     count : int
-        How many processes, if any.
+        Number of workers.
 
     Attributes
     ----------
     width : int
-        How many processes.
+        Number of workers.
     hands : dict of PriorityLane to dict
-        Tasks that each process has by their numbers, the one in work first; of those processes
-        that have been started and are not known to have died.
+        Tasks of each running worker by their numbers; the first is in work.
     failed_starts : int
-        Processes in a row that could not be started, or have died before they were ready.
+        Number of workers in succession that could not be started, or died before they were ready.
     """
 
     def __init__(self, make: Make[Input, Output], count: int) -> None:
@@ -96,31 +100,37 @@ class Workers(Generic[Input, Output]):
             self._remove(lane)
 
     def wait(self) -> None:
-        """Wait until all processes that have been started are ready, or have died."""
+        """Wait until each worker started so far is ready or has died."""
         for lane in [lane for lane in self.hands if not lane.ready]:
             self._take(lane)
 
     def put(self, number: int, item: Input, about: Hashable = None) -> None:
-        """Let an item be worked on; `collect` returns its result.
+        """Queue an item; `collect` returns its result.
 
         Parameters
         ----------
         number : int
-            Its own.
+            Unique number of the item, by which `collect` identifies the result.
         item : object
         about : hashable, optional
-            What it is about: a process that has had something about it before is the first to get
-            it, if it has room.
+            Subject of the item: a worker that had an item of this subject before is preferred, if
+            it has room.
         """
         self._queue.append(_Task(number, item, about))
 
     def collect(self) -> list[tuple[int, Output | Lost]]:
-        """Wait until something that was put has its result, and return all that have.
+        """Wait for at least one result, and return all results that have arrived.
+
+        Returns
+        -------
+        list of (int, object)
+            Number and result of each finished item; the result is a `Lost` if the item killed two
+            workers. Empty if no item is queued or in work.
 
         Raises
         ------
         CruxError
-            If processes do not start.
+            If workers cannot be started.
         """
         found: list[tuple[int, Output | Lost]] = []
         while not found and (self._queue or any(self.hands.values())):
