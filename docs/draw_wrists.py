@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import msgspec
 import numpy as np
 
-from hand_models import Pose
+from hand_models import Pose, spiny_hand
 from hand_models.base import Array, turns_about
 from hand_models.hand import FINGERS, SettledHand
 from planner import plan
@@ -43,7 +43,7 @@ def draw(axes: Any, settled: SettledHand, hand: HandPlan) -> None:
     """Draw one hand seen along y of H: in grey closed, in blue where its wrist settles."""
     assert hand.wrist is not None
     moved = Pose(hand.wrist.twist[:3], turns_about(hand.wrist.twist[3:]))
-    there = settled.hand.settle(
+    there = spiny_hand().settle(
         settled.hold,
         settled.surface,
         settled.grasp,
