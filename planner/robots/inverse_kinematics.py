@@ -144,8 +144,8 @@ def lower_torques(batch: LimbBatch, angles: Array) -> Array:
     batch : LimbBatch
         L limbs of up to m joints, with the target poses of their hands.
     angles : ndarray, shape (L, m)
-        Joint angles [rad]. A limb of at most six joints, or whose pose they do not solve, is
-        returned unchanged.
+        Joint angles [rad]. A limb of at most six joints is returned unchanged, and so is a limb
+        whose target pose these angles do not solve.
 
     Returns
     -------

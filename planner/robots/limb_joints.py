@@ -164,7 +164,9 @@ def _advice(joints: Iterable[JointElement], already: Collection[str]) -> str:
 
 
 class JointCoupling(NamedTuple):
-    """Positions q = matrix · a + offset of k joints of a limb, a those of the n driving joints.
+    """Coupling of a limb's k joints to the n of them that motors drive: q = matrix · a + offset.
+
+    q are the positions of all joints, a those of the driving joints.
 
     Attributes
     ----------

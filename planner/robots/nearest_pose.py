@@ -116,11 +116,11 @@ def lacking(limb: LimbBatch, starts: Sequence[Array]) -> tuple[float, float | No
     Returns
     -------
     missing : float
-        Distance of the hand from its position with the orientation of the pose, or if no posture
-        has that orientation, with any [m]. About at least the distance beyond the limb's reach.
+        Distance from the hand to its target position [m], in the target's orientation if a posture
+        with that orientation was found, otherwise in any. Never less than the distance by which the
+        target is beyond the limb's reach.
     turned : float or None
-        Angle to the orientation of the pose, if the hand reaches its position [rad]; otherwise
-        None.
+        Angle to the target's orientation, if the hand reaches its position [rad]; otherwise None.
     """
     first = 300.0  # weight of the quantity that is least first, over that of the second
     # what is missing is only reported: a few starts will do

@@ -144,9 +144,9 @@ class Robot:
         return Robot, (self.description, self.urdf, self.hand)
 
     def stretches(self, body: Pose, limbs: Sequence[str], hands: Sequence[Pose]) -> list[float]:
-        """Return the distance of each hand from its shoulder, over the limb's reach.
+        """Return the distance of each hand from its limb's shoulder as a share of the limb's reach.
 
-        Parameters as in `limb_spans`. Above 1 a hand is out of reach.
+        Parameters as in `limb_spans`. A hand with a share above 1 is out of reach.
         """
         away, reach = self.limb_spans(body, limbs, hands)
         return (np.sqrt(np.einsum("nx,nx->n", away, away)) / reach).tolist()  # type: ignore[no-any-return]

@@ -90,6 +90,12 @@ class FixedSolution(Solution):
     def best_in(
         self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
     ) -> FixedSolution:
+        """Return the best solution for an objective within the cap on the utilisation.
+
+        Without loads, or if they are beyond the cap, the solution itself is returned. If the
+        program is not solved, the solution is returned with the reason in ``faults``, or marked as
+        unfinished.
+        """
         used = self.least.value
         if not self.loads or used > self.cap + CAP_SLACK:
             return self
@@ -113,10 +119,12 @@ class FixedSolution(Solution):
         )
 
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+        """Return the load factor: the largest multiple of the body wrench at utilisation 1."""
         factor = most_of_fixed(prepared.hands, self.sets.data)
         return LoadFactor(factor, unfinished=factor is None and deadline.expired())
 
     def no_answer(self, prepared: PreparedStance) -> str:
+        """Return a sentence with the solver's status."""
         return f"the solver gave no usable answer ({self.least.status})"
 
 

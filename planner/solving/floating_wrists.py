@@ -57,6 +57,12 @@ class FloatingSolution(Solution):
     def best_in(
         self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
     ) -> FloatingSolution:
+        """Return the best solution for an objective within the cap, with new poses of the wrists.
+
+        Without loads, or if they are beyond the cap, the solution itself is returned. If the
+        deadline passes before the search finds a plan, the solution is returned, marked as
+        unfinished.
+        """
         used = self.search.measure.utilisation
         if not self.loads or used > self.cap + CAP_SLACK:
             return self
@@ -96,12 +102,14 @@ class FloatingSolution(Solution):
         return found if found.proven else replace(found, faults=(), most=np.inf)
 
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+        """Search for the load factor; it is a lower bound if no plan was found beyond it."""
         most = most_load(prepared.hands, self.usual, self.factor, budget)
         if most is None:
             return LoadFactor(unfinished=deadline.expired())
         return LoadFactor(most.factor, least=not most.sure)
 
     def no_answer(self, prepared: PreparedStance) -> str:
+        """Return a sentence about the missing equilibrium of the wrists, with a likely reason."""
         reason = "no equilibrium found for the wrists"
         if wrench_is_given(prepared):
             reason += " with their given wrenches, which does not prove that there is none"

@@ -181,14 +181,17 @@ class MinEffort(CappedObjective):
     words = "effort"
 
     def solve(self, data: StanceData, cap: float) -> Outcome:
+        """Minimise the effort of hands with fixed wrists under a cap on the utilisation."""
         return programs.effort(data, cap)
 
     def value(self, data: StanceData, loads: Sequence[Array]) -> float:
+        """Return the effort, plus a small term in the squares of loads that are no tensions."""
         z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
         small = sum(float(hand.rest @ x**2) for hand, x in zip(data.hands, z, strict=True))
         return programs.used_effort(data, loads) + small
 
     def slopes(self, data: StanceData, loads: Sequence[Array]) -> Array:
+        """Return the gradient of `value` in the scaled loads of all hands, shape (M,)."""
         found = []
         for hand, y in zip(data.hands, loads, strict=True):
             z = y / hand.unit
@@ -196,9 +199,11 @@ class MinEffort(CappedObjective):
         return np.concatenate(found)
 
     def goal(self, cap: float, farthest: Sequence[Array]) -> Goal:
+        """Return the goal of the search for the wrists' poses of least effort."""
         return LeastEffort(cap, farthest)
 
     def reported(self, binding: ActiveLimits, cap: float) -> Mapping[str, Any]:
+        """Return the shadow prices of the binding limits in terms of the effort."""
         return {"effort_prices": binding.prices(cap)}
 
 

@@ -137,9 +137,9 @@ class TileLimits(ResidualLimits):
         self._planes: tuple[tuple[tuple[HalfPlane, ...], ...], Array] = (), np.zeros(0)
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return the residuals of friction and bare frames, the utilisations, and their errors.
+        """Return the residuals of friction and bare frames, and the utilisations with their errors.
 
-        The reported utilisation of a nail is compared with the recomputed one in ``again.nails``.
+        The utilisation that the plan reports for a nail is compared with that in ``again.nails``.
         """
         name, planned = self._names.tile, again.arrays
         residuals = self.holding(again.loads)
@@ -203,9 +203,18 @@ class TileLimits(ResidualLimits):
 
 
 def planes_of(pieces: tuple[tuple[HalfPlane, ...], ...]) -> Array:
-    """Return hands' half-planes over their capacities, shape (H, 2 p, 3).
+    """Return the half-planes of H hands, divided by their capacities, shape (H, 2 p, 3).
 
-    For lateral loads of either sign; zero where a hand has fewer than others.
+    Parameters
+    ----------
+    pieces : tuple of tuple of HalfPlane
+        Half-planes of a whole tile of each hand, at most p of them.
+
+    Returns
+    -------
+    ndarray, shape (H, 2 p, 3)
+        Coefficients of shear, normal and lateral load, one row for each sign of the lateral load;
+        zero rows for hands with fewer than p half-planes.
     """
     found = np.zeros((len(pieces), 2 * max(map(len, pieces)), 3))
     for rows, own in zip(found, pieces, strict=True):
