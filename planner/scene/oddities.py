@@ -30,7 +30,8 @@ QUATERNION_SLIP: Final = "is its quaternion [x, y, z, w]?"
 def findings(scene: Scene) -> tuple[Finding, ...]:
     """Return a finding for each oddity in the geometry of a stance.
 
-    Such as hands out of reach, reversed, overlapping or in the body, a body in rock, crossed limbs.
+    Oddities are hands that are out of reach, reversed, overlapping or in the body, a reversed body,
+    a body in rock, crossed limbs, gravity that points up and fingers that point down.
 
     Raises
     ------

@@ -115,7 +115,19 @@ class Rows(NamedTuple):
         return np.asarray(self.b + self.d * u - self.C @ z)
 
     def tight(self, z: Array, u: float) -> Mask:
-        """Return a mask (k,) of the rows that are active at a feasible point z (M,), u."""
+        """Return which rows are active at a feasible point: equations, and rows without slack.
+
+        Parameters
+        ----------
+        z : ndarray, shape (M,)
+            Scaled loads of all hands.
+        u : float
+            Utilisation.
+
+        Returns
+        -------
+        ndarray of bool, shape (k,)
+        """
         active = self.room(z, u) <= TOLERANCES.row
         active[: self.equations] = True
         return active

@@ -103,11 +103,14 @@ class Interpolation:
         )
 
     def distance(self, wrench: Array) -> float:
-        """Return the relative distance Σ |t| of a wrench (6,) from the centre; valid up to 1."""
+        """Return the relative distance ``Σ |t|`` of a body wrench (6,) from the centre.
+
+        The interpolation is valid up to a distance of 1.
+        """
         return float(np.abs((wrench - self.centre) * self._per).sum())
 
     def at(self, wrench: Array) -> tuple[float, Array]:
-        """Return the relative distance Σ |t| and the interpolated loads of a body wrench.
+        """Return the relative distance ``Σ |t|`` and the interpolated loads of a body wrench.
 
         Parameters
         ----------
@@ -117,7 +120,7 @@ class Interpolation:
         Returns
         -------
         distance : float
-            Σ |t|; the loads are a plan only if it is at most 1.
+            ``Σ |t|``; the loads are a plan only if it is at most 1.
         loads : ndarray, shape (n,)
             Loads y, for one hand after the other [N].
         """

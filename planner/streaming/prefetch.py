@@ -40,7 +40,7 @@ class Mixture(NamedTuple):
     bound : float
         Lower bound of the least utilisation.
     distance : float
-        Distance Σ |t| from the newest centre, in radii; infinite without an interpolation.
+        Distance ``Σ |t|`` from the newest centre, in radii; infinite without an interpolation.
     """
 
     weight: float
@@ -187,5 +187,5 @@ class Prefetch:
 
 
 def _weight(distance: float) -> float:
-    """Return the weight φ of an interpolation at a distance Σ |t| from its centre."""
+    """Return the weight φ of an interpolation at a distance ``Σ |t|`` from its centre."""
     return min(max((1.0 - distance) / 0.2, 0.0), 1.0)  # it falls in the outermost fifth

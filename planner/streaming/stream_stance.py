@@ -67,7 +67,7 @@ class SupportBound(NamedTuple):
     direction : ndarray, shape (6,)
         Direction in B.
     most : float
-        Largest feasible value of direction · w.
+        Upper bound of direction · w over all feasible body wrenches w.
     """
 
     direction: Array
@@ -132,7 +132,13 @@ class StreamStance:
         self._rows, self._rest = reader.rows / LOAD_UNIT, reader.at_rest
 
     def read(self, loads: Array) -> LoadEffects:
-        """Return hand wrenches and the largest utilisation of loads y, shape (hands, m) [N]."""
+        """Compute the hands' wrenches and the largest utilisation from loads.
+
+        Parameters
+        ----------
+        loads : ndarray, shape (hands, m)
+            Loads y of each hand, padded with zeros [N].
+        """
         rows = (self._rows @ loads[:, :, None])[:, :, 0]
         rows += self._rest
         return LoadEffects(rows[:, :6], float(np.maximum.reduce(rows[:, 6:], axis=None)))
