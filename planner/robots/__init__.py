@@ -1,4 +1,4 @@
-"""Robots: URDF, kinematics, statics, inverse kinematics."""
+"""Robots: URDF parsing, kinematics, statics and inverse kinematics of the limbs."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Pinocchio's model of a robot, built from its URDF and the places of its hands."""
+"""Build Pinocchio's model of a robot from its URDF and the mounts of its hands."""
 
 from __future__ import annotations
 
@@ -28,45 +28,48 @@ ROOT_JOINT: Final = 1
 class Chain:
     """A limb: joints from the body outward, with a hand on the last link.
 
-    Of its k joints n have a place of their own, most often all; the others follow these. Angles,
-    torques and limits are of those n: what is said of an angle [rad] and a torque [N·m] is of a
-    joint that slides a length [m] and a force [N].
+    A limb has k joints. Of these, n move by themselves, most often all; the others follow these by
+    a fixed ratio (mimic). Angles, torques and limits are of the n. For a joint that slides, read
+    lengths [m] for angles [rad], and forces [N] for torques [N·m].
 
     Attributes
     ----------
     joints : tuple of str, length n
-        Names of those that move by themselves, from the body outward.
+        Names of the joints that move by themselves, from the body outward.
     moving : tuple of str, length k
-        Names of all.
+        Names of all joints.
     sliding : ndarray of bool, shape (n,)
-        Which of the n slide along their axis.
+        True for a joint that slides along its axis.
     coupling : ndarray, shape (k, n)
-        How far each joint moves for each unit of the n.
+        Motion of each of the k joints per unit of each of the n.
     offset : ndarray, shape (k,)
-        Where each joint is while the n are at zero.
+        Positions of all joints while the n are at zero [rad].
     lower, upper : ndarray, shape (n,)
-        Limits of the joints' angles [rad], infinite for continuous joints.
+        Limits of the joint angles [rad], infinite for continuous joints.
     torque_limits : ndarray, shape (n,)
-        What the joints bear [N·m]; zero for one without a motor.
+        Largest torques of the joints [N·m]; zero for a joint without a motor.
     rated : bool
-        Whether the robot's file says so; otherwise these are the efforts of its URDF.
+        True if the torque limits are from the robot's file, False if they are the URDF's efforts.
     shoulder : ndarray, shape (3,)
-        Where the limb begins, in B [m]: its second joint if that lies on the axis of the first, so
+        Start of the limb, in B [m]: its second joint if that lies on the axis of the first, so
         that no joint moves it, otherwise its first.
     reach : float
         Upper bound of the distance from the shoulder to the link that carries the hand [m]: the
         sum of the distances from joint to joint, or where that link only turns in its place, the
-        distance of H from there.
+        distance of H from the link's origin.
     spacing : ndarray, shape (k,)
-        How far each joint is from the one before it, the first from B [m].
-    ids, frame : tuple of int, int
-        Of all joints and of H in Pinocchio's model.
-    places : ndarray, shape (k,)
-        Where the joints are in a configuration.
-    turning : ndarray, shape (at most k,)
-        Which of them are there as cosine and sine: those that turn without end.
+        Distance of each joint from the one before it, of the first from the origin of the root
+        link [m].
+    ids : tuple of int, length k
+        Indices of all joints in Pinocchio's model.
+    frame : int
+        Index of the hand frame H in Pinocchio's model.
+    places : ndarray of int, shape (k,)
+        Index of each joint's first entry in a configuration.
+    turning : ndarray of int, shape (at most k,)
+        Indices of the continuous joints among the k; a configuration has cosine and sine of these.
     columns : slice
-        Where they are among the rates.
+        Columns of the joints among Pinocchio's rates.
     """
 
     joints: tuple[str, ...]
@@ -89,11 +92,11 @@ class Chain:
 
     @property
     def rest(self) -> Array:
-        """Angles (n,) of which nothing is said: zero, or the limit that is nearest to it."""
+        """Default angles of the joints, shape (n,) [rad]: zero, or the limit nearest to zero."""
         return np.asarray(np.clip(0.0, self.lower, self.upper))
 
     def turn(self, q: Array, given: Array) -> None:
-        """Write the limb's angles (n,) into a configuration of Pinocchio's, shape (nq,)."""
+        """Write the limb's angles (n,) into a Pinocchio configuration ``q`` (nq,), in place."""
         angles = self.coupling @ given + self.offset
         q[self.places] = angles
         if self.turning.size:
@@ -102,42 +105,44 @@ class Chain:
 
 
 def pose_of(placement: Any) -> Pose:
-    """Return the pose that a placement of Pinocchio's says."""
+    """Convert a placement of Pinocchio (`pinocchio.SE3`) to a `Pose`."""
     return Pose(np.array(placement.translation), np.array(placement.rotation))
 
 
 def build_model(
     tree: Urdf, urdf: str, described: RobotDescription, hand_mass: float
 ) -> tuple[Any, Pose, dict[str, Chain], dict[str, float]]:
-    """Return Pinocchio's model of a robot that floats, with its hands.
+    """Build Pinocchio's model of a robot with hands and a free-floating body.
 
-    Joints that no limb has are where they are locked, or at zero.
+    Joints that belong to no limb are fixed where they are locked, or at zero.
 
     Parameters
     ----------
     tree : Urdf
-        What the text of the URDF says.
+        Links and joints of the URDF.
     urdf : str
-        The text, which Pinocchio reads by itself.
+        Text of the URDF, which Pinocchio parses by itself.
     described : RobotDescription
+        Content of the robot's file.
     hand_mass : float
-        [kg]
+        Mass of one hand [kg].
 
     Returns
     -------
-    model
+    model : pinocchio.Model
+        Its gravity is zero: gravity is given as an acceleration of the root link.
     root : Pose
-        B in the root link.
+        Pose of B in the root link.
     chains : dict of str to Chain
-        By limb.
+        Joints of each limb, by limb.
     locked : dict of str to float
-        Where joints are that never move, by name [rad, or m].
+        Positions of the joints that never move, by name [rad, or m].
 
     Raises
     ------
     InvalidInputError
-        If Pinocchio cannot read it, a link is not in it, or a limb is no chain of joints of its
-        own.
+        If Pinocchio cannot read the URDF, no link has a mass, a link is not in the URDF, or a limb
+        is no chain of joints of its own.
     """
     with errors_under("body"):
         tree.require(described.body)

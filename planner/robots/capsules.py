@@ -1,9 +1,9 @@
-"""Represent the links of a robot by capsules, for its clearance from the rock.
+"""Represent the links of a robot by capsules, to compute its clearance from the rock.
 
-A capsule is all places within its radius of a segment. A robot's file may have those of any link
-(``[capsules]``, by the link's name or a pattern of it). A limb's link without any has one from its
-joint to the next, of the limb's ``radius`` or else that of ``parameters/scene.toml``; other links
-have none.
+A capsule is the set of points within a radius of a line segment. A robot's file may define the
+capsules of any link (``[capsules]``, by the link's name or a pattern of names). A joint of a limb
+whose links have no capsule gets one from that joint to the next; its radius is the limb's
+``radius``, or else that of ``parameters/scene.toml``. Other links have no capsule.
 """
 
 from __future__ import annotations
@@ -31,24 +31,25 @@ SCENE_NUMBERS: Final = ParameterTable.read(
 
 
 class Capsules(NamedTuple):
-    """Capsules about links. Those of the body come first, then limb by limb, outward.
+    """Capsules of a robot's links: first those of the body, then limb by limb, outward.
 
     Attributes
     ----------
     names : tuple of str, length n
-        Of their links; several may be of one.
+        Link of each capsule that the robot's file defines; of the others, the joint that moves the
+        capsule. A link may have several.
     limbs : tuple of str or None, length n
-        Whose they are; None for the body's.
+        Limb of each capsule; None for the body's.
     steps : ndarray of int, shape (n,)
-        How many of its limb's joints move a capsule; zero for the body's.
+        Number of the limb's joints that move a capsule; zero for the body's.
     joints : ndarray of int, shape (n,)
-        Those that move them, in Pinocchio's model.
+        Index in Pinocchio's model of the joint that a capsule moves with.
     ends : ndarray, shape (n, 2, 3)
-        Of their segments, in these joints' frames [m].
+        Ends of each segment, in the frame of that joint [m].
     radii : ndarray, shape (n,)
-        [m]
+        Radius of each capsule [m].
     assumed : ndarray of bool, shape (n,)
-        Whether the radius is in no file of the robot, but assumed.
+        True if the radius is from ``parameters/scene.toml``, not from the robot's file.
     """
 
     names: tuple[str, ...]
@@ -71,7 +72,16 @@ class _Capsule(NamedTuple):
 
 
 def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Chain]) -> Capsules:
-    """Return the capsules about a robot's links."""
+    """Return the capsules of a robot's links.
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+    described : RobotDescription
+        Content of the robot's file, with its capsules and radii.
+    chains : mapping of str to Chain
+        Joints of each limb.
+    """
     places = {ROOT_JOINT: (None, 0)} | {  # moved by no joint
         joint: (limb, step)
         for limb, chain in chains.items()
@@ -119,5 +129,5 @@ def _given(
 
 
 def scene_number(section: str, name: str) -> float:
-    """Return a number of ``parameters/scene.toml``, in SI units."""
+    """Return a positive number of ``parameters/scene.toml``, in SI units."""
     return SCENE_NUMBERS.positive(section, name)

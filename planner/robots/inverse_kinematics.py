@@ -1,7 +1,9 @@
-"""Joint angles for poses of the hands: first any that put them there, then such that bear less.
+"""Inverse kinematics: joint angles for poses of the hands, with low joint torques.
 
-The second is Gauss–Newton on ``Σ (τ / τ_max)²`` over the directions in which a redundant limb can
-move without moving its hand, with each step's error of the pose taken back in the next.
+First any angles that solve the poses are found. Then, for limbs with more than six joints, Gauss–
+Newton steps lower ``Σ (τ / τ_max)²`` (τ: joint torques, τ_max: their limits) along the motions that
+leave the hand in place (its null space). The next step corrects the error of the pose that one
+makes.
 """
 
 from __future__ import annotations
@@ -24,16 +26,17 @@ __all__ = ["UnreachableError", "lower_torques", "solve_limbs"]
 
 
 class UnreachableError(InvalidInputError):
-    """Poses of hands that no joint angles were found for.
+    """Error of hand poses for which no joint angles were found.
 
     Parameters
     ----------
     missing : mapping of str to float
-        By limb: the distance that is missing [m].
+        By limb: the distance by which the hand does not reach its position [m].
     turned : mapping of str to float
-        By limb, of those whose place is within reach, but not with these axes: the angle that is
-        missing there [rad].
+        By limb, for hands that reach their position, but not with the given orientation: the angle
+        to that orientation [rad].
     field : str, optional
+        Field of the question that has the poses.
     """
 
     kind = "unreachable"
@@ -64,30 +67,35 @@ def solve_limbs(
     gravity: Array,
     near: tuple[float, float] | None = None,
 ) -> dict[str, Array]:
-    """Return joint angles for poses of the hands, within the joints' limits, shape (n,) each [rad].
+    """Solve the inverse kinematics: return joint angles, within limits, for poses of the hands.
 
-    The same question always has the same answer. A limb of more than six joints uses what its pose
-    leaves open to lower Σ (τ / τ_max)²; one of fewer than six reaches few poses.
+    The result is deterministic. A limb of more than six joints uses its redundancy to lower
+    Σ (τ / τ_max)², its torques over their limits; a limb of fewer than six reaches few poses.
 
     Parameters
     ----------
     robot : Robot
     poses : mapping of str to Pose
-        H in B, by limb.
+        Target pose of H in B, by limb.
     loads : mapping of str to ndarray, shape (6,)
-        Wrench that a hand is to exert on the rock, in H [N, N·m]; none where it is left out.
+        Wrench of a hand on the rock, in H [N, N·m]; zero for a limb that is left out.
     gravity : ndarray, shape (3,)
-        In B [m/s²]. Without gravity and loads there is no torque to lower.
+        Acceleration of gravity, in B [m/s²]. Without gravity and loads no torque is to be lowered.
     near : tuple of float, float, optional
-        Distance [m] and angle [rad] up to which a hand may be off a pose that no angles solve; then
-        it is put where it comes nearest, as if that were its pose. By default it may not be off.
+        Distance [m] and angle [rad] by which a hand may miss a pose that no angles solve. The hand
+        is then put as near to its pose as was found. By default no pose may be missed.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        Joint angles, by limb [rad].
 
     Raises
     ------
     UnreachableError
-        That names every limb whose pose is not solved, nor come near to.
+        If a pose is neither solved nor approached within ``near``; the error names every such limb.
     DeadlineError
-        If the time is over before.
+        If the deadline passes first.
     """
     batch = LimbBatch(robot, poses, loads, gravity)
     angles, solved = _solved(batch)
@@ -129,23 +137,25 @@ def _lowered(batch: LimbBatch, angles: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def lower_torques(batch: LimbBatch, angles: Array) -> Array:
-    """Return angles for the same poses, within the limits, with joint torques no higher.
+    """Return joint angles for the same hand poses, within limits, with joint torques no higher.
 
     Parameters
     ----------
     batch : LimbBatch
+        L limbs of up to m joints, with the target poses of their hands.
     angles : ndarray, shape (L, m)
-        Limbs whose poses they do not solve are left as they are.
+        Joint angles [rad]. A limb of at most six joints is returned unchanged, and so is a limb
+        whose target pose these angles do not solve.
 
     Returns
     -------
     ndarray, shape (L, m)
-        Σ (τ / τ_max)² of each limb is at most that at ``angles``, and near a local minimum.
+        Joint angles [rad]. The cost Σ (τ / τ_max)² of each limb is at most that at ``angles``.
 
     Raises
     ------
     DeadlineError
-        If the time is over before.
+        If the deadline passes first.
     """
     now = _measured(batch, angles.copy())
     movable = np.abs(now.errors).max(axis=1) <= TOLERANCES.pose_error

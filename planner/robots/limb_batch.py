@@ -1,4 +1,4 @@
-"""Limbs whose hands are to be put somewhere, moved together, with one pass of Pinocchio for all."""
+"""Evaluate limbs together for inverse kinematics: pose errors, Jacobians and joint torques."""
 
 from __future__ import annotations
 
@@ -14,36 +14,42 @@ __all__ = ["LimbBatch"]
 
 
 class LimbBatch:
-    """L limbs of up to m joints, the poses that their hands are to have, and what these carry.
+    """L limbs of up to m joints, with the target poses and the loads of their hands.
 
-    Angles are (L, m) [rad]. A hand's error is the twist in H that is missing, its Jacobian that of
-    the hand, both with lengths over the limb's reach. An effort is a joint's torque over its limit,
-    at rest. Limbs of fewer joints have columns of zeros at the end.
+    Joint angles are arrays (L, m) [rad]. The error of a hand is the twist in H from its pose to its
+    target, and its Jacobian maps joint rates to the hand's twist in H; lengths in both are divided
+    by the limb's reach. The effort of a joint is its torque over its torque limit, at rest. Limbs
+    of fewer than m joints have columns of zeros at the end.
 
     Parameters
     ----------
     robot : Robot
     poses : mapping of str to Pose
-        H in B, by limb.
+        Target pose of H in B, by limb.
     loads : mapping of str to ndarray, shape (6,)
-        Wrench that a limb's hand exerts on the rock, in H [N, N·m]; none if it is left out. It
-        turns with the hand.
+        Wrench of a limb's hand on the rock, in H [N, N·m]; zero for a limb that is left out. The
+        wrench turns with the hand.
     gravity : ndarray, shape (3,)
-        In B [m/s²].
+        Acceleration of gravity, in B [m/s²].
 
     Attributes
     ----------
+    robot, poses, loads, gravity
+        The parameters.
     limbs : tuple of str
-    joints : list of int
-        How many each limb has.
+        Names of the limbs, in the order of all arrays.
+    joints : list of int, length L
+        Number of joints of each limb.
+    shape : tuple of int
+        (L, m).
     lower, upper : ndarray, shape (L, m)
         Limits of the angles [rad].
     reach : ndarray, shape (L,)
-        [m]
+        Reach of each limb [m].
     beyond : ndarray, shape (L,)
-        How far each pose is out of reach of the limb, stretched out [m]; zero if it is not.
+        Distance by which each target is farther than the limb's reach [m]; zero within reach.
     levers : ndarray, shape (L,)
-        Distance of H from the end of the limb, up to which its reach goes [m].
+        Distance of H from the origin of the link that carries the hand [m].
     """
 
     def __init__(
@@ -82,7 +88,7 @@ class LimbBatch:
             self._forces[chain.ids[-1]] = place.act(pin.Force(-load))
 
     def part(self, chosen: Indices) -> LimbBatch:
-        """Return the batch of some of the limbs."""
+        """Return the batch of the limbs with the given indices."""
         if len(chosen) == len(self.limbs):
             return self
         names = [self.limbs[i] for i in chosen]
@@ -97,17 +103,19 @@ class LimbBatch:
         return q
 
     def errors(self, angles: Array) -> tuple[Array, Array]:
-        """Return the hands' errors and their Jacobians.
+        """Return the pose errors of the hands and their Jacobians.
 
         Parameters
         ----------
         angles : ndarray, shape (S, L, m)
-            Of S postures.
+            Joint angles of S postures [rad].
 
         Returns
         -------
         errors : ndarray, shape (S, L, 6)
+            Twist from pose to target, in H: linear part over the limb's reach [1], rotation [rad].
         jacobians : ndarray, shape (S, L, 6, m)
+            Hand Jacobians, linear rows over the limb's reach [1/rad, 1].
         """
         model, data = self.robot.model, self.robot.data
         errors = np.empty((*angles.shape[:2], 6))
@@ -126,9 +134,19 @@ class LimbBatch:
         return errors, jacobians
 
     def efforts(self, angles: Array) -> tuple[Array, Array]:
-        """Return the efforts of angles (S, L, m), of that shape, and their slopes.
+        """Return the torque of each joint over its limit, and the derivatives by the joint angles.
 
-        The slopes are of shape (S, L, m, m) [1/rad].
+        Parameters
+        ----------
+        angles : ndarray, shape (S, L, m)
+            Joint angles of S postures [rad].
+
+        Returns
+        -------
+        efforts : ndarray, shape (S, L, m)
+            Joint torque over torque limit; zero for joints without a motor.
+        slopes : ndarray, shape (S, L, m, m)
+            Derivatives of the efforts by the angles of the same limb [1/rad].
         """
         model, data = self.robot.model, self.robot.data
         efforts = np.zeros(angles.shape)
@@ -146,6 +164,9 @@ class LimbBatch:
         return efforts / self._limits, slopes / self._limits[:, :, None]
 
     def cost(self, angles: Array) -> Array:
-        """Return Σ (τ / τ_max)² of angles (S, L, m), shape (S, L)."""
+        """Return the cost Σ (τ / τ_max)² of joint angles (S, L, m), shape (S, L).
+
+        τ is a joint's torque, τ_max its limit; the sum is over a limb's joints.
+        """
         efforts, _ = self.efforts(angles)
         return np.asarray((efforts * efforts).sum(axis=-1))

@@ -1,9 +1,8 @@
-"""Find the joints of a robot's limbs in its URDF: driven ones, ones that follow, locked ones.
+"""Find the joints of a robot's limbs in its URDF: driven joints, mimic joints and locked joints.
 
-A limb's joints are ``q = matrix · a + offset`` where a are those that motors move; the others
-follow these (mimic). By virtual work the force of a motor is then ``matrixᵀ · τ``: its own joint's,
-and that of every joint that follows it, times how far that one moves for each radian or metre of
-its own.
+The positions q of a limb's joints are ``q = matrix · a + offset``, where a are the positions of the
+joints that motors move; the other joints follow these (mimic). By virtual work the torque of a
+motor is then ``matrixᵀ · τ``, τ the torques at all joints.
 """
 
 from __future__ import annotations
@@ -26,12 +25,14 @@ LOCKED_UNITS: Final = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
 
 
 def locked_joints(tree: Urdf, described: RobotDescription) -> dict[str, float]:
-    """Return where joints are that never move, by name [rad, or m]: by limits, or by the file.
+    """Return the positions of the joints that never move, by joint name [rad, or m].
+
+    A joint is locked if its limits are equal, or if the robot's file says so (``[locked]``).
 
     Raises
     ------
     InvalidInputError
-        If the file locks a joint that is not there, or where it cannot be.
+        If the file locks an unknown joint, or a joint beyond its limits.
     """
     joints = {joint.name: joint for joint in tree.joints.values()}
     units = {n: LOCKED_UNITS[j.type] for n, j in joints.items() if j.type in LOCKED_UNITS}
@@ -59,13 +60,22 @@ def _stuck(joint: JointElement) -> bool:
 def limb_joints(
     tree: Urdf, described: RobotDescription, locked: Collection[str]
 ) -> dict[str, tuple[JointElement, ...]]:
-    """Return every limb's joints, from the body outward.
+    """Return the joints of each limb that are not locked, by limb, from the body outward.
+
+    Parameters
+    ----------
+    tree : Urdf
+    described : RobotDescription
+        Content of the robot's file.
+    locked : collection of str
+        Names of the joints that never move.
 
     Raises
     ------
     InvalidInputError
-        If a limb has no joints, too many, some that others have too, or some that neither turn nor
-        slide, or follow a joint that is none of the limb's; the message says how to lock these.
+        If a limb has no joints or more than 64, shares a joint with another limb, or has a joint
+        that neither turns nor slides or that follows a joint of another limb. The message says how
+        to lock such joints.
     """
     body, chains = described.body, {}
     most = 64  # no request names more
@@ -154,18 +164,20 @@ def _advice(joints: Iterable[JointElement], already: Collection[str]) -> str:
 
 
 class JointCoupling(NamedTuple):
-    """Positions of k joints of a limb as a function of the n that move by themselves.
+    """Coupling of a limb's k joints to the n of them that motors drive: q = matrix · a + offset.
+
+    q are the positions of all joints, a those of the driving joints.
 
     Attributes
     ----------
     driving : tuple of JointElement, length n
         Joints that move by themselves, from the body outward.
     matrix : ndarray, shape (k, n)
-        [1, or m/rad or rad/m where one of them slides]
+        Motion of each joint per unit of each driving joint [1, m/rad or rad/m].
     offset : ndarray, shape (k,)
-        [rad, or m]
+        Positions of all joints while the driving joints are at zero [rad, or m].
     lower, upper : ndarray, shape (n,)
-        Limits of those that drive, such that those that follow keep to theirs, too [rad, or m].
+        Limits of the driving joints [rad, or m], within which all joints keep to their limits.
     """
 
     driving: tuple[JointElement, ...]
@@ -176,12 +188,17 @@ class JointCoupling(NamedTuple):
 
 
 def coupling_of(chain: Sequence[JointElement]) -> JointCoupling:
-    """Return how the joints of a limb hang together, all of which follow its own motors.
+    """Return the coupling of a limb's joints to those that motors move.
+
+    Parameters
+    ----------
+    chain : sequence of JointElement
+        The limb's joints, from the body outward; each moves by itself or follows one of them.
 
     Raises
     ------
     InvalidInputError
-        If the limits of coupled joints leave no room to a joint that drives them.
+        If the limits of a joint and of those that follow it have no common range.
     """
     known = _drivers(chain)
     driving = tuple(joint for joint in chain if joint.mimic is None)

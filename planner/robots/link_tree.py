@@ -1,9 +1,9 @@
-"""Compute link places and joint torques of a robot from its URDF, joint by joint.
+"""Compute link poses and joint torques of a robot from its URDF, joint by joint.
 
-This is the second way to joint torques, for checking the first (`planner.robots.robot`), with which
-it shares nothing but the texts: places follow from the joints of the URDF as it was read, and the
-torque of a joint from the moments about its axis of every link beyond it and of the rock on the
-hand.
+The check of plans compares joint torques with these. Nothing is shared with the computation that it
+checks (`planner.robots.robot`) but the texts: link poses follow from the joints of the parsed URDF,
+and the torque of a joint from the moments about its axis of every link beyond the joint and of the
+rock on the hand.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ __all__ = ["LimbTorques", "LinkTree"]
 
 
 class LimbTorques(NamedTuple):
-    """Joint torques and body wrench that hold a robot up.
+    """Joint torques and body wrench that carry a robot's weight, acceleration and payloads.
 
     Attributes
     ----------
     torques : dict of str to ndarray, shape (n,)
         Joint torques by limb [N·m].
     body_wrench : ndarray, shape (6,)
-        Wrench of its own weight and acceleration, which the rock must give, in B [N, N·m].
+        Wrench that the rock must exert for the robot's own weight and acceleration, in B [N, N·m].
     hands : dict of str to Pose
-        H in B.
+        Pose of each limb's hand frame H in B.
     com : ndarray, shape (3,)
-        Centre of mass in B [m].
+        Centre of mass of the robot with its hands, without payloads, in B [m].
     payloads : ndarray, shape (6,)
-        Wrench of the weight and acceleration of its payloads, in B [N, N·m].
+        Wrench that the rock must exert for the payloads' weight and acceleration, in B [N, N·m].
     """
 
     torques: dict[str, Array]
@@ -45,11 +45,17 @@ class LimbTorques(NamedTuple):
 
 
 class LinkTree:
-    """The links of a robot with its hands, each after its parent.
+    """The links of a robot with its hands, each after its parent (forward kinematics and statics).
 
     Parameters
     ----------
     robot : Robot
+
+    Attributes
+    ----------
+    robot : Robot
+    links : list of Link
+        Links of the URDF, the root link first.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -79,9 +85,15 @@ class LinkTree:
         return found
 
     def places(self, angles: Mapping[str, float]) -> dict[str, Pose]:
-        """Return every link in B, for angles by the joints' names.
+        """Return the pose of every link in B at given joint positions, by link name.
 
-        Joints left out are where they are locked, or those are that they follow; else at zero.
+        A joint that is left out is at its locked position, follows another joint (mimic), or is at
+        zero.
+
+        Parameters
+        ----------
+        angles : mapping of str to float
+            Joint positions, by joint name [rad, or m].
         """
         found = {self.links[0].name: Pose.identity()}
         where = {**self.robot.locked, **angles}
@@ -107,23 +119,25 @@ class LinkTree:
         held: Mapping[str, Pose] | None = None,
         payloads: Sequence[Payload] = (),
     ) -> LimbTorques:
-        """Return what holds the robot up while its body accelerates and nothing turns yet.
+        """Return the joint torques and body wrench that carry the robot (inverse dynamics).
+
+        The body accelerates, all velocities are zero, and the joints stand still.
 
         Parameters
         ----------
         angles : mapping of str to ndarray, shape (n,)
-            Of every limb [rad].
+            Joint angles of every limb [rad, or m].
         wrenches : mapping of str to ndarray, shape (6,)
-            What hands exert on the rock, in H; nothing where a limb is left out.
+            Wrench of each hand on the rock, in H [N, N·m]; zero for a limb that is left out.
         gravity : ndarray, shape (3,)
-            In B [m/s²].
+            Acceleration of gravity, in B [m/s²].
         acceleration : ndarray, shape (6,)
-            Of B in B, linear and angular [m/s², rad/s²].
+            Acceleration of B, in B, linear part first [m/s², rad/s²].
         held : mapping of str to Pose, optional
-            H in B where hands exert these, fixed to their links; where the joints put it by
-            default.
+            Pose of H in B at which each hand's wrench acts on its link; by default the one that the
+            joint angles give.
         payloads : sequence of Payload
-            What the links carry.
+            Masses that the links carry.
         """
         chains, mounts = self.robot.chains, self.robot.description.mounts
         by_name = {

@@ -1,8 +1,8 @@
-"""Bring a limb as near as possible to a pose that none of its angles solve.
+"""Bring a hand as near as possible to a pose that no joint angles of its limb solve.
 
-The least sum of squares, which does not vanish there, has many minima, and is flat where a
-limb is stretched: so it is sought from many postures, and with curvatures (sequential quadratic
-programming) instead of the slopes alone.
+The sum of the squared distance and angle to the pose is minimised by sequential quadratic
+programming (SLSQP), from many postures: the sum has many local minima, and is flat where a limb is
+stretched.
 """
 
 from __future__ import annotations
@@ -40,14 +40,22 @@ class _Approach(NamedTuple):
 
 
 def starts_beside(batch: LimbBatch, i: int, best: Array) -> tuple[LimbBatch, Sequence[Array]]:
-    """Return limb i by itself, and angles (n,) from which its pose is approached.
+    """Return a batch of limb i alone, and start postures for `angles_near` and `lacking`.
 
     Parameters
     ----------
     batch : LimbBatch
     i : int
+        Index of the limb in the batch.
     best : ndarray, shape (n,)
-        The angles that came nearest so far; the first of those returned.
+        Joint angles that came nearest to the pose so far [rad].
+
+    Returns
+    -------
+    limb : LimbBatch
+        The batch of limb i.
+    starts : sequence of ndarray, shape (n,)
+        Joint angles [rad]: ``best``, then eight more, the nearest first.
     """
     limb = batch.part(np.array([i]))
     angles = postures_near(batch, i, 128)[:, None]
@@ -62,23 +70,23 @@ def starts_beside(batch: LimbBatch, i: int, best: Array) -> tuple[LimbBatch, Seq
 def angles_near(
     limb: LimbBatch, starts: Sequence[Array], most: tuple[float, float]
 ) -> Array | None:
-    """Return angles of a limb that put its hand nearest to its pose, within a tolerance.
+    """Return joint angles that put a hand nearest to its pose, within a distance and an angle.
 
-    Nearest is the least (distance / tolerance)² + (angle / tolerance)², both within theirs.
+    The angles minimise (distance / tolerance)² + (angle / tolerance)², each with its tolerance.
 
     Parameters
     ----------
     limb : LimbBatch
-        One alone.
+        A batch of a single limb.
     starts : sequence of ndarray, shape (n,)
-        Where to begin, as `starts_beside` finds them.
+        Start postures, from `starts_beside` [rad].
     most : tuple of float, float
-        Distance [m] and angle [rad] up to which a pose is near.
+        Tolerances: distance [m] and angle [rad].
 
     Returns
     -------
     ndarray, shape (n,), or None
-        None if none were found.
+        Joint angles [rad]; None if no posture within both tolerances was found.
     """
     # the end of the limb is moved by no more than this
     if limb.beyond[0] > most[0] + most[1] * limb.levers[0]:
@@ -93,26 +101,26 @@ def angles_near(
 
 
 def lacking(limb: LimbBatch, starts: Sequence[Array]) -> tuple[float, float | None]:
-    """Return what a limb's pose lacks that no joint angles give.
+    """Return by how far a hand misses a pose that no joint angles solve.
 
-    From the first starts, the hand is put in its place and turned as far as that lets it; and it is
-    turned as asked and brought as near as that lets it.
+    Two searches from the first four starts: one puts distance before angle, the other angle before
+    distance.
 
     Parameters
     ----------
     limb : LimbBatch
-        One alone.
+        A batch of a single limb.
     starts : sequence of ndarray, shape (n,)
-        Where to begin, as `starts_beside` finds them.
+        Start postures, from `starts_beside` [rad].
 
     Returns
     -------
     missing : float
-        How far away the hand stays, turned as asked if it can be, and not less than the pose is
-        beyond the stretched limb [m].
+        Distance from the hand to its target position [m], in the target's orientation if a posture
+        with that orientation was found, otherwise in any. Never less than the distance by which the
+        target is beyond the limb's reach.
     turned : float or None
-        Where the place is within reach, but not with these axes: the angle that is missing there
-        [rad].
+        Angle to the target's orientation, if the hand reaches its position [rad]; otherwise None.
     """
     first = 300.0  # weight of the quantity that is least first, over that of the second
     # what is missing is only reported: a few starts will do

@@ -1,6 +1,6 @@
-"""Masses that a robot carries on its links.
+"""Payloads: masses that a robot carries on its links or in its hands.
 
-A payload travels, so that it is here without the libraries that it is weighed with.
+`Payload` is part of requests, so importing this module does not load the kinematics libraries.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ __all__ = ["Payload", "carriers", "check_carrier", "held_up"]
 
 
 class Payload(Strict, frozen=True):
-    """A mass that is fixed to a link, or to a limb's hand, beside the robot's own.
+    """A mass that is fixed to a link, or to a limb's hand, in addition to the robot's mass.
 
     Attributes
     ----------
     mass : float
-        [kg]
+        Mass of the payload [kg].
     link : str, optional
-        Name of the link in the robot's URDF. Either this or ``limb`` is given.
+        Name of the link in the robot's URDF. Either ``link`` or ``limb`` is given.
     limb : str, optional
-        Name of the limb whose hand carries it.
+        Name of the limb whose hand carries the payload.
     com : tuple of float
-        Its centre of mass [m], in the link's frame, or in H of the limb's hand.
+        Centre of mass of the payload [m], in the link's frame, or in H of the limb's hand.
 
     Raises
     ------
     InvalidInputError
-        If neither or both of ``link`` and ``limb`` are given, or a number is none.
+        If neither or both of ``link`` and ``limb`` are given, or a number is not valid.
     """
 
     mass: Mass
@@ -70,18 +70,18 @@ class Payload(Strict, frozen=True):
 def held_up(mass: float, place: Array, linear: Array, angular: Array) -> Array:
     """Return the wrench in B that a point mass needs to move with the body, shape (6,) [N, N·m].
 
-    ``f = m (a + α × p)`` at p; the body does not turn yet.
+    The force ``f = m (a + α × p)`` acts at p; the angular velocity is zero.
 
     Parameters
     ----------
     mass : float
-        [kg]
+        Mass m [kg].
     place : ndarray, shape (3,)
-        p in B [m].
+        Position p of the mass, in B [m].
     linear : ndarray, shape (3,)
-        a, the acceleration of B's origin less gravity, in B [m/s²].
+        Acceleration a of B's origin minus that of gravity, in B [m/s²].
     angular : ndarray, shape (3,)
-        α in B [rad/s²].
+        Angular acceleration α of B, in B [rad/s²].
     """
     import numpy as np
 
@@ -91,12 +91,12 @@ def held_up(mass: float, place: Array, linear: Array, angular: Array) -> Array:
 
 
 def check_carrier(robot: Robot, payload: Payload) -> None:
-    """Refuse a payload whose limb or link the robot does not have.
+    """Reject a payload on a limb or a link that the robot does not have.
 
     Raises
     ------
     InvalidInputError
-        The field is relative to the payload.
+        If limb or link is unknown; the error's field is relative to the payload.
     """
     import pinocchio as pin
 
@@ -116,14 +116,25 @@ def check_carrier(robot: Robot, payload: Payload) -> None:
 def carriers(
     robot: Robot, angles: Mapping[str, Array], payloads: Sequence[Payload]
 ) -> list[tuple[Pose, dict[str, Array]]]:
-    """Return the frames in which payloads are, in B, and the Jacobians of these, by limb.
+    """Return the frame that carries each payload, in B, and its Jacobians by limb.
 
-    Shape (6, n) each, as those of the hands; zero of limbs that do not carry it.
+    Parameters
+    ----------
+    robot : Robot
+    angles : mapping of str to ndarray, shape (n,)
+        Joint angles, by limb [rad, or m].
+    payloads : sequence of Payload
+
+    Returns
+    -------
+    list of tuple of Pose and dict of str to ndarray, shape (6, n)
+        For each payload: pose in B of its link, or of H of its hand; and the Jacobian of that frame
+        in its own axes for each limb's joints, zero for limbs that do not move it [m/rad, 1].
 
     Raises
     ------
     InvalidInputError
-        If a payload's limb or link is unknown; the field is relative to the load.
+        If a payload's limb or link is unknown; the error's field is relative to the load.
     """
     if not payloads:
         return []

@@ -1,9 +1,9 @@
-"""Joint angles that put hands where they are to be, by damped least squares.
+"""Solve the inverse kinematics of limbs by damped least squares (Levenberg–Marquardt).
 
 With a hand's error e and its Jacobian J, the step is ``Jᵀ (J Jᵀ + λ 1)⁻¹ e``, whose damping λ
 vanishes with e² (Sugihara, *Solvability-unconcerned inverse kinematics by the Levenberg–Marquardt
-method*, IEEE Transactions on Robotics, 2011). Where it ends in a local minimum, it starts again
-from another of many postures whose hands are near the pose.
+method*, IEEE Transactions on Robotics, 2011). Where an iteration ends in a local minimum, the
+search restarts from another random posture whose hand is near the pose.
 """
 
 from __future__ import annotations
@@ -25,14 +25,24 @@ POSE_IDENTITY: Final = np.eye(6)
 
 
 def find_angles(batch: LimbBatch) -> Array:
-    """Return angles within the limits, shape (L, m), that solve the poses or come nearest to it.
+    """Return joint angles that put each hand on its target pose, or as near as was found.
 
-    The one of the least torques is taken where several solutions turn up.
+    Of several solutions, the one with the smallest Σ (τ / τ_max)² is returned.
+
+    Parameters
+    ----------
+    batch : LimbBatch
+        L limbs of up to m joints, with the target poses of their hands.
+
+    Returns
+    -------
+    ndarray, shape (L, m)
+        Joint angles within their limits [rad]; zero beyond a limb's last joint.
 
     Raises
     ------
     DeadlineError
-        If the time is over before.
+        If the deadline passes first.
     """
     best, least = np.zeros(batch.shape), np.full(len(batch.limbs), np.inf)
     for k in range(8):  # rounds of starts for a pose that may be within reach
@@ -76,14 +86,24 @@ def _follow(batch: LimbBatch, angles: Array) -> tuple[Array, Array]:
 
 
 def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array) -> Array:
-    """Return the angles after a damped step; joints that would go on beyond a limit stay there.
+    """Return the joint angles after one damped least-squares step.
+
+    A joint at a limit that the step would exceed stays there. No joint turns by more than 1 rad.
 
     Parameters
     ----------
     batch : LimbBatch
     angles : ndarray, shape (S, L, m)
+        Joint angles of S postures [rad].
     errors : ndarray, shape (S, L, 6)
+        Pose errors at these angles, from `LimbBatch.errors`.
     jacobians : ndarray, shape (S, L, 6, m)
+        Jacobians at these angles, from `LimbBatch.errors`.
+
+    Returns
+    -------
+    ndarray, shape (S, L, m)
+        Joint angles within their limits [rad].
     """
     slope = (errors[..., None, :] @ jacobians)[..., 0, :]
     stuck = (angles <= batch.lower) & (slope < 0.0) | (angles >= batch.upper) & (slope > 0.0)
@@ -110,7 +130,23 @@ def _starts_near(batch: LimbBatch, i: int, k: int) -> Array:
 
 
 def postures_near(batch: LimbBatch, i: int, count: int) -> Array:
-    """Return so many angles of limb i that put its hand near its pose, shape (count, n)."""
+    """Return random postures of limb i whose hand is nearest to its target pose.
+
+    The postures are looked up among 4096 random ones with a k-d tree.
+
+    Parameters
+    ----------
+    batch : LimbBatch
+    i : int
+        Index of the limb in the batch.
+    count : int
+        Number of postures.
+
+    Returns
+    -------
+    ndarray, shape (count, n)
+        Joint angles of the limb, the nearest first [rad].
+    """
     limb = batch.limbs[i]
     samples, tree = _postures(batch.robot)[limb]
     _, nearest = tree.query(_place(batch.poses[limb], batch.reach[i]), count)

@@ -1,8 +1,8 @@
-"""Robots, RoboSimian, which is bundled, and those that a file describes: kinematics and statics.
+"""Climbing robots (RoboSimian, which is bundled, or any from a file): kinematics and statics.
 
-By joint angles, in the body frame B, with Pinocchio. Rates of joints, twists and wrenches have the
-project's signs: a hand's Jacobian turns joint rates into the twist of H in H's axes, and a joint's
-torque is its gravity torque + Jᵀ·(hand wrench on the rock).
+Positions and forces follow from joint angles, in the body frame B, by Pinocchio. Signs: a hand's
+Jacobian J maps joint rates to the twist of the hand frame H in H's axes; a joint's torque is its
+gravity torque + Jᵀ·(wrench of the hand on the rock).
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ Angles = Mapping[str, Array] | Mapping[str, Sequence[float]]
 
 
 class Statics(NamedTuple):
-    """Body wrench and joint torques that hold up a robot whose joints stand still.
+    """Body wrench and joint torques that carry a robot's weight and acceleration.
 
     Attributes
     ----------
     body_wrench : ndarray, shape (6,)
         Wrench that the rock must exert on the robot, in B about B's origin [N, N·m].
     joint_torque : dict of str to ndarray, shape (n,)
-        Torques of a limb's joints while its hand carries nothing, by limb [N·m].
+        Torques of a limb's joints while its hand exerts no wrench, by limb [N·m].
     """
 
     body_wrench: Array
@@ -56,14 +56,15 @@ class Statics(NamedTuple):
 class Robot:
     """A climbing robot: a body and its limbs, each a chain of joints that ends in a hand.
 
-    Angles are always a mapping of limb to an array (n,) [rad], [m] of joints that slide, from the
-    body outward; limbs that are left out are at zero, or the limit nearest to it. Joints of the
-    URDF that no limb has are where the robot's file locks them, or their limits; otherwise at zero.
+    Joint angles are a mapping of limb name to array (n,) [rad], [m] for joints that slide, from the
+    body outward. A limb that is left out has all joints at zero, or at the limit nearest to zero.
+    Joints that belong to no limb stay where the robot's file or equal limits lock them, or at zero.
     A hand counts as a point mass. Threads may share a robot.
 
     Parameters
     ----------
     description : RobotDescription
+        Content of the robot's file.
     urdf : str
         Text of the robot's URDF, without hands.
     hand : SpinyHand
@@ -72,38 +73,38 @@ class Robot:
     Attributes
     ----------
     description, urdf, hand
-        As given.
+        The parameters.
     name : str
-        As in the service's keys.
+        Name of the robot in its file.
     mass : float
-        With its hands [kg].
+        Mass of the robot with its hands [kg].
     com : ndarray, shape (3,)
-        Centre of mass in B while no joint angles are given [m].
+        Centre of mass in B that is used while no joint angles are given [m].
     limbs : tuple of str
-        In the order of the robot's file.
+        Names of the limbs, in the order of the robot's file.
     chains : dict of str to Chain
-        By limb.
+        Joints of each limb, by limb.
     back : ndarray, shape (3,), or None
-        Direction out of its back in B, where that is known.
+        Unit vector out of the robot's back, in B; None if its file has none.
     reach : float
-        The longest limb's [m].
+        Reach of the longest limb [m].
     tree : Urdf
-        Links and joints, as the URDF has them.
-    model
-        Pinocchio's; the body floats, with its root link at the origin.
+        Links and joints of the URDF.
+    model : pinocchio.Model
+        The robot with a free-floating body.
     root : Pose
-        B in the root link.
+        Pose of B in the root link.
     locked : dict of str to float
-        Where joints are that never move, by name [rad, or m].
+        Positions of the joints that never move, by name [rad, or m].
     capsules : Capsules
-        What of it could be in the way; its hands are left out.
+        Capsules about the links, without the hands, for clearance (collision) checks.
     body_capsules : tuple of ndarray, shapes (n, 2, 3), (n,)
-        Segments in B and radii of those that no joint moves [m].
+        Segments in B and radii of the capsules that no joint moves [m].
 
     Raises
     ------
     InvalidInputError
-        If the URDF is none, a link is not in it, or a limb is no chain of joints of its own.
+        If the URDF is invalid, a link is not in it, or a limb is no chain of joints of its own.
     """
 
     def __init__(self, description: RobotDescription, urdf: str, hand: SpinyHand) -> None:
@@ -143,9 +144,9 @@ class Robot:
         return Robot, (self.description, self.urdf, self.hand)
 
     def stretches(self, body: Pose, limbs: Sequence[str], hands: Sequence[Pose]) -> list[float]:
-        """Return how much of their limbs' reaches hands ask for, with their poses and B's in W.
+        """Return the distance of each hand from its limb's shoulder as a share of the limb's reach.
 
-        Above 1 is out of reach.
+        Parameters as in `limb_spans`. A hand with a share above 1 is out of reach.
         """
         away, reach = self.limb_spans(body, limbs, hands)
         return (np.sqrt(np.einsum("nx,nx->n", away, away)) / reach).tolist()  # type: ignore[no-any-return]
@@ -153,22 +154,22 @@ class Robot:
     def limb_spans(
         self, body: Pose, limbs: Sequence[str], hands: Sequence[Pose]
     ) -> tuple[Array, Array]:
-        """Return the ways from limbs' shoulders to the links that carry their hands, and reaches.
+        """Return each limb's reach, and the vector from its shoulder to the link of its hand.
 
         Parameters
         ----------
         body : Pose
-            B in W.
-        limbs : sequence of str
-        hands : sequence of Pose
-            H in W of each.
+            Pose of B in the world frame W.
+        limbs : sequence of str, length n
+        hands : sequence of Pose, length n
+            Pose of each limb's hand frame H in W.
 
         Returns
         -------
         away : ndarray, shape (n, 3)
-            In B [m].
+            Vectors from shoulder to link, in B [m].
         reach : ndarray, shape (n,)
-            Upper bound of its length [m].
+            Upper bound of the length of each vector [m].
         """
         ends = np.array([self._ends[limb] for limb in limbs])
         links = np.einsum("nxy,ny->nx", np.array([hand.rotation for hand in hands]), ends[:, :3])
@@ -177,7 +178,7 @@ class Robot:
 
     @property
     def data(self) -> Any:
-        """Pinocchio's working memory of this thread."""
+        """Pinocchio's working memory (`pinocchio.Data`), one for each thread."""
         try:
             return self._local.data
         except AttributeError:
@@ -185,12 +186,12 @@ class Robot:
             return self._local.data
 
     def configuration(self, angles: Angles) -> Array:
-        """Return Pinocchio's configuration, shape (nq,), with the root link at the origin.
+        """Return Pinocchio's configuration vector, shape (nq,), with the root link at the origin.
 
         Raises
         ------
         InvalidInputError
-            If the joints cannot be there; see `checked_angles`.
+            If an angle is invalid or beyond its joint's limits; see `checked_angles`.
         """
         q, known = np.array(pin.neutral(self.model)), self.checked_angles(angles)
         for limb, chain in self.chains.items():
@@ -198,13 +199,13 @@ class Robot:
         return q
 
     def checked_angles(self, angles: Angles) -> dict[str, Array]:
-        """Return angles of limbs, if the joints can be there.
+        """Return joint angles as arrays, by limb, after a check against the joints' limits.
 
         Raises
         ------
         InvalidInputError
-            If a limb is unknown, an angle missing, or one beyond its joint's limit; the field is
-            the limb, with the joint's index.
+            If a limb is unknown, or an angle is missing, not finite or more than 1e-6 beyond its
+            joint's limits; the error's field is the limb, with the joint's index.
         """
         found = {}
         for limb, given in angles.items():
@@ -224,24 +225,24 @@ class Robot:
         return found
 
     def hand_poses(self, angles: Angles) -> dict[str, Pose]:
-        """Return every limb's H in B.
+        """Return the pose of each limb's hand frame H in B (forward kinematics), by limb.
 
         Raises
         ------
         InvalidInputError
-            If the joints cannot be there; see `checked_angles`.
+            If an angle is invalid or beyond its joint's limits; see `checked_angles`.
         """
         return {limb: pose for limb, (pose, _) in self.kinematics(angles).items()}
 
     def jacobians(self, angles: Angles) -> dict[str, Array]:
-        """Return every limb's Jacobian, shape (6, n) [m/rad, 1].
+        """Return the Jacobian of each limb's hand, shape (6, n), by limb [m/rad, 1].
 
-        It turns the joints' rates into the twist of H against B in H's axes, linear part first.
+        The Jacobian maps joint rates to the twist of H against B in H's axes, linear part first.
         """
         return {limb: jacobian for limb, (_, jacobian) in self.kinematics(angles).items()}
 
     def kinematics(self, angles: Angles) -> dict[str, tuple[Pose, Array]]:
-        """Return H in B and the Jacobian of each limb, from one pass."""
+        """Return the pose of H in B and the Jacobian, shape (6, n), of each limb, from one pass."""
         model, data = self.model, self.data
         pin.computeJointJacobians(model, data, self.configuration(angles))
         found: dict[str, tuple[Pose, Array]] = {}
@@ -257,15 +258,18 @@ class Robot:
         gravity: Array,
         acceleration: Array | None = None,
     ) -> Statics:
-        """Return what holds the robot up, at rest or while it accelerates as one rigid body.
+        """Return the body wrench and joint torques that carry the robot (inverse dynamics).
+
+        All velocities are zero and the joints stand still.
 
         Parameters
         ----------
-        angles : mapping of str to ndarray
+        angles : mapping of str to ndarray, shape (n,)
+            Joint angles, by limb [rad, or m].
         gravity : ndarray, shape (3,)
-            In B [m/s²].
+            Acceleration of gravity, in B [m/s²].
         acceleration : ndarray, shape (6,), optional
-            Of B in B, linear part first [m/s², rad/s²]; none by default. Velocities are zero.
+            Acceleration of B, in B, linear part first [m/s², rad/s²]; zero by default.
         """
         model, data = self.model, self.data
         rates = self.root_acceleration(gravity, acceleration)
@@ -276,9 +280,9 @@ class Robot:
         )
 
     def root_acceleration(self, gravity: Array, acceleration: Array | None = None) -> Array:
-        """Return Pinocchio's accelerations, shape (nv,), of a body that moves as in `statics`.
+        """Return Pinocchio's accelerations, shape (nv,), for a body that moves as in `statics`.
 
-        Gravity is an acceleration of the root link the other way.
+        Gravity is included, as an acceleration of the root link in the opposite direction.
         """
         spatial = (
             np.zeros(6) if acceleration is None else finite_vector(acceleration, 6, "acceleration")
@@ -294,20 +298,20 @@ class Robot:
         return sum(mass for mass, _, _ in self._limb_weights.values())
 
     def com_at(self, angles: Angles) -> Array:
-        """Return the centre of mass of the robot with its hands in B, shape (3,) [m]."""
+        """Return the centre of mass of the robot with its hands, in B, shape (3,) [m]."""
         centre = pin.centerOfMass(self.model, self.data, self.configuration(angles))
         return self._from_root.apply(np.array(centre))
 
     def com_reaching(self, hands: Mapping[str, Array]) -> Array:
-        """Estimate the centre of mass in B with hands at places, shape (3,) [m].
+        """Estimate the robot's centre of mass in B from where its hands are, shape (3,) [m].
 
-        A limb that reaches for one has its own on the line from its shoulder to its hand, as far
-        along as at zero; which way it bends is left out. Other limbs are at zero.
+        The centre of mass of a limb in ``hands`` is taken to be on the line from shoulder to hand,
+        at the same share of its length as with all joints at zero. Other limbs are at zero.
 
         Parameters
         ----------
         hands : mapping of str to ndarray, shape (3,)
-            H's origin in B, by limb [m].
+            Origin of H in B, by limb [m].
         """
         moment = self.mass * self._com_at_zero
         for limb, place in hands.items():
@@ -330,7 +334,7 @@ class Robot:
         return found
 
     def placed_capsules(self, angles: Angles) -> Array:
-        """Return the segments of all `capsules` in B, shape (n, 2, 3) [m]."""
+        """Return the segments of all `capsules` in B at joint angles, shape (n, 2, 3) [m]."""
         data = self.data
         pin.forwardKinematics(self.model, data, self.configuration(angles))
         moved = [pose_of(data.oMi[int(joint)]) for joint in self.capsules.joints]
@@ -338,7 +342,7 @@ class Robot:
         return self._from_root.apply(np.array(placed).reshape(-1, 2, 3))
 
     def link_chain(self, angles: Angles, limb: str) -> Array:
-        """Return the places in B of a limb's joints and of its H, shape (n + 1, 3) [m]."""
+        """Return the positions in B of a limb's k joints and of its H, shape (k + 1, 3) [m]."""
         data, chain = self.data, self.chains[limb]
         pin.framesForwardKinematics(self.model, data, self.configuration(angles))
         places = [data.oMi[i].translation for i in chain.ids]
@@ -347,36 +351,36 @@ class Robot:
 
 
 def robosimian(hand_numbers: ParameterTable | None = None) -> Robot:
-    """Return RoboSimian with four SpinyHands, from ``parameters/robosimian.toml``, built once.
+    """Return RoboSimian with four SpinyHands, from ``parameters/robosimian.toml``; cached.
 
     Parameters
     ----------
     hand_numbers : ParameterTable, optional
-        All numbers of its hands; the bundled ones by default.
+        All parameters of the hands; the bundled ones by default.
 
     Raises
     ------
     InvalidInputError
-        If a number of the hand is missing or impossible.
+        If a parameter of the hand is missing or impossible.
     """
     return robot_of(RobotFile.bundled(), hand_numbers)
 
 
 @stored("robots", 32)
 def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Robot:
-    """Return the robot of a file's content, built once.
+    """Return the robot that a robot file describes; the last 32 are kept (LRU cache).
 
     Parameters
     ----------
     file : RobotFile
     hand_numbers : ParameterTable, optional
-        All numbers of its hands; the bundled ones by default.
+        All parameters of the hands; the bundled ones by default.
 
     Raises
     ------
     InvalidInputError
-        In one line that names the file and the entry, if one is unknown, missing or impossible, or
-        does not fit the URDF; or names a number of the hand.
+        If an entry of the file is unknown, missing or impossible, or does not fit the URDF; the
+        message names file and entry. Also if a parameter of the hand is missing or impossible.
     """
     hand = spiny_hand(hand_numbers)
     with in_file(file.origin):

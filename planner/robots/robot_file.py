@@ -1,10 +1,10 @@
-"""A robot's own file: which URDF it has, where its hands sit, and what its joints bear.
+"""Parse a robot's file: the URDF that it names, the mounts of the hands, and the torque limits.
 
-TOML in the form of ``parameters/robosimian.toml``: ``name``, ``urdf`` (a path, from the file's
-folder) and ``body`` (a link), then numbers with unit and source. ``[limbs.NAME]`` names the
-``link`` that carries a limb's hand; ``[every_limb]`` has what limbs do not say themselves;
-``[locked]`` has joints that do not move, and where they are. A bare number, or list of numbers, is
-in the SI unit of its entry, and `assumed`.
+TOML, like ``parameters/robosimian.toml``: ``name``, ``urdf`` (a path, from the file's folder) and
+``body`` (a link), then numbers with unit and source. ``[limbs.NAME]`` names the ``link`` that
+carries a limb's hand; ``[every_limb]`` has defaults for all limbs; ``[locked]`` has joints that do
+not move, with their positions. A bare number, or list of numbers, is in the SI unit of its entry
+and counts as `assumed`.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ __all__ = ["Mount", "RobotDescription", "RobotFile", "section_table"]
 
 @dataclass(frozen=True)
 class RobotFile:
-    """The content of a robot's file, which can be passed on, compared and hashed.
+    """The texts of a robot's file and of its URDF; can be compared, hashed and sent.
 
     Attributes
     ----------
     name : str
-        The robot's.
+        Name of the robot.
     toml, urdf : str
-        Texts of the file and of its URDF.
+        Texts of the robot's file and of its URDF.
     origin : str
-        What messages call the file.
+        Name of the file in error messages.
     """
 
     name: str
@@ -53,7 +53,7 @@ class RobotFile:
         Raises
         ------
         InvalidInputError
-            If one of them cannot be read, or the file does not say which URDF it has.
+            If the URDF cannot be read, or an entry of the file is unknown, missing or impossible.
         """
         with in_file(str(path)):
             toml = path.read_text(encoding="utf-8")
@@ -64,13 +64,13 @@ class RobotFile:
     @classmethod
     @cache
     def bundled(cls) -> RobotFile:
-        """Return RoboSimian's file, read once."""
+        """Return the bundled file of RoboSimian; cached."""
         with resources.as_file(resources.files("planner.parameters")) as folder:
             return cls.load(folder / "robosimian.toml")
 
     @property
     def limbs(self) -> tuple[str, ...]:
-        """Names of its limbs."""
+        """Names of the robot's limbs, in the order of the file."""
         return tuple(RobotDescription.read(self.toml).mounts)
 
 
@@ -81,16 +81,16 @@ class Mount:
     Attributes
     ----------
     link : str
-        The link that carries it.
+        Name of the link that carries the hand.
     pose : Pose
-        H in the link.
+        Pose of the hand frame H in the link's frame.
     hand_com : tuple of float
-        The hand's centre of mass in H [m].
+        Centre of mass of the hand in H [m].
     torque_limits : tuple of float or None
-        One number for all joints of the limb, or one each [N·m], [N] of one that slides; zero for
-        one without a motor. None: the efforts of the URDF.
+        Largest torques: one number for all joints of the limb, or one for each [N·m], [N] for a
+        joint that slides; zero for a joint without a motor. None: the efforts of the URDF.
     radius : float, optional
-        Radius of its links that have no capsules [m].
+        Radius of the limb's links for which the file has no capsules [m].
     """
 
     link: str
@@ -102,27 +102,28 @@ class Mount:
 
 @dataclass(frozen=True, eq=False)
 class RobotDescription:
-    """Content of a robot's file.
+    """Parsed content of a robot's file.
 
     Attributes
     ----------
     name : str
+        Name of the robot.
     urdf : str
         Path of the URDF, from the file's folder.
     body : str
-        The link whose frame is B.
+        Name of the link whose frame is B.
     com : tuple of float, optional
-        Centre of mass in B [m] while no joint angles are given.
-    back : tuple of float, optional
-        Direction out of its back in B, of unit length.
+        Centre of mass in B that is used while no joint angles are given [m].
     mounts : mapping of str to Mount
         Mounts of the hands, by limb.
     locked : mapping of str to object
-        Places of the joints that do not move, by name, as the file has them: their units are known
-        with the URDF only.
+        Positions of the joints that do not move, by joint name, unparsed: whether a position is in
+        [rad] or [m] is known from the URDF only.
     capsules : mapping of str to tuple
-        Capsules of links, by a pattern of their names: the ends of each one's segment in the link
-        and its radius, seven numbers [m].
+        Capsules of links, by a pattern of link names. A capsule has seven numbers [m]: both ends of
+        its segment in the link's frame, and its radius.
+    back : tuple of float, optional
+        Unit vector out of the robot's back, in B.
     """
 
     name: str
@@ -136,12 +137,12 @@ class RobotDescription:
 
     @classmethod
     def read(cls, toml: str) -> RobotDescription:
-        """Parse a robot's file.
+        """Parse the text of a robot's file.
 
         Raises
         ------
         InvalidInputError
-            If an entry is unknown, missing or impossible; the field is its place in the file.
+            If an entry is unknown, missing or impossible; the error's field is the entry.
         """
         try:
             raw = tomllib.loads(toml)
@@ -220,21 +221,22 @@ def _mapping(value: Any, field: str) -> Mapping[str, Any]:
 
 
 def section_table(entries: Any, section: str, units: Mapping[str, str]) -> ParameterTable:
-    """Return a section's quantities.
+    """Return the quantities of a section of a robot's file.
 
     Parameters
     ----------
     entries : mapping of str to object
-        As TOML has them: quantities, or bare numbers and lists of numbers, which are in the
-        entry's unit and `assumed`.
+        Parsed TOML: quantities, or bare numbers and lists of numbers, which are in the entry's unit
+        and count as `assumed`.
     section : str
+        Name of the section, for error messages.
     units : mapping of str to str
-        Of all entries that there may be.
+        Units of all valid entries, by name.
 
     Raises
     ------
     InvalidInputError
-        If an entry is none of these, or in another unit.
+        If an entry is unknown, not a quantity, or in another unit.
     """
     entries = _mapping(entries, section)
     for name in entries:

@@ -1,4 +1,4 @@
-"""Sizes and accuracies of robots' numbers."""
+"""Tolerances of robot files and of inverse kinematics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ __all__ = ["TOLERANCES", "RobotTolerances"]
 
 @dataclass(frozen=True, slots=True)
 class RobotTolerances:
-    """Largest numbers in robots' files, beyond which units are wrong; accuracy of poses."""
+    """Largest numbers that a robot's files may have, and the accuracy of inverse kinematics.
+
+    A larger number in a file most often is in another unit.
+    """
 
     frame_distance: float = 100.0  # [m] from a frame to its parent's
     angle: float = 100.0  # [rad] of a URDF

@@ -1,4 +1,4 @@
-"""A robot's links and joints as its URDF has them, checked before anything is built on them."""
+"""Parse a URDF into links and joints, and check its numbers."""
 
 from __future__ import annotations
 
@@ -29,12 +29,13 @@ class Link:
     Attributes
     ----------
     name : str
+        Name of the link in the file.
     mass : float
-        [kg]
+        Mass of the link [kg]; zero if the file has none.
     com : ndarray, shape (3,)
-        In the link [m].
+        Centre of mass in the link's frame [m].
     inertia : ndarray, shape (3, 3)
-        About its centre of mass, in the link's axes [kg·m²].
+        Inertia about the centre of mass, in the link's axes [kg·m²].
     """
 
     name: str
@@ -44,16 +45,16 @@ class Link:
 
 
 class Mimic(NamedTuple):
-    """A coupling to another joint: where a joint is, ``multiplier · other + offset``.
+    """Coupling of a joint to another: its position is ``multiplier · position of joint + offset``.
 
     Attributes
     ----------
     joint : str
-        The other.
+        Name of the joint that is followed.
     multiplier : float
-        [1], or [m/rad] or [rad/m] where one of them slides.
+        Ratio of the motions [1], or [m/rad] or [rad/m] where one of the two slides.
     offset : float
-        [rad, or m]
+        Position while the followed joint is at zero [rad, or m].
     """
 
     joint: str
@@ -68,18 +69,18 @@ class JointElement:
     Attributes
     ----------
     name, type, parent, child : str
-        As the file has them.
+        Name of the joint, its URDF type, its parent link and its child link.
     place : Pose
-        In the parent, at zero.
+        Pose of the joint in the parent link's frame, at position zero.
     axis : ndarray, shape (3,)
-        In its own frame, of unit length.
+        Unit vector of the axis, in the joint's frame.
     lower, upper : float
-        Limits [rad], of a prismatic joint [m]; infinite for all but these two types. Where they are
-        equal nothing moves.
+        Limits of a revolute joint [rad] or a prismatic joint [m]; infinite for all other types. A
+        joint with equal limits does not move.
     effort : float
-        What the joint bears [N·m], a prismatic one [N]; zero where the file does not say.
+        Largest torque [N·m], or force of a prismatic joint [N]; zero if the file has none.
     mimic : Mimic or None
-        How it follows another joint.
+        Coupling to another joint; None if the joint moves by itself.
     """
 
     name: str
@@ -95,27 +96,33 @@ class JointElement:
 
     @property
     def slides(self) -> bool:
-        """True if it moves along its axis instead of about it."""
+        """True for a prismatic joint, which moves along its axis instead of about it."""
         return self.type == "prismatic"
 
 
 @dataclass(frozen=True, eq=False)
 class Urdf:
-    """The tree of a URDF.
+    """The kinematic tree of a URDF.
 
     Attributes
     ----------
     links : mapping of str to Link
-        By name.
+        Links by name.
     joints : mapping of str to JointElement
-        By child link.
+        Joints by the name of the child link.
     """
 
     links: Mapping[str, Link]
     joints: Mapping[str, JointElement]
 
     def trail(self, link: str) -> list[str]:
-        """Return a link and its parents, up to the root; refuse a ring."""
+        """Return the names of a link and of its ancestors, up to the root link.
+
+        Raises
+        ------
+        InvalidInputError
+            If the links form a loop.
+        """
         trail = [link]
         while trail[-1] in self.joints:
             parent = self.joints[trail[-1]].parent
@@ -125,18 +132,19 @@ class Urdf:
         return trail
 
     def chain(self, body: str, link: str, locked: Collection[str]) -> tuple[JointElement, ...]:
-        """Return the joints that move between a link and the body, from the body outward.
+        """Return the joints that can move between a link and the body, from the body outward.
 
         Parameters
         ----------
         body, link : str
+            Names of the body's link and of the other link.
         locked : collection of str
-            Joints that do not move although they could.
+            Names of joints that are left out, as they are kept from moving.
 
         Raises
         ------
         InvalidInputError
-            If there is no such link, or it does not hang on the body.
+            If the link is unknown, or is not connected to the body.
         """
         self.require(link)
         trail = self.trail(link)
@@ -150,20 +158,26 @@ class Urdf:
         return tuple(joint for joint in moving if joint.name not in locked)
 
     def require(self, link: str) -> None:
-        """Refuse a link that is not there."""
+        """Reject an unknown link.
+
+        Raises
+        ------
+        InvalidInputError
+            If the URDF has no link of this name.
+        """
         if link not in self.links:
             known = shorten(", ".join(self.links), 200, placeholder=" …")
             raise InvalidInputError(f"unknown link {link!r}; known are {known}")
 
 
 def parse_urdf(text: str) -> Urdf:
-    """Read the tree of a URDF, and check its numbers.
+    """Parse the text of a URDF into links and joints, and check its numbers.
 
     Raises
     ------
     InvalidInputError
-        If it is no XML, an unexpanded xacro, no tree, or a number is missing, not finite or absurd;
-        the message names the link or joint.
+        If the text is no XML, an unexpanded xacro or no tree, or a number is missing, not finite
+        or too large to be plausible; the message names the link or joint.
     """
     try:
         root = ElementTree.fromstring(text)

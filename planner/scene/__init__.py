@@ -1,4 +1,4 @@
-"""A question looked at as a scene: what is odd, and may not be meant, and what is near what."""
+"""Geometry of a stance: distances, collisions, and findings about likely mistakes."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

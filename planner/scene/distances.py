@@ -1,4 +1,4 @@
-"""Least distances between parts of a scene; with joints, links in rock and in each other."""
+"""Least distances between the parts of a scene, and collisions of links."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class _Near(NamedTuple):
 
 
 def clearance(scene: Scene, angles: Mapping[str, Array] | None) -> Clearance:
-    """Return the least distances about a stance.
+    """Return the least distances between hands, body, rock and, with joint angles, links.
 
     Parameters
     ----------
     scene : Scene
-    angles : mapping of str to ndarray, or None
-        Of every limb [rad]; None where they are not known: then links are not measured.
+    angles : mapping of str to ndarray, shape (n,), or None
+        Joint angles of every limb [rad, or m]; None if unknown: links are not measured then.
     """
     hands, rocks, body = hand_solids(scene), rock_solids(scene), _body(scene)
     unchecked = [] if body else ["body: the robot's file has no capsules of it"]
@@ -69,21 +69,21 @@ def clearance(scene: Scene, angles: Mapping[str, Array] | None) -> Clearance:
 
 
 def body_clearance(scene: Scene) -> Distance | None:
-    """Return the body's least distance from rock; None where the robot's file has no capsules."""
+    """Return the body's least distance from rock; None if the body has no capsules."""
     return _least(scene, _with_rock(scene, _body(scene), rock_solids(scene)))
 
 
 def link_findings(scene: Scene, angles: Mapping[str, Array]) -> tuple[Finding, ...]:
-    """Return links in rock and in each other.
+    """Return a finding for links that are more than 0.02 m deep in rock or in each other.
 
-    Of given joints the deepest of each limb, and of each two of them; of solved ones, which nobody
-    has asked for one by one, the deepest of all.
+    For given joint angles: the deepest collision of each limb, and of each pair of limbs. For
+    solved joints: only the deepest of all.
 
     Parameters
     ----------
     scene : Scene
-    angles : mapping of str to ndarray
-        Of every limb [rad].
+    angles : mapping of str to ndarray, shape (n,)
+        Joint angles of every limb [rad, or m].
     """
     robot, links = scene.stance.robot, _links(scene, angles)
     owners = dict(zip(robot.capsules.names, robot.capsules.limbs, strict=True))

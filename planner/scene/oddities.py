@@ -1,10 +1,10 @@
-"""Find what is odd about a stance, apart from its joints, and may not be meant.
+"""Find oddities in the geometry of a stance, apart from its joints, that are likely mistakes.
 
-All is judged in the body's frame, so that it does not depend on the world's frame; only gravity
-that points up is about W, whose z is up by the contract. A hand that points out of the body's back
-is turned around itself, if the body is on the rock's side of its palm; or the body is, if the palm
-has the body behind it. Where a robot's file does not say which way its back is, it is away from
-where most hands point.
+All is computed in the body's frame, so that it does not depend on the world's frame W; only gravity
+that points up is checked in W, whose z is up by the contract. If z of a hand, into its rock, points
+out of the body's back, the hand is reversed if the body is on the rock's side of its palm;
+otherwise the body is, if all hands are like that. If the robot's file does not give the direction
+of the back, it is taken to be opposite to where most hands point.
 """
 
 from __future__ import annotations
@@ -28,13 +28,16 @@ QUATERNION_SLIP: Final = "is its quaternion [x, y, z, w]?"
 
 
 def findings(scene: Scene) -> tuple[Finding, ...]:
-    """Return what is odd about a stance.
+    """Return a finding for each oddity in the geometry of a stance.
+
+    Oddities are hands that are out of reach, reversed, overlapping or in the body, a reversed body,
+    a body in rock, crossed limbs, gravity that points up and fingers that point down.
 
     Raises
     ------
     InvalidInputError
-        If it cannot be: two hands in one place, or a body deep in rock; the field is relative to
-        the question.
+        If the stance is impossible: two hands at the same place, or a body deep in rock; the
+        error's field is relative to the question.
     """
     along = _back(scene) @ scene.axes[:, :, 2].T
     above = -np.einsum("nx,nx->n", scene.places, scene.axes[:, :, 2])

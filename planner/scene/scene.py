@@ -1,4 +1,4 @@
-"""A stance as a scene: all that is looked at, in the body's frame, whatever the world's."""
+"""A stance as a scene: all its geometry, in the body's frame B, whatever the world's frame."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Scene", "scene_of", "smooth_depths"]
 
 @dataclass(frozen=True, slots=True)
 class SceneSettings:
-    """Bounds of what is usual in a scene, and how far rock goes."""
+    """Bounds of usual sizes in a scene, and the length to which rock is extended."""
 
     in_thousands: float = 1.0 / 300.0
     """Part of what is usual up to which a number is taken for one in thousands, such as kN or t."""
@@ -35,22 +35,23 @@ SCENE_SETTINGS: Final = SceneSettings()
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Poses of hands and rock, as seen from the body. Arrays are of the hands, in their order.
+    """Geometry of a stance in the body's frame. Arrays have one row for each of the n hands.
 
     Attributes
     ----------
     stance : Stance
     hands : tuple of HandOnHold
+        The hands of the stance.
     swept : tuple of Swept or None
-        Their rock where it is smooth.
+        Smooth shape of each hand's hold; None for a hold that is not smooth.
     places : ndarray, shape (n, 3)
-        H's origins in B [m].
+        Origins of the hand frames H, in B [m].
     axes : ndarray, shape (n, 3, 3)
-        H's axes in B, as columns.
+        Axes of the hand frames H in B, as columns.
     shoulders : ndarray, shape (n, 3)
-        Where the limbs begin, in B [m].
+        Shoulders of the hands' limbs, in B [m].
     rocks : tuple of Pose
-        B in each hold's frame.
+        Pose of B in each hold's frame.
     """
 
     stance: Stance
@@ -62,7 +63,15 @@ class Scene:
     rocks: tuple[Pose, ...]
 
     def smooth_depths(self, hands: Sequence[int], points: Array) -> Array:
-        """Return how deep points (n, 3) in B are in the smooth rock of hands, shape (k, n) [m]."""
+        """Return the depth of points in the rock of hands on smooth holds, shape (k, n) [m].
+
+        Parameters
+        ----------
+        hands : sequence of int, length k
+            Indices of hands whose hold is smooth.
+        points : ndarray, shape (n, 3)
+            Points in B [m].
+        """
         rocks = [self.rocks[i] for i in hands]
         turned = points @ np.array([rock.rotation.T for rock in rocks])
         seen = turned + np.array([rock.position for rock in rocks])[:, None]
@@ -71,14 +80,15 @@ class Scene:
 
     @property
     def limbs(self) -> tuple[str, ...]:
-        """Limbs of the hands."""
+        """Limb of each hand."""
         return tuple(hand.limb for hand in self.hands)
 
     @property
     def palms(self) -> tuple[Array, float]:
-        """A capsule in each hand, behind its palm's face: segments in B (n, 2, 3), radius [m].
+        """Capsule that stands for each hand: segments (n, 2, 3) in B, and radius [m].
 
-        It is as long as the palm and as wide as the bases of its outer fingers.
+        The capsule lies behind the palm's face. It is as long as the palm and as wide as the bases
+        of its outer fingers.
         """
         hand = self.stance.robot.hand
         radius = min(abs(hand.outer_axis.item(1)), 0.5 * hand.palm_length)
@@ -89,7 +99,14 @@ class Scene:
 
 
 def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:
-    """Return a stance, with its hands closed on their holds, as a scene."""
+    """Return the scene of a stance whose hands are closed on their holds.
+
+    Parameters
+    ----------
+    stance : Stance
+    settled : sequence of SettledHand
+        The stance's hands, closed on their holds.
+    """
     turn, hands = stance.body.rotation, stance.hands
     positions = np.array([hand.pose.position for hand in hands])
     rotations = np.array([hand.pose.rotation for hand in hands])
@@ -115,16 +132,16 @@ def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:
 
 
 def smooth_depths(shapes: Sequence[Swept], points: Array) -> Array:
-    """Return how deep points are in smooth holds, shape (k, n) [m].
+    """Return the depth of points in smooth holds, shape (k, n) [m]; negative outside.
 
-    That is the distance from their surface, of an ellipsoid no more than that; negative outside.
+    The depth is the distance from the surface; for an ellipsoid, a lower bound of that distance.
 
     Parameters
     ----------
     shapes : sequence of Swept, length k
-        Balls that are swept along faces (`hand_models.sections.Swept`).
+        Shapes of the holds (`hand_models.sections.Swept`).
     points : ndarray, shape (k, n, 3)
-        In each hold's frame [m].
+        Points in each hold's frame [m].
     """
     numbers = np.array(shapes)
     scales, (middle, radius, sine, cosine) = numbers[:, None, :3], numbers[:, 3:7].T[:, :, None]

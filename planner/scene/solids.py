@@ -1,6 +1,6 @@
-"""Obstacles as shapes that `coal` measures, in B: capsules, hands, rock.
+"""Obstacles as shapes of the collision library `coal`, in B: capsules, hands, rock.
 
-A wall goes on without end; logs, edges and outlines are drawn out along y as far as the limbs get.
+A wall is unbounded; logs, edges and outlines are extended along y as far as limbs reach.
 """
 
 from __future__ import annotations
@@ -27,21 +27,22 @@ DISTANCE_REQUEST: Final = coal.DistanceRequest(True)
 
 
 class Solid(NamedTuple):
-    """Solid with its place.
+    """A solid with its pose, for distances.
 
     Attributes
     ----------
     name : str
+        Name of the solid in messages.
     shape
-        Of `coal`.
-    place
-        `coal.Transform3s` in B.
+        Shape of the library `coal`.
+    place : coal.Transform3s
+        Pose of the shape in B.
     middle : ndarray, shape (3,)
-        Of a ball about it, in B [m].
+        Centre of a bounding sphere, in B [m].
     bound : float
-        Radius of that ball; infinite for rock [m].
+        Radius of the bounding sphere [m]; infinite for rock.
     assumed : float
-        How much of its thickness is in no file of the robot, but assumed [m].
+        Radius, if it is assumed because the robot's file has none; otherwise zero [m].
     """
 
     name: str
@@ -53,7 +54,16 @@ class Solid(NamedTuple):
 
 
 def capsule_solids(names: Iterable[str], ends: Array, radii: Array) -> tuple[Solid, ...]:
-    """Return capsules with segments (n, 2, 3) in B and radii (n,) [m]."""
+    """Return capsules as solids.
+
+    Parameters
+    ----------
+    names : iterable of str, length n
+    ends : ndarray, shape (n, 2, 3)
+        Ends of the capsules' segments, in B [m].
+    radii : ndarray, shape (n,)
+        Radii of the capsules [m].
+    """
     along, middles = ends[:, 1] - ends[:, 0], 0.5 * (ends[:, 0] + ends[:, 1])
     lengths = np.linalg.norm(along, axis=1)
     turns = _along_z(along, lengths)
@@ -77,14 +87,14 @@ def _along_z(along: Array, lengths: Array) -> Array:
 
 
 def hand_solids(scene: Scene) -> tuple[Solid, ...]:
-    """Return a capsule in every hand."""
+    """Return a capsule for every hand, as a solid."""
     segments, radius = scene.palms
     names = [f"hand of {limb}" for limb in scene.limbs]
     return capsule_solids(names, segments, np.full(len(names), radius))
 
 
 def rock_solids(scene: Scene) -> tuple[Solid, ...]:
-    """Return the rock of every hand."""
+    """Return the rock of every hand, as a solid."""
     found = []
     for hand, rock in zip(scene.hands, scene.rocks, strict=True):
         shape, centre = ROCK_SHAPES.get(hand.hold, partial(_rock, hand.hold))
@@ -150,9 +160,14 @@ def _surface(vertices: Array, faces: Indices) -> Any:
 
 
 def distance_between(first: Solid, second: Solid) -> tuple[float, Sequence[Array]]:
-    """Return the distance of two solids, below zero how deep they are in each other [m].
+    """Return the distance between two solids, and their nearest points.
 
-    And the nearest points of both, in B [m].
+    Returns
+    -------
+    distance : float
+        Distance [m]; below zero, the depth of penetration.
+    points : sequence of ndarray, shape (3,)
+        The nearest point of each solid, in B [m].
     """
     result = coal.DistanceResult()
     away = coal.distance(

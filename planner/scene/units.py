@@ -1,9 +1,9 @@
-"""Find numbers of a question whose size is odd, so that another unit is likely.
+"""Find numbers of a question whose size is odd, so that they are likely in another unit.
 
-Each number is compared with what is known of the robot (its own weight, what its hands hold, how
-far its limbs reach) and with the presets' strengths. What another unit of the field would explain
-is a finding of the kind ``unit``; a factor of a few is no slip of units and gives no finding.
-Gravity is that of the place: of the Earth, the Moon or a small body, but hardly 1 m/s².
+Each number is compared with known sizes of the robot (its weight, the strength of its hands, the
+reach of its limbs) and with the strengths of the preset surfaces. A size that another unit of the
+field would explain gives a finding of the kind ``unit``; a factor of a few gives none. Gravity may
+be that of the Earth, the Moon or a small body, but hardly 1 m/s².
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ __all__ = ["unit_findings", "wrench_findings"]
 
 
 def unit_findings(question: Question) -> tuple[Finding, ...]:
-    """Return which numbers of a question look as if they were in another unit.
+    """Return a finding for each number of a question that is likely in another unit.
 
     Parameters
     ----------
     question : Question
-        Its body wrench is left aside: see `wrench_findings`.
+        Its body wrench is not checked: see `wrench_findings`.
     """
     stance = question.stance
     robot = tuple(_robot(stance.robot))
@@ -47,7 +47,11 @@ def unit_findings(question: Question) -> tuple[Finding, ...]:
 
 
 def wrench_findings(question: Question) -> tuple[Finding, ...]:
-    """Return whether a body wrench that is given looks as if it were in another unit."""
+    """Return a finding if a given body wrench is likely in another unit.
+
+    Empty if the question has no body wrench, if the load has a mass or a centre of mass, or if the
+    robot's own numbers are odd.
+    """
     stance, wrench = question.stance, question.body_wrench
     if wrench is None or not question.load.own or any(_robot(stance.robot)):
         return ()

@@ -1,4 +1,4 @@
-"""Answer a question with a verified plan."""
+"""Solve a question: the best plan, verified and explained, or the proof that there is none."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,22 +1,24 @@
-"""The active-set method for the quadratic programs of a stance, begun next to their end.
+"""The active-set method for the quadratic programs of a stance, started close to the optimum.
 
-min u + ½ zᵀQ z with C z − d u ≤ b, d one for limits, the first rows equations. With the active rows
-as equations the optimum is where (Karush, Kuhn and Tucker)
+The program is min u + ½ zᵀQ z with C z − d u ≤ b: z are the scaled loads of all hands, u is the
+utilisation, d is one for limits and zero for other rows, and the first rows, the balance, are
+equations. With the active rows as equations the optimum fulfils (Karush, Kuhn and Tucker)
 
-    Q z + Cᵀ λ = 0,   dᵀ λ = 1,   C z − d u = b.
+    Q z + Cᵀ λ = 0,   dᵀ λ = 1,   C z − d u = b,
 
-Newton's step to it from a point is, with z eliminated, one small system, r being what is missing in
-the three:
+with the multipliers λ of the rows. With z eliminated, Newton's step from a point is one small
+system, where r₁, r₂ and r₃ are the residuals of the three equations:
 
     [ S  d ] [ δλ ]   [ C Q⁻¹ r₁ − r₂ ]
     [ dᵀ 0 ] [ δu ] = [ r₃            ] ,   S = C Q⁻¹ Cᵀ,   δz = Q⁻¹ (r₁ − Cᵀ δλ).
 
-A little softness keeps S regular where rows say the same, and takes nothing away, since steps are
-repeated. Where Q is w times as large, S⁻¹ is so, too: one factorisation serves all weights of the
-quadratic term. Where u is given, there is neither its row nor its column.
+A small term on its diagonal keeps S regular where rows are linearly dependent; it costs no
+accuracy, since steps are repeated. If Q is multiplied by w, so is S⁻¹: one factorisation serves all
+weights of the quadratic term. If u is given, its row and its column are left out.
 
-On the way there the first row that would break becomes active; at its end the one with the least
-λ < 0 no longer is (Nocedal and Wright, Numerical Optimization, algorithm 16.3).
+On the way to the optimum of the active rows, the first row that would be violated becomes active;
+at the optimum, the row with the smallest λ < 0 is dropped (Nocedal and Wright, Numerical
+Optimization, algorithm 16.3).
 """
 
 from __future__ import annotations
@@ -48,7 +50,10 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class SolvingTolerances:
-    """Tolerances of a plan's optimum."""
+    """Tolerances of a plan's optimum.
+
+    The multipliers of the limits add up to one, the quadratic term has weight 1.
+    """
 
     row: float = 1e-9  # scaled, of one that holds
     multiplier: float = 1e-14
@@ -61,7 +66,7 @@ TOLERANCES: Final = SolvingTolerances()
 
 
 class Point(NamedTuple):
-    """Loads z, scaled, the utilisation u and the multipliers λ of rows."""
+    """Scaled loads z (M,), utilisation u and multipliers λ (k,) of all k rows, at one iterate."""
 
     z: Array
     u: float
@@ -69,7 +74,19 @@ class Point(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """All rows C z − d u ≤ b of a stance, of which the first, of the balance, are equations."""
+    """All rows C z − d u ≤ b of a stance; the first ones, of the balance, are equations.
+
+    Attributes
+    ----------
+    C : ndarray, shape (k, M)
+        Coefficients of the scaled loads z.
+    d : ndarray, shape (k,)
+        One for limits, zero for the balance and for hard rows.
+    b : ndarray, shape (k,)
+        Right-hand sides, scaled.
+    equations : int
+        Number of equations.
+    """
 
     C: Array
     d: Array
@@ -86,34 +103,55 @@ class Rows(NamedTuple):
         return cls(C, d, np.concatenate([data.offset, rest]), nb)
 
     def room(self, z: Array, u: float) -> Array:
-        """Return the slack of each row."""
+        """Return the slack b + d u − C z of each row, shape (k,).
+
+        Parameters
+        ----------
+        z : ndarray, shape (M,)
+            Scaled loads of all hands.
+        u : float
+            Utilisation.
+        """
         return np.asarray(self.b + self.d * u - self.C @ z)
 
     def tight(self, z: Array, u: float) -> Mask:
-        """Return which rows are active at a point that keeps to all."""
+        """Return which rows are active at a feasible point: equations, and rows without slack.
+
+        Parameters
+        ----------
+        z : ndarray, shape (M,)
+            Scaled loads of all hands.
+        u : float
+            Utilisation.
+
+        Returns
+        -------
+        ndarray of bool, shape (k,)
+        """
         active = self.room(z, u) <= TOLERANCES.row
         active[: self.equations] = True
         return active
 
 
 class ApartError(Exception):
-    """Active rows do not meet."""
+    """Error of active rows that have no common point, or of an iteration that does not converge."""
 
 
 class ActiveFace:
-    """The points where some rows are active, ready for Newton's steps.
+    """The points at which a set of rows is active, factorised for Newton's steps.
 
     Parameters
     ----------
     rows : Rows
     Q : ndarray, shape (M,)
-        Curvature at a weight of 1.
-    active : ndarray of bool
+        Diagonal of the curvature at a weight of 1.
+    active : ndarray of bool, shape (k,)
+        Mask of the active rows.
 
     Raises
     ------
     ApartError
-        If the rows do not meet.
+        If the system of the active rows cannot be factorised.
     """
 
     def __init__(self, rows: Rows, Q: Array, active: Mask) -> None:
@@ -134,20 +172,21 @@ class ActiveFace:
         self.stiffness = float(self.d @ self.across)
 
     def least(self, start: Point, weight: float = 1.0, *, fixed: bool = False) -> Point:
-        """Return the least point of the face.
+        """Return the point of the face at which the objective is least.
 
         Parameters
         ----------
         start : Point
+            Point at which Newton's steps start.
         weight : float, optional
-            Of the quadratic term.
+            Weight of the quadratic term.
         fixed : bool, optional
-            Whether u stays.
+            True to keep u as it is at the start.
 
         Raises
         ------
         ApartError
-            If the rows do not meet.
+            If the active rows have no common point.
         """
         if not (fixed or self.stiffness > 0.0):
             raise ApartError
@@ -176,9 +215,17 @@ class ActiveFace:
         raise ApartError
 
     def keeps(self, least: Point, weight: float) -> bool:
-        """Return whether the least point of the face is the optimum of another weight, too.
+        """Return whether the least point of the face remains the optimum at another weight.
 
-        It is where multipliers of the same rows, none below zero, make up for the larger gradient.
+        The point remains optimal if multipliers of the same rows, none of them negative, balance
+        the scaled gradient.
+
+        Parameters
+        ----------
+        least : Point
+            Least point of the face at a weight of 1.
+        weight : float
+            The other weight of the quadratic term.
         """
         r1 = -weight * self.Q * least.z - least.multipliers[self.active] @ self.C
         step = (self.root @ (self.flexible @ r1)) @ self.root
@@ -192,7 +239,7 @@ class ActiveFace:
 
 
 class Optimum(NamedTuple):
-    """An optimum, and the face that it is the least point of."""
+    """An optimum, and the face of active rows of which it is the least point."""
 
     point: Point
     face: ActiveFace
@@ -208,27 +255,33 @@ def optimum(
     *,
     fixed: bool = False,
 ) -> Optimum | None:
-    """Return the optimum, by the active-set method; None if it is too far away.
+    """Solve a quadratic program of a stance by the active-set method.
 
     Parameters
     ----------
     rows : Rows
     Q : ndarray, shape (M,)
+        Diagonal of the curvature at a weight of 1.
     start : Point
-        About feasible, unless its active rows are those of the optimum.
-    first : ndarray of bool or ActiveFace
+        A point that is nearly feasible, or any point if ``first`` are the optimum's active rows.
+    first : ndarray of bool, shape (k,), or ActiveFace
         The rows that are active at first.
     rounds : int
-        Sets of active rows that are tried at most.
+        Largest number of sets of active rows that are tried.
     weight : float, optional
-        Of the quadratic term.
+        Weight of the quadratic term.
     fixed : bool, optional
-        Whether u stays as it is.
+        True to keep u as it is at the start.
+
+    Returns
+    -------
+    Optimum or None
+        None if the optimum was not found within ``rounds``, or too many rows are violated.
 
     Raises
     ------
     ApartError
-        If active rows do not meet.
+        If active rows have no common point.
     """
     face = first if isinstance(first, ActiveFace) else None
     active = first.active.copy() if isinstance(first, ActiveFace) else first.copy()

@@ -1,4 +1,4 @@
-"""Prove lower bounds of a program's least value by its multipliers."""
+"""Prove lower bounds of a program's optimum by its multipliers (weak duality)."""
 
 from __future__ import annotations
 
@@ -20,14 +20,25 @@ __all__ = [
 
 
 def is_least(value: float, bound: float) -> bool:
-    """Return whether a utilisation, or an effort, is as low as its bound, within 1e-5."""
+    """Return whether a value exceeds its lower bound by at most 1e-5, relative above 1.
+
+    Parameters
+    ----------
+    value, bound : float
+        A utilisation or an effort, and its lower bound.
+    """
     return value - bound <= TOLERANCES.optimality * max(1.0, value)
 
 
 def unproven_sentences(words: str, value: float, bound: float) -> tuple[str, ...]:
-    """Return why a value is not proven the least, if its bound does not prove it.
+    """Return a sentence if a lower bound does not prove a value to be the least; else nothing.
 
-    ``words``: what the value is.
+    Parameters
+    ----------
+    words : str
+        Name of the quantity, with which the sentence begins.
+    value, bound : float
+        The quantity and its lower bound.
     """
     if is_least(value, bound):
         return ()
@@ -38,7 +49,8 @@ def least_bound(data: StanceData, outcome: Outcome) -> float:
     """Return a lower bound of the least utilisation from the multipliers of `programs.margin`.
 
     With λ of the limit rows (Σ λ = 1), μ of the hard rows and ν of the balance, every plan has
-    u ≥ λ·l0 − μ·h − ν·(W − g), as far as Lᵀλ + Hᵀμ + Gᵀν is zero; −∞ where it is not.
+    u ≥ λ·l0 − μ·h − ν·(W − g) if Lᵀλ + Hᵀμ + Gᵀν is zero within 1e-5. Otherwise −∞ is returned.
+    The rows are L z + l0 ≤ u, H z ≤ h and G z + g = W.
     """
     return _dual_bound(data, outcome, None, 0.0, _missing(outcome))
 
@@ -46,14 +58,21 @@ def least_bound(data: StanceData, outcome: Outcome) -> float:
 def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> float:
     """Return a lower bound of the least utilisation from the multipliers of `programs.unique`.
 
-    Its second term f is convex, so with the plan z₁ and its slope every plan z has
+    The second term f of that program is convex, so with its plan z₁ every plan z has
 
         u ≥ [least of u + ∇f(z₁)·z] + f(z₁) − ∇f(z₁)·z₁ − f(z),
 
-    the first as in `least_bound`. Of a plan with at most the utilisation u₁ of z₁, f(z) is at most
-    `TIE_WEIGHT` u₁²: no tension is above u₁ times its maximum (weights of other loads are next to
-    none).
-    ``share``: how much of its weight the second term had.
+    the bracket as in `least_bound`. For a plan with at most the utilisation u₁ of z₁, f(z) is at
+    most `TIE_WEIGHT` u₁²: no tension is above u₁ times its maximum (weights of other loads are
+    negligible).
+
+    Parameters
+    ----------
+    data : StanceData
+    outcome : Outcome
+        Outcome of `programs.unique`.
+    share : float, optional
+        Factor on the weight of the second term with which the program was solved.
     """
     rows = data.rows
     z = np.concatenate(outcome.loads) / rows.unit
@@ -68,19 +87,25 @@ def convex_bound(
 ) -> float:
     """Return a lower bound of a convex function f from the multipliers of its program.
 
-    Every plan has f(z) ≥ f(z₁) + ∇f(z₁)·(z − z₁) about the plan z₁ of the outcome, and the
+    Every plan z has f(z) ≥ f(z₁) + ∇f(z₁)·(z − z₁), with z₁ the plan of the outcome, and the
     multipliers bound that linear function from below, as in `least_bound`.
 
     Parameters
     ----------
     data : StanceData
     outcome : Outcome
+        Outcome of the program that minimises f, with its multipliers.
     value : float
-        f(z₁)
+        f(z₁).
     slopes : ndarray, shape (M,)
-        ∇f(z₁)
+        Gradient ∇f(z₁) in the scaled loads of all hands.
     cap : float
-        On the utilisation.
+        Cap on the utilisation.
+
+    Returns
+    -------
+    float
+        −∞ if the multipliers prove no bound.
     """
     z = np.concatenate(outcome.loads) / data.rows.unit
     return _dual_bound(data, outcome, slopes, cap, 0.0) + value - float(slopes @ z)

@@ -1,4 +1,4 @@
-"""Make the plan that is reported from a solution: explained, with its warnings."""
+"""Compose the reported plan from a verified answer: limits, prices, certificate, warnings."""
 
 from __future__ import annotations
 
@@ -62,18 +62,21 @@ def explained_plan(
     attempt: Attempt,
     moments: tuple[float, float, float],
 ) -> Plan:
-    """Return the plan, explained, with all that is wanted beside it.
+    """Compose the reported plan, with its explanation and the extras that the question wants.
 
     Parameters
     ----------
     prepared : PreparedStance
     checks : Checks
     answer : Answer
+        Verified loads, a proof of infeasibility, or a failure.
     factor : LoadFactor
+        Load factor of the answer.
     attempt : callable
-        Plans another stance, for the spread.
+        Plans a stance with other hands, for the spread (`try_stance`).
     moments : tuple of (float, float, float)
-        When it began, was prepared, and was solved, on the clock of `time.perf_counter`.
+        Times at which the answer was begun, prepared and solved, on the clock of
+        `time.perf_counter` [s].
     """
     question, where, solution = prepared.question, prepared.where, answer.solution
     start, prepared_at, solved = moments
@@ -176,7 +179,14 @@ def _of_plan(
 
 
 def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinished, ...]:
-    """Return that a proof is not explained, if it was to be, and that is for the time."""
+    """Return ``("explanation",)`` if the deadline cut off the explanation of a proof, else nothing.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    proof : Certificate
+        Complete if it has both an irreducible infeasible subset and sufficient changes.
+    """
     if not prepared.question.explain:
         return ()
     whole = proof.irreducible is not None and proof.sufficient is not None

@@ -1,8 +1,8 @@
-"""Plans of hands with fixed wrists: of least utilisation, but for what less tension is worth.
+"""Plans of hands with fixed wrists: least utilisation, except for what is traded for less tension.
 
-One solve has the least utilisation, and mostly its active rows, which give its last digits and the
-plan. Where that does not pass its checks, other ways to the same plan follow, each slower and with
-more digits.
+One solve gives the least utilisation and its active rows, from which the active-set method computes
+the exact plan. If that plan does not pass its checks, other methods for the same plan follow, each
+slower and more accurate.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ class FixedSolution(Solution):
     Attributes
     ----------
     spare : tuple of SpareHand
-        Hands that add nothing to them.
+        Hands without which the utilisation would hardly be larger.
     start : LeastUtilisation or None
-        What they were found from, for the same hands at another wrench to begin at.
+        Result from which the loads were computed; a warm start for the same hands at another body
+        wrench.
     """
 
     spare: tuple[SpareHand, ...] = ()
@@ -53,19 +54,21 @@ class FixedSolution(Solution):
         bound: float | None = None,
         start: LeastUtilisation | None = None,
     ) -> Self:
-        """Return loads of the least utilisation, or near it.
+        """Return a solution whose objective is the least utilisation.
 
         Parameters
         ----------
         prepared : PreparedStance
         sets : Sets
+            Wrench spaces of the hands and rows of the programs.
         least : Outcome
-            Of the program of least utilisation.
-        loads : tuple of ndarray, optional
+            Outcome of the program of least utilisation.
+        loads : tuple of ndarray, shape (m,), optional
+            Loads y of each hand [N].
         bound : float, optional
-            The least utilisation is not below; by default as the multipliers prove it.
+            Lower bound of the least utilisation; by default computed from the multipliers.
         start : LeastUtilisation, optional
-            What they were found from.
+            Result from which the loads were computed.
         """
         cap, faults = prepared.question.limits.utilisation, tuple[str, ...]()
         if least.solved:
@@ -87,6 +90,12 @@ class FixedSolution(Solution):
     def best_in(
         self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
     ) -> FixedSolution:
+        """Return the best solution for an objective within the cap on the utilisation.
+
+        Without loads, or if they are beyond the cap, the solution itself is returned. If the
+        program is not solved, the solution is returned with the reason in ``faults``, or marked as
+        unfinished.
+        """
         used = self.least.value
         if not self.loads or used > self.cap + CAP_SLACK:
             return self
@@ -110,23 +119,25 @@ class FixedSolution(Solution):
         )
 
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+        """Return the load factor: the largest multiple of the body wrench at utilisation 1."""
         factor = most_of_fixed(prepared.hands, self.sets.data)
         return LoadFactor(factor, unfinished=factor is None and deadline.expired())
 
     def no_answer(self, prepared: PreparedStance) -> str:
+        """Return a sentence with the solver's status."""
         return f"the solver gave no usable answer ({self.least.status})"
 
 
 def fixed_solutions(
     prepared: PreparedStance, near: Solution | None = None
 ) -> Iterator[FixedSolution]:
-    """Yield the plan of least utilisation that is meant, in one way after the other.
+    """Yield candidates for the plan of least utilisation, from one method after the other.
 
     Parameters
     ----------
     prepared : PreparedStance
     near : Solution, optional
-        Of the same hands at another wrench, where the first way begins.
+        Solution for the same hands at another body wrench, as a warm start.
     """
     sets, cap = prepared.at_rest, prepared.question.limits.utilisation
     before = near.start if isinstance(near, FixedSolution) else None
@@ -193,15 +204,17 @@ def _less_tense(prepared: PreparedStance, least: FixedSolution) -> Iterator[Fixe
 def nearest_solutions(
     prepared: PreparedStance, found: Solution, nearest: Outcome
 ) -> Iterator[FixedSolution]:
-    """Yield plans for the nearest body wrench that can be had, which rounding has put outside.
+    """Yield candidate plans for the feasible body wrench nearest to the one of the question.
+
+    For a body wrench that is infeasible only by rounding.
 
     Parameters
     ----------
     prepared : PreparedStance
     found : Solution
-        For the wrench that is asked for.
+        Solution for the body wrench of the question.
     nearest : Outcome
-        Of `programs.nearest`.
+        Outcome of `programs.nearest`, whose loads give the nearest wrench.
     """
     data = found.sets.data
     sets = found.sets._replace(data=data.turned(programs.body_wrench(data, nearest.loads)))
@@ -213,7 +226,14 @@ def nearest_solutions(
 
 
 def most_of_fixed(hands: HandSets, data: StanceData) -> float | None:
-    """Return the load factor of hands with fixed wrists; None if none passes its checks."""
+    """Return the load factor of hands with fixed wrists; None without one that passes its checks.
+
+    Parameters
+    ----------
+    hands : HandSets
+    data : StanceData
+        Rows of the hands' wrench spaces, and the body wrench.
+    """
     result = programs.load_factor(data)
     if not result.solved:
         return None

@@ -1,4 +1,4 @@
-"""Plans of hands of which some float: where their wrists go, and what all hands carry there."""
+"""Plans of stances with floating or compliant wrists: the wrists' poses and all hands' loads."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ __all__ = ["FloatingSolution", "floating_solution", "wrench_is_given"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FloatingSolution(Solution):
-    """Loads of hands of which some float, their poses included.
+    """Loads of the hands of a stance with floating or compliant wrists, and the wrists' poses.
 
     Attributes
     ----------
     search : WristSolution
-        Where the search that led to the loads ended.
+        Result of the search that gave the loads.
     usual : WristSolution
-        Where the search for the least utilisation ended.
+        Result of the search for the least utilisation.
     factor : LargestFactor or None
         The largest load factor that the search met.
     driven : tuple of bool
-        Which hands' motors keep their tensions while the wrist gives way.
+        True for hands whose wrist is compliant: their motors keep the tendons' tensions.
     """
 
     search: WristSolution
@@ -51,12 +51,18 @@ class FloatingSolution(Solution):
 
     @property
     def proven(self) -> bool:
-        """False if its search ended without proof."""
+        """False if the search for the wrists' poses ended without proof of an optimum."""
         return self.search.found != "unproven"
 
     def best_in(
         self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
     ) -> FloatingSolution:
+        """Return the best solution for an objective within the cap, with new poses of the wrists.
+
+        Without loads, or if they are beyond the cap, the solution itself is returned. If the
+        deadline passes before the search finds a plan, the solution is returned, marked as
+        unfinished.
+        """
         used = self.search.measure.utilisation
         if not self.loads or used > self.cap + CAP_SLACK:
             return self
@@ -96,12 +102,14 @@ class FloatingSolution(Solution):
         return found if found.proven else replace(found, faults=(), most=np.inf)
 
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+        """Search for the load factor; it is a lower bound if no plan was found beyond it."""
         most = most_load(prepared.hands, self.usual, self.factor, budget)
         if most is None:
             return LoadFactor(unfinished=deadline.expired())
         return LoadFactor(most.factor, least=not most.sure)
 
     def no_answer(self, prepared: PreparedStance) -> str:
+        """Return a sentence about the missing equilibrium of the wrists, with a likely reason."""
         reason = "no equilibrium found for the wrists"
         if wrench_is_given(prepared):
             reason += " with their given wrenches, which does not prove that there is none"
@@ -112,14 +120,20 @@ class FloatingSolution(Solution):
 def floating_solution(
     prepared: PreparedStance, budget: Budget, near: Solution | None = None
 ) -> FloatingSolution:
-    """Find where floating wrists go, and return the plan of least utilisation there.
+    """Search for the wrists' poses with the least utilisation, and return the loads there.
 
     Parameters
     ----------
     prepared : PreparedStance
     budget : Budget
+        Number of programs that the search may solve.
     near : Solution, optional
-        Of much the same stance, where the search begins.
+        Solution of a similar stance, from which the search starts.
+
+    Returns
+    -------
+    FloatingSolution
+        Without loads if no equilibrium was found.
     """
     begin = near.usual if isinstance(near, FloatingSolution) and near.usual.exact else None
     search, factor = least_use(prepared.hands, budget, begin)
@@ -171,7 +185,10 @@ def _less_tense_beside(prepared: PreparedStance, search: WristSolution) -> Wrist
 
 
 def wrench_is_given(prepared: PreparedStance) -> bool:
-    """Return whether the wrench of a hand that gives way is given: other sets prove little."""
+    """Return whether the wrench of a floating or compliant hand is given in the question.
+
+    A proof of infeasibility is then not valid for other poses of the wrists.
+    """
     return any(
         hand.wrist != "fixed" and hand.wrench is not None for hand in prepared.question.stance.hands
     )

@@ -1,8 +1,9 @@
-"""Objectives of a plan, each with its program, bound, check, prices and words.
+"""Objectives of a plan, each with its program, lower bound, check and names in sentences.
 
-Every question is first answered with the plan of least utilisation, which says whether the limits
-can be kept. A `CappedObjective` then takes the best plan of its own within them. To add one is to
-write such a class, and to enter it in `NAMED_OBJECTIVES`; or a question has the object itself.
+Every question is first answered with the plan of least utilisation, which shows whether all limits
+can be kept. A `CappedObjective` then minimises its own function within the cap on the utilisation.
+To add an objective, write such a class and enter it in `NAMED_OBJECTIVES`; or pass an instance in
+the question.
 """
 
 from __future__ import annotations
@@ -40,69 +41,115 @@ class Objective(ABC):
     Attributes
     ----------
     name : str
-        Name in a question.
+        Name of the objective in a question.
     words : str
-        What is least, for sentences.
+        Name of the minimised quantity, for sentences.
     """
 
     name: ClassVar[str]
     words: ClassVar[str]
 
     def reported(self, binding: ActiveLimits, cap: float) -> Mapping[str, Any]:
-        """Return what a plan says of it besides, by fields of `Plan`; nothing by default.
+        """Return fields of `Plan` that this objective adds to a plan; none by default.
 
         Parameters
         ----------
         binding : ActiveLimits
-            By the multipliers of its program.
+            Limits that bind in the objective's program, by its multipliers.
         cap : float
-            On the utilisation.
+            Cap on the utilisation.
         """
         return {}
 
 
 class MaxMargin(Objective):
-    """Least utilisation, but for what less tension is worth (`planner.programs.TensionTrade`)."""
+    """Least utilisation, except for a little that is traded for less tension.
+
+    The trade is `planner.programs.TensionTrade`.
+    """
 
     name = "max_margin"
     words = "utilisation"
 
 
 class CappedObjective(Objective):
-    """Objective that is least at a utilisation within a cap: a convex function of the loads.
+    """Objective that minimises a convex function of the loads under a cap on the utilisation.
 
     Attributes
     ----------
     late : str
-        What a deadline leaves unfinished that comes before its plan.
+        Name of the unfinished step in a plan if the deadline passes before this program is solved.
     """
 
     late: ClassVar[Unfinished] = "least_effort"
 
     @abstractmethod
     def solve(self, data: StanceData, cap: float) -> Outcome:
-        """Return its plan of hands with fixed wrists, with the multipliers that prove it."""
+        """Solve the objective's program for hands with fixed wrists.
+
+        Parameters
+        ----------
+        data : StanceData
+            Rows of all hands and the wrench that they must balance.
+        cap : float
+            Cap on the utilisation.
+
+        Returns
+        -------
+        Outcome
+            Loads, with the multipliers that prove them optimal.
+        """
 
     @abstractmethod
     def value(self, data: StanceData, loads: Sequence[Array]) -> float:
-        """Return what its program makes least, of loads y of each hand."""
+        """Return the value of the minimised function.
+
+        Parameters
+        ----------
+        data : StanceData
+        loads : sequence of ndarray, shape (m,)
+            Loads y of each hand [N], of a floating wrist [m, rad].
+        """
 
     @abstractmethod
     def slopes(self, data: StanceData, loads: Sequence[Array]) -> Array:
-        """Return the gradient of `value` in the scaled loads z of all hands, shape (M,)."""
+        """Return the gradient of `value` in the scaled loads z = y / unit of all hands, shape (M,).
+
+        Parameters
+        ----------
+        data : StanceData
+        loads : sequence of ndarray, shape (m,)
+            Loads y of each hand [N], of a floating wrist [m, rad].
+        """
 
     def bound(self, data: StanceData, outcome: Outcome, cap: float) -> float:
-        """Return what no plan is below, as the multipliers prove it; −∞ where they do not."""
+        """Return a lower bound of the value of every plan, proven by multipliers; −∞ without proof.
+
+        Parameters
+        ----------
+        data : StanceData
+        outcome : Outcome
+            Outcome of `solve`, with its multipliers.
+        cap : float
+            Cap on the utilisation.
+        """
         value, slopes = self.value(data, outcome.loads), self.slopes(data, outcome.loads)
         return convex_bound(data, outcome, value, slopes, cap)
 
     def goal(self, cap: float, farthest: Sequence[Array]) -> Goal:
-        """Return the goal of a search for floating wrists, so far from rest at most [m, rad].
+        """Return the goal of the search for the wrists' poses of floating hands.
+
+        Parameters
+        ----------
+        cap : float
+            Cap on the utilisation.
+        farthest : sequence of ndarray, shape (6,)
+            Largest displacement of each hand's wrist from rest, by component [m, rad].
 
         Raises
         ------
         UnsupportedError
-            If there is no such search, as by default.
+            If the objective requires fixed wrists, as by default.
         """
         raise UnsupportedError(
             f"{self.name} requires fixed wrists; with floating wrists only max_margin is valid",
@@ -110,25 +157,41 @@ class CappedObjective(Objective):
         )
 
     def problems(self, arrays: PlanArrays, value: float) -> list[str]:
-        """Return what is wrong with its value by the plan's own numbers; nothing by default."""
+        """Return errors in the objective's value that a plan's numbers show; none by default.
+
+        Parameters
+        ----------
+        arrays : PlanArrays
+            The plan's numbers.
+        value : float
+            Value of the objective for these loads.
+
+        Returns
+        -------
+        list of str
+            One sentence for each error.
+        """
         return []
 
 
 class MinEffort(CappedObjective):
-    """Least sum of squared relative tensions and joint torques (`planner.programs.Effort`)."""
+    """Least sum of squared relative tensions and joint torques (`planner.programs.effort`)."""
 
     name = "min_effort"
     words = "effort"
 
     def solve(self, data: StanceData, cap: float) -> Outcome:
+        """Minimise the effort of hands with fixed wrists under a cap on the utilisation."""
         return programs.effort(data, cap)
 
     def value(self, data: StanceData, loads: Sequence[Array]) -> float:
+        """Return the effort, plus a small term in the squares of loads that are no tensions."""
         z = [y / hand.unit for hand, y in zip(data.hands, loads, strict=True)]
         small = sum(float(hand.rest @ x**2) for hand, x in zip(data.hands, z, strict=True))
         return programs.used_effort(data, loads) + small
 
     def slopes(self, data: StanceData, loads: Sequence[Array]) -> Array:
+        """Return the gradient of `value` in the scaled loads of all hands, shape (M,)."""
         found = []
         for hand, y in zip(data.hands, loads, strict=True):
             z = y / hand.unit
@@ -136,9 +199,11 @@ class MinEffort(CappedObjective):
         return np.concatenate(found)
 
     def goal(self, cap: float, farthest: Sequence[Array]) -> Goal:
+        """Return the goal of the search for the wrists' poses of least effort."""
         return LeastEffort(cap, farthest)
 
     def reported(self, binding: ActiveLimits, cap: float) -> Mapping[str, Any]:
+        """Return the shadow prices of the binding limits in terms of the effort."""
         return {"effort_prices": binding.prices(cap)}
 
 
@@ -151,12 +216,12 @@ NAMED_OBJECTIVES: Final[Mapping[str, Objective]] = {
 
 
 def objective_of(question: Question) -> Objective:
-    """Return what a question wants the best plan in.
+    """Return the objective that a question asks for.
 
     Raises
     ------
     InvalidInputError
-        If it has neither a name nor an objective.
+        If the question's objective is neither a valid name nor an `Objective`.
     """
     asked = question.objective
     found = NAMED_OBJECTIVES[asked] if isinstance(asked, str) else asked

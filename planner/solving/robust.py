@@ -1,18 +1,19 @@
-"""Robust load factor: over places of the hands near the given ones.
+"""Robust load factor: quantiles over places of the hands near the given ones (Monte Carlo).
 
-Every hand is closed at 128 places about its own, whichever other hands there are. A sample
-puts each hand at one of its places, so that over all samples each place is taken equally often and
-hands are combined at random: closing costs most, and what hands do together needs more samples than
-places. A sample in which a hand cannot be, or nothing is held at any multiple, counts as zero.
+Every hand is closed at 128 places about the given one, independent of the other hands. A sample
+puts each hand at one of its places; over all samples each place is used equally often, and the
+places of the hands are combined at random: closing a hand is costly, and the hands' combinations
+need more samples than there are places. A sample in which a hand cannot close, or which has no load
+factor, counts as zero.
 
-How sure a quantile is follows from how far the samples below it vary with the place of each hand.
-With p the quantile, σ_h² the variance of the share below over the places of hand h, and what is
-left of p (1 − p), the variance of the share of all samples below is
+The confidence interval of a quantile p follows from how the samples below the quantile depend on
+the place of each hand. With σ_h² the variance, over the places of hand h, of the share of samples
+below it, the variance of the share of all samples below is
 
-    Σ_h σ_h² / places + (p (1 − p) − Σ_h σ_h²) / samples,
+    Σ_h σ_h² / places + (p (1 − p) − Σ_h σ_h²) / samples.
 
-as of random places, which are less even than those here. The interval has the order statistics at
-the quantiles 1.96 standard deviations off.
+The formula holds for random places, which are less even than the ones used here. The interval has
+the order statistics at the quantiles 1.96 standard deviations to either side.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ __all__ = ["find_robust_load_factor"]
 
 @dataclass(frozen=True, slots=True)
 class RobustSettings:
-    """Number and seed of the samples that are planned."""
+    """Number of the samples that are planned, and the seed of their random numbers."""
 
     seed: int = 0  # of the places and of their combinations
     rounds: int = 16
@@ -63,13 +64,18 @@ Places = Sequence[WrenchSpace | None]
 def find_robust_load_factor(
     prepared: PreparedStance, *, overloaded: bool
 ) -> RobustLoadFactor | None:
-    """Return the load factor over places of the hands near the given ones; None if out of time.
+    """Return quantiles of the load factor over places of the hands near the given ones.
 
     Parameters
     ----------
     prepared : PreparedStance
     overloaded : bool
-        Whether a limb without a hand cannot bear itself.
+        True if a limb without a hand cannot carry its own weight: every factor is zero then.
+
+    Returns
+    -------
+    RobustLoadFactor or None
+        None if the deadline passed before all samples were planned.
     """
     try:
         reasons: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Solution of a stance: loads of all hands, and what their multipliers prove."""
+"""Solutions of a stance: loads of all hands and the multipliers that prove them optimal."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
-    """Loads of all hands, and how good they are proven to be.
+    """Loads of all hands, and the proof of how good they are.
 
     Attributes
     ----------
     sets : Sets
-        Of the hands, about the loads.
-    loads : tuple of ndarray
-        y of each hand; empty without any.
+        Wrench spaces of the hands and rows of the programs, linearised about the loads.
+    loads : tuple of ndarray, shape (m,)
+        Loads y of each hand [N], of a floating wrist [m, rad]; empty without a solution.
     least : Outcome
-        Of the program of least utilisation.
+        Outcome of the program of least utilisation.
     objective : Objective
-        What the loads are the best in.
+        Objective that the loads minimise.
     best : Outcome
-        Of the objective's program.
+        Outcome of the objective's program.
     cap : float
-        On the utilisation.
+        Cap on the utilisation.
     most : float
-        Largest utilisation that the loads are to have.
+        Largest utilisation that the loads may have to pass the checks.
     faults : tuple of str
-        Why the multipliers do not prove them the best, if they do not.
+        Sentences that say why the multipliers do not prove the loads optimal; empty if they do.
     unfinished : tuple of str
-        What the deadline came before.
+        Names of the steps that the deadline cut off.
     poses : tuple of WristPlan or None
-        Where each hand's wrist goes; None for a fixed one.
+        Displacement of each hand's wrist; None for a fixed wrist.
     """
 
     sets: Sets
@@ -68,37 +68,56 @@ class Solution:
 
     @property
     def proven(self) -> bool:
-        """False if its search, if there is any, ended without proof."""
+        """False if a search for wrist poses ended without proof of the least utilisation."""
         return True
 
     def late(self, *names: Unfinished) -> Self:
-        """Return the same with something more that is not finished."""
+        """Return a copy of the solution with more steps marked as unfinished."""
         return replace(self, unfinished=self.unfinished + names)
 
     @abstractmethod
     def best_in(
         self, objective: CappedObjective, prepared: PreparedStance, budget: Budget
     ) -> Solution:
-        """Return the best loads for an objective within the cap; the same where there are none."""
+        """Return the best solution for an objective within the cap on the utilisation.
+
+        Without loads, or if they are beyond the cap, the solution itself is returned.
+
+        Parameters
+        ----------
+        objective : CappedObjective
+        prepared : PreparedStance
+        budget : Budget
+            Number of programs that a search for wrist poses may still solve.
+        """
 
     @abstractmethod
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
-        """Return how many times the body wrench could be held."""
+        """Return the load factor: the largest multiple of the body wrench at utilisation 1.
+
+        Parameters
+        ----------
+        prepared : PreparedStance
+        budget : Budget
+            Number of programs that a search for wrist poses may still solve.
+        """
 
     @abstractmethod
     def no_answer(self, prepared: PreparedStance) -> str:
-        """Say why there are neither loads nor a proof of none."""
+        """Return a sentence that says why neither loads nor a proof of infeasibility was found."""
 
 
 @dataclass(frozen=True, eq=False)
 class Failed:
-    """A solution without loads, or whose loads do not pass the checks.
+    """A solution without loads, or with loads that do not pass the checks.
 
     Attributes
     ----------
     solution : Solution
     reason : str
-        Why it is no plan.
+        Sentence that says why the solution is no plan.
+    utilisation, whole : float
+        Infinite, as for every answer without a plan.
     """
 
     solution: Solution
@@ -109,13 +128,15 @@ class Failed:
 
 @dataclass(frozen=True, eq=False)
 class Infeasible:
-    """A proof that there are no loads that balance the body.
+    """A proof that no loads balance the body (infeasibility certificate).
 
     Attributes
     ----------
     solution : Solution
-        That failed.
+        The solution without a balance.
     proof : Certificate
+    utilisation, whole : float
+        Infinite, as for every answer without a plan.
     """
 
     solution: Solution
@@ -130,22 +151,23 @@ ByHand = Callable[[], tuple[HandPlan, ...]]
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """Loads that pass the checks, and what they do.
+    """Loads that pass the checks, with the numbers of the plan.
 
     Attributes
     ----------
     solution : Solution
     arrays : PlanArrays
-        The plan's numbers.
+        The plan's numbers, in arrays over all hands.
     used : ndarray, shape (sum of nl,)
-        Utilisation of every limit row, hand by hand.
+        Utilisation of every limit, for one hand after the other; a hand has nl limits.
     effort : float
+        Sum of squared relative tensions and joint torques.
     utilisation : float
-        The largest of the hands.
+        Largest utilisation of the hands' limits.
     whole : float
-        The largest of these, and of the joints of limbs without a hand.
+        Largest utilisation, including the joints of limbs without a hand.
     by_hand : callable
-        Returns the plan's numbers hand by hand.
+        Returns the plan's numbers as a `HandPlan` for each hand.
     """
 
     solution: Solution
@@ -164,9 +186,18 @@ Answer = Verified | Failed | Infeasible
 def load_factor_of(
     prepared: PreparedStance, answer: Answer, budget: Budget, *, overloaded: bool
 ) -> LoadFactor:
-    """Return how many times the body wrench could be held at utilisation 1, if it can be known.
+    """Return the load factor: the largest multiple of the body wrench at utilisation 1.
 
-    ``overloaded``: whether a limb without a hand cannot bear itself.
+    Without a body wrench the factor is unbounded, if the stance is feasible at utilisation 1.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    answer : Answer
+    budget : Budget
+        Number of programs that a search for wrist poses may still solve.
+    overloaded : bool
+        True if a limb without a hand cannot carry its own weight; there is no factor then.
     """
     if overloaded:
         return LoadFactor()

@@ -1,4 +1,4 @@
-"""Answer a question with a verified plan: prepare, solve, recover the loads, verify, explain."""
+"""Answer a question with a verified plan: prepare, solve, recover the numbers, verify, explain."""
 
 from __future__ import annotations
 
@@ -30,22 +30,24 @@ __all__ = ["KnownStance", "plan", "plan_on", "try_stance", "with_advice"]
 
 
 def plan(question: Question) -> Plan:
-    """Answer a question: the best plan, verified, or why there is none, and advice if wanted.
+    """Answer a question: return the best plan, verified, or the reason why there is none.
 
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective; advice is added if the question wants it.
 
     Returns
     -------
     Plan
+        Its status is ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
 
     Raises
     ------
     InvalidInputError
-        If the question cannot be understood; its ``field`` is relative to the question.
+        If the question is not valid; the error's field is relative to the question.
     DeadlineError
-        If its deadline comes before anything is found that passes the checks.
+        If the deadline passes before a plan passes the checks or is proven infeasible.
     """
     start = time.perf_counter()
     with deadline.within(checked_question(question).deadline, started=start):
@@ -59,22 +61,22 @@ def plan_on(
     known: Checks | None = None,
     near: Solution | None = None,
 ) -> tuple[Plan, Solution]:
-    """Answer a question of a prepared stance; return the solution, too, that the plan is made of.
+    """Answer the question of a prepared stance; return the plan and its solution.
 
     Parameters
     ----------
     prepared : PreparedStance
     start : float
-        When it began, on the clock of `time.perf_counter`.
+        Time at which the answer was begun, on the clock of `time.perf_counter` [s].
     known : Checks, optional
-        What recovers and checks its plans; made here by default.
+        Recovery and checks of the stance's plans; prepared here by default.
     near : Solution, optional
-        Of the same hands at another wrench, where solving begins.
+        Solution for the same hands at another body wrench, as a warm start.
 
     Raises
     ------
     DeadlineError
-        If the deadline comes before anything is found that passes the checks.
+        If the deadline passes before a plan passes the checks or is proven infeasible.
     """
     question, modelled, budget = prepared.question, time.perf_counter(), Budget(SETTINGS.programs)
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
@@ -180,15 +182,20 @@ def try_stance(
     idle: Sequence[LimitUse] | None = None,
     near: Solution | None = None,
 ) -> StanceTrial:
-    """Return the verified plan of a stance, of which no store keeps anything.
+    """Solve and verify the plan of a stance without explanation; nothing is cached.
 
     Parameters
     ----------
     prepared : PreparedStance
     idle : sequence of LimitUse, optional
-        How much of their joints' torque limbs without a hand use, where that is known.
+        Utilisation of the joints of limbs without a hand; computed by default.
     near : Solution, optional
-        A plan of much the same stance, where solving begins.
+        Solution of a similar stance, as a warm start.
+
+    Returns
+    -------
+    StanceTrial
+        Utilisation of the verified plan, infinite without one, and a function for the load factor.
     """
     budget = Budget(SETTINGS.programs)
     checks = Checks.of(prepared, idle)
@@ -202,21 +209,25 @@ def try_stance(
 
 
 class KnownStance:
-    """A stance on its holds, for a planner that asks about one body wrench after the other.
+    """A prepared stance, for a planner that asks about one body wrench after the other.
 
-    Hands are settled, joints found and sets computed once; a query pays for the check of its plan
-    and, unless the limits bind that bound in the query before, for its solver.
+    Hands, joints and wrench spaces are computed once. Each further query costs the check of its
+    plan, and a call of the solver unless the limits that bound the previous plan still bind.
 
     Parameters
     ----------
     question : Question
-        The stance, and what is asked of it; limits, objective and extras hold for every wrench.
-        Its joints' torques stay those of its load.
+        The stance, with limits, objective and extras, which apply to every body wrench. Joint
+        torques stay those of the question's load.
+
+    Attributes
+    ----------
+    prepared : PreparedStance
 
     Raises
     ------
     InvalidInputError
-        If the question cannot be understood; its ``field`` is relative to the question.
+        If the question is not valid; the error's field is relative to the question.
     """
 
     def __init__(self, question: Question) -> None:
@@ -228,17 +239,19 @@ class KnownStance:
             self._checks = prepare_checks(prepared)
 
     def plan(self, body_wrench: Array) -> Plan:
-        """Answer for another body wrench, as `planner.solving.plan` would.
+        """Answer for another body wrench, like `planner.solving.plan`, but without advice.
 
         Parameters
         ----------
         body_wrench : ndarray, shape (6,)
-            In B [N, N·m].
+            Wrench that the rock must exert on the robot, in B [N, N·m].
 
         Raises
         ------
         InvalidInputError
-            If it is not six finite numbers, or absurdly large.
+            If the wrench is not six finite numbers, or too large to be plausible.
+        DeadlineError
+            If the deadline passes before a plan passes the checks or is proven infeasible.
         """
         start = time.perf_counter()
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
@@ -251,9 +264,17 @@ class KnownStance:
 
 
 def with_advice(question: Question, answer: Plan) -> Plan:
-    """Return a question's plan with advice; what time was left out is reported as ever.
+    """Return a plan with advice added: changes of the question that would help.
 
-    There is none while a number may be in another unit, which a warning says.
+    If the deadline cuts the search off, ``advice`` is added to the unfinished results, with a
+    warning. No advice is searched for while a finding doubts the unit of a number; a warning names
+    the number.
+
+    Parameters
+    ----------
+    question : Question
+    answer : Plan
+        The question's plan.
     """
     start = time.perf_counter()
     odd = [each.field for each in answer.findings if each.kind == "unit"]

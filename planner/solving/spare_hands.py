@@ -1,20 +1,20 @@
-"""Hands that add nothing to a plan, whose tendons stay as closing has left them.
+"""Spare hands: hands that a plan hardly needs, whose tendons stay near their closing tension.
 
-A hand adds nothing where the least utilisation without it, u', is no more than what the plan gives
-away. With the utilisation multipliers of all hands a bound of u' is known at once,
+A hand is spare if the least utilisation without it, u', is no more than the plan may give away for
+less tension. The multipliers of the program with all hands give a lower bound of u',
 
     u' ≥ (u* − v) / (1 − Σ λ),
 
-λ of the hand's limits and v its own part of the dual objective, so that hardly a program is solved
-for hands that do add something. In the plan of least tension the tension t of a hand that adds
-nothing is measured from f times its closing tension instead of zero, and weighs 1 / (1 − f) times
-as much,
+with u* the least utilisation, λ the multipliers of the hand's limits and v the hand's part of the
+dual objective. So hardly a program is solved for hands that are needed. In the plan of least
+tension the tension t of a spare hand is measured from f times its closing tension instead of from
+zero, and weighs 1 / (1 − f) times as much,
 
     f = (r / r₀) min((u* + r − u') / r₀, 1),
 
-with r the utilisation that may be given away, r₀ of it far from the cap. So tensions change
-continuously with u', and with the cap; with f = 1 they are those of closing where the body's
-balance lets them.
+with r the utilisation that may be given away, and r₀ its value far from the cap. So tensions change
+continuously with u', and with the cap. With f = 1 they are the closing tensions, if the body's
+balance allows that.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ __all__ = ["SpareHand", "at_closing", "less_tense", "spare_hands"]
 
 
 class SpareHand(NamedTuple):
-    """A hand that adds nothing.
+    """A hand without which the least utilisation is no more than the plan may have.
 
     Attributes
     ----------
     place : int
-        Of the hand, among all.
+        Index of the hand.
     without : float
-        The least utilisation without it.
+        Least utilisation without the hand.
     part : float
-        f.
+        Share f of the closing tension from which the hand's tensions are measured, 0 to 1.
     """
 
     place: int
@@ -51,14 +51,15 @@ class SpareHand(NamedTuple):
 
 
 def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[SpareHand, ...]:
-    """Return the hands that add nothing; none where nothing may be given away.
+    """Return the spare hands of a stance; none if the plan may not give away any utilisation.
 
     Parameters
     ----------
     data : StanceData
     exact : Outcome
-        Of the least utilisation.
+        Outcome of the program of least utilisation, with exact multipliers.
     trade : TensionTrade
+        Utilisation that the plan may give away for less tension.
     """
     room = trade.most - exact.value
     # with more than the body's six rows of balance, a hand's wrench is given
@@ -90,12 +91,13 @@ def at_closing(
     spare: Sequence[SpareHand],
     closing: Sequence[float],
 ) -> Outcome:
-    """Return the plan of less tension in which spare hands stay near their closing tensions.
+    """Solve for the plan of less tension in which spare hands stay near their closing tensions.
 
     Parameters
     ----------
     data : StanceData
     trade : TensionTrade
+        Utilisation that the plan may give away for less tension.
     spare : sequence of SpareHand
     closing : sequence of float
         Closing tension of every hand [N].
@@ -118,14 +120,15 @@ def at_closing(
 def less_tense(
     data: StanceData, least: Outcome, trade: TensionTrade, closing: Sequence[float]
 ) -> tuple[Outcome, tuple[SpareHand, ...]]:
-    """Return the plan of less tension as a solver finds it, and the hands that add nothing to it.
+    """Solve for the plan of less tension; return its outcome and the spare hands.
 
     Parameters
     ----------
     data : StanceData
     least : Outcome
-        Of the least utilisation.
+        Outcome of the program of least utilisation.
     trade : TensionTrade
+        Utilisation that the plan may give away for less tension.
     closing : sequence of float
         Closing tension of every hand [N].
     """

@@ -1,10 +1,10 @@
-"""Plan a stance anew for each sample of the hand's and the rock's numbers, which gives the spread.
+"""Spread: plan a stance anew for Monte Carlo samples of the hand's and the rock's parameters.
 
 A sample changes the hands and the strength of their tiles. Body, poses of the hands, joints and
-body wrench stay. A seated hand closes as the sample's hand seats it: its H stays, and its rock is
-elsewhere. A hand whose best seat was searched for stays where that was found. The search for
-floating wrists begins where they are with the question's own hands. A sample's plan has neither
-certificate nor prices nor words.
+body wrench stay the same. A hand with a seat is closed at the seat of the sample's hand: H stays
+where it is, and the rock is elsewhere. A hand whose best seat was searched for keeps that seat. The
+search for floating wrists starts from the solution for the question's hands. A sample's plan has no
+certificate, no prices and no explanation.
 """
 
 from __future__ import annotations
@@ -31,17 +31,22 @@ __all__ = ["find_spread"]
 def find_spread(
     prepared: PreparedStance, idle: Sequence[LimitUse], usual: Solution, attempt: Attempt
 ) -> Spread | None:
-    """Return a stance's plans over its question's draws; None if time does not allow all of them.
+    """Return the plans of a stance over all samples of uncertain parameters (Monte Carlo).
 
     Parameters
     ----------
     prepared : PreparedStance
     idle : sequence of LimitUse
-        How much of their joints' torque limbs without a hand use: the same in every draw.
+        Utilisation of the joints of limbs without a hand, the same in every sample.
     usual : Solution
-        With the question's own hands: each draw's search for floating wrists begins there.
+        Solution for the question's hands, from which searches for floating wrists start.
     attempt : callable
-        Plans a draw's stance.
+        Plans the stance of a sample (`try_stance`).
+
+    Returns
+    -------
+    Spread or None
+        None if the deadline passed before all samples were planned.
     """
     question, plans = prepared.question, []
     drawn = question.stance.robot.hand, question.draws

@@ -1,15 +1,15 @@
-"""The plan that is meant: least utilisation, its proof, and what of it is given away for tension.
+"""Compute the unique plan of a stance: least utilisation, its proof, and less tension for a little.
 
-An interior-point solver ends near the optimum of `programs.unique`, whose second term is so small
-that tensions may be off by newtons while the objective has all its digits. Which rows are active is
-nearly clear by then, and the active-set method (`planner.solving.active_set`) has the last digits.
-Where the rows that were active at another wrench still are, no solver is needed: one system, and
-the signs of its multipliers, prove the plan.
+An interior-point solver ends near the optimum of `programs.unique`. The second term of that program
+is so small that tensions may be off by newtons although the objective is accurate. The solver's
+result nearly shows which rows are active, and the active-set method (`planner.solving.active_set`)
+computes the exact plan. If the rows that were active at another body wrench are still active, no
+solver is needed: one linear system, and the signs of its multipliers, prove the plan.
 
-From there to the plan that is meant (`programs.less_tension`), whose second term is larger, the
-same method goes on: mostly the same rows are active, and their multipliers at the larger weight
-prove that the plan stays as it is, for the price of one step. Where it is not, utilisation is
-given away for less tension, up to a most, at which u is fixed.
+The reported plan is that of `programs.less_tension`, whose second term is larger. The same method
+continues to its optimum: mostly the same rows are active, and their multipliers at the larger
+weight prove in one step that the plan stays the same. Otherwise some utilisation is traded for less
+tension, up to a maximum at which u is fixed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = ["LeastUtilisation", "active_set_optimum", "least_utilisation"]
 
 
 class LeastUtilisation(NamedTuple):
-    """Result of `programs.unique`, and of `programs.less_tension` from there.
+    """Results of `programs.unique` and of `programs.less_tension`, solved after it.
 
     Attributes
     ----------
@@ -49,10 +49,10 @@ class LeastUtilisation(NamedTuple):
     bound : float
         Lower bound of the least utilisation; −∞ without a solution.
     meant : Outcome or None
-        The plan that is meant; None where it is not found, for the time or as the outcome has not
-        its last digits.
+        The plan to report, that of less tension; None if the deadline passed, or the outcome is not
+        exact.
     spare : tuple of SpareHand
-        Hands that add nothing.
+        Hands without which the utilisation would hardly be larger.
     """
 
     outcome: Outcome
@@ -62,7 +62,7 @@ class LeastUtilisation(NamedTuple):
 
     @property
     def proven(self) -> bool:
-        """True if the utilisation is the least, within the tolerance of `is_least`."""
+        """True if the utilisation is proven the least, within the tolerance of `is_least`."""
         return self.outcome.solved and is_least(self.outcome.value, self.bound)
 
 
@@ -72,22 +72,23 @@ def least_utilisation(
     closing: Sequence[float],
     near: LeastUtilisation | None = None,
 ) -> LeastUtilisation:
-    """Return the least utilisation, and the plan that is meant.
+    """Solve for the least utilisation, and for the plan to report, which has less tension.
 
-    What makes the plan of `programs.unique` unique exceeds the least utilisation by up to
-    `program.TIE_WEIGHT` times its square: far beyond the limits it is asked for again with
-    less weight.
+    The second term of `programs.unique` may raise the utilisation by up to `programs.TIE_WEIGHT`
+    times its square. Where that is too much, far beyond the limits, the program is solved again
+    with a smaller weight.
 
     Parameters
     ----------
     data : StanceData
+        Rows of all hands, and the body wrench.
     cap : float
-        On the utilisation, that the question asks for.
+        Cap on the utilisation in the question.
     closing : sequence of float
         Closing tension of every hand [N].
     near : LeastUtilisation, optional
-        Of the same hands at another wrench: where its active rows are those of the optimum, no
-        solver is asked.
+        Result for the same hands at another body wrench. If the same rows are active at the
+        optimum, no solver is called.
     """
     if near is not None:
         exact = active_set_optimum(data, near.outcome, rounds=1)
@@ -113,18 +114,20 @@ def _far_beyond(outcome: Outcome) -> bool:
 
 
 class ActiveSetOptimum(NamedTuple):
-    """The optimum of `programs.unique`, exact.
+    """The exact optimum of `programs.unique`.
 
     Attributes
     ----------
     outcome : Outcome
-        Its value is the utilisation.
+        Outcome with exact loads and multipliers; its value is the utilisation.
     bound : float
-        The least utilisation is not below.
+        Lower bound of the least utilisation.
     found : Optimum
+        The optimum and its active rows.
     rows : Rows
+        All rows of the stance.
     weight : float
-        Of its second term, on the sum of squares.
+        Weight of the sum of squares in the program's second term.
     """
 
     outcome: Outcome
@@ -137,18 +140,23 @@ class ActiveSetOptimum(NamedTuple):
 def active_set_optimum(
     data: StanceData, near: Outcome, share: float = 1.0, rounds: int | None = None
 ) -> ActiveSetOptimum | None:
-    """Return the exact optimum of `programs.unique`; None if it is not found.
+    """Compute the exact optimum of `programs.unique` by the active-set method.
 
     Parameters
     ----------
     data : StanceData
     near : Outcome
-        Solved, of the same program or of one at another wrench.
+        Solved outcome of the same program, or of the same hands at another body wrench.
     share : float, optional
-        Of the weight of its second term, as in `programs.unique`.
+        Factor on the weight of the program's second term, as in `programs.unique`.
     rounds : int, optional
-        Sets of active rows that are tried at most; by default as many as are sooner tried than
-        solved anew.
+        Largest number of sets of active rows that are tried; by default as many as take less time
+        than a new solve.
+
+    Returns
+    -------
+    ActiveSetOptimum or None
+        None if the optimum was not found.
     """
     rows, weight = Rows.of(data), share * tie_weight(len(data.hands))
     Q = 2.0 * weight * data.rows.tie

@@ -1,4 +1,4 @@
-"""Loads recovered and checked, by what is made for that before there are loads."""
+"""Recover a plan's numbers from loads, and verify them; the checks are prepared before solving."""
 
 from __future__ import annotations
 
@@ -28,20 +28,21 @@ __all__ = ["Checks", "idle_joints", "prepare_checks", "recover", "verify"]
 
 
 class Checks(NamedTuple):
-    """Recovery and checks of the loads of a stance, made before there are any.
+    """Recovery and checks of the loads of a stance, prepared before there are any loads.
 
     Attributes
     ----------
     check : Check
         Check that every plan must pass.
     recovery : LoadRecovery or None
-        Reads loads of fixed wrists; None where a wrist floats.
+        Converts loads of fixed wrists to a plan's numbers; None if a wrist is floating or
+        compliant.
     idle : tuple of LimitUse
-        Use of the joint torques of limbs without a hand.
+        Utilisation of the joint torques of limbs without a hand.
     findings : tuple of Finding
-        Findings about the stance as a scene, and about the sizes of the question's numbers.
+        Findings about the geometry of the stance and about likely units of the question's numbers.
     oddities : tuple of str
-        All that is odd about it, these included, in words.
+        Sentences about all that is odd in the stance, the findings included.
     """
 
     check: Check
@@ -52,14 +53,18 @@ class Checks(NamedTuple):
 
     @property
     def overloaded(self) -> bool:
-        """True if a limb without a hand cannot bear itself, whatever the body needs."""
+        """True if a limb without a hand cannot carry its own weight, whatever the body wrench."""
         return any(used.utilisation > 1.0 + CAP_SLACK for used in self.idle)
 
     @classmethod
     def of(cls, prepared: PreparedStance, idle: Sequence[LimitUse] | None = None) -> Checks:
-        """Return what recovers and checks loads, and nothing of what is odd.
+        """Return recovery and checks of the loads of a stance, without findings.
 
-        ``idle``: how much limbs without a hand use, where that is known.
+        Parameters
+        ----------
+        prepared : PreparedStance
+        idle : sequence of LimitUse, optional
+            Utilisation of the joints of limbs without a hand; computed by default.
         """
         batch, hands = prepared.batch, prepared.hands
         fixed = None if hands.floating else LoadRecovery(batch, hands.spaces, hands.scaled)
@@ -68,19 +73,19 @@ class Checks(NamedTuple):
 
 
 def prepare_checks(prepared: PreparedStance) -> Checks:
-    """Return what recovering and checking plans of a stance needs, and what is odd about it.
+    """Return recovery and checks of the loads of a stance, with the findings about the stance.
 
     Raises
     ------
     InvalidInputError
-        If the stance cannot be; the field is relative to the question.
+        If the stance is impossible; the error's field is relative to the question.
     """
     findings, words = oddities(prepared)
     return Checks.of(prepared)._replace(findings=findings, oddities=words)
 
 
 def idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
-    """Return how much of their joints' torque limbs without a hand use."""
+    """Return the utilisation of the joint torques of limbs without a hand."""
     where = prepared.where
     idle = {} if where is None else where.idle(prepared.question.stance)
     return tuple(
@@ -94,7 +99,15 @@ def idle_joints(prepared: PreparedStance) -> tuple[LimitUse, ...]:
 
 
 def recover(prepared: PreparedStance, checks: Checks, solution: Solution) -> Verified:
-    """Return what the loads of a solution do, for `verify` to check."""
+    """Compute a plan's numbers from the loads of a solution; `verify` checks these numbers.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    checks : Checks
+    solution : Solution
+        With loads.
+    """
     spaces, data = solution.sets
     if checks.recovery is not None:
         arrays, used, effort = checks.recovery.read(solution.loads)
@@ -122,7 +135,18 @@ def _hand(prepared: PreparedStance, solution: Solution, index: int) -> HandPlan:
 
 
 def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Verified | Failed:
-    """Return loads, and what they do, if they pass the checks and are the best; else why not."""
+    """Check recovered loads; return them if every check passes, and otherwise the first error.
+
+    The plan's numbers must pass `Check.problems` and the objective's check, the loads must be
+    proven optimal, and their utilisation must not exceed ``solution.most``.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    checks : Checks
+    recovered : Verified
+        Numbers from `recover`.
+    """
     solution, arrays = recovered.solution, recovered.arrays
     wrong = checks.check.problems(arrays, recovered.whole, prepared.wrench, recovered.effort)
     objective = solution.objective

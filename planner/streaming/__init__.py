@@ -1,4 +1,4 @@
-"""Set-points for a body wrench that changes."""
+"""Set-points at controller rate, for a body wrench that changes on a stance that stays."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,13 +1,14 @@
-"""Affine bound of the least utilisation that one solved program proves for every body wrench.
+"""Lower bound of the least utilisation, affine in the body wrench, from one solved program.
 
 With multipliers λ ≥ 0 of the limit rows, Σ λ = 1, μ ≥ 0 of the hard rows and ν of the balance,
 every plan z of a body wrench W has
 
     u ≥ λ·(L z + l0) + μ·(H z − h) + ν·(G z + g − W) = λ·l0 − μ·h + ν·(g − W) + r·z,
 
-r = Lᵀλ + Hᵀμ + Gᵀν. A solver's multipliers leave a small r; they are repaired so that it is zero
-but for rounding. The bound is lowered by what is left of it, with no load above `LOAD_BOX`. So the
-bound holds exactly, and for every W, not only that of the program.
+r = Lᵀλ + Hᵀμ + Gᵀν. The rows are L z + l0 ≤ u (limits), H z ≤ h (hard rows) and G z + g = W
+(balance). A solver's multipliers leave a small r; they are repaired until r is zero except for
+rounding, and the bound is lowered by the rest of r, with no load above `LOAD_BOX`. So the bound is
+exact, and valid for every W, not only that of the program.
 """
 
 from __future__ import annotations
@@ -23,13 +24,14 @@ __all__ = ["AffineBound", "affine_bound"]
 
 
 class AffineBound(NamedTuple):
-    """Least utilisation ≥ slope · body wrench + constant.
+    """Lower bound of the least utilisation: slope · body wrench + constant.
 
     Attributes
     ----------
     slope : ndarray, shape (6,)
-        [1/N, 1/(N·m)]
+        Slope of the bound in the body wrench in B [1/N, 1/(N·m)].
     constant : float
+        Bound at zero body wrench.
     """
 
     slope: Array
@@ -37,15 +39,15 @@ class AffineBound(NamedTuple):
 
 
 def affine_bound(data: StanceData, outcome: Outcome) -> AffineBound | None:
-    """Return what the multipliers of a program that minimises the utilisation prove.
-
-    Of `programs.margin`, or of `Best.unique`, whose second term the repair takes out.
+    """Return the lower bound of the utilisation that a program's multipliers prove, for any wrench.
 
     Parameters
     ----------
     data : StanceData
+        Rows of all hands, and the body wrench of the program.
     outcome : Outcome
-        Solved.
+        Solved outcome of `programs.margin` or `programs.unique`; of the latter, the repair of the
+        multipliers takes out the second term.
 
     Returns
     -------

@@ -1,13 +1,14 @@
-"""Plans of all wrenches near one, from 13 that are solved: a convex interpolation, with its gap.
+"""Plans of all wrenches near a centre, by convex interpolation of 13 solved plans, with their gap.
 
-About a centre w₀ the plans y₀ of w₀ and y_k± of w₀ ± δ_k e_k along the six axes are solved. Loads
-that balance a wrench do so linearly, and limits are convex, so for every wrench with
+About a centre w₀ the plans y₀ of w₀ and y_k± of w₀ ± δ_k e_k along the six axes k are solved. Loads
+that balance a wrench depend linearly on that wrench, and limits are convex, so for every wrench w
+with
 
     t_k = (w − w₀)_k / δ_k,    Σ |t_k| ≤ 1,
 
-the mixture y = y₀ + Σ |t_k| (y_k± − y₀) is a plan of w, its utilisation at most the same mixture of
-theirs. How far that is from the least is known from below: what the multipliers of each of the 13
-prove holds for every wrench (`planner.streaming.affine_bounds`).
+the mixture y = y₀ + Σ |t_k| (y_k± − y₀) is a plan of w, with a utilisation of at most the same
+mixture of theirs. A lower bound of the least utilisation is known, too: what the multipliers of
+each of the 13 plans prove is valid for every wrench (`planner.streaming.affine_bounds`).
 """
 
 from __future__ import annotations
@@ -29,22 +30,22 @@ PER_RADIUS: Final = WRENCH_UNIT / WRENCH_UNIT[0]
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """Plans of the wrenches about a centre.
+    """Plans of the body wrenches near a centre, interpolated between 13 solved plans.
 
     Attributes
     ----------
     centre : ndarray, shape (6,)
-        w₀ in B [N, N·m].
+        Body wrench w₀ at the centre, in B [N, N·m].
     radius : float
-        δ of forces [N].
+        Distance δ from the centre to the solved plans along a force [N].
     middle : ndarray, shape (n,)
-        y₀ of all hands, one after the other [N].
+        Loads y₀ at the centre, for one hand after the other [N].
     sides : ndarray, shape (12, n)
-        y_k± − y₀: first along + of the axes, then along −.
+        Differences y_k± − y₀ [N]: first for + along the six axes, then for −.
     slopes, constants : ndarray, shapes (c, 6), (c,)
-        Least utilisation ≥ slopes · w + constants.
+        Lower bounds of the utilisation of a wrench w: slopes · w + constants [1/N, 1/(N·m)].
     utilisation, most : float
-        Of the plan of the centre, and the largest of the 13.
+        Utilisation at the centre, and the largest of the 13 plans.
     """
 
     centre: Array
@@ -59,7 +60,21 @@ class Interpolation:
 
     @classmethod
     def about(cls, stance: StreamStance, centre: Array, radius: float) -> Interpolation | None:
-        """Solve the 13 plans; None where one of them has no plan, or no proof."""
+        """Solve the 13 plans about a centre, and return their interpolation.
+
+        Parameters
+        ----------
+        stance : StreamStance
+        centre : ndarray, shape (6,)
+            Body wrench in B [N, N·m].
+        radius : float
+            Distance from the centre to the solved plans along a force [N].
+
+        Returns
+        -------
+        Interpolation or None
+            None if one of the 13 wrenches has no proven plan, or no lower bound is known.
+        """
         per = 1.0 / (radius * PER_RADIUS)
         steps = np.diag(1.0 / per)
         loads, cuts, used = [], [], []
@@ -88,11 +103,27 @@ class Interpolation:
         )
 
     def distance(self, wrench: Array) -> float:
-        """Return Σ |t|; the interpolation is for wrenches where it is at most 1."""
+        """Return the relative distance ``Σ |t|`` of a body wrench (6,) from the centre.
+
+        The interpolation is valid up to a distance of 1.
+        """
         return float(np.abs((wrench - self.centre) * self._per).sum())
 
     def at(self, wrench: Array) -> tuple[float, Array]:
-        """Return Σ |t| and the loads y of a wrench, all hands' one after the other, (n,) [N]."""
+        """Return the relative distance ``Σ |t|`` and the interpolated loads of a body wrench.
+
+        Parameters
+        ----------
+        wrench : ndarray, shape (6,)
+            Body wrench in B [N, N·m].
+
+        Returns
+        -------
+        distance : float
+            ``Σ |t|``; the loads are a plan only if it is at most 1.
+        loads : ndarray, shape (n,)
+            Loads y, for one hand after the other [N].
+        """
         t = (wrench - self.centre) * self._per
         parts = np.empty(12)
         forth, back = parts[:6], parts[6:]
@@ -103,5 +134,5 @@ class Interpolation:
         return float(np.add.reduce(parts)), loads
 
     def bound(self, wrench: Array) -> float:
-        """Return a lower bound of a wrench's least utilisation."""
+        """Return a lower bound of the least utilisation for a body wrench (6,) in B [N, N·m]."""
         return float(np.maximum.reduce(self.slopes @ wrench + self.constants))

@@ -1,11 +1,11 @@
-"""Interpolations that follow a wrench: the newest, the one before, and the next, in a thread.
+"""Interpolations that follow a changing wrench: the newest, the previous one, and the next.
 
-Where the wrench drifts from the centre, a thread solves the plans of the next interpolation about
-where it is going. All weights change continuously with the wrench:
+When the wrench drifts from the centre of the newest interpolation, a thread solves the plans of the
+next one, about where the wrench is going. All weights change continuously with the wrench:
 
-- φ of an interpolation falls from 1 to 0 in its outermost shell;
-- τ grows from 0 to 1 with the way that the wrench goes after a new interpolation has come; its
-  weight is τ φ, that of the one before (1 − τ) φ.
+- the weight φ of an interpolation falls from 1 to 0 in its outermost shell;
+- the share τ of a new interpolation grows from 0 to 1 with the distance that the wrench moves after
+  that interpolation was taken over; its weight is τ φ, that of the previous one (1 − τ) φ.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ log = logging.getLogger(__name__)
 
 
 class Mixture(NamedTuple):
-    """Mixture of interpolations at a wrench.
+    """Mixture of interpolations at a body wrench.
 
     Attributes
     ----------
     weight : float
-        Weight of the interpolations, at most 1; 0 where none covers the wrench.
+        Total weight of the interpolations, 0 to 1; 0 where none covers the wrench.
     loads : ndarray, shape (hands, m)
-        Their mixture [N].
+        Mixed loads y of each hand, padded with zeros [N].
     bound : float
-        Of the least utilisation, from below.
+        Lower bound of the least utilisation.
     distance : float
-        Σ |t| from the newest one's centre; infinite where there is none.
+        Distance ``Σ |t|`` from the newest centre, in radii; infinite without an interpolation.
     """
 
     weight: float
@@ -50,19 +50,23 @@ class Mixture(NamedTuple):
 
 
 class Prefetch:
-    """Interpolations about a wrench that changes from call to call; for one thread.
+    """Interpolations about a body wrench that changes from call to call, solved ahead in a thread.
+
+    Not thread-safe: `WrenchStream` guards every call with its lock.
 
     Parameters
     ----------
     stance : StreamStance
     radius : float
-        Of the interpolations; smaller where plans end [N].
+        Radius of the interpolations along a force [N]; smaller near the boundary of the feasible
+        wrenches.
 
     Attributes
     ----------
     newest : Interpolation or None
+        The interpolation that was solved last and is in use.
     coming : Future or None
-        The next one.
+        The next interpolation, which the thread is solving.
     """
 
     def __init__(self, stance: StreamStance, radius: float) -> None:
@@ -78,12 +82,18 @@ class Prefetch:
         """Wrench at which an interpolation was asked for that is not there."""
 
     def close(self) -> ThreadPoolExecutor | None:
-        """Ask for no more interpolations; return the thread, for the caller to end."""
+        """Stop solving interpolations; return the thread pool, for the caller to shut down."""
         thread, self._thread = self._thread, None
         return thread
 
     def go(self, last: Array, wrench: Array) -> None:
-        """Go from the last wrench to another."""
+        """Update the weights for a new body wrench, and take over an interpolation that is ready.
+
+        Parameters
+        ----------
+        last, wrench : ndarray, shape (6,)
+            Previous and new body wrench, in B [N, N·m].
+        """
         if self.coming is not None and self.coming.done():
             self._take_over(self.coming, last)
         if self._fading < 1.0:
@@ -92,7 +102,7 @@ class Prefetch:
             self._before = None
 
     def mixture(self, wrench: Array) -> Mixture:
-        """Return what the interpolations say of the wrench."""
+        """Return the mixture of the interpolations at a body wrench (6,) in B [N, N·m]."""
         weight, loads, bound, distance = 0.0, np.zeros((0, 0)), -math.inf, math.inf
         if self.newest is not None:
             distance, loads = self.newest.at(wrench)
@@ -108,7 +118,15 @@ class Prefetch:
         return Mixture(weight, loads, bound, distance)
 
     def look_ahead(self, wrench: Array, distance: float) -> None:
-        """Let the next interpolation be solved if the wrench is far from the newest centre."""
+        """Start solving the next interpolation if the wrench is far from the newest centre.
+
+        Parameters
+        ----------
+        wrench : ndarray, shape (6,)
+            Body wrench in B [N, N·m].
+        distance : float
+            Distance of the wrench from the newest centre, in radii (`Mixture.distance`).
+        """
         if self.coming is not None or self._thread is None:
             return
         # what was not found is looked for again a quarter of a radius away
@@ -169,5 +187,5 @@ class Prefetch:
 
 
 def _weight(distance: float) -> float:
-    """Return the weight φ of an interpolation at a distance Σ |t| from its centre."""
+    """Return the weight φ of an interpolation at a distance ``Σ |t|`` from its centre."""
     return min(max((1.0 - distance) / 0.2, 0.0), 1.0)  # it falls in the outermost fifth

@@ -1,14 +1,14 @@
 """Set-points for a body wrench that changes a thousand times a second, on a stance that stays.
 
-Plans near a centre are solved before they are asked for, and mixed
-(`planner.streaming.interpolation`), which takes a small part of a solution's time; they follow the
-wrench (`planner.streaming.prefetch`). A set-point is a mixture of plans of its wrench w, so it is a
-plan, too:
+Plans near a centre are solved in advance and interpolated (`planner.streaming.interpolation`),
+which takes a small part of the time of a solve. The interpolations follow the wrench
+(`planner.streaming.prefetch`). A set-point is a mixture of plans of the same body wrench w, so the
+mixture is a plan, too:
 
     y = s ω y_i(w) + (1 − s ω) y*(w)
 
-of the interpolations, with their weight ω, and of the plan y* that is solved for w alone, wherever
-that weight is not 1. s falls from 1 to 0 where the utilisation comes near the cap: there, and
+with the interpolated loads y_i and their weight ω, and the plan y* that is solved for w alone where
+s ω is below 1. The factor s falls from 1 to 0 where the utilisation approaches the cap: there, and
 beyond, an interpolation does not show whether a plan is ``optimal``. All weights change
 continuously with the wrench, so set-points do.
 """
@@ -34,22 +34,29 @@ __all__ = ["WrenchStream"]
 
 
 class WrenchStream:
-    """Set-points of a stance, for one body wrench after another. Safe to use from several threads.
+    """Set-points of a stance for one body wrench after another, at controller rate; thread-safe.
+
+    A context manager: leaving it closes the stream.
 
     Parameters
     ----------
     question : Question
-        The stance, with fixed wrists, and its limits; its body wrench, or its load, is the first
-        centre. Extras and deadlines do not count.
+        The stance, with fixed wrists, and its limits. Its body wrench, or its load, is the first
+        centre of interpolation. Extras and the deadline are ignored.
     radius : float, optional
-        How far from its centre an interpolation goes along a force [N]; along a moment a tenth of
-        it, per metre. Smaller where plans end.
+        Radius of an interpolation along a force [N]; along a moment a tenth of that [N·m]. Smaller
+        near the boundary of the feasible wrenches.
+
+    Attributes
+    ----------
+    question : Question
+    radius : float
 
     Raises
     ------
     InvalidInputError
-        If the question cannot be understood, or asks for what a stream does not do
-        (`UnsupportedError`).
+        If the question is not valid; an `UnsupportedError` if it has a wrist that is not fixed, an
+        objective other than ``max_margin``, or a limit on the change of tensions.
     """
 
     def __init__(self, question: Question, *, radius: float = 30.0) -> None:
@@ -72,23 +79,23 @@ class WrenchStream:
 
     @property
     def columns(self) -> tuple[tuple[str, ...], ...]:
-        """Names of each hand's loads."""
+        """Names of each hand's loads, in the order of `SetPoints.loads`."""
         return self._stance.columns
 
     @property
     def first(self) -> Array:
-        """The first centre, in B, shape (6,) [N, N·m]."""
+        """Body wrench of the first interpolation's centre, in B, shape (6,) [N, N·m]."""
         return self._stance.first
 
     @property
     def newest(self) -> Interpolation | None:
-        """The newest interpolation; None where there is none."""
+        """The newest interpolation; None if none was found yet."""
         with self._lock:
             return self._following.newest
 
     @property
     def interpolates(self) -> float | None:
-        """Radius of the newest interpolation [N]; None where there is none."""
+        """Radius of the newest interpolation [N]; None if none was found yet."""
         newest = self.newest
         return None if newest is None else newest.radius
 
@@ -99,7 +106,7 @@ class WrenchStream:
         self.close()
 
     def close(self) -> None:
-        """End the thread, and give no more set-points."""
+        """Close the stream: end its thread; further calls of `set_points` raise an error."""
         with self._lock:
             self._closed = True
             thread = self._following.close()
@@ -107,29 +114,35 @@ class WrenchStream:
             thread.shutdown(wait=True, cancel_futures=True)
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for the interpolation that is being solved; say whether it, if any, is there.
+        """Wait until the interpolation that is being solved is ready; False on timeout.
 
         Parameters
         ----------
         timeout : float, optional
-            [s]; as long as it takes by default.
+            Longest time to wait [s]; unlimited by default.
+
+        Returns
+        -------
+        bool
+            True if the interpolation is ready, or none is being solved.
         """
         with self._lock:
             coming = self._following.coming
         return coming is None or not wait([coming], timeout).not_done
 
     def set_points(self, body_wrench: ArrayLike) -> SetPoints:
-        """Return the set-points of a body wrench.
+        """Return the set-points for a body wrench: tensions, winch angles, motor currents.
 
         Parameters
         ----------
         body_wrench : array_like, shape (6,)
-            That the rock must exert on the robot, in B [N, N·m].
+            Wrench that the rock must exert on the robot, in B [N, N·m].
 
         Raises
         ------
         InvalidInputError
-            If it is not six finite numbers, or absurdly large, or if the stream is closed.
+            If the wrench is not six finite numbers, or too large to be plausible, or if the stream
+            is closed.
         """
         # a copy: callers may well fill their own array again
         wrench = checked_body_wrench(

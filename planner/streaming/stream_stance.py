@@ -1,7 +1,7 @@
-"""The stance of a stream: known once, and asked about wrench after wrench, in arrays of all hands.
+"""The stance of a stream: prepared once, then solved for one body wrench after the other.
 
-Loads y of all hands are one array (hands, m), each hand's filled up with zeros to the most that one
-has: so readings and checks are products of stacked matrices.
+Loads y of all hands are one array (hands, m): row h has the loads of hand h, padded with zeros to
+m, the largest number of loads of a hand. So recovery and checks are products of stacked matrices.
 """
 
 from __future__ import annotations
@@ -27,15 +27,16 @@ __all__ = ["LoadEffects", "Solved", "StreamStance", "SupportBound"]
 
 
 class Solved(NamedTuple):
-    """A plan of one wrench, straight from the solver.
+    """A plan of one body wrench, from the solver.
 
     Attributes
     ----------
     loads : ndarray, shape (hands, m)
-        [N]
+        Loads y of each hand, padded with zeros [N].
     outcome : Outcome
+        Outcome of the program of least utilisation.
     bound : float
-        Of the least utilisation, from below.
+        Lower bound of the least utilisation.
     """
 
     loads: Array
@@ -44,21 +45,37 @@ class Solved(NamedTuple):
 
 
 class LoadEffects(NamedTuple):
-    """Effects of loads: the hands' wrenches (hands, 6) on the rock in H, largest utilisation."""
+    """Effects of loads on a stance.
+
+    Attributes
+    ----------
+    wrenches : ndarray, shape (hands, 6)
+        Wrench of each hand on the rock, in H [N, N·m].
+    utilisation : float
+        Largest utilisation of the hands' limits.
+    """
 
     wrenches: Array
     utilisation: float
 
 
 class SupportBound(NamedTuple):
-    """Proof that no plan has a body wrench w with direction · w > most."""
+    """Proof that no body wrench w with direction · w > most has a plan.
+
+    Attributes
+    ----------
+    direction : ndarray, shape (6,)
+        Direction in B.
+    most : float
+        Upper bound of direction · w over all feasible body wrenches w.
+    """
 
     direction: Array
     most: float
 
 
 class StreamStance:
-    """A stance whose hands all have fixed wrists, on its holds.
+    """A stance whose hands all have fixed wrists, prepared for many body wrenches.
 
     Parameters
     ----------
@@ -68,24 +85,29 @@ class StreamStance:
     Attributes
     ----------
     known : KnownStance
-        What has the whole plan of a wrench, or the proof that there is none.
+        Answers with a complete plan of a body wrench, or with the proof of infeasibility.
     first : ndarray, shape (6,)
-        That body wrench, in B [N, N·m].
+        Body wrench of the question, in B [N, N·m].
     cap : float
-        On the utilisation.
+        Cap on the utilisation.
     limbs : tuple of str
+        Limbs of the hands, in the order of all arrays.
     columns : tuple of tuple of str
         Names of each hand's loads.
+    shape : tuple of int
+        Number of hands, and largest number of loads of a hand.
     check : LoadsCheck
-        That of every plan.
+        Check that every plan must pass.
+    drive : TendonDrive
+        Motor and winch of a tendon.
     winches : ndarray, shape (2, hands, 4)
-        Their angles without a tension [rad], and per newton of it.
+        Winch angles at zero tension [rad], and their change per newton of tension [rad/N].
 
     Raises
     ------
     InvalidInputError
-        If the question cannot be understood; an `UnsupportedError` if it asks for what a stream
-        does not do.
+        If the question is not valid; an `UnsupportedError` if it has a wrist that is not fixed, an
+        objective other than ``max_margin``, or a limit on the change of tensions.
     """
 
     def __init__(self, question: Question) -> None:
@@ -110,13 +132,30 @@ class StreamStance:
         self._rows, self._rest = reader.rows / LOAD_UNIT, reader.at_rest
 
     def read(self, loads: Array) -> LoadEffects:
-        """Return what loads (hands, m) do."""
+        """Compute the hands' wrenches and the largest utilisation from loads.
+
+        Parameters
+        ----------
+        loads : ndarray, shape (hands, m)
+            Loads y of each hand, padded with zeros [N].
+        """
         rows = (self._rows @ loads[:, :, None])[:, :, 0]
         rows += self._rest
         return LoadEffects(rows[:, :6], float(np.maximum.reduce(rows[:, 6:], axis=None)))
 
     def solve(self, body_wrench: Array) -> Solved | None:
-        """Return the plan of least utilisation that is meant; None without one that is proven."""
+        """Solve for the plan of a body wrench: least utilisation, traded a little for less tension.
+
+        Parameters
+        ----------
+        body_wrench : ndarray, shape (6,)
+            Wrench that the rock must exert on the robot, in B [N, N·m].
+
+        Returns
+        -------
+        Solved or None
+            None without a plan that is proven to have the least utilisation.
+        """
         data = self._data.turned(self._scaled(body_wrench))
         found = least_utilisation(data, self.cap, self._closing)
         outcome, bound, meant = found.outcome, found.bound, found.meant
@@ -133,11 +172,26 @@ class StreamStance:
         return Solved(self._stacked((meant if meant.solved else outcome).loads), outcome, bound)
 
     def affine_bound(self, body_wrench: Array, solved: Solved) -> AffineBound | None:
-        """Return what the solver's answer proves for every wrench."""
+        """Return the lower bound of the utilisation that a solved plan proves for every wrench.
+
+        Parameters
+        ----------
+        body_wrench : ndarray, shape (6,)
+            Body wrench of the plan, in B [N, N·m].
+        solved : Solved
+
+        Returns
+        -------
+        AffineBound or None
+            None if the plan's multipliers prove no bound.
+        """
         return affine_bound(self._data.turned(self._scaled(body_wrench)), solved.outcome)
 
     def proof(self, plan: Plan) -> SupportBound | None:
-        """Return what the proof of a plan that is infeasible says of other wrenches."""
+        """Return the body wrenches that an infeasible plan's certificate excludes.
+
+        None if the plan has no certificate, or one that depends on the cap on the utilisation.
+        """
         found = plan.certificate
         if found is None or found.utilisation is not None:
             return None
@@ -146,7 +200,7 @@ class StreamStance:
         return SupportBound(found.direction, found.supremum - given)
 
     def loads_of(self, plan: Plan) -> Array:
-        """Return the loads (hands, m) of a plan."""
+        """Return the loads y of a plan, padded with zeros, shape (hands, m) [N]."""
         return self.check.loads_of(PlanArrays.of(plan.hands or ()))
 
     def _scaled(self, body_wrench: Array) -> Array:

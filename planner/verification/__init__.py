@@ -1,4 +1,4 @@
-"""Independent check of every plan before it is returned."""
+"""Independent check of every plan before it is returned: all laws and limits are recomputed."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,16 +1,15 @@
-"""Check of every plan before it is returned: from its numbers back to the rock.
+"""Check every plan before it is returned: recompute all limits and laws from the plan's numbers.
 
-Nothing here is shared with the way the plan was found. The plan's own forces must balance every
-joint and tendon (`joint_balance`), which says nothing of the affine maps of Eq. 14, and motors,
-winches and nails must fit (`fingers`); wrenches are summed force by force (`hands`); limits are
-Eq. 21 itself and the plan's half-planes (`tiles`), and the structure's published figures; balance
-is added up about the body's origin. What is different where a wrist floats is in `floating`, what
-joints and callers ask in `limbs`.
+Nothing is shared with the computation of the plan. The plan's forces must balance every joint and
+tendon (`joint_balance`), without the affine maps of Eq. 14; motors, winches and nails must fit
+(`fingers`); wrenches are summed force by force (`hands`); limits are Eq. 21 itself and the plan's
+half-planes (`tiles`), and the published figures of the structure; the balance is summed about the
+body's origin. `floating` has what differs for a floating wrist, `limbs` the joints and the limits
+that a question adds.
 
-Each of these is one kind of `ResidualLimits` and recomputes its residuals from a plan's numbers, of
-all hands at once, in arrays.
-Where numbers are not near enough to be right whatever their size, it is worked out by how much
-each is off, and how much it may be.
+Each of these is one kind of `ResidualLimits` and recomputes its residuals for all hands at once, in
+arrays. If all residuals are tiny, the plan passes; otherwise each residual is compared with its
+tolerance.
 """
 
 from __future__ import annotations
@@ -46,23 +45,30 @@ __all__ = ["Check"]
 
 
 class SettledLimits:
-    """The limits of settled hands on their holds, whatever is asked of them.
+    """The limits of settled hands on their holds, without those that a question adds.
 
     Parameters
     ----------
     known : HandBatch
+        The hands on their holds.
     places : sequence of HandOnHold
-        Whose limbs, wrists and preloads count: the tensions (4,) to which the motors of each hand
-        have tightened its tendons if its wrist floats [N], by default the closing tension.
+        Limb, wrist and tendon preload of each hand. The preload (4,) has the tensions to which the
+        motors of a floating hand have tightened its tendons [N]; by default the closing tension.
     strength : float
-        What every tendon may hold [N].
+        Largest tension of every tendon [N].
 
     Attributes
     ----------
     names : PartNames
+        Names of the hands' parts.
+    wound : dict of int to float or ndarray, shape (4,)
+        Tensions to which the tendons of each floating hand are tightened, by hand index [N].
     tiles : TileLimits
+        Limits of the tiles.
+    nails : NailLimits
+        Limits of the nails; `recompute` has their residuals.
     limits : tuple of ResidualLimits
-        But for nails, whose residuals come with what is recomputed of them.
+        All limits but those of nails.
     """
 
     def __init__(self, known: HandBatch, places: Sequence[HandOnHold], strength: float) -> None:
@@ -82,7 +88,15 @@ class SettledLimits:
         self.limits = (balance, tiles, drives, HandLimits(names))
 
     def recompute(self, found: list[str], arrays: PlanArrays) -> Recomputed:
-        """Return what tensions, or where wrists go, do to the fingers; with the plan's numbers."""
+        """Recompute the tile loads from a plan's tensions, or for floating wrists from their poses.
+
+        Parameters
+        ----------
+        found : list of str
+            Error messages so far; further ones are appended.
+        arrays : PlanArrays
+            The plan's numbers.
+        """
         balance, f, lateral = self._balance, arrays.tensions, arrays.loads[:, 2]
         nails = self.nails.recompute(arrays)
         if not any(arrays.wrists):
@@ -115,22 +129,30 @@ def _settled_limits(
 
 
 class Check:
-    """The check of plans for a stance, made once for its settled hands.
+    """The check of plans for a stance, prepared once for its settled hands.
 
     Parameters
     ----------
     question : Question
-        Its body wrench only counts where joints bear the robot's own weight.
+        Stance, limits and load. Its body wrench only counts where joints carry the robot's weight.
     known : HandBatch
         The hands on their holds.
     where : Posture, optional
-        The joints; None if the question says nothing of them.
+        Joint angles and joint loads; None if the question has no joints.
 
     Attributes
     ----------
+    question, known, where
+        The parameters.
+    strength : float
+        Largest tension of every tendon [N].
     settled : SettledLimits
+        Limits of the hands on their holds.
+    limbs : tuple of str
+        Limb of each hand.
     carry : ndarray, shape (6, 6 H)
-        From the hands' wrenches on the rock, each in its H, to the rock's reaction in B.
+        Map from the wrenches of the H hands on the rock, each in its H, to the rock's reaction on
+        the robot in B.
     """
 
     def __init__(self, question: Question, known: HandBatch, where: Posture | None = None) -> None:
@@ -158,18 +180,23 @@ class Check:
         body_wrench: Array,
         effort: float | None = None,
     ) -> list[str]:
-        """Return what is wrong with a plan, each in a sentence; nothing if it may be returned.
+        """Check a plan; return an error message for each failure, and nothing if the plan passes.
 
         Parameters
         ----------
         arrays : PlanArrays
             The plan's numbers.
         utilisation : float
-            The plan's.
+            The plan's utilisation.
         body_wrench : ndarray, shape (6,)
-            The one planned for, in B.
+            Wrench that the rock must exert on the robot, in B [N, N·m].
         effort : float, optional
-            The plan's.
+            The plan's effort; not checked by default.
+
+        Returns
+        -------
+        list of str
+            One sentence for each failure.
         """
         found: list[str] = []
         with np.errstate(invalid="ignore", over="ignore"):
@@ -194,34 +221,47 @@ class Check:
         return list(dict.fromkeys(found))
 
     def joints(self, found: list[str], wrenches: Array, body_wrench: Array) -> dict[str, JointUse]:
-        """Check the limbs' joints; return what they bear, by limb."""
+        """Check the limbs' joints; return the loads of the joints, by limb.
+
+        Parameters
+        ----------
+        found : list of str
+            Error messages so far; further ones are appended.
+        wrenches : ndarray, shape (H, 6)
+            Wrench of each hand on the rock, in its H [N, N·m].
+        body_wrench : ndarray, shape (6,)
+            Wrench that the rock must exert on the robot, in B [N, N·m].
+        """
         if self.where is None and self.question.stance.joints is None:
             return {}
         by_limb = dict(zip(self.limbs, wrenches, strict=True))
         return check_limbs(found, self.question, by_limb, body_wrench, self.where)
 
     def idle(self, joints: Mapping[str, JointUse]) -> float:
-        """Return the largest use of the joints of limbs without a hand."""
+        """Return the largest joint utilisation of limbs without a hand; zero without such limbs."""
         alone = [use for limb, use in joints.items() if limb not in self.limbs]
         return max([float(np.abs(use.shares).max()) for use in alone], default=0.0)
 
     def recompute(
         self, found: list[str], arrays: PlanArrays, joints: Mapping[str, JointUse]
     ) -> tuple[list[Residual], Recomputed, Array]:
-        """Recompute what a plan's numbers do to the hands.
+        """Recompute all residuals of the hands, and their utilisations, from a plan's numbers.
 
         Parameters
         ----------
         found : list of str
-            What is wrong so far; what is found on the way is appended.
+            Error messages so far; further ones are appended.
         arrays : PlanArrays
+            The plan's numbers.
         joints : mapping of str to JointUse
-            What the limbs' joints bear.
+            Loads of the limbs' joints.
 
         Returns
         -------
         residuals : list of Residual
+            Residuals of all limits, and the errors of the reported utilisations.
         again : Recomputed
+            The plan's numbers and the recomputed tile loads.
         used : ndarray, shape (H,)
             Utilisation of each hand.
         """
@@ -243,12 +283,23 @@ class Check:
         return residuals, again, used
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
-        """Recompute what is not affine in the loads, see `ResidualLimits.recompute_curved`."""
+        """Return the residuals of all limits that are not affine in the loads.
+
+        Parameters as in `ResidualLimits.recompute_curved`.
+        """
         of_all = [limits.recompute_curved(arrays, loads, wrenches) for limits in self._limits]
         return [residual for residuals in of_all for residual in residuals]
 
     def unbalanced(self, wrenches: Array, body_wrench: Array) -> Iterator[str]:
-        """Yield by how much hands' wrenches (H, 6) do not balance the body, if they do not."""
+        """Yield an error message if the hands' wrenches do not balance the body wrench.
+
+        Parameters
+        ----------
+        wrenches : ndarray, shape (H, 6)
+            Wrench of each hand on the rock, in its H [N, N·m].
+        body_wrench : ndarray, shape (6,)
+            Wrench that the rock must exert on the robot, in B [N, N·m].
+        """
         error = self.carry @ wrenches.ravel() - body_wrench
         off, size = math.sqrt(error.dot(error)), math.sqrt(body_wrench.dot(body_wrench))
         if not off <= 1e-6 * max(size, 1.0):  # moments count over a metre

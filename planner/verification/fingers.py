@@ -1,6 +1,7 @@
-"""Fingers in the check of plans: tendons, motors, winches, published figures, and nails that hook.
+"""Check tendons, motors, winches and nails that hook, and the published figures of fingers.
 
-P across a nail follows from the balance about its pin; A along it is a load of its own.
+The force P across a nail follows from the balance about its pin; the force A along it is a load of
+the program.
 """
 
 from __future__ import annotations
@@ -41,17 +42,18 @@ class _Row(IntEnum):
 
 
 class DriveLimits(ResidualLimits):
-    """Limits of tendons, motors and fingers, and the angles of their winches.
+    """Limits of tendons, motors and fingers, and the angles of the winches.
 
     Parameters
     ----------
     names : PartNames
+        Names of the hands' parts.
     left : ndarray, shape (T,)
-        Part of a tendon's tension that is left at each tile.
+        Share of a tendon's tension that is left at each tile.
     strength : float
-        What every tendon may hold [N].
+        Largest tension of every tendon [N].
     hooked : ndarray of int, shape (k,)
-        Fingers whose nails hook.
+        Indices of the fingers whose nails hook, counted through all hands.
     """
 
     def __init__(self, names: PartNames, left: Array, strength: float, hooked: Indices) -> None:
@@ -88,7 +90,10 @@ class DriveLimits(ResidualLimits):
         self._hand_of_drive = np.tile(self._hand, _Row.TENDON)
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return what tensions use of tendons, motors and fingers, and how far drives are off."""
+        """Return the use of tendons, motors and fingers, and the errors of reported drives.
+
+        Drives are motor torques [N·m], motor currents [A] and winch angles [rad].
+        """
         first, planned = self._places.first_of_finger, again.arrays
         f, nail = planned.tensions, self._body.nail
         shear, normal, lateral = again.loads.T
@@ -119,16 +124,17 @@ class DriveLimits(ResidualLimits):
 
 
 class NailLimits:
-    """The nails of settled hands that hook: balance, friction and strength.
+    """Limits of the nails that hook: balance, friction and strength.
 
     Parameters
     ----------
     names : PartNames
+        Names of the hands' parts.
 
     Attributes
     ----------
     tiles, fingers : ndarray of int, shape (k,)
-        Which of the tiles they are, and whose, counted through all hands.
+        Index of each nail among the tiles, and of its finger, counted through all hands.
     """
 
     def __init__(self, names: PartNames) -> None:
@@ -159,7 +165,7 @@ class NailLimits:
         self._sideways = np.cross(self._outs, np.cross(self._along, [0.0, 0.0, 1.0]))
 
     def recompute(self, arrays: PlanArrays) -> RecomputedNails:
-        """Return what a plan's forces leave of balance and friction of k nails, and use of them."""
+        """Return angles, utilisations, and residuals of balance and friction of the k nails."""
         if not len(self.tiles):
             return RecomputedNails([], np.zeros(0), np.zeros(0))
         nail, force = self._nail, arrays.forces[self.tiles]

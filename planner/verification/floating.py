@@ -1,12 +1,12 @@
-"""The check of a floating hand: from where its wrist goes back to the rock, law by law.
+"""Check a floating or compliant hand: recompute its loads from the wrist's pose, law by law.
 
-Nothing here is shared with the way the plan was found, which settles every finger in closed form
-and knows the tendon by its regimes. The postures in the plan are compared with the chain of
-phalanges and the rock; slips are measured along the rock between a tile's contacts before and
-after, and where its bed of springs bears between them is integrated; stick and slip of the tendon
+Nothing is shared with the computation of the plan, which settles every finger in closed form and
+distinguishes the tendon's regimes. The postures in the plan are compared with the chain of
+phalanges and with the rock. Slips are measured along the rock between a tile's contacts before and
+after, and the pressure of its spring bed between them is integrated. Stick and slip of the tendon
 are solved as one complementarity problem (`FingerTendon.held`), the normals by the balance of the
-free joints (`JointBalance.solved`); what tiles do across the finger and the palm against the rock
-is put into their own laws (Section 5.3).
+free joints (`JointBalance.solved`). Lateral loads of tiles and the force of the palm are compared
+with their laws (Section 5.3).
 """
 
 from __future__ import annotations
@@ -30,9 +30,16 @@ __all__ = ["recompute_floating"]
 
 
 def moved(place: Array, wrist: WristPlan) -> Array:
-    """Return how far a place of the hand goes, shape (3,) [m].
+    """Return the displacement of a point of the hand under a wrist's twist, shape (3,) [m].
 
-    As the model takes it, to second order in the turn.
+    To second order in the rotation, like the model.
+
+    Parameters
+    ----------
+    place : ndarray, shape (3,)
+        Point in H at rest [m].
+    wrist : WristPlan
+        The twist of the wrist.
     """
     x, y, z = wrist.twist[3:]
     turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -42,24 +49,27 @@ def moved(place: Array, wrist: WristPlan) -> Array:
 def recompute_floating(
     found: list[str], names: PartNames, balance: JointBalance, arrays: PlanArrays, wound: Array
 ) -> tuple[Array, Array, Array]:
-    """Return what fingers of hands do of which some float; check where those and palms are.
+    """Recompute the tile loads of floating or compliant hands, and check their postures.
 
     Parameters
     ----------
     found : list of str
-        What is wrong so far; what cannot be is appended.
+        Error messages so far; further ones are appended.
     names : PartNames
+        Names of the hands' parts.
     balance : JointBalance
+        Balance of the fingers' joints.
     arrays : PlanArrays
+        The plan's numbers.
     wound : ndarray, shape (F,)
-        Tensions to which winches have drawn the tendons [N].
+        Tensions to which the winches have drawn the tendons [N].
 
     Returns
     -------
     shear, normal : ndarray, shape (T,)
-        Of each tile [N]; of nails zero.
+        Loads of each tile [N]; of nails zero.
     left : ndarray, shape (F, 3)
-        What is left of each joint's balance [N·m].
+        Residual of each joint's balance, which a stop must carry, positive if closing [N·m].
     """
     known = names.known
     allowed = allowed_errors(known, arrays).tolist()

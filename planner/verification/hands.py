@@ -1,4 +1,4 @@
-"""Palms, and hands as a whole: forces and their sums, what a hand holds, contacts as planned."""
+"""Check palms and whole hands: sums of forces, loads of hands, and reported contacts."""
 
 from __future__ import annotations
 
@@ -30,11 +30,12 @@ PALM_SIGNS: Final = np.array([-1.0, 1.0])
 
 
 class HandLimits(ResidualLimits):
-    """Limits of palms and whole hands, and their wrenches as sums of forces.
+    """Limits of palms and whole hands, and the hands' wrenches as sums of forces.
 
     Parameters
     ----------
     names : PartNames
+        Names of the hands' parts.
     """
 
     def __init__(self, names: PartNames) -> None:
@@ -45,7 +46,7 @@ class HandLimits(ResidualLimits):
         self._hand_load = known.hands[0].hand.structure.hand_load
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return what forces leave of their sums, and use of palms and hands."""
+        """Return the residuals of force sums and palms, and the use of palms and hands."""
         planned, names, own = again.arrays, self._names, self._each
         tiles, palms = len(planned.loads), planned.palms
         off = planned.forces[:tiles] - (planned.loads[:, None] @ planned.axes)[:, 0]
@@ -71,7 +72,11 @@ class HandLimits(ResidualLimits):
         ]
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
-        """Return what rows say that hands hold, beyond what they do: across and away from rock."""
+        """Return by how much the program's linear bounds exceed the size of each hand's force.
+
+        Only the part of the force across and away from the rock counts. The bound is the largest
+        product of the force with `HELD_DIRECTIONS`; it must not be below the size.
+        """
         forces = wrenches[:, :3]
         held = np.minimum(forces, PULLING_BOUNDS)
         size = np.sqrt(np.add.reduce(held * held, axis=1))
@@ -81,7 +86,15 @@ class HandLimits(ResidualLimits):
 
 
 def check_contacts(names: PartNames, arrays: PlanArrays) -> Iterator[str]:
-    """Yield what carries a load that cannot, and contacts that are not as the plan says."""
+    """Yield an error message for each load without contact and each wrongly reported contact.
+
+    Parameters
+    ----------
+    names : PartNames
+        Names of the hands' parts, with the settled hands.
+    arrays : PlanArrays
+        The plan's numbers.
+    """
     known, limbs, palms = names.known, names.limbs, arrays.palms
     for own, planned in ((known.points, arrays.points), (known.axes, arrays.axes)):
         if not (planned is own or np.array_equal(planned, own)):

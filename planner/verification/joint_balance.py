@@ -1,18 +1,21 @@
 """The balance of joints and tendons with forces on the rock (Eqs. 4–8), for the check of plans.
 
-A plan's numbers are put into the balance. About joint i, of angle q_i to the phalanx before it, the
-forces F_j on the rock of its own phalanx and those beyond turn as much as what the tendon leaves of
-its spring,
+A plan's numbers are put into the balance. About joint i, with angle q_i to the phalanx before it,
+the forces F_j on the rock of the joint's own phalanx and those beyond balance the tendon's torque
+minus that of the joint's spring,
 
     Σ_{j ≥ i} (p_j − p_i) × F_j = M_i r_i f − k_i q_i − τ_i,
 
-and a tile carries the shear φ_t M_t (g f + (e_t − g) f_c), with the closing tension f_c at which
-its spines engaged and the share φ_t of them that did. Moments are taken about the joints' axes in
-H, of the forces where the plan has them, each axis a row (a × p, −a) that is multiplied by a wrench
-(F, M) about the origin of H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for a joint
-at (x, z) of its plane. Nothing here is shared with the way settled hands find their affine maps
-(Eq. 14): the balance is solved as it stands, once for hands at rest, whose loads are affine in
-tensions.
+and a tile carries the shear φ_t M_t (g f + (e_t − g) f_c). Here p are positions, f is the tension,
+M_i the share of the tension that is left at joint i or tile t, r_i the pulley radius, k_i and τ_i
+stiffness and preload of the spring, g and e_t gains of shear, f_c the closing tension at which the
+spines engaged, and φ_t the share of the spines that did.
+
+Moments are taken about the joints' axes in H. Each axis is a row (a × p, −a) that is multiplied by
+a wrench (F, M) about the origin of H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for
+a joint at (x, z) of the finger's plane. Nothing is shared with the computation of the affine maps
+of settled hands (Eq. 14): the balance itself is solved, once for hands at rest, whose loads are
+affine in the tensions.
 """
 
 from __future__ import annotations
@@ -45,23 +48,38 @@ CROSS_PRODUCT: Final = SKEW_MATRICES.transpose(0, 2, 1).reshape(9, 3)
 
 
 def wrenches_of(points: Array, forces: Array) -> Array:
-    """Return the wrenches (n, 6) of forces at some places, both (n, 3)."""
+    """Return the wrenches about the origin of forces at points, shape (n, 6) [N, N·m].
+
+    Parameters
+    ----------
+    points, forces : ndarray, shape (n, 3)
+        Points [m] and the forces that act there [N], in one frame.
+    """
     moments = (points[:, :, None] * forces[:, None]).reshape(-1, len(CROSS_PRODUCT)) @ CROSS_PRODUCT
     return np.concatenate((forces, moments), axis=1)
 
 
 def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array, Array]:
-    """Return what the tendons of hands do, all of one model whose tiles all touch.
+    """Return the coefficients of tendons on joints and tiles, for hands of one model.
+
+    The T tiles and F fingers are counted through all hands; all tiles are taken to touch.
+
+    Parameters
+    ----------
+    places : TileIndex
+        Index of the tiles of all hands.
+    hand : HandModel
 
     Returns
     -------
     pull : ndarray, shape (F, 3)
-        M r of the joints [m].
+        Torque of each joint per newton of tension, M r [m].
     left : ndarray, shape (T,)
-        What is left of the tension at each tile; of nails zero.
-    gain, engaged : ndarray, shape (T,)
-        Shear of each tile per newton of tension, and at zero tension per newton of closing tension;
-        of nails zero.
+        Share of the tension that is left at each tile after friction; of nails zero.
+    gain : ndarray, shape (T,)
+        Shear of each tile per newton of tension; of nails zero.
+    engaged : ndarray, shape (T,)
+        Shear of each tile at zero tension per newton of closing tension; of nails zero.
     """
     model = hand.finger
     loss = 1.0 - model.friction
@@ -80,18 +98,21 @@ def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array,
 
 
 class Fingers(NamedTuple):
-    """Fingers on their holds, and what they carry but for their tiles' normals.
+    """State of fingers on their holds, from which the normals of their tiles are solved.
 
     Attributes
     ----------
-    shear : ndarray, shape (T,)
-        Of each tile [N].
-    torques : ndarray, shape (F, 3)
-        What tendons leave of the joints' springs [N·m].
+    shear : ndarray, shape (…, T)
+        Shear of each tile [N].
+    torques : ndarray, shape (…, F, 3)
+        Tendon torque minus spring torque of each joint, positive if closing [N·m].
     joints : ndarray, shape (F, 3, 2)
-        Along each straight finger and into the rock, from its proximal joint [m].
-    points, axes : ndarray, shapes (T + …, 3), (T, 3, 3)
-        Of the tiles.
+        Position of each joint from the proximal one: along the straight finger, and into the rock
+        [m].
+    points : ndarray, shape (at least T, 3)
+        Point of each tile in H [m].
+    axes : ndarray, shape (T, 3, 3)
+        Unit vectors of shear, normal and lateral load of each tile, in H.
     """
 
     shear: Array
@@ -102,22 +123,24 @@ class Fingers(NamedTuple):
 
 
 class JointBalance(ResidualLimits):
-    """The balance of the fingers of settled hands, and what their tendons and stops cannot do.
+    """The balance of the fingers' joints, and the limits of their tendons and stops.
 
     Parameters
     ----------
     names : PartNames
+        Names of the hands' parts.
     floating : collection of int
-        Hands whose wrists float, whose tendons may be slackened.
+        Indices of the hands with floating or compliant wrists, whose tendons may be slackened.
 
     Attributes
     ----------
     left : ndarray, shape (T,)
-        Part of a tendon's tension that is left at each tile; of nails zero.
+        Share of a tendon's tension that is left at each tile; of nails zero.
     held : ndarray of bool, shape (F, 3), or None
-        Joints that a stop holds, or whose finger bears nothing; None where none are.
+        True for joints that a stop, or tendon and springs alone, hold, and for all joints of a
+        finger without contact; None if all tiles touch.
     stop_fingers, stop_joints : ndarray of int, shape (k,)
-        Joints that stand at a limit, of fingers that touch rock.
+        Finger and joint of each joint at a stop, for fingers that touch rock.
     """
 
     def __init__(self, names: PartNames, floating: Collection[int] = ()) -> None:
@@ -176,21 +199,21 @@ class JointBalance(ResidualLimits):
         self._left_at_zero, self._left_per_newton = left[0], left[1] - left[0]
 
     def loads(self, tensions: Array, lateral: Array) -> tuple[Array, Array]:
-        """Return what tensions (F,) of tendons do to hands at rest.
+        """Return the tile loads of hands at rest for given tendon tensions.
 
         Parameters
         ----------
         tensions : ndarray, shape (F,)
-            [N]
+            Tendon tensions [N].
         lateral : ndarray, shape (T,)
-            Loads of the tiles, which no tendon changes [N].
+            Lateral loads of the tiles, which do not depend on tensions [N].
 
         Returns
         -------
         loads : ndarray, shape (T, 3)
-            Of each tile [N]; shear and normal of nails zero.
+            Shear, normal and lateral load of each tile [N]; shear and normal of nails zero.
         left : ndarray, shape (F, 3)
-            What is left of each joint's balance, closing it [N·m].
+            Residual of each joint's balance, which a stop must carry, positive if closing [N·m].
         """
         loads = self._per_newton * tensions.take(self._known.places.finger)[:, None]
         loads += self._at_zero
@@ -198,7 +221,7 @@ class JointBalance(ResidualLimits):
         return loads, self._left_at_zero + self._left_per_newton * tensions[:, None]
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return what loads leave of the balance, of tendons that pull and of joints' stops."""
+        """Return the residuals of the joints' balance, tendons that must pull and joint stops."""
         names, (shear, normal, _) = self._names, again.loads.T
         planned, tensions, hands = again.arrays.loads, again.arrays.tensions, self._hand_of_finger
         off = planned[:, :2] - again.loads[:, :2]
@@ -224,25 +247,36 @@ class JointBalance(ResidualLimits):
         return residuals
 
     def stops(self, left: Array) -> Array:
-        """Return how each joint that stands at a limit presses on it, shape (k,) [N·m]."""
+        """Return the torque with which each joint at a stop presses on it, shape (k,) [N·m].
+
+        Parameters
+        ----------
+        left : ndarray, shape (F, 3)
+            Residual of each joint's balance, positive if closing [N·m].
+        """
         return np.asarray(left[self.stop_fingers, self.stop_joints] * self._sides)
 
     def solved(self, fingers: Fingers) -> tuple[Array, Array]:
-        """Solve the balance of the joints that are free for the normals.
+        """Solve the balance of the free joints for the tiles' normal loads.
 
-        Shears and torques of the fingers may have further axes in front, and so has what is found.
+        Shears and torques may have further leading axes (…), which the results have, too.
+
+        Parameters
+        ----------
+        fingers : Fingers
+            Shears, torques and positions of all fingers.
 
         Returns
         -------
-        normal : ndarray, shape (T,)
-            Of each tile [N]; of nails zero.
-        left : ndarray, shape (F, 3)
-            What is left of each joint's balance, closing it [N·m].
+        normal : ndarray, shape (…, T)
+            Normal load of each tile [N]; of nails zero.
+        left : ndarray, shape (…, F, 3)
+            Residual of each joint's balance, which a stop must carry, positive if closing [N·m].
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            If contacts do not hold the joints that are free.
+            If the contacts cannot balance the free joints.
         """
         phalanges, points = self._known.places.phalanges, fingers.points[: len(fingers.axes)]
         along = wrenches_of(points, fingers.axes[:, 0])[phalanges]
@@ -265,7 +299,7 @@ class JointBalance(ResidualLimits):
         return normal, left - (turns @ normals)[..., 0]
 
     def fingers(self, tensions: Array) -> Fingers:
-        """Return the fingers at rest, with their tendons' tensions (…, F)."""
+        """Return the state of the fingers at rest for tendon tensions, shape (…, F) [N]."""
         known = self._known
         shear = self._shear + self._gain * tensions[..., known.places.finger]
         torques = self._pull * tensions[..., None] + self._rest

@@ -1,7 +1,7 @@
-"""The check of limbs: their joints, and what is asked of a hand's force and tendons.
+"""Check the joints of limbs, and the limits that a question sets on hands' forces and tendons.
 
-Joints are checked against the robot's URDF itself, by moments about each axis (`LinkTree`), not by
-the Jacobians and the Newton–Euler pass that the program's rows are made of.
+Joint torques are recomputed from the robot's URDF itself, by moments about each axis (`LinkTree`),
+not by the Jacobians and the Newton–Euler pass from which the program's rows are made.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ class JointUse(NamedTuple):
     Attributes
     ----------
     shares : ndarray, shape (n,)
-        Torques over limits; zero of joints without a motor.
+        Joint torque over torque limit, with sign; zero for joints without a motor.
     passive : dict of str to float
-        Torques of those of limbs with a hand, by name, which must be zero [N·m, N].
+        Torques of the joints without a motor, by joint name, which must be zero [N·m, or N]; empty
+        for a limb without a hand.
     """
 
     shares: Array
@@ -51,18 +52,24 @@ def check_limbs(
     body_wrench: Array,
     where: Posture | None,
 ) -> dict[str, JointUse]:
-    """Check joints and the robot's own weight; return what the joints of all limbs bear.
+    """Check joint angles, joint torques and the body wrench of the robot's weight.
 
     Parameters
     ----------
     found : list of str
-        What is wrong so far; more is appended.
+        Error messages so far; further ones are appended.
     question : Question
     wrenches : mapping of str to ndarray, shape (6,)
-        Of the hands on the rock, by limb.
+        Wrench of each hand on the rock in its H, by limb [N, N·m].
     body_wrench : ndarray, shape (6,)
-        The one planned for, in B.
+        Wrench that the rock must exert on the robot, in B [N, N·m].
     where : Posture or None
+        Joint angles and joint loads of the plan; None if it has none.
+
+    Returns
+    -------
+    dict of str to JointUse
+        Recomputed loads of the joints of every limb; empty without joints.
     """
     uses: dict[str, JointUse] = {}
     if (where is None) != (question.stance.joints is None):
@@ -97,7 +104,16 @@ def check_limbs(
 
 
 def recompute_joints(limb: str, h: int, use: JointUse) -> list[Residual]:
-    """Return what the joints of hand h use of their torque, and bear without a motor."""
+    """Return the utilisations of a limb's joints, and the residuals of joints without a motor.
+
+    Parameters
+    ----------
+    limb : str
+    h : int
+        Index of the limb's hand.
+    use : JointUse
+        Recomputed loads of the limb's joints.
+    """
     hand, torques = np.array([h]), np.array([*use.passive.values()])
     residuals = [Residual("use", np.concatenate((use.shares, -use.shares))[None], hand)]
     if use.passive:
@@ -212,13 +228,15 @@ def _cap_of(question: Question, h: int, cap: ForceCap) -> _Cap:
 
 
 class AskedLimits(ResidualLimits):
-    """Limits that a question puts on hands: caps, given wrenches, small changes of tensions.
+    """Limits that a question sets on hands: caps on forces, given wrenches, changes of tensions.
 
     Parameters
     ----------
     question : Question
     names : PartNames
+        Names of the hands' parts.
     tiles : TileLimits
+        Limits of the tiles, to which the question may add a margin.
     """
 
     def __init__(self, question: Question, names: PartNames, tiles: TileLimits) -> None:
@@ -246,7 +264,7 @@ class AskedLimits(ResidualLimits):
         self._hand = np.arange(len(hands)).repeat(FINGER_COUNT)
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return what tensions and wrenches leave of what is asked."""
+        """Return the residuals of the question's limits on tensions, forces and wrenches."""
         tensions, wrenches = again.arrays.tensions, again.arrays.wrenches
         residuals = self._tiles.holding(again.loads, self._margin) if self._margin else []
         if self._least:
@@ -278,7 +296,10 @@ class AskedLimits(ResidualLimits):
         return residuals
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
-        """Return what rows say of forces that are capped in all directions, beyond their size."""
+        """Return by how much the program's linear bounds exceed the size of each capped force [N].
+
+        For caps on a force in all directions; the bound must not be below the size.
+        """
         residuals = []
         for cap in self._caps:
             if cap.ball:

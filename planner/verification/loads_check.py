@@ -1,10 +1,10 @@
-"""The check of a stance's loads, for one body wrench after the other.
+"""Check the loads of a stance fast, for one body wrench after the other.
 
-Every load of a hand with a fixed wrist is affine in what its plan chooses: tensions, lateral
-reactions, nails' pulls, the palm's loads; and so is most of what the check of plans recomputes
-(`Residual.affine`). For a stance that stays, these residuals are tabulated without loads and for
-each newton of one: what is zero for these is zero for all loads. A plan is then checked by one
-matrix, and by the residuals that are not affine.
+All loads of a hand with a fixed wrist are affine in the variables of its plan (tensions, lateral
+reactions, forces of nails, loads of the palm), and so are most residuals of the check
+(`Residual.affine`). For a stance that stays, these residuals are tabulated at zero and for one
+newton of each variable. A residual that is zero there is zero for all loads and is left out. A plan
+is then checked by one matrix product, and by the residuals that are not affine.
 """
 
 from __future__ import annotations
@@ -28,23 +28,24 @@ most = np.maximum.reduce
 
 
 class LoadsCheck:
-    """The check of loads of a stance, for any body wrench.
+    """The check of a stance's loads for any body wrench, in one matrix product.
 
     Parameters
     ----------
     check : Check
-        Of plans of the stance, with fixed wrists alone and a body wrench; without present tensions.
+        Check of the stance's plans. All wrists are fixed, the question has a body wrench, and it
+        has no present tensions.
     reader : LoadRecovery
-        Reads the loads of its hands.
+        Converts the hands' loads to a plan's numbers.
     columns : sequence of tuple of str
         Names of each hand's loads y.
 
     Attributes
     ----------
     wrong : list of str
-        What is wrong with the stance, whatever its loads.
+        Error messages about the stance that do not depend on its loads.
     idle : float
-        Of their joints' torques, what limbs without a hand use.
+        Largest joint utilisation of limbs without a hand.
     """
 
     def __init__(
@@ -112,7 +113,7 @@ class LoadsCheck:
         return np.asarray(changing | ~(at_zero <= self._negligible))
 
     def loads_of(self, arrays: PlanArrays) -> Array:
-        """Return the loads (hands, m) of a plan's numbers, by their names."""
+        """Return the loads y in a plan's numbers, padded with zeros, shape (hands, m) [N]."""
         places = self._check.known.places
         first, ends = places.first_of_finger, [*places.first_of_finger[1:], len(arrays.loads)]
         kinds = {
@@ -134,18 +135,18 @@ class LoadsCheck:
     def fault(
         self, loads: Array, wrenches: Array, utilisation: float, body_wrench: Array
     ) -> str | None:
-        """Return what is wrong with a plan's numbers; None if nothing is.
+        """Check a plan's numbers; return the first error, or None if the plan passes.
 
         Parameters
         ----------
         loads : ndarray, shape (hands, m)
-            y of each hand, filled up with zeros [N].
+            Loads y of each hand, padded with zeros [N].
         wrenches : ndarray, shape (hands, 6)
-            On the rock, in each H.
+            Wrench of each hand on the rock, in its H [N, N·m].
         utilisation : float
-            Of the whole stance, limbs without a hand included.
+            Utilisation of the whole stance, limbs without a hand included.
         body_wrench : ndarray, shape (6,)
-            In B.
+            Wrench that the rock must exert on the robot, in B [N, N·m].
         """
         if self.wrong:
             return self.wrong[0]

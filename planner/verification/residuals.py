@@ -1,8 +1,8 @@
-"""Residuals of limits and laws in a plan's numbers, and whether they are more than rounding.
+"""Residuals of limits and laws, recomputed from a plan's numbers, and their tolerances.
 
-Every kind of limit (`ResidualLimits`) recomputes its residuals from the numbers of a plan, and
-nothing else says what the limit is: the check of a plan judges these, and the check of a stream
-tabulates those that are affine in the loads.
+Every kind of limit (`ResidualLimits`) recomputes its residuals from the numbers of a plan. It is
+the only definition of the limit: `Check` compares the residuals of a plan with their tolerances,
+and `LoadsCheck`, for streams, tabulates the residuals that are affine in the loads.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ FINGER_COUNT: Final = len(FINGERS)
 
 @dataclass(frozen=True, slots=True)
 class VerificationTolerances:
-    """Largest errors of a plan's numbers against what is recomputed of them."""
+    """Largest errors of a plan's numbers against the recomputed numbers."""
 
     load: float = 1e-6  # of a tile, relative to the largest load of its hand
     utilisation: float = 1e-6
@@ -49,15 +49,16 @@ TOLERANCES: Final = VerificationTolerances()
 
 
 class RecomputedNails(NamedTuple):
-    """Recomputed state of the k nails that hook, under a plan's forces.
+    """State of the k nails that hook, recomputed from a plan's forces.
 
     Attributes
     ----------
     residuals : list of Residual
+        Residuals of balance, friction and strength of the nails.
     angles : ndarray, shape (k,)
-        How far each has turned, by where it hooks [rad].
+        Angle by which each nail has turned, computed from the point at which it hooks [rad].
     used : ndarray, shape (k,)
-        Utilisation of each, by shear of its finger and by what its tip bears.
+        Utilisation of each nail: by the shear of its finger, and by the load of its fingertip.
     """
 
     residuals: list[Residual]
@@ -66,21 +67,24 @@ class RecomputedNails(NamedTuple):
 
 
 class Recomputed(NamedTuple):
-    """A plan's numbers, and what its tensions, or where its wrists go, do to the fingers.
+    """A plan's numbers, and the tile loads recomputed from its tensions or its wrists' poses.
+
+    T tiles and F fingers are counted through all hands.
 
     Attributes
     ----------
     arrays : PlanArrays
         The plan's numbers.
     loads : ndarray, shape (T, 3)
-        Of each tile [N]; shear and normal of nails zero.
+        Shear, normal and lateral load of each tile [N]; shear and normal of nails zero.
     left : ndarray, shape (F, 3)
-        What is left of each joint's balance, for its stop [N·m].
+        Residual of each joint's balance, which a stop must carry, positive if closing [N·m].
     wound : ndarray, shape (F,)
-        Tensions to which the winches have drawn the tendons [N].
+        Tension of each tendon at which its winch stands [N].
     drawn : ndarray, shape (T,)
-        Shears of the tiles when they had [N].
+        Shear of each tile at these tensions, with the wrists at rest [N].
     nails : RecomputedNails
+        State of the nails that hook.
     """
 
     arrays: PlanArrays
@@ -92,27 +96,29 @@ class Recomputed(NamedTuple):
 
 
 class Residual(NamedTuple):
-    """Numbers that a plan leaves of one kind of limit.
+    """Residuals of one kind of limit, for n tiles, fingers or hands.
 
     Attributes
     ----------
     kind : {"zero", "least", "use"}
-        What must be zero; what may not be below zero; utilisations.
+        Meaning of the values: they must be zero, they must not be negative, or they are
+        utilisations.
     values : ndarray, shape (n, …)
+        Residuals of the n parts.
     hand : ndarray of int, shape (n,)
-        Whose they are.
+        Index of the hand to which each part belongs.
     name : callable, optional
-        Name of what each of the n belongs to.
+        Returns the name of part i, with which the error message begins.
     text : str
-        What is said of one that is off, right after that name.
-    numbers : tuple of ndarray, shapes (n,) or that of the values
-        What the text is formatted with.
+        Rest of the error message, a format string.
+    numbers : tuple of ndarray, shape (n,) or that of the values
+        Numbers for the format string.
     error : float, optional
-        How far each may be off; as far as the loads of its hand by default.
+        Tolerance of each value; by default the tolerance for loads of the part's hand.
     scale : ndarray, optional
-        Numbers that the error is relative to where they are larger than one, in size.
+        Numbers to which ``error`` is relative where their size is above one.
     affine : bool
-        Whether the values are affine in the loads of the hands.
+        True if the values are affine in the loads of the hands.
     """
 
     kind: Literal["zero", "least", "use"]
@@ -126,7 +132,13 @@ class Residual(NamedTuple):
     affine: bool = True
 
     def off(self, allowed: Array) -> Iterator[str]:
-        """Yield what is off by more than it may be: by ``allowed`` (H,) [N] in hands' loads."""
+        """Yield an error message for each value that exceeds its tolerance or is not finite.
+
+        Parameters
+        ----------
+        allowed : ndarray, shape (H,)
+            Tolerance for the loads of each hand [N].
+        """
         if self.kind == "use":
             return
         room = -np.abs(self.values) if self.kind == "zero" else self.values
@@ -144,11 +156,17 @@ class Residual(NamedTuple):
 
 
 class ResidualLimits(ABC):
-    """One kind of limits of the hands of a stance."""
+    """One kind of limits of the hands of a stance, which recomputes its residuals from a plan."""
 
     @abstractmethod
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return the residuals that are affine in the hands' loads, and what a plan claims."""
+        """Return the residuals that are affine in the loads, and the errors of reported numbers.
+
+        Parameters
+        ----------
+        again : Recomputed
+            The plan's numbers and the recomputed tile loads.
+        """
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
         """Return the residuals that are not affine in the loads; none by default.
@@ -156,11 +174,11 @@ class ResidualLimits(ABC):
         Parameters
         ----------
         arrays : PlanArrays
-            Of its numbers, those that no load changes.
+            A plan's numbers, of which only those are used that do not change with loads.
         loads : ndarray, shape (T, 3)
-            Of the tiles [N].
+            Shear, normal and lateral load of each tile [N].
         wrenches : ndarray, shape (H, 6)
-            Of the hands on the rock [N, N·m].
+            Wrench of each hand on the rock, in its H [N, N·m].
         """
         return []
 
@@ -173,13 +191,32 @@ def claim(
     name: Callable[[int], str],
     what: str = "",
 ) -> Residual:
-    """Return by how much numbers of a plan are not what was recomputed of them."""
+    """Return the residuals of reported numbers against the recomputed ones.
+
+    Parameters
+    ----------
+    own : ndarray, shape (n,)
+        Recomputed numbers.
+    said : ndarray, shape (n,)
+        The plan's numbers.
+    hand : ndarray of int, shape (n,)
+        Index of the hand to which each number belongs.
+    relative : float
+        Tolerance, relative to the recomputed number where that is above one.
+    name : callable
+        Returns the name of the part to which number i belongs.
+    what : str, optional
+        Name of the quantity, for the error message.
+    """
     text, off = what + " is {:.8g}, not {:.8g}", own - said
     return Residual("zero", off, hand, name, text, (own, said), relative, own, affine=False)
 
 
 def is_near(residuals: Iterable[Residual]) -> bool:
-    """Say whether no residual can be off by what it may be, whatever the size of the loads."""
+    """Return whether all residuals are within the smallest tolerance, 1e-9, whatever the loads.
+
+    If so, no residual can exceed its tolerance, and the tolerances need not be computed.
+    """
     zero = np.concatenate([r.values for r in residuals if r.kind == "zero"], axis=None)
     least = np.concatenate([r.values for r in residuals if r.kind == "least"], axis=None)
     # both are false of numbers that are not finite; no number exceeds the norm of all
@@ -189,23 +226,35 @@ def is_near(residuals: Iterable[Residual]) -> bool:
 
 
 def allowed_errors(known: HandBatch, arrays: PlanArrays) -> Array:
-    """Return the error that loads of each hand may have, shape (H,), at least 1e-6 N."""
+    """Return the tolerance for the loads of each hand, shape (H,) [N].
+
+    The tolerance is 1e-6 of the largest load of the hand's tiles and palm, and at least 1e-6 N.
+    """
     largest = np.fmax.reduceat(np.abs(arrays.loads).ravel(), 3 * known.places.first)
     largest = np.fmax(largest, np.abs(arrays.palms).max(axis=1))
     return np.asarray(TOLERANCES.load * np.fmax(largest, 1.0))
 
 
 class PartNames(NamedTuple):
-    """Names of what hands have: ``front_left: proximal tile of inner_right``."""
+    """Names of hands' parts in messages, such as ``front_left: proximal tile of inner_right``.
+
+    Attributes
+    ----------
+    limbs : tuple of str
+        Limb of each hand.
+    known : HandBatch
+        The hands on their holds.
+    """
 
     limbs: tuple[str, ...]
     known: HandBatch
 
     def limb(self, h: int) -> str:
+        """Return the name of the limb of hand h, with a colon."""
         return f"{self.limbs[h]}: "
 
     def tile(self, t: int) -> str:
-        """Return the name of a tile, or after them all of a palm."""
+        """Return the name of tile t of all hands; indices after the tiles are palms."""
         places = self.known.places
         if t >= len(places.hand):
             return f"{self.limbs[t - len(places.hand)]}: palm"
@@ -215,14 +264,22 @@ class PartNames(NamedTuple):
         return f"{self.limbs[h]}: {what} of {tile.finger}"
 
     def limb_of(self, hands: Indices) -> Callable[[int], str]:
-        """Return the function that names the limb of each hand."""
+        """Return a function that names the limb of the hand ``hands[i]``."""
         return lambda i: self.limb(int(hands[i]))
 
     def finger(self, what: str, finger: int) -> str:
-        """Return the name of something of a finger: ``front_left: tendon of inner_right``."""
+        """Return the name of a finger's part: ``front_left: tendon of inner_right``.
+
+        Parameters
+        ----------
+        what : str
+            Name of the part.
+        finger : int
+            Index of the finger, counted through all hands.
+        """
         h, i = divmod(finger, FINGER_COUNT)
         return f"{self.limbs[h]}: {what} of {FINGERS[i]}"
 
     def of_fingers(self, what: str, fingers: Indices) -> Callable[[int], str]:
-        """Return the function that names something of each finger."""
+        """Return a function that names the part ``what`` of the finger ``fingers[i]``."""
         return lambda i: self.finger(what, int(fingers[i]))

@@ -1,7 +1,7 @@
-"""Contacts of tiles that roll and slide on rock: where they touch it, and how far they slip.
+"""Contacts of tiles that roll and slide on rock: where they touch, and how far they slip.
 
-Of the check of a floating hand (`planner.verification.floating`): from the rock's normals and
-distances alone.
+For the check of a floating hand (`planner.verification.floating`), from normals and distances of
+the rock alone.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ __all__ = ["TileFace", "slip_of"]
 
 
 class TileFace(NamedTuple):
-    """A tile's face in its phalanx's axes, turned by the contact's tilt.
+    """A tile's face in the axes of its phalanx, turned by the contact's tilt.
 
     Attributes
     ----------
     along, height : float
-        Of the contact at rest from the phalanx's joint [m].
+        Position of the contact at rest from the phalanx's joint: along the face, and normal to it
+        [m].
     near, far : float
-        Where along them the face begins and ends [m].
+        Positions along the face at which it begins and ends [m].
     way : ndarray, shape (2,)
-        Along it at rest.
+        Unit vector along the face at rest, in the finger's plane (x, z).
     depth : float
-        How far it is pressed in [m].
+        Depth to which the face is pressed in [m].
     lies : bool
-        Whether it touches with the face itself, and not with an edge.
+        True if the tile touches with its face, False if with an edge.
     """
 
     along: float
@@ -46,6 +47,7 @@ class TileFace(NamedTuple):
 
     @classmethod
     def of(cls, contact: Contact, model: FingerModel, depth: float) -> TileFace:
+        """Return the face of a tile that is pressed in to a depth [m], from its contact."""
         way = contact.angle + contact.tilt
         arm = complex(contact.along, model.tile_height + contact.rise)
         arm *= cmath.rect(1.0, -contact.tilt)
@@ -54,7 +56,15 @@ class TileFace(NamedTuple):
         return cls(arm.real, arm.imag, near, far, axis, depth, contact.kind == "face")
 
     def bears(self, touches: float, radius: float) -> float:
-        """Return the middle of the pressures on a circle that it touches at a place [m]."""
+        """Return the centre of pressure of the face on a circle of rock, along the face [m].
+
+        Parameters
+        ----------
+        touches : float
+            Position along the face at which it touches the circle [m].
+        radius : float
+            Radius of the circle [m].
+        """
         widest = math.sqrt(2.0 * self.depth * radius)
         start, end = max(self.near, touches - widest), min(self.far, touches + widest)
         if not start < end:
@@ -68,11 +78,29 @@ class TileFace(NamedTuple):
 def slip_of(
     section: Section, face: TileFace, points: tuple[Array, Array], after: tuple[float, Array]
 ) -> tuple[float | None, float]:
-    """Return how far a tile slipped, and how far off the place is where it is said to bear [m].
+    """Return the slip of a tile on the rock, and the error of its reported contact point [m].
 
-    A face rolls: it slips by how far the place where it touches goes along it, less its way along
-    the rock. No slip where that is not known. ``points``: of the contact, before and after.
-    ``after``: how far along the phalanx it is then, and along what axis.
+    A rolling face slips by the travel of the contact along the face minus its travel along the
+    rock.
+
+    Parameters
+    ----------
+    section : Section
+        Rock in the finger's plane.
+    face : TileFace
+        The tile's face at rest.
+    points : tuple of ndarray, shape (2,)
+        Contact points before and after, in the finger's plane (x, z) [m].
+    after : tuple of float, ndarray of shape (2,)
+        Position of the contact along the phalanx after the motion [m], and the unit vector along
+        the face then.
+
+    Returns
+    -------
+    slip : float or None
+        None where the rock is neither a circle nor a line near the contact.
+    off : float
+        Distance along the phalanx from the reported contact to the recomputed one.
     """
     before, there = points
     along, way = after

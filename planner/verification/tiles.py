@@ -1,7 +1,8 @@
-"""Loads of tiles against the law of their spines on rock (Eqs. 20, 21), recomputed.
+"""Check tile loads against the law of spines on rock (Eqs. 20, 21).
 
-Whether a load is outside the law's surface is computed from the law that a surface declares, and
-not by the half-planes that a plan is made of; by these only what the plan says is used of a tile.
+Whether a load is within the limit surface is computed from the law itself, not from the half-planes
+that approximate it in the programs. The half-planes only serve to recompute the reported
+utilisations.
 """
 
 from __future__ import annotations
@@ -27,23 +28,25 @@ __all__ = ["LimitCurves", "TileLimits"]
 
 
 class LimitCurves:
-    """The limit surfaces of some tiles, each on its own rock.
+    """The limit surfaces of n tiles, each on its own rock.
 
-    The same surface as `Surface.strength`, written in the load itself instead of its direction:
-    with a the load in the tile's plane and r its size, cos φ = a / r and cos θ = T / a, so that
+    The same limit as `Surface.strength`, written in the load itself instead of its direction. With
+    T the shear, a the load in the tile's plane and r the size of the load, cos φ = a / r and cos θ
+    = T / a, so that the strength is
 
-        f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)] = f_s(φ) [1 − (1 − λ(φ)) (a − T) / r],
+        f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)] = f_s(φ) [1 − (1 − λ(φ)) (a − T) / r].
 
-    and the exponent with which f_s falls that of the surface.
+    f_s is the strength in the shear direction at the pull-off angle φ, which falls with φ by the
+    surface's exponent; λ is the ratio of the lateral strength to f_s.
 
     Parameters
     ----------
     surfaces : sequence of Surface
-        Some of them, in any order.
+        The surfaces of all tiles, in any order.
     of_tile : ndarray of int, shape (n,)
-        Which of them each tile has.
+        Index of each tile's surface.
     shares : ndarray, shape (n,) or ()
-        Part of each tile's spines that are on the rock: that of a whole tile's strength.
+        Share of each tile's spines that are on the rock, by which its strength is multiplied.
     """
 
     def __init__(self, surfaces: Sequence[Surface], of_tile: Indices, shares: Array) -> None:
@@ -56,19 +59,20 @@ class LimitCurves:
         )
 
     def excess(self, shear: Array, normal: Array, lateral: Array, relative: float) -> Array:
-        """Return how far loads are beyond their surfaces, pressing ones in the tiles' planes [N].
+        """Return by how much loads exceed their tiles' strength [N]; negative inside the limit.
 
         Parameters
         ----------
         shear, normal, lateral : ndarray, shape (n,)
-            The last of either sign. Shear below zero is Coulomb friction's, not the spines'.
+            Loads of the tiles [N]; normal is positive if pressing, lateral has either sign.
+            Negative shear counts as zero: Coulomb friction carries it, not the spines.
         relative : float
-            Part of its strength by which a load may exceed it.
+            Part of the strength by which a load may exceed it.
 
         Returns
         -------
         ndarray, shape (n,)
-            Negative inside.
+            Size of the load minus strength. Pressing adds to the strength.
         """
         shear = np.maximum(shear, 0.0)
         along = np.hypot(shear, lateral)
@@ -98,23 +102,24 @@ def _numbers(surface: Surface) -> tuple[float, ...]:
 
 
 def limiting_shares(known: HandBatch) -> Array:
-    """Return the part of a whole tile's strength that limits each tile on rock, shape (T,).
+    """Return the share of a whole tile's strength that limits each tile, shape (T,).
 
-    The share of its spines there; with fewer than φ₀ of them, the hand's ``least_share``, half of
-    φ₀ at none, and as a parabola between.
+    That is the share of the tile's spines on the rock. Below ``least_share`` of the hand's model,
+    φ₀, the share that counts falls along a parabola to φ₀ / 2 without spines on the rock.
     """
     share, least = known.engagement, known.hands[0].hand.least_share
     return np.where(share < least, 0.5 * least * (1.0 + (share / least) ** 2), share)
 
 
 class TileLimits(ResidualLimits):
-    """Limits of tiles: friction, the law's surface, and what a plan's half-planes say is used.
+    """Limits of tiles: friction, the limit surface, and the reported utilisations of half-planes.
 
     Parameters
     ----------
     names : PartNames
+        Names of the hands' parts.
     nails : ndarray of int, shape (k,)
-        Nails that hook, counted among the tiles.
+        Indices of the nails that hook, counted among the tiles.
     """
 
     def __init__(self, names: PartNames, nails: Indices) -> None:
@@ -132,9 +137,9 @@ class TileLimits(ResidualLimits):
         self._planes: tuple[tuple[tuple[HalfPlane, ...], ...], Array] = (), np.zeros(0)
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return what loads leave of friction and of frames that only rest on rock, and their use.
+        """Return the residuals of friction and bare frames, and the utilisations with their errors.
 
-        The plan says with the tiles' what is used of nails.
+        The utilisation that the plan reports for a nail is compared with that in ``again.nails``.
         """
         name, planned = self._names.tile, again.arrays
         residuals = self.holding(again.loads)
@@ -149,9 +154,15 @@ class TileLimits(ResidualLimits):
         ]
 
     def holding(self, loads: Array, margin: float = 0.0) -> list[Residual]:
-        """Return what loads (T, 3) leave of friction and of bare frames' pressing, past a margin.
+        """Return the residuals of friction, and of bare frames that must press on the rock.
 
-        Tiles that touch nothing are never short of a margin.
+        Parameters
+        ----------
+        loads : ndarray, shape (T, 3)
+            Shear, normal and lateral load of each tile [N].
+        margin : float, optional
+            Load by which each tile must stay within these limits [N]; tiles that touch nothing need
+            none.
         """
         known, name = self._known, self._names.tile
         shear, normal, _ = loads.T
@@ -168,9 +179,10 @@ class TileLimits(ResidualLimits):
         return residuals
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
-        """Return how far loads (T, 3) are within the law's surface [N]; zero beyond half-planes.
+        """Return by how much tile loads (T, 3) are within the limit surface [N].
 
-        There a tile may be outside the surface, too, and the plan says that it is overloaded.
+        These residuals are not affine in the loads. They are zero for tiles beyond their
+        half-planes, which may be outside the surface, too: the plan is reported as overloaded.
         """
         inside = -self._curves.excess(loads[:, 0], loads[:, 1], loads[:, 2], TOLERANCES.utilisation)
         if not np.minimum.reduce(inside) >= -TOLERANCES.load:
@@ -191,9 +203,18 @@ class TileLimits(ResidualLimits):
 
 
 def planes_of(pieces: tuple[tuple[HalfPlane, ...], ...]) -> Array:
-    """Return hands' half-planes over their capacities, shape (H, 2 p, 3).
+    """Return the half-planes of H hands, divided by their capacities, shape (H, 2 p, 3).
 
-    For lateral loads of either sign; zero where a hand has fewer than others.
+    Parameters
+    ----------
+    pieces : tuple of tuple of HalfPlane
+        Half-planes of a whole tile of each hand, at most p of them.
+
+    Returns
+    -------
+    ndarray, shape (H, 2 p, 3)
+        Coefficients of shear, normal and lateral load, one row for each sign of the lateral load;
+        zero rows for hands with fewer than p half-planes.
     """
     found = np.zeros((len(pieces), 2 * max(map(len, pieces)), 3))
     for rows, own in zip(found, pieces, strict=True):
