@@ -1,4 +1,4 @@
-"""Numbers by which the paths of closing fingers are followed."""
+"""Step sizes and tolerances of the increments by which fingers are closed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["CONTACT_CODES", "SETTINGS"]
 
 @dataclass(frozen=True, slots=True)
 class ContactCodes:
-    """Codes of a contact state: of the place of a phalanx, and of its tile's spines."""
+    """Integer codes of a contact state: of a phalanx's contact, and of its tile's spines."""
 
     off: int = 0  # the phalanx is off the rock
     on: int = 1  # it touches the rock
@@ -23,10 +23,10 @@ class ContactCodes:
 
 @dataclass(frozen=True, slots=True)
 class FingerSettings:
-    """Sizes of increments, and tolerances.
+    """Sizes of increments, and tolerances, relative to a finger's own scales.
 
-    Of tensions in parts of the closing tension, of torques in parts of the proximal joint's at the
-    closing tension, of damping over a turn of one radian as well, of gaps in a tile's length.
+    Tensions are relative to the closing tension, torques to the proximal joint's torque at the
+    closing tension, damping to that torque over one radian, gaps to a tile's length.
     """
 
     most_increments: int = 1200
