@@ -139,7 +139,7 @@ class BoundedStore(Generic[Question, Answer]):
             return found
 
     def get(self, question: Question, make: Callable[[], Answer]) -> Answer:
-        """Return the answer to a question; on a miss call ``make`` and keep its result."""
+        """Return the answer to a question (key); on a miss call ``make`` and keep its result."""
         (answer,) = self.find([question])
         if answer is None:
             answer = make()

@@ -11,7 +11,7 @@ DISTRIBUTION_NAME: Final = "crux-climb"
 
 
 def installed_version(package: str = DISTRIBUTION_NAME) -> str | None:
-    """Return the version of an installed distribution; None if it is not installed."""
+    """Return the version of the installed distribution ``package``; None if it is not installed."""
     # which takes long to load, and ``--help`` does without it
     from importlib.metadata import PackageNotFoundError, version
 
@@ -22,5 +22,5 @@ def installed_version(package: str = DISTRIBUTION_NAME) -> str | None:
 
 
 def to_install(extra: str) -> str:
-    """Return the instruction by which a user installs an extra of this distribution."""
+    """Return the instruction by which a user installs the optional dependencies ``extra``."""
     return f"in a checkout of {DISTRIBUTION_NAME}, pip install -e '.[{extra}]'"

@@ -32,7 +32,15 @@ Indices = NDArray[np.intp]
 
 
 def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
-    """Return ``value`` as a float array of shape ``(size,)``.
+    """Return ``value`` as a float array of shape ``(size,)``, checked to be finite.
+
+    Parameters
+    ----------
+    value : array_like
+    size : int
+        Required length.
+    field : str
+        Field path for the error message.
 
     Raises
     ------
@@ -52,7 +60,7 @@ def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
 
 
 def skew(v: ArrayLike) -> Array:
-    """Return the cross product matrix ``[v]×`` of shape (3, 3): ``[v]× w = v × w``."""
+    """Return the cross product matrix ``[v]×``, shape (3, 3), of a vector v: ``[v]× w = v × w``."""
     x, y, z = np.asarray(v, dtype=float)
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 

@@ -40,7 +40,7 @@ class FingerAtRest(NamedTuple):
     Attributes
     ----------
     finger : SettledFinger
-        Posture and contacts, the proximal joint at the origin of F.
+        Posture and contacts, the proximal joint at the origin of the finger frame F.
     section : Section or None
         Rock in the finger's plane; None if there is none.
     tendon : FingerTendon
@@ -97,10 +97,10 @@ class FingerLoads(NamedTuple):
     stop_torques : ndarray, shape (F, m, 3)
         Torque on the stop of each joint that no contact supports, positive toward closing [N·m].
     points : ndarray, shape (F, m, 3, 2)
-        Contacts (x, z) in F, the frame of the base at rest [m].
+        Contacts (x, z) in the finger's frame at rest [m].
     directions : ndarray, shape (F, m, 3, 2)
-        Unit vectors (x, z) in F opposite to each tile's drag: along the phalanx, turned by the
-        contact's ``tilt``.
+        Unit vectors (x, z) in that frame, opposite to each tile's drag: along the phalanx, turned
+        by the contact's ``tilt``.
     reached : ndarray of bool, shape (F, m)
         Whether every phalanx with a contact still meets rock.
     """
@@ -116,7 +116,7 @@ class FingerLoads(NamedTuple):
     reached: NDArray[np.bool_]
 
     def of(self, finger: int) -> FingerLoads:
-        """Return the loads of one finger by its index, shapes (m, …)."""
+        """Return the loads of the finger with the index ``finger``, shapes (m, …)."""
         return FingerLoads(*(part[finger] for part in self))
 
     @property
@@ -179,7 +179,7 @@ class CompliantFingers:
         Parameters
         ----------
         x, z : ndarray, shape (F, m)
-            Displacement of each proximal joint in F [m].
+            Displacement of each proximal joint in the finger frame F [m].
         turn : ndarray, shape (F, m)
             ψ, rotation of each base from x toward z [rad].
         tension : ndarray, shape (F, m)

@@ -51,7 +51,7 @@ class HandLoads(NamedTuple):
     stop_torques : ndarray, shape (m, k)
         Torque against the stop of each joint at a limit, in the order of `SettledHand.stops` [N·m].
     palm : ndarray, shape (m, 2)
-        Shear of the palm along −x of H, and its pressing along +z [N].
+        Shear of the palm along −x of the hand frame H, and its pressing along +z [N].
     positions : ndarray, shape (m, n, 3)
         Contacts in H at rest [m].
     axes : ndarray, shape (m, n, 3, 3)
@@ -164,7 +164,7 @@ class CompliantHand:
         Parameters
         ----------
         twists : ndarray, shape (m, 6)
-            Displacement v and rotation ω of H about its origin at rest [m, rad].
+            Displacement v and rotation ω of the hand frame H about its origin at rest [m, rad].
         tensions : ndarray, shape (m, 4), optional
             Tension at which each finger has closed before the wrist moves [N]; the preload by
             default.
@@ -208,12 +208,38 @@ class CompliantHand:
         )
 
     def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
-        """Return the loads of finger ``i`` in its plane at twists of the wrist, shape (m, 6)."""
+        """Return the loads of one finger in its plane at twists of the wrist.
+
+        Parameters
+        ----------
+        i : int
+            Index of the finger in `FINGERS`.
+        twists : ndarray, shape (m, 6)
+            [m, rad]
+
+        Returns
+        -------
+        FingerLoads
+            Shapes (m, …).
+        """
         closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
         return self._alone[i].loads(*self._bases([i], twists, closed)).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
-        """Return the lateral loads of finger ``i``'s tiles at twists (m, 6), shape (m, n_i) [N]."""
+        """Return the lateral loads of one finger's tiles at twists of the wrist.
+
+        Parameters
+        ----------
+        i : int
+            Index of the finger in `FINGERS`.
+        twists : ndarray, shape (m, 6)
+            [m, rad]
+
+        Returns
+        -------
+        ndarray, shape (m, n_i)
+            For the n_i tiles of the finger, from the base outward [N].
+        """
         v, turn, across = twists[:, :3], twists[:, 3:], self.frames[i].across
         places = self.settled.positions[self.tiles_of(i)]
         # b · (v + ω × p + ω × (ω × p) / 2) for all places p at once
@@ -270,7 +296,13 @@ class CompliantHand:
         return np.asarray(moved[:, ::2] * (-1.0, 1.0))
 
     def wrenches(self, loads: HandLoads) -> Numbers:
-        """Return the wrenches of the hand on the rock, in H at rest, shape (m, 6) [N, N·m]."""
+        """Return the wrenches of the hand on the rock for given loads.
+
+        Returns
+        -------
+        ndarray, shape (m, 6)
+            Force and moment in the hand frame H at rest [N, N·m].
+        """
         forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)
         moments = np.cross(loads.positions, forces).sum(axis=1)
         shear, pressing = loads.palm[:, 0], loads.palm[:, 1]

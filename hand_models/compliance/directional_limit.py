@@ -44,9 +44,17 @@ class Farthest:
 
 
 def pose_units(columns: tuple[str, ...]) -> Array:
-    """Return the unit (scale) of each component of a pose, by the component's name, shape (d,).
+    """Return the unit (scale) of each component of a pose: 1e-3 m, 1e-2 rad or 100 N.
 
-    1e-3 m for displacements, 1e-2 rad for rotations, 100 N for tensions.
+    Parameters
+    ----------
+    columns : tuple of str, length d
+        Names of the components: displacements ``wrist/v…``, rotations ``wrist/w…``, tensions
+        ``…/tension``.
+
+    Returns
+    -------
+    ndarray, shape (d,)
     """
     units = {"v": 1e-3, "w": 1e-2, "t": 100.0}  # of displacements and turns of a wrist
     return np.array([units[name.split("/")[1][0]] for name in columns])

@@ -143,15 +143,15 @@ class FloatingWrist(CompliantGrasp):
         return LoadRows(layout.rows, P, p, held, s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at m poses of the wrist, shape (m, d)."""
+        """Return loads and wrenches at poses of the wrist, ``twists`` of shape (m, d)."""
         return self._grasp_loads(self.hand_loads(twists))
 
     def closed_at(self, y: Array) -> Array:
-        """Return the tensions at which the hand has closed, for a pose (d,), shape (4,) [N]."""
+        """Return the closing tensions that belong to the pose ``y`` (d,), shape (4,) [N]."""
         return self.hand.preload
 
     def hand_loads(self, y: Numbers) -> HandLoads:
-        """Return the loads of hand and tiles at m poses of the wrist, shape (m, d)."""
+        """Return the loads of tiles, tendons and palm at poses ``y`` of the wrist, shape (m, d)."""
         return self.hand.loads(y)
 
     def _grasp_loads(self, loads: HandLoads) -> GraspLoads:

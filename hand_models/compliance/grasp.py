@@ -122,7 +122,13 @@ class CompliantGrasp(ABC):
 
     @abstractmethod
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at m poses of the wrist, shape (m, d)."""
+        """Return loads and wrenches at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses, real or with complex steps.
+        """
 
     @property
     def limits(self) -> tuple[Row, ...]:
@@ -130,7 +136,13 @@ class CompliantGrasp(ABC):
         return self.load_rows.names[: len(self.load_rows.s)]
 
     def evaluate(self, twists: Array) -> Evaluation:
-        """Return wrenches, utilisation and violations at m poses of the wrist, shape (m, d)."""
+        """Return wrenches, utilisation and violations of limits at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses.
+        """
         rows, found = self.load_rows, self.loads_at(twists)
         lost = ~found.reached[:, None]
         with np.errstate(invalid="ignore"):
@@ -141,9 +153,14 @@ class CompliantGrasp(ABC):
         return Evaluation(found.wrenches, used.max(axis=1), used.argmax(axis=1), most)
 
     def sieve(self, twists: Array) -> Indices:
-        """Return the indices of the poses (m, d) that may be within the limits, by a quick test.
+        """Return the indices of the poses that may be within the limits, by a quick test.
 
         All of them by default; a subclass may rule out poses before their full evaluation.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses.
         """
         return np.arange(len(twists))
 
@@ -204,12 +221,34 @@ class CompliantGrasp(ABC):
 
 
 def complex_steps(at: Array) -> Numbers:
-    """Return d copies of a pose (d,), copy i with a complex step in component i, shape (d, d)."""
+    """Return copies of a pose for complex-step derivatives.
+
+    Parameters
+    ----------
+    at : ndarray, shape (d,)
+        The pose.
+
+    Returns
+    -------
+    ndarray of complex, shape (d, d)
+        Row i is the pose with an imaginary step in component i.
+    """
     return np.asarray(at + 1j * COMPLEX_STEP * np.eye(len(at)))
 
 
 def slopes(values: Numbers) -> Array:
-    """Return the derivatives from values (d, …) at `complex_steps`, one column for each step."""
+    """Return derivatives from function values at `complex_steps`.
+
+    Parameters
+    ----------
+    values : ndarray of complex, shape (d, k)
+        Value of the function, k numbers, at each of the d steps.
+
+    Returns
+    -------
+    ndarray, shape (k, d)
+        Column i is the derivative by component i.
+    """
     return np.asarray(values.imag.T / COMPLEX_STEP)
 
 
@@ -221,7 +260,10 @@ def _affine(values: Numbers, at: Array) -> tuple[Array, Array]:
 
 
 def rows_of_range(columns: tuple[str, ...]) -> tuple[Row, ...]:
-    """Return the names of 2 d hard rows that keep a pose within a range, upper bounds first."""
+    """Return the names of 2 d hard rows that keep a pose within a range, upper bounds first.
+
+    ``columns``: names of the d components of the pose.
+    """
     return tuple(
         Row(None, None, "wrist_range", "hard", f"wrist_range/{name.removeprefix('wrist/')}{sign}")
         for sign in "+-"

@@ -157,7 +157,18 @@ class Gripper(CompliantGrasp):
         )
 
     def finger_loads(self, twists: Numbers) -> tuple[FingerLoads, FingerLoads]:
-        """Return the loads of both fingers, right first, at m poses of the wrist, shape (m, 3)."""
+        """Return the loads of both fingers at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, 3)
+            m poses (x, z, ω_y) [m, m, rad].
+
+        Returns
+        -------
+        tuple of FingerLoads
+            Right finger, left finger; shapes (m, …).
+        """
         x, z, turn = np.moveaxis(np.asarray(twists), -1, 0)
         # the joints are at (±b, −origin_height) of the origin; ω_y turns z toward x
         cosine, sine = np.cos(turn) - 1.0, np.sin(turn)
@@ -173,7 +184,7 @@ class Gripper(CompliantGrasp):
         return found.of(0), found.of(1)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads e and wrenches on the rock about G's origin, at m poses, shape (m, 3)."""
+        """Return loads e, and wrenches on the rock about G's origin, at poses of shape (m, 3)."""
         loads = self.finger_loads(twists)
         right, left = (side.planar_wrench for side in loads)
         wrenches = np.zeros((len(right), 6), dtype=right.dtype)

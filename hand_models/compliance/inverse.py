@@ -37,7 +37,7 @@ class WristPose:
     Attributes
     ----------
     twist : ndarray, shape (6,)
-        ξ, twist of H about its origin at rest [m, rad].
+        ξ, twist of the hand frame H about its origin at rest [m, rad].
     residual : ndarray, shape (6,)
         Given wrench minus the wrench at the pose, w − w_g(ξ) [N, N·m].
     converged : bool
@@ -56,7 +56,7 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
     ----------
     hand : CompliantHand
     wrench : array_like, shape (6,)
-        Wrench on the rock, in H at rest [N, N·m].
+        Wrench on the rock, in the hand frame H at rest [N, N·m].
 
     Returns
     -------

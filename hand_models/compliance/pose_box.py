@@ -39,7 +39,7 @@ class SearchBox:
     range: Array
 
     def poses(self, t: Array) -> Array:
-        """Return the poses (m, d) of coordinates t, shape (m, d)."""
+        """Return the poses ``centre + axes · t`` for m coordinates ``t``, shape (m, d)."""
         return np.asarray(self.centre + t @ self.axes.T)
 
     def grid(self, per_axis: int, start: int, end: int) -> Array:

@@ -67,7 +67,7 @@ class MovedPosture(NamedTuple):
 
 
 def bearing_angle(x: Numbers, z: Numbers) -> Numbers:
-    """Return the angle of (x, z) from x toward z, analytic for complex steps in both [rad]."""
+    """Return the angle of the vector (x, z) from x toward z [rad]; valid for complex steps."""
     angle = np.arctan2(z.real, x.real)
     if not (np.iscomplexobj(x) or np.iscomplexobj(z)):
         return np.asarray(angle)
@@ -228,7 +228,7 @@ class RollingContact:
         Parameters
         ----------
         x, z : ndarray, shape (F, m)
-            Displacement of the proximal joint in F [m].
+            Displacement of the proximal joint in the finger frame F [m].
         turn : ndarray, shape (F, m)
             ψ, rotation of the base from x toward z [rad].
         """

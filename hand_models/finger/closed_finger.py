@@ -62,8 +62,8 @@ class Refused(NamedTuple):
     depth : float
         Depth of the rock inside the open finger [m]; zero if no equilibrium was found.
     lift : float
-        Distance along −z of F by which the finger would have to be lifted clear of the rock [m];
-        infinite if a finger's length is not enough, NaN if not searched for.
+        Distance along −z of the finger frame F by which the finger would have to be lifted clear of
+        the rock [m]; infinite if a finger's length is not enough, NaN if not searched for.
     """
 
     depth: float
@@ -77,7 +77,7 @@ def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused
     ----------
     model : FingerModel
     section : Section or None
-        Rock in the finger's plane, in F; None if there is none.
+        Rock in the finger's plane, in the finger frame F; None if there is none.
 
     Returns
     -------

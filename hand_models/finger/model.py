@@ -286,7 +286,7 @@ class SettledFinger:
 
     @cached_property
     def points(self) -> Array:
-        """Places (x, z) of the contacts in F, shape (3, 2) [m]."""
+        """Places (x, z) of the contacts in the finger frame F, shape (3, 2) [m]."""
         return np.array([contact.point(self.model.tile_height) for contact in self.contacts])
 
     @cached_property

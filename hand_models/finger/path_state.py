@@ -55,7 +55,8 @@ class OpenFinger(NamedTuple):
     Attributes
     ----------
     section : Section or None
-        Rock in the finger's plane, with the proximal joint at the origin of F; None if no rock.
+        Rock in the finger's plane, with the proximal joint at the origin of the finger frame F;
+        None if no rock.
     surface : Surface
         Strength of the tiles on the rock.
     tension : float
@@ -292,9 +293,19 @@ def held_share(state: PathState, around: Around) -> Array:
 
 
 def take(rows: Rows, fingers: Indices | Flags) -> Rows:
-    """Return the rows of some fingers from every array of a tuple, as a tuple of the same type.
+    """Return some fingers' rows of every array in a tuple of arrays.
 
-    ``fingers``: row indices, or a boolean mask.
+    Parameters
+    ----------
+    rows : tuple of ndarray
+        Arrays with a row for each finger.
+    fingers : ndarray of int or bool
+        Indices of the fingers, or a mask.
+
+    Returns
+    -------
+    tuple of ndarray
+        Of the same type as ``rows``.
     """
     return type(rows)(*(values[fingers] for values in rows))
 

@@ -208,7 +208,7 @@ class PhalanxShape(NamedTuple):
         seen : ndarray of complex, shape (p,)
             Points in the axes of their phalanges [m].
         near : NearPoints
-            The same points, in F.
+            The same points, in the finger frame F.
         within : ndarray
             Margin of each phalanx: its tile's depth plus the largest further motion [m].
         """
@@ -302,7 +302,8 @@ def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
     Returns
     -------
     joints, directions : ndarray of complex, shape (..., 3)
-        x + i z of each joint in F, the first at the origin [m]; unit vector along each phalanx.
+        x + i z of each joint in the finger frame F, the first at the origin [m]; unit vector along
+        each phalanx.
     """
     u = np.exp(1j * np.cumsum(q, axis=-1))
     joints = np.zeros(u.shape, dtype=complex)

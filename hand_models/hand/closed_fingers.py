@@ -58,8 +58,8 @@ class ClosedFingers:
     alone : dict of int to ClosedFinger
         Fingers that were closed along their paths, by their index in ``row_of``.
     lifts : dict of int to float
-        By the index of each hand with rock inside an open finger: distance along −z of H that would
-        clear it [m].
+        By the index of each hand with rock inside an open finger: distance along −z of the hand
+        frame H that would clear it [m].
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ class StackRows(NamedTuple):
     joints, alongs : slice
         Places of the fingers' proximal joints, and directions of the fingers.
     into : int
-        Row of the direction z of H, into the rock.
+        Row of the direction z of the hand frame H, into the rock.
     """
 
     tiles: slice = slice(0, -2 * len(FINGERS) - 1)
@@ -53,7 +53,7 @@ class TileColumns(NamedTuple):
     Attributes
     ----------
     position, axes : slice
-        Place of the contact [m], and the three unit axes row by row, in H.
+        Place of the contact [m], and the three unit axes row by row, in the hand frame H.
     shear, normal : slice
         Load at zero tension [N], and per newton of tension.
     engagement, kind : int
@@ -77,7 +77,7 @@ TILE_COLUMNS = TileColumns()
 
 @dataclass(frozen=True)
 class FingerFrame:
-    """Frame of a finger in H.
+    """Frame of a finger in the hand frame H.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class FrameStack:
         is that of `StackRows`. t palm tiles.
     planes : ndarray, shape (n, 4, 3, 3)
         Plane F of each finger, rows: along, into the rock, joint. A place (x, z, 1) or a direction
-        (x, z, 0) in F times these rows is the place or direction in H.
+        (x, z, 0) in the finger frame F times these rows is the place or direction in H.
     across : ndarray, shape (n, 4, 3, 3)
         Unit vector across each finger's plane, repeated for its three phalanges.
     base_tiles : ndarray, shape (n, 2, 18)
@@ -140,7 +140,7 @@ class FrameStack:
         Parameters
         ----------
         joints, alongs : ndarray, shape (n, 4, 3)
-            Proximal joints [m] and directions of the fingers, in H.
+            Proximal joints [m] and directions of the fingers, in the hand frame H.
         bases : ndarray, shape (n, 2, 3)
             Base tiles of the outer fingers, left first, in H [m].
         palm : ndarray, shape (t, 3)

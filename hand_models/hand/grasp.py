@@ -88,7 +88,7 @@ class WristTravel(Strict, frozen=True):
     Attributes
     ----------
     position : float
-        Largest displacement along each axis of H, in both directions [m].
+        Largest displacement along each axis of the hand frame H, in both directions [m].
     inward : float
         Largest displacement toward the rock, +z of H, if less than ``position`` [m]. Contact states
         stay those of the closed hand, and are least valid for motion toward the rock.

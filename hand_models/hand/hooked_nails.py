@@ -25,7 +25,8 @@ class Nails(NamedTuple):
     angles : ndarray, shape (4,)
         Angle of each finger's nail; fully retracted if it does not hook [rad].
     normals : ndarray, shape (4, 3)
-        Unit vector out of the rock at each nail's hook, in H; zero if the nail does not hook.
+        Unit vector out of the rock at each nail's hook, in the hand frame H; zero if the nail does
+        not hook.
     rows : tuple of (ndarray, ndarray)
         ``H`` and ``h`` of the `Cling` of each nail that hooks, in the order of `FINGERS`.
     tiles : ndarray, shape (4, 18)

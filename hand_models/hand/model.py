@@ -143,7 +143,7 @@ class HandModel:
         return self is other or (isinstance(other, HandModel) and self.table == other.table)
 
     def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:
-        """Return the frames of the four fingers in H, in the order of `FINGERS`.
+        """Return the frames of the four fingers in the hand frame H, in the order of `FINGERS`.
 
         ``outer_rotation``: rotation of the outer fingers, from 0 to π [rad].
         """
@@ -194,7 +194,7 @@ class HandModel:
         grasp : Grasp
             In a fingernail grasp the section is `Hold.raw_section`.
         hold_in_hand : Pose
-            The hold's frame in H.
+            The hold's frame in the hand frame H.
         """
         frame = self.frames(grasp.outer_rotation)[FINGERS.index(finger)]
         return frame.cut(hold, hold_in_hand.inverse(), raw=grasp.fingernail)

@@ -30,7 +30,7 @@ class Placement(NamedTuple):
         Strength of a tile on the hold.
     grasp : Grasp
     hold_in_hand : Pose or None
-        The hold's frame in H; None to have the hand seated.
+        The hold's frame in the hand frame H; None to have the hand seated.
     at : Pose or None
         Frame on the hold, in the hold's frame, on which a hand without ``hold_in_hand`` is seated;
         None for the hold's own frame.
@@ -82,7 +82,7 @@ class PlacedHands:
     Attributes
     ----------
     frames : FrameStack
-        Finger frames and tiles of the hands, in H.
+        Finger frames and tiles of the hands, in the hand frame H.
     """
 
     def __init__(
@@ -139,7 +139,8 @@ class PlacedHands:
     def gaps(self) -> list[list[float]]:
         """Distances from the two base tiles, then the palm's tiles, of each hand to the rock [m].
 
-        One list for each hand; along z of H, negative inside the rock, infinite without rock.
+        One list for each hand; along z of the hand frame H, negative inside the rock, infinite
+        without rock.
         """
         tiles, into = STACK_ROWS.tiles, STACK_ROWS.into
         return [

@@ -47,7 +47,7 @@ class Seating:
     Attributes
     ----------
     pose : Pose
-        The hold's frame in H.
+        The hold's frame in the hand frame H.
     rule : {'given', 'pinch', 'palm_on_rock', 'palm_on_rock_centred', 'flat'}
         How the pose was found.
     backed_off : float
@@ -67,7 +67,7 @@ class Seating:
 
 
 def seating_given(pose: Pose) -> Seating:
-    """Return the seating for a given pose of the hold in H, as a read-only copy."""
+    """Return the seating for a given pose of the hold in the hand frame H, as a read-only copy."""
     position, rotation = np.array(pose.position, dtype=float), np.array(pose.rotation, dtype=float)
     position.setflags(write=False)
     rotation.setflags(write=False)
@@ -240,7 +240,7 @@ class RockUnder:
         Parameters
         ----------
         x : ndarray, shape (n,)
-            x of the frame in H [m].
+            x of the frame in the hand frame H [m].
 
         Returns
         -------

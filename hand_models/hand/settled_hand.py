@@ -34,7 +34,7 @@ class HandPostures(NamedTuple):
     angles : ndarray
         θ, angle of each phalanx from x toward z of its finger's F [rad].
     joints : ndarray of complex
-        x + i z of each phalanx's joint in F [m].
+        x + i z of each phalanx's joint in the finger frame F [m].
     alongs, rises, tilts, engagement : ndarray
         Contact of each phalanx: distance from the joint [m], height above the tile's face [m],
         angle of its force from the phalanx's normal [rad], share of the tile's spines on the rock.
@@ -52,7 +52,7 @@ class HandPostures(NamedTuple):
     stops: NDArray[np.int8]
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
-        """Return the postures as one `SettledFinger` for each finger, in the order of `FINGERS`."""
+        """Return the posture of each finger, in the order of `FINGERS`; ``model``: the fingers'."""
         return tuple(
             SettledFinger(
                 model,
@@ -100,7 +100,8 @@ class SettledPalm(NamedTuple):
     Attributes
     ----------
     gaps : ndarray, shape (8,)
-        Distance from each tile to the rock along z of H, infinite where there is none [m].
+        Distance from each tile to the rock along z of the hand frame H, infinite where there is
+        none [m].
     engaged : tuple of int
         Indices of the tiles with rock within their spines' travel.
     engagement : tuple of float
@@ -161,7 +162,7 @@ class SettledHand:
     finger_of : ndarray of int, shape (n,)
         Index of each tile's finger.
     positions : ndarray, shape (n, 3)
-        Place of each tile's contact in H [m].
+        Place of each tile's contact in the hand frame H [m].
     axes : ndarray, shape (n, 3, 3)
         Rows: unit force on the rock of shear, of normal and of lateral load, in H.
     loads : ndarray, shape (n, 2, 2)

@@ -74,7 +74,18 @@ def settle_hands(
 
 
 def seated(hand: HandModel, placements: Sequence[Placement]) -> Sequence[Seating]:
-    """Return the pose of each hold in its hand; hands without a given pose are seated."""
+    """Return the seating of each hand: the pose of its hold in it, found where none is given.
+
+    Parameters
+    ----------
+    hand : HandModel
+    placements : sequence of Placement
+
+    Returns
+    -------
+    sequence of Seating
+        In the order of ``placements``.
+    """
     return _seated(hand, placements)[0].seatings
 
 

@@ -94,8 +94,9 @@ class SpinyHand(HandModel):
         grasp : Grasp, optional
             Default grasp if left out.
         hold_in_hand : Pose, optional
-            The hold's frame in H. If left out, the hand is seated (see `hand_models.hand.seating`),
-            and backs off by at most ``back_off`` from rock inside its open fingers.
+            The hold's frame in the hand frame H. If left out, the hand is seated (see
+            `hand_models.hand.seating`), and backs off by at most ``back_off`` from rock inside its
+            open fingers.
         at : Pose, optional
             Frame on the hold, in the hold's frame, on which to seat the hand; the hold's own frame
             by default. Only used without ``hold_in_hand``.
@@ -177,8 +178,8 @@ def _rock_bytes(hands: Iterable[SettledHand]) -> int:
 def nearby_closures(settled: SettledHand, distance: float = 1e-4) -> tuple[NearbyClosure, ...]:
     """Return how each finger of a settled hand would close if the rock were slightly elsewhere.
 
-    The hand closes again with the hold moved by ``distance`` to and fro along each axis of H.
-    Fingers with two equilibria close to each other change their closure.
+    The hand closes again with the hold moved by ``distance`` to and fro along each axis of the hand
+    frame H. Fingers with two equilibria close to each other change their closure.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class HandTiles(NamedTuple):
     finger_of : ndarray of int, shape (n,)
         Index of each tile's finger.
     positions : ndarray, shape (n, 3)
-        Place of each tile's contact in H [m].
+        Place of each tile's contact in the hand frame H [m].
     axes : ndarray, shape (n, 3, 3)
         Rows: unit force on the rock of shear, of normal and of lateral load, in H.
     loads : ndarray, shape (n, 2, 2)
@@ -168,9 +168,9 @@ def _named(kinds: bytes, nails: bool) -> tuple[SettledTile, ...]:
 
 
 def palms_on_rock(placed: PlacedHands) -> list[SettledPalm]:
-    """Return the palm of each hand; a tile is engaged if rock is within its spines' travel.
+    """Return the palm of each hand: its engaged tiles and their strength.
 
-    A grasp without ``palm`` engages no tile.
+    A tile is engaged if rock is within its spines' travel. A grasp without ``palm`` engages none.
     """
     hand = placed.hand
     gaps = np.array(placed.gaps)[:, STACK_ROWS.base_count :]

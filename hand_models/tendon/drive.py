@@ -132,11 +132,11 @@ class TendonDrive:
         return self.torque_per_newton / self.torque_constant
 
     def torque(self, tension: Values) -> Values:
-        """Return the motor's torque τ [N·m] that tightens a tendon to a tension [N]."""
+        """Return the motor's torque τ [N·m] that tightens a tendon to ``tension`` [N]."""
         return tension * self.torque_per_newton
 
     def current(self, tension: Values) -> Values:
-        """Return the motor's current I [A] while it tightens a tendon to a tension [N]."""
+        """Return the motor's current I [A] while it tightens a tendon to ``tension`` [N]."""
         return tension * self.current_per_newton + self.no_load_current
 
     def driven(self, tensions: Array, wound: tuple[Array, Array, Array, Array, Array]) -> Array:

@@ -52,7 +52,15 @@ class TendonResponse(NamedTuple):
 
 
 def pad_tiles(rows: Sequence[Sequence[float] | Array], fill: float) -> Array:
-    """Return rows with a number for each tile as one array (F, n), padded with ``fill``."""
+    """Return numbers of tiles as one array (F, n), from rows of different lengths.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of float, length F
+        One number for each tile of each finger.
+    fill : float
+        Number put at the end of rows with fewer than n tiles.
+    """
     count = max(map(len, rows))
     return np.array([[*row, *[fill] * (count - len(row))] for row in rows], dtype=float)
 

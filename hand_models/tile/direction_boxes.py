@@ -73,16 +73,25 @@ class DirectionBoxes(NamedTuple):
         return _steepness(self.last, self.near)
 
     def line(self, a: float, b: float) -> tuple[Array, Array]:
-        """Return the least and the largest positive ``a cos ω + b sin ω`` in each box."""
+        """Return bounds of ``a cos ω + b sin ω`` in each box, where it is positive.
+
+        Returns
+        -------
+        least, largest : ndarray, shape (n,)
+        """
         ends = [a * np.cos(side) + b * np.sin(side) for side in (self.first, self.last)]
         top = math.atan2(b, a)
         within = (self.first < top) & (top < self.last)
         return np.minimum(*ends), np.where(within, math.hypot(a, b), np.maximum(*ends))
 
     def aside(self) -> tuple[Array, Array]:
-        """Return the least and the largest cos φ (1 − cos θ) / sin η in each box, at most 1.
+        """Return bounds of cos φ (1 − cos θ) / sin η in each box, at most 1.
 
         θ: azimuth in the tile's plane, from the drag to the side.
+
+        Returns
+        -------
+        least, largest : ndarray, shape (n,)
         """
         least = np.sin(self.near) / (np.cos(self.flat) + np.cos(self.near) * np.cos(self.first))
         with np.errstate(divide="ignore", invalid="ignore"):

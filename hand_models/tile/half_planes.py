@@ -71,15 +71,15 @@ class TileLaw(Protocol):
     def __hash__(self) -> int: ...
 
     def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """Return F(φ, θ), the largest load in a direction [N]."""
+        """Return F(φ, θ), largest load [N] at the angle φ and the azimuth θ [rad]."""
         ...
 
     def straight_strength(self, angle: ArrayLike) -> Array:
-        """Return f_s(φ), the largest load in the finger's plane [N]."""
+        """Return f_s(φ), largest load in the finger's plane [N], at the angle φ [rad]."""
         ...
 
     def sideways_share(self, angle: ArrayLike) -> Array:
-        """Return λ(φ), lateral strength over strength along the drag."""
+        """Return λ(φ), strength sideways over strength along the drag, at the angle φ [rad]."""
         ...
 
 
@@ -126,6 +126,11 @@ def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     """Return half-planes whose intersection is inside the limit surface, for shear T ≥ 0.
 
     The last 256 results are kept in an LRU cache.
+
+    Parameters
+    ----------
+    surface : TileLaw
+        Such as a `Surface`.
 
     Returns
     -------

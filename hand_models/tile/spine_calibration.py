@@ -122,7 +122,20 @@ def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
 
 
 def within_law(angles: Array, pull_off_angle: float) -> Array:
-    """Return a mask of the loading angles in [0, φ_max] [rad], for which Eq. 21 is published."""
+    """Return which loading angles are in [0, φ_max], the range for which Eq. 21 is published.
+
+    Parameters
+    ----------
+    angles : ndarray
+        φ of each load, from shear toward pull-off [rad].
+    pull_off_angle : float
+        φ_max [rad].
+
+    Returns
+    -------
+    ndarray of bool
+        The shape of ``angles``.
+    """
     return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + BASE_TOLERANCES.angle))
 
 

@@ -146,7 +146,7 @@ class Surface:
 
     @property
     def strongest_tile(self) -> float | None:
-        """Largest load of a tile with all its spines [N], if ``shear_limit`` exceeds it."""
+        """Largest load of all spines of a tile [N]; None unless ``shear_limit`` exceeds it."""
         most = _bound("tile_strength")
         return most if self.shear_limit > most else None
 
@@ -236,7 +236,7 @@ class Surface:
         return self.shear_limit, self.pull_off_limit, self.pull_off_angle, self.pull_off_exponent
 
     def sideways_share(self, angle: ArrayLike) -> Array:
-        """Return λ(φ), strength sideways over that along the drag; never rises with φ [rad]."""
+        """Return λ(φ), strength sideways over that along the drag; φ in rad. Never rises with φ."""
         ratio = np.clip(np.asarray(angle) / self.pull_off_angle, 0.0, 1.0)
         kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
         return np.asarray(self.lateral_limit / self.shear_limit * kept)
@@ -248,7 +248,7 @@ class Surface:
         ----------
         shear, normal, lateral : array_like
             T, N (> 0 pressing) and Y of the tile [N]; broadcast. A tile that is dragged backwards
-            (T < 0) has the strength that it has without drag.
+            (T < 0) is taken to be as strong as one without drag.
         """
         forward, pull = np.maximum(shear, 0.0), -np.asarray(normal, dtype=float)
         angle = np.arctan2(pull, np.hypot(forward, lateral))
