@@ -22,7 +22,7 @@ __all__ = ["SearchBox", "linear_box", "search_box"]
 
 @dataclass(frozen=True, eq=False)
 class SearchBox:
-    """Box of poses ``centre + axes · t`` with |t_i| ≤ range_i.
+    """Box of poses ``centre + axes · t`` with ``|t_i| ≤ range_i``, coordinates t of shape (d,).
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class SearchBox:
     axes : ndarray, shape (d, d)
         One column for each axis of the box [m, rad].
     range : ndarray, shape (d,)
-        Largest coordinate |t_i| along each axis.
+        Largest size of the coordinate along each axis.
     """
 
     centre: Array

@@ -1,17 +1,18 @@
 """The fingernail: an ultrashort phalanx at each fingertip, for shallow edges (Section 3.2).
 
-It turns about a pin at the end of the distal phalanx, from straight ahead (ψ = 0) toward the rock,
-on the softest spring of the finger, so the tendon moves it first. Where it meets rock on its way it
-*hooks*, with its tip or with its flank on an edge; where it meets none it turns by 180° and is out
-of the way.
+The nail turns about a pin at the end of the distal phalanx, from straight ahead (ψ = 0) toward the
+rock, on the softest spring of the finger, so the tendon moves the nail first. Where the nail meets
+rock on its way it *hooks*, with its tip or with its flank on an edge; where it meets none it turns
+by 180° and is out of the way.
 
 To cling, the finger stays straight and only the nails carry. With w the unit vector along the nail
 and v the one across it, in which the tendon turns it, a nail that touches at the distance c from
 its pin loads the rock with F = P v − A w. P follows from the tendon's tension f by the balance
 about the pin; A goes through the pin and is passive. The rock, with its normal n (of the nail's
-flank where that touches), holds F by friction, and F must not close the finger: its joints stand
-on stops against opening (``assumed``; nothing is published), and tendon and nail both turn them.
-With joint i at q_i and the local tensions f_i of Eq. 8,
+flank where that touches), carries F by friction, and F must not close the finger: its joints are
+at stops against opening (``assumed``; nothing is published), and tendon and nail both turn them.
+With joint i at q_i, local tensions f_i of Eq. 8, pulley radii r, spring stiffnesses K and preloads
+p (index n for the nail), and the nail's friction μ_n,
 
     P = (f_n r_n − K_n ψ − p_n) / c,
     |F along the rock| ≤ μ_n · (F into the rock),
@@ -73,9 +74,9 @@ class Cling(NamedTuple):
     force : tuple of float
         P, force across the nail: at zero tension [N], and per newton of the tendon's tension.
     H : ndarray, shape (6, 2)
-        The nail holds at tendon tension f and axial force A if H (f, A) ≤ h. Three rows of the
-        friction cone, the first of which keeps the nail from pulling on the rock, then one row for
-        each joint, proximal first, as a force at the nail's pin.
+        The nail stays hooked at the tendon tension f and the axial force A if H (f, A) ≤ h. Three
+        rows of the friction cone, the first of which keeps the nail from pulling on the rock, then
+        one row for each joint, proximal first, as a force at the nail's pin.
     h : ndarray, shape (6,)
         Right-hand side of ``H`` [N].
     """
@@ -86,7 +87,10 @@ class Cling(NamedTuple):
     h: Array
 
     def lasts(self, tension: float) -> bool:
-        """Return True if at a tension [N] the nail gets to its hook and some force A holds it."""
+        """Return True if at a tension [N] the nail reaches its hook and can stay hooked.
+
+        The nail stays hooked if some axial force A satisfies ``H (f, A) ≤ h`` at the tension f.
+        """
         if self.force[0] + self.force[1] * tension < 0.0:
             return False
         slope, left = self.H[:, 1], self.h - self.H[:, 0] * tension

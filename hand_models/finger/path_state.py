@@ -285,7 +285,7 @@ class PathState(NamedTuple):
 
 
 def held_share(state: PathState, around: Around) -> Array:
-    """Return the share of each tile's spines that hold on the rock, φ − ψ, shape (n, 3).
+    """Return the share of each tile's spines that grip the rock, φ − ψ, shape (n, 3).
 
     φ: share on the rock (`Around.share`); ψ: share that was pulled off (`PathState.off`).
     """

@@ -142,8 +142,8 @@ def close_fingers(
     tensions : sequence of float, length n
         Closing tension of each hand [N].
     errors : dict of int to InvalidInputError
-        Errors by index of the hand. Hands that have one are skipped; hands that cannot close are
-        added.
+        Errors by index of the hand, changed in place: hands that have one are skipped, hands that
+        cannot close are added.
     """
     # the first stands for a finger of a hand that cannot be where it is
     rows = [[0.0] * (len(PHALANGES) * PHALANX_NUMBERS)]

@@ -1,8 +1,8 @@
 """Close many hands on their holds together: seat them, then place their palms and fingers on rock.
 
-What hands have in common is computed on arrays: their poses at their holds, the places and axes of
-their tiles. Each finger's closing is found one by one (`hand_models.hand.closed_fingers`), mirror
-images once.
+The parts that all hands have in common are computed on arrays: their poses at their holds, and the
+places and axes of their tiles. Each finger's closing is found on its own
+(`hand_models.hand.closed_fingers`), mirror images once.
 """
 
 from __future__ import annotations

@@ -48,10 +48,9 @@ def _held() -> Array:
 
 
 HELD_DIRECTIONS: Final = _held()
-"""Directions d_k of the rows that bound a hand's force F, in H, shape (17, 3).
-
-max_k d_k · F is at least |(F_x, F_y, min(F_z, 0))|, and at most 1.12 times as much (1.04 times
-straight along x or y)."""
+"""Directions d_k of the rows that bound a hand's force F, in the hand frame H, shape (17, 3).
+The largest d_k · F is at least the length of (F_x, F_y, min(F_z, 0)), and at most 1.12 times as
+much (1.04 times straight along x or y)."""
 
 
 @dataclass(frozen=True)

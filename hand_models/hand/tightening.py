@@ -66,15 +66,16 @@ class ClosingSequence(NamedTuple):
 
 
 def resting_tensions(model: FingerModel, turns: Array, losses: Array) -> Array:
-    """Return the tendon tensions at which springs hold joints at their angles: (p + K q) / (M r).
+    """Return the tendon tensions that balance the joints' springs at angles q: (p + K q) / (M r).
 
     Parameters
     ----------
     model : FingerModel
+        Preloads p, stiffnesses K and pulley radii r of the joints.
     turns : ndarray, shape (..., 3)
         q, angle of each joint [rad].
     losses : ndarray, shape (..., 3)
-        Diagonals of M (Eq. 8).
+        Diagonals of M, friction losses of the tendon (Eq. 8).
 
     Returns
     -------

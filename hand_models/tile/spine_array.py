@@ -2,9 +2,9 @@
 
 The laws are those of Wang, Jiang, Cutkosky (IJRR 2017), the model [16] behind Section 5.5 and
 Appendix 9.4. Spines slide freely along channels, tilted by β from the tile's normal, and are
-dragged together. A spine that finds an asperity holds up to Φ_i (a Gaussian cut to the strength of
-asperities and of the shaft), after the play S_i ~ U(0, backlash) of its channel is taken up. The
-first spine to reach its limit ends the travel X of all, and the tile holds
+dragged together. A spine that finds an asperity carries up to Φ_i (a Gaussian cut to the strength
+of asperities and of the shaft), after the play S_i ~ U(0, backlash) of its channel is taken up. The
+first spine to reach its limit ends the travel X of all, and the tile carries
 
     X = min_i (Φ_i / k + S_i),     F = Σ_i k max(X − S_i, 0),
 
@@ -12,12 +12,12 @@ with k the stiffness of a spine on its asperity.
 
 Asperities have slopes ψ with a linear density f on [ψ_min, ψ_max] that is zero at ψ_max. Loaded at
 the angle φ toward pull-off, a spine stays on those with ψ ≥ φ + π/2 − atan μ; on those steeper than
-β + π/2 − α/2 its shaft is in touch, not its tip, and it holds c_i of its strength (C_i); and beyond
-the friction cone of its channel, φ > β + atan μ_s, it slips there and holds
+β + π/2 − α/2 its shaft is in touch, not its tip, and it carries c_i of its strength (C_i); and
+beyond the friction cone of its channel, φ > β + atan μ_s, it slips there and carries
 
     C_c = cos(φ − β + atan μ_s) (1 + μ_s²).
 
-Loaded at the azimuth θ from the drag, β becomes asin(sin β cos θ). Spine i of a trial then holds
+Loaded at the azimuth θ from the drag, β becomes asin(sin β cos θ). Spine i of a trial then carries
 
     w_i F_i,   w_i = C_c C_i(ψ_i) [ψ_i ≥ φ + π/2 − atan μ] / ∫ C_i f dψ |_(φ = θ = 0),
 
@@ -215,7 +215,7 @@ class SpineArray:
         angle: ArrayLike = 0.0,
         azimuth: ArrayLike = 0.0,
     ) -> Array:
-        """Return Monte Carlo samples of a tile's strength in some directions.
+        """Return Monte Carlo samples of a tile's strength in given directions of load.
 
         Each trial puts the tile on a new place of the rock, and loads it there in every direction.
 
@@ -223,13 +223,14 @@ class SpineArray:
         ----------
         rng : numpy.random.Generator
         trials : int
+            Count of samples.
         angle, azimuth : array_like
             φ and θ of the load, as for `share` [rad].
 
         Returns
         -------
         ndarray, shape (trials, ...)
-            Largest force [N]; infinite where the friction of pressing alone holds any load.
+            Largest force [N]; infinite where the friction of pressing alone carries any load.
         """
         phi, theta = np.broadcast_arrays(np.asarray(angle, float), np.asarray(azimuth, float))
         size = (trials, self.spines)

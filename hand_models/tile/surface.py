@@ -10,15 +10,15 @@ strength is
 
     F(φ, θ) = f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)],
 
-a fit to the spine array (``spine_array.py``): channels lean along the drag, so that spines hold
-less sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
+a fit to the spine array (``spine_array.py``): channels lean along the drag, so that spines are
+weaker sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
 times ``lateral_pull_off_ratio`` at φ_max, and stays; with cos φ, θ loses its effect at pure
-pull-off, where it has no meaning. Pressed into the rock with N, a tile holds F(0, θ) + γ N in its
-plane, with γ the compression gain.
+pull-off, where it has no meaning. Pressed into the rock with the normal load N, a tile carries
+F(0, θ) + γ N in its plane, with γ the compression gain.
 
-Spines cling only while they are dragged toward the finger's base. A tile that is dragged the other
-way is held by Coulomb friction alone, in proportion to its pressing, and one that is pulled off
-needs the drag in proportion: both are, for the shear T,
+Spines grip only while they are dragged toward the finger's base. A tile that is dragged the other
+way carries Coulomb friction alone, in proportion to its pressing, and one that is pulled off needs
+the drag in proportion: both are, for the shear T,
 
     T ≥ −μ N
 
