@@ -35,7 +35,7 @@ class StoreInfo(NamedTuple):
 
 
 class Store(Protocol):
-    """Protocol of a cache that reports its statistics."""
+    """Protocol of a cache that reports its statistics: its name, and a method `info`."""
 
     name: str
 

@@ -50,7 +50,10 @@ class CruxError(Exception):
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
     def within(self, parent: str) -> Self:
-        """Prefix the error's field path with ``parent``, and return the error."""
+        """Prefix the error's field path with ``parent`` in place, and return the error.
+
+        ``hold`` within ``stance.hands[0]`` becomes ``stance.hands[0].hold``.
+        """
         if self.field is None:
             self.field = parent
         else:

@@ -193,7 +193,7 @@ class Pose:
         return Pose(self.position + self.rotation @ other.position, self.rotation @ other.rotation)
 
     def apply(self, point: ArrayLike) -> Array:
-        """Return a point (3,), or points (n, 3), of the child frame in the parent frame [m]."""
+        """Transform a point (3,) or points (n, 3) from the child frame to the parent frame [m]."""
         return np.asarray(point, dtype=float) @ self.rotation.T + self.position
 
 

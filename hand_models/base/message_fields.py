@@ -36,4 +36,4 @@ Name = Annotated[str, Meta(max_length=64)]
 
 
 class Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Base class of the parts of a request: unknown fields are an error."""
+    """Base class of the parts of a request; decoding a part with an unknown field is an error."""

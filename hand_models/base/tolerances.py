@@ -9,7 +9,7 @@ __all__ = ["BASE_TOLERANCES", "BaseTolerances"]
 
 @dataclass(frozen=True, slots=True)
 class BaseTolerances:
-    """Tolerances that rooms use directly, or derive their tolerances from."""
+    """Tolerances shared by all rooms (sub-packages), which use them directly or derive others."""
 
     length: float = 1e-9
     """A distance that is none [m]: far below any part of a hand, far above the rounding of it."""

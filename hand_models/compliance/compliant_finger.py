@@ -68,12 +68,12 @@ class FingerAtRest(NamedTuple):
 
     @property
     def losses(self) -> Array:
-        """Tension at each tile at rest, over the motor's tension (Eq. 8), shape (n,)."""
+        """Tendon tension at each tile over the motor's tension at rest (Eq. 8), shape (n,)."""
         return np.asarray((1.0 - self.closing_friction) ** np.arange(len(self.shears), dtype=float))
 
     @property
     def anchored(self) -> FingerTendon:
-        """Tendon with zero contact stiffness for the tiles that are off the rock."""
+        """The tendon, with zero contact stiffness for the tiles that are off the rock."""
         stiffness = np.array(self.tendon.contact_stiffness)
         stiffness[-len(PHALANGES) :] *= self.finger.touching
         return replace(self.tendon, contact_stiffness=tuple(stiffness.tolist()))
@@ -121,14 +121,20 @@ class FingerLoads(NamedTuple):
 
     @property
     def forces(self) -> Numbers:
-        """Force (x, z) in F of each phalanx on the rock, shape (..., 3, 2) [N]; no base tile's."""
+        """Force of each phalanx on the rock without the base tile's, shape (..., 3, 2) [N].
+
+        (x, z) in the finger frame F.
+        """
         u = self.directions
         across = np.stack([-u[..., 1], u[..., 0]], axis=-1)
         return np.asarray(self.normals[..., None] * across - self.shears[..., None] * u)
 
     @property
     def planar_wrench(self) -> Numbers:
-        """F_x, F_z and moment M from x toward z about F's origin, shape (..., 3) [N, N·m]."""
+        """Wrench of each finger in its plane on the rock, shape (..., 3) [N, N·m].
+
+        F_x, F_z and the moment M from x toward z about the origin of the finger frame F.
+        """
         forces, points = self.forces, self.points
         moments = points[..., 0] * forces[..., 1] - points[..., 1] * forces[..., 0]
         sums = [forces.sum(axis=-2), moments.sum(axis=-1)[..., None]]

@@ -369,7 +369,10 @@ class CompliantHands:
 
 
 def own_shears(found: FingerLoads, count: int) -> Numbers:
-    """Return the shears of a finger's ``count`` tiles, a base tile's first, shape (m, count)."""
+    """Return the shears of a finger's tiles at m poses, shape (m, count) [N].
+
+    ``count``: 3, or 4 with a base tile, whose shear then comes first.
+    """
     if count == len(PHALANGES):
         return found.shears
     return np.concatenate([found.base_shears[:, None], found.shears], axis=1)

@@ -143,15 +143,38 @@ class FloatingWrist(CompliantGrasp):
         return LoadRows(layout.rows, P, p, held, s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at poses of the wrist, ``twists`` of shape (m, d)."""
+        """Return loads e and wrenches w at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses of the wrist: its twist, in a subclass other components too.
+        """
         return self._grasp_loads(self.hand_loads(twists))
 
     def closed_at(self, y: Array) -> Array:
-        """Return the closing tensions that belong to the pose ``y`` (d,), shape (4,) [N]."""
+        """Return the tensions at which the hand has closed, for a pose of the wrist.
+
+        Parameters
+        ----------
+        y : ndarray, shape (d,)
+            The pose; here the tensions are the hand's preload whatever it is.
+
+        Returns
+        -------
+        ndarray, shape (4,)
+            Tension of each tendon [N].
+        """
         return self.hand.preload
 
     def hand_loads(self, y: Numbers) -> HandLoads:
-        """Return the loads of tiles, tendons and palm at poses ``y`` of the wrist, shape (m, d)."""
+        """Return the loads of tiles, tendons and palm at poses of the wrist.
+
+        Parameters
+        ----------
+        y : ndarray, shape (m, d)
+            m poses of the wrist.
+        """
         return self.hand.loads(y)
 
     def _grasp_loads(self, loads: HandLoads) -> GraspLoads:
@@ -189,11 +212,19 @@ class FloatingWrist(CompliantGrasp):
         return left
 
     def palm_mode(self, y: Array, given: PalmMode) -> PalmMode:
-        """Return the palm's mode at a pose; here ``given``, in which the set was linearised."""
+        """Return the mode in which the palm carries at a pose.
+
+        Parameters
+        ----------
+        y : ndarray, shape (d,)
+            The pose.
+        given : PalmMode
+            Mode in which the set was linearised; here it is returned as it is.
+        """
         return given
 
     def palm_modes(self) -> tuple[PalmMode, ...]:
-        """Return the modes that the palm can carry in; only ``off`` if no palm tile is engaged."""
+        """Return the palm's modes, each with its set; ``off`` alone if no palm tile is engaged."""
         if not self.hand.settled.palm.engaged:
             return ("off",)
         return tuple(PALM_MODES.values())

@@ -68,7 +68,10 @@ class WristSearch:
             ) from None
 
     def support(self, direction: ArrayLike) -> float:
-        """Return the support function max { d · w } of the hull, for a direction d, shape (6,)."""
+        """Return the support function of the convex hull: the largest d · w over its wrenches w.
+
+        ``direction``: d, shape (6,).
+        """
         return float((self.wrenches @ np.asarray(direction, dtype=float)).max())
 
 

@@ -184,7 +184,19 @@ class Gripper(CompliantGrasp):
         return found.of(0), found.of(1)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads e, and wrenches on the rock about G's origin, at poses of shape (m, 3)."""
+        """Return loads e and wrenches at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, 3)
+            m poses (x, z, ω_y) [m, m, rad].
+
+        Returns
+        -------
+        GraspLoads
+            Wrenches on the rock about the origin of the gripper's frame G; only F_x, F_z and M_y
+            differ from zero.
+        """
         loads = self.finger_loads(twists)
         right, left = (side.planar_wrench for side in loads)
         wrenches = np.zeros((len(right), 6), dtype=right.dtype)

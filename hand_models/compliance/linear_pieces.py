@@ -60,7 +60,7 @@ class PieceList:
 
     @property
     def error(self) -> float:
-        """Largest relative difference between the two support functions."""
+        """Largest relative difference between the union's support function and the exact one."""
         return float(np.abs(self.covered / self.exact - 1.0).max())
 
 

@@ -38,7 +38,19 @@ CODE_DIGITS: Final = 3 ** np.arange(4 * JOINT_COUNT)
 
 
 class Forces(NamedTuple):
-    """Torques on fingers [N·m], their slopes in f and their −∂/∂q, and the tiles' shears [N]."""
+    """Torques and shears of n fingers in their contact states, and derivatives of the torques.
+
+    Attributes
+    ----------
+    torque : ndarray, shape (n, 3)
+        Torque on each joint of springs, tendon and drag [N·m].
+    slope : ndarray, shape (n, 3)
+        Derivative of ``torque`` by the path parameter s [m].
+    stiffness : ndarray, shape (n, 3, 3)
+        −∂(torque)/∂q [N·m/rad], contact forces included, for the joint angles q.
+    shears : ndarray, shape (n, 3)
+        Shear of each tile [N].
+    """
 
     torque: Array
     slope: Array
@@ -227,13 +239,13 @@ def forces_on(drive: Drive, state: PathState, around: Around) -> Forces:
     ----------
     drive : Drive
     state : PathState
+        Joint angles, path parameter and contact states.
     around : Around
+        Gaps, engagement and lever arms at these angles.
 
     Returns
     -------
     Forces
-        ``torque`` [N·m], its slope per newton of the path parameter s [m], stiffness −∂(torque)/∂q
-        [N·m/rad] and the tiles' shears [N].
     """
     mode, f = state.mode, np.minimum(state.s, drive.closing)[:, None]
     share = held_share(state, around)

@@ -184,7 +184,7 @@ class FingerModel:
         return np.asarray(pull / (self.tile_centre * self.bed_stiffness))
 
     def losses(self, base_tile: bool) -> Array:
-        """Return the diagonal of M (Eq. 8): each phalanx's tension over the motor's, shape (3,).
+        """Return M, each phalanx's tendon tension over the motor's (diagonal of Eq. 8), shape (3,).
 
         ``base_tile``: whether a base tile comes first on the tendon (one more factor 1 − μ).
         """

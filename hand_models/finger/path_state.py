@@ -140,7 +140,7 @@ class Drive(NamedTuple):
 
     @property
     def end(self) -> Array:
-        """Value of the path parameter `PathState.s` at each finger's path's end, shape (n,) [N]."""
+        """Path parameter s (see `PathState`) at the end of each finger's path, shape (n,) [N]."""
         return (1.0 + SETTINGS.catching_part) * self.closing
 
 

@@ -156,12 +156,15 @@ class PhalanxShape(NamedTuple):
 
     @property
     def fine(self) -> float:
-        """Smoothing length of the gap: about its largest difference from the least distance [m]."""
+        """Smoothing length of the gap [m].
+
+        The gap differs from the least distance to the rock by about this length at most.
+        """
         return self.length / 4800.0
 
     @property
     def closes(self) -> float:
-        """Tolerance on negative gaps: rock that is less deep needs no correction [m]."""
+        """Tolerance on negative gaps: rock inside a phalanx by less counts as touching [m]."""
         return self.length / 2.4e6
 
     def beside(self, near: NearPoints, joint: Complexes, u: Complexes, depth: Array) -> Beside:
@@ -236,7 +239,10 @@ class PhalanxShape(NamedTuple):
         return np.where(distance <= np.abs(beyond), from_tile, beyond), distance
 
     def alone(self, lengths: Array) -> Array:
-        """Return how far a bed sinks on one point of rock alone, for each boundary length [m]."""
+        """Return how far a bed of springs sinks if it rests on a single point of rock [m].
+
+        ``lengths``: boundary length w that each point represents [m].
+        """
         return np.asarray(np.minimum(self._root / np.sqrt(lengths), self.far))
 
     @property

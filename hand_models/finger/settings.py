@@ -11,7 +11,7 @@ __all__ = ["CONTACT_CODES", "SETTINGS"]
 
 @dataclass(frozen=True, slots=True)
 class ContactCodes:
-    """Integer codes of a contact state: of a phalanx's contact, and of its tile's spines."""
+    """Integer codes of contact states: of a phalanx's contact, and of its tile's spines."""
 
     off: int = 0  # the phalanx is off the rock
     on: int = 1  # it touches the rock

@@ -47,12 +47,12 @@ load."""
 
 
 class ClosedFingers:
-    """Closed fingers of n hands, four for each hand.
+    """Closed fingers of n hands, four for each hand, as arrays.
 
     Parameters
     ----------
     rows : sequence of list of float
-        Numbers of the distinct fingers, `PHALANX_NUMBERS` for each phalanx.
+        Numbers of each distinct finger, three phalanges of `PHALANX_NUMBERS` each.
     row_of : sequence of int, length 4 n
         Index into ``rows`` of each finger, hand by hand.
     alone : dict of int to ClosedFinger

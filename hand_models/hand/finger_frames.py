@@ -48,12 +48,13 @@ class StackRows(NamedTuple):
 
 
 class TileColumns(NamedTuple):
-    """Meaning of the numbers that describe a tile; see `SettledHand` for each of them.
+    """Columns of the arrays that hold 18 numbers for each tile.
 
     Attributes
     ----------
     position, axes : slice
-        Place of the contact [m], and the three unit axes row by row, in the hand frame H.
+        Place of the contact [m]; unit forces of shear, normal and lateral load, row by row; in the
+        hand frame H.
     shear, normal : slice
         Load at zero tension [N], and per newton of tension.
     engagement, kind : int

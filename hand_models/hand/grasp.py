@@ -16,7 +16,7 @@ __all__ = ["Grasp", "WristTravel"]
 
 @dataclass(frozen=True, slots=True)
 class RotationTolerances:
-    """Tolerances of an outer rotation near π [rad]."""
+    """Tolerances on an outer rotation of π, at which the fingers pinch [rad]."""
 
     pinch: float = 1e-6
     """How close to π it counts as a pinch."""
@@ -109,7 +109,10 @@ class WristTravel(Strict, frozen=True):
 
     @property
     def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and largest value of each component of the wrist's twist [m, rad], tuples of 6."""
+        """Least and largest value of each component of the wrist's twist, two tuples of 6.
+
+        Displacement along x, y, z of the hand frame H [m], then rotation about them [rad].
+        """
         most = (self.position,) * 3 + (self.angle,) * 3
         least = tuple([-end for end in most])
         return least, (*most[:2], min(self.inward, self.position), *most[3:])

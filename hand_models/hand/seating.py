@@ -60,7 +60,10 @@ class Seating:
     backed_off: float = 0.0
 
     def off(self, distance: float) -> Seating:
-        """Return the seating after the hand has backed off along −z of H by ``distance`` [m]."""
+        """Return the seating after the hand has backed off from the rock.
+
+        ``distance``: along −z of the hand frame H [m].
+        """
         position = self.pose.position + np.array([0.0, 0.0, distance])
         position.setflags(write=False)
         return Seating(Pose(position, self.pose.rotation), self.rule, distance)
@@ -106,8 +109,9 @@ def propose(
     -------
     seating : Seating
     on_contact : bool
-        Whether the seat assumes that the inner fingers touch at c₁. If so, and `touches_seat` is
-        False for the closed finger, the caller uses `CENTRED_SEATING` instead.
+        Whether the seat assumes that the inner fingers' proximal tiles touch at the distance
+        ``hand.seated_contact`` from their joints. If so, and `touches_seat` is False for the closed
+        finger, the caller uses `CENTRED_SEATING` instead.
     """
     _, y, z = hand.inner_place
     if at is not None:
@@ -134,9 +138,10 @@ def propose(
 
 
 def touches_seat(hand: HandModel, along: float) -> bool:
-    """Return True if an inner finger's proximal contact is at c₁, where its seat assumed it.
+    """Return True if an inner finger's proximal contact is where its seat assumed it.
 
-    ``along``: distance of the contact from the proximal joint [m].
+    ``along``: distance of the contact from the proximal joint, compared with ``seated_contact``
+    [m].
     """
     return abs(along - hand.seated_contact) < 1e-6  # [m]
 
@@ -192,7 +197,7 @@ def _smooth(hand: HandModel, hold: Hold, crest: float | None) -> Place | None:
 
 
 class RockUnder:
-    """Outlines of the rock under a palm and the inner fingers, in planes along x of a frame.
+    """Outlines of the rock under a palm and the inner fingers, in planes y = const of a frame.
 
     Parameters
     ----------

@@ -52,7 +52,10 @@ class HandPostures(NamedTuple):
     stops: NDArray[np.int8]
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
-        """Return the posture of each finger, in the order of `FINGERS`; ``model``: the fingers'."""
+        """Return the posture of each finger as a `SettledFinger`, in the order of `FINGERS`.
+
+        ``model``: the model that the four fingers share.
+        """
         return tuple(
             SettledFinger(
                 model,
@@ -248,7 +251,10 @@ class SettledHand:
 
     @cached_property
     def lateral_shares(self) -> Array:
-        """Share of its finger's lateral reaction that each tile carries: φ over Σ φ, shape (n,)."""
+        """Share of its finger's lateral reaction that each tile carries, shape (n,).
+
+        The tile's spine engagement φ over the sum of φ of the finger's tiles.
+        """
         sums = np.where(self._whole_tiles > 0.0, self._whole_tiles, 1.0)
         return np.asarray(self.engagement / sums[self.finger_of])
 
@@ -274,7 +280,7 @@ class SettledHand:
 
     @cached_property
     def lateral_limits(self) -> Array:
-        """Largest lateral reaction of each finger's tiles together, shape (4,) [N]."""
+        """Lateral strength of each finger, the sum over its tiles by engagement, shape (4,) [N]."""
         return self.surface.lateral_limit * self._whole_tiles
 
     @cached_property
@@ -290,7 +296,7 @@ class SettledHand:
 
     @cached_property
     def holding(self) -> Array:
-        """True for tiles and nails that can load the rock with their spines or tip, shape (n,)."""
+        """True for tiles that are on rock and for nails that hook, shape (n,)."""
         return np.logical_or(self.touching, self.nails)
 
     @cached_property

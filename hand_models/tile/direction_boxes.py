@@ -64,16 +64,21 @@ class DirectionBoxes(NamedTuple):
 
     @property
     def flat(self) -> Array:
-        """Least φ in each box, shape (n,) [rad]."""
+        """Least φ (angle from the tile's plane toward pull-off) in each box, shape (n,) [rad]."""
         return _steepness(self.first, self.far)
 
     @property
     def steep(self) -> Array:
-        """Largest φ in each box, shape (n,) [rad]."""
+        """Largest φ (angle from the tile's plane toward pull-off) in each box, shape (n,) [rad]."""
         return _steepness(self.last, self.near)
 
     def line(self, a: float, b: float) -> tuple[Array, Array]:
         """Return bounds of ``a cos ω + b sin ω`` in each box, where it is positive.
+
+        Parameters
+        ----------
+        a, b : float
+            Coefficients of shear and pull-off, seen from the side.
 
         Returns
         -------
@@ -87,7 +92,8 @@ class DirectionBoxes(NamedTuple):
     def aside(self) -> tuple[Array, Array]:
         """Return bounds of cos φ (1 − cos θ) / sin η in each box, at most 1.
 
-        θ: azimuth in the tile's plane, from the drag to the side.
+        φ: angle from the tile's plane toward pull-off; θ: azimuth in that plane, from the drag to
+        the side.
 
         Returns
         -------

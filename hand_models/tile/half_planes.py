@@ -71,15 +71,24 @@ class TileLaw(Protocol):
     def __hash__(self) -> int: ...
 
     def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """Return F(φ, θ), largest load [N] at the angle φ and the azimuth θ [rad]."""
+        """Return F(φ, θ), the largest load of a tile in a direction [N].
+
+        ``angle``: φ from shear toward pull-off; ``azimuth``: θ from the drag [rad].
+        """
         ...
 
     def straight_strength(self, angle: ArrayLike) -> Array:
-        """Return f_s(φ), largest load in the finger's plane [N], at the angle φ [rad]."""
+        """Return f_s(φ), the largest load of a tile in the finger's plane [N].
+
+        ``angle``: φ from shear toward pull-off [rad].
+        """
         ...
 
     def sideways_share(self, angle: ArrayLike) -> Array:
-        """Return λ(φ), strength sideways over strength along the drag, at the angle φ [rad]."""
+        """Return λ(φ), strength straight sideways over strength along the drag.
+
+        ``angle``: φ from shear toward pull-off [rad].
+        """
         ...
 
 
@@ -106,13 +115,15 @@ class HalfPlane(NamedTuple):
 class BoundsGap(NamedTuple):
     """Gap between half-planes and the limit surface, for loads that pull off (T ≥ 0, N ≤ 0).
 
+    T is the shear of a tile, N its normal load (> 0 pressing).
+
     Attributes
     ----------
     inner_volume, outer_volume : float
         Volume within the inner and within the outer half-planes, over that within the surface.
     inner_worst, outer_worst : float
-        Least ratio of the inner half-planes' strength to the surface's, over all directions, and
-        largest ratio of the outer ones'.
+        Over all directions of load: the least ratio of the inner half-planes' strength to the
+        surface's, and the largest ratio of the outer half-planes' strength to it.
     """
 
     inner_volume: float
@@ -135,9 +146,10 @@ def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
     Returns
     -------
     tuple of HalfPlane
-        The one that bounds shear, then the chords from pure shear to φ_max, moved inward where the
-        curve has a dent. The last chord runs on beyond φ_max; where it would leave the curve there
-        (which stays at f_min), one more chord, down to pure pull-off, closes the region.
+        The half-plane that bounds shear, then the chords of the curve of Eq. 21 from pure shear to
+        the pull-off angle φ_max, moved inward where the curve has a dent. The last chord runs on
+        beyond φ_max; where it would leave the curve there (which stays at f_min), one more chord,
+        down to pure pull-off, closes the region.
     """
     nodes = _nodes(surface)
     # a gain steeper than the first chord would cut into the side of pull-off
@@ -159,9 +171,15 @@ def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
 
 
 def outer_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
-    """Return half-planes that contain the limit surface, with the inner ones' normals (T ≥ 0).
+    """Return half-planes that contain the limit surface, for shear T ≥ 0.
 
-    Where pressing raises the strength faster than a normal allows, the normal is tilted as needed.
+    Their normals are those of `inner_half_planes`. Where pressing raises the strength faster than a
+    normal allows, the normal is tilted as needed.
+
+    Parameters
+    ----------
+    surface : TileLaw
+        Such as a `Surface`.
     """
     pieces = []
     for piece in inner_half_planes(surface):

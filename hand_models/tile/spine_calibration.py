@@ -55,7 +55,7 @@ class LineFit(NamedTuple):
     Attributes
     ----------
     shear_limit, pull_off_limit : float
-        f_max and f_min [N].
+        f_max, strength in pure shear, and f_min, strength at the pull-off angle φ_max [N].
     rms, worst : float
         Root mean square and largest residual [N].
     r_squared : float
@@ -72,12 +72,14 @@ class LineFit(NamedTuple):
 class LateralFit(NamedTuple):
     """Lateral law of `Surface`, fitted to a spine array.
 
+    F(φ, θ) is the strength at the angle φ toward pull-off and the azimuth θ from the drag.
+
     Attributes
     ----------
     lateral_ratio : float
         Lateral strength over strength in drag, at φ = 0.
     lateral_pull_off_ratio : float
-        λ at φ_max over λ at φ = 0, with λ the lateral share of the strength.
+        λ at φ_max over λ at φ = 0, with λ the lateral strength over that along the drag.
     rms, worst : float
         Root mean square and largest error of F(φ, θ) / F(φ, 0), over 0 ≤ φ ≤ φ_max, 0 ≤ θ ≤ π/2.
     """

@@ -146,7 +146,11 @@ class Surface:
 
     @property
     def strongest_tile(self) -> float | None:
-        """Largest load of all spines of a tile [N]; None unless ``shear_limit`` exceeds it."""
+        """Bound on the strength of a tile [N] if ``shear_limit`` exceeds the bound, else None.
+
+        At the bound (``tile_strength`` of ``parameters/surfaces.toml``) the shafts of all spines
+        break.
+        """
         most = _bound("tile_strength")
         return most if self.shear_limit > most else None
 
@@ -227,16 +231,23 @@ class Surface:
         return np.where(phi >= 0.0, pulling, pressing)
 
     def straight_strength(self, angle: ArrayLike) -> Array:
-        """Return f_s(φ), strength in the finger's plane [N]: never rises with φ; f_max if φ ≤ 0."""
+        """Return f_s(φ), strength in the finger's plane [N].
+
+        ``angle``: φ from shear toward pull-off [rad]; f_s never rises with φ, and is f_max if φ ≤
+        0.
+        """
         return pull_strength(*self.straight_law, angle)
 
     @property
     def straight_law(self) -> tuple[float, float, float, float]:
-        """Parameters of f_s(φ) in the order of `pull_strength`: f_max, f_min, φ_max and p."""
+        """Parameters f_max, f_min [N], φ_max [rad] and p of Eq. 21, in `pull_strength`'s order."""
         return self.shear_limit, self.pull_off_limit, self.pull_off_angle, self.pull_off_exponent
 
     def sideways_share(self, angle: ArrayLike) -> Array:
-        """Return λ(φ), strength sideways over that along the drag; φ in rad. Never rises with φ."""
+        """Return λ(φ), strength straight sideways over strength along the drag.
+
+        ``angle``: φ from shear toward pull-off [rad]; λ never rises with φ.
+        """
         ratio = np.clip(np.asarray(angle) / self.pull_off_angle, 0.0, 1.0)
         kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
         return np.asarray(self.lateral_limit / self.shear_limit * kept)
