@@ -1,4 +1,4 @@
-"""Frames and wrench transports, the project's exceptions, one bounded store."""
+"""Foundation of all rooms: frames, wrench transports, exceptions, LRU caches, message fields."""
 
 import lazy_loader
 

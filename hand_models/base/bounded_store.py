@@ -1,4 +1,4 @@
-"""Answers to the last questions that were asked: a bounded store that threads may share."""
+"""Bounded LRU caches that threads may share, with statistics of all caches of the process."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ Args = ParamSpec("Args")
 
 
 class StoreInfo(NamedTuple):
-    """Statistics of the stores of one name.
+    """Statistics of the caches of one name.
 
     Attributes
     ----------
     hits, misses : int
-        Answers found and missed since they were cleared.
+        Lookups that were answered, and that were not, since the caches were cleared.
     kept, most : int
-        Answers kept now, and at most.
+        Answers in the caches now, and at most.
     """
 
     hits: int
@@ -35,12 +35,12 @@ class StoreInfo(NamedTuple):
 
 
 class Store(Protocol):
-    """Protocol of a cache that reports its statistics."""
+    """Protocol of a cache that reports its statistics: its name, and a method `info`."""
 
     name: str
 
     def info(self) -> StoreInfo:
-        """Return how it has served."""
+        """Return the cache's hits, misses, size and bound."""
 
 
 _stores: WeakSet[Store] = WeakSet()
@@ -51,13 +51,13 @@ _listing = Lock()
 
 
 def enlist(store: Store) -> None:
-    """Let `stores` list a store as long as its owner has it."""
+    """Register a cache for `stores`, for as long as its owner keeps it alive (weak reference)."""
     with _listing:
         _stores.add(store)
 
 
 def stores() -> dict[str, StoreInfo]:
-    """Return how the stores of this process have served, those of one name together."""
+    """Return the statistics of all live caches of this process, by name, summed for equal names."""
     found: dict[str, StoreInfo] = {}
     with _listing:
         kept = list(_stores)
@@ -70,20 +70,20 @@ def stores() -> dict[str, StoreInfo]:
 
 
 class BoundedStore(Generic[Question, Answer]):
-    """The answers to the questions that were asked last.
+    """LRU cache from questions (keys) to answers, safe for threads.
 
-    Its answers are not part of what it is: a copy, and what another process gets, begins empty.
+    Copies and pickles of a cache are empty.
 
     Parameters
     ----------
     name : str
-        What its answers are; several stores may have one name, each with its own owner.
+        Name in `stores`; several caches may share one.
     most : int
-        Answers kept; the one that was asked for longest ago goes first.
+        Largest number of answers; the least recently used is dropped first.
     size : callable, optional
-        Returns how large answers are together; by default their size does not matter.
+        Returns the total size of some answers, in any unit.
     largest : float, optional
-        What that may come to.
+        Largest total size; no bound by default.
     """
 
     def __init__(
@@ -103,18 +103,28 @@ class BoundedStore(Generic[Question, Answer]):
         return type(self), (self.name, self.most, self._size, self._largest)
 
     def clear(self) -> None:
-        """Forget all."""
+        """Drop all answers and reset the statistics."""
         with self._lock:
             self._answers: OrderedDict[Question, Answer] = OrderedDict()
             self._hits = self._misses = 0
 
     def info(self) -> StoreInfo:
-        """Return how the store has served."""
+        """Return the cache's hits, misses, size and bound."""
         with self._lock:
             return StoreInfo(self._hits, self._misses, len(self._answers), self.most)
 
     def find(self, questions: Sequence[Question]) -> list[Answer | None]:
-        """Return the answer to each question, None where it is not known."""
+        """Look up answers, and mark them as recently used.
+
+        Parameters
+        ----------
+        questions : sequence of Question
+
+        Returns
+        -------
+        list of Answer or None
+            In the order of ``questions``; None for an answer that is not in the cache.
+        """
         with self._lock:
             answers = self._answers
             found: list[Answer | None] = []
@@ -129,7 +139,7 @@ class BoundedStore(Generic[Question, Answer]):
             return found
 
     def get(self, question: Question, make: Callable[[], Answer]) -> Answer:
-        """Return the answer to a question, made and kept where it is not known."""
+        """Return the answer to a question (key); on a miss call ``make`` and keep its result."""
         (answer,) = self.find([question])
         if answer is None:
             answer = make()
@@ -137,7 +147,7 @@ class BoundedStore(Generic[Question, Answer]):
         return answer
 
     def keep(self, answers: Iterable[tuple[Question, Answer]]) -> None:
-        """Add answers, and let those go that were not asked for longest."""
+        """Add pairs (question, answer), and drop the least recently used beyond the bounds."""
         with self._lock:
             for question, answer in answers:
                 self._answers[question] = answer
@@ -149,7 +159,15 @@ class BoundedStore(Generic[Question, Answer]):
 
 
 def stored(name: str, most: int) -> Callable[[Callable[Args, Answer]], Callable[Args, Answer]]:
-    """Keep a function's last answers, by its arguments, in a store of this name that it owns."""
+    """Return a decorator that caches a function's results by its arguments (memoisation, LRU).
+
+    Parameters
+    ----------
+    name : str
+        Name of the cache in `stores`.
+    most : int
+        Largest number of results. Arguments must be hashable.
+    """
 
     def owning(function: Callable[Args, Answer]) -> Callable[Args, Answer]:
         answers: BoundedStore[Hashable, Answer] = BoundedStore(name, most)

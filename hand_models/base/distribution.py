@@ -1,4 +1,4 @@
-"""The name that this distribution has where packages are installed, and its version."""
+"""Name of this distribution for package installers, and versions of installed distributions."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Final
 __all__ = ["DISTRIBUTION_NAME", "installed_version", "to_install"]
 
 DISTRIBUTION_NAME: Final = "crux-climb"
-"""The name ``crux`` belongs to another project on PyPI."""
+"""Name of this distribution; ``crux`` belongs to another project on PyPI."""
 
 
 def installed_version(package: str = DISTRIBUTION_NAME) -> str | None:
-    """Return the version of a distribution; None where it is not installed."""
+    """Return the version of the installed distribution ``package``; None if it is not installed."""
     # which takes long to load, and ``--help`` does without it
     from importlib.metadata import PackageNotFoundError, version
 
@@ -22,5 +22,5 @@ def installed_version(package: str = DISTRIBUTION_NAME) -> str | None:
 
 
 def to_install(extra: str) -> str:
-    """Return in words how an extra of this distribution is installed."""
+    """Return the instruction by which a user installs the optional dependencies ``extra``."""
     return f"in a checkout of {DISTRIBUTION_NAME}, pip install -e '.[{extra}]'"

@@ -1,4 +1,4 @@
-"""The project's exceptions: one base, and a class for each thing a caller can do about it."""
+"""Exceptions of the project: one base class, and a subclass for each way to react to the error."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ __all__ = [
 
 
 class CruxError(Exception):
-    """Base of every exception that the project raises on purpose.
+    """Base class of every exception that the project raises deliberately.
 
     Parameters
     ----------
     message : str
-        One line that names the field, the value and what would be valid.
+        One line that names the field, the value and the valid values.
     field : str, optional
-        Path of the field to blame, such as ``stance.hands[0].hold.diameter``.
+        Path of the invalid field, such as ``stance.hands[0].hold.diameter``.
 
     Attributes
     ----------
     kind : str
-        Short machine-readable class of the error; travels as ``error.kind``.
+        Short machine-readable class of the error, ``error.kind`` in replies.
     """
 
     kind = "error"
@@ -50,7 +50,10 @@ class CruxError(Exception):
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
     def within(self, parent: str) -> Self:
-        """Return the error with ``parent`` put before its field's path."""
+        """Prefix the error's field path with ``parent`` in place, and return the error.
+
+        ``hold`` within ``stance.hands[0]`` becomes ``stance.hands[0].hold``.
+        """
         if self.field is None:
             self.field = parent
         else:
@@ -69,38 +72,48 @@ class InvalidInputError(CruxError):
 
 
 class InvalidFieldError(InvalidInputError, ValueError):
-    """A part of a request that is impossible by itself.
+    """A part of a request that is invalid by itself.
 
-    As a ``ValueError`` of a struct that is being decoded, msgspec says where in the message it is.
+    Being a ``ValueError`` too, it can be raised while msgspec decodes a struct; msgspec then adds
+    the part's path in the message.
     """
 
 
 class UnsupportedError(InvalidInputError):
-    """A value that is meaningful, but that this version does not implement."""
+    """A value that is valid in principle, but that this version does not implement."""
 
     kind = "unsupported"
 
 
 class LimitError(InvalidInputError):
-    """A question that is meaningful, but would cost more than is allowed; it names the limit."""
+    """A valid question whose cost exceeds a limit of the program; the message names the limit."""
 
     kind = "limit"
 
 
 class EmptySetError(CruxError):
-    """A set of wrenches in which nothing is left: its rows contradict each other."""
+    """An empty set of wrenches or poses: its conditions contradict each other (infeasible)."""
 
     kind = "empty_set"
 
 
 class SolverError(CruxError):
-    """A numerical method that gave no answer which passes its checks."""
+    """A numerical method without a result that passes its checks."""
 
     kind = "solver"
 
 
 def check_positive(value: float, unit: str, field: str, most: float = sys.float_info.max) -> None:
-    """Refuse a number that is not above 0, or above the most; without that, what is not finite."""
+    """Raise `InvalidInputError` unless 0 < ``value`` ≤ ``most``.
+
+    Parameters
+    ----------
+    value : float
+    unit, field : str
+        Unit and field path for the message.
+    most : float, optional
+        Upper bound; by default the largest finite number, so that infinity and NaN are refused.
+    """
     if not 0.0 < value <= most:
         bound = "" if most >= sys.float_info.max else f" and at most {most:g}"
         raise InvalidInputError(f"must be above 0{bound} {unit}, got {value:g}", field=field)
@@ -108,7 +121,7 @@ def check_positive(value: float, unit: str, field: str, most: float = sys.float_
 
 @contextmanager
 def errors_under(path: str) -> Iterator[None]:
-    """Put a path before the field of an error."""
+    """Context manager that prefixes the field path of an `InvalidInputError` with ``path``."""
     try:
         yield
     except InvalidInputError as error:
@@ -117,7 +130,14 @@ def errors_under(path: str) -> Iterator[None]:
 
 @contextmanager
 def in_file(name: str) -> Iterator[None]:
-    """Put the name of a TOML file before an error of reading it, or of what it says."""
+    """Context manager that turns errors of reading a TOML file into errors that name the file.
+
+    Raises
+    ------
+    InvalidInputError
+        In place of an OSError, a UnicodeDecodeError, a RecursionError, a ValueError or an
+        InvalidInputError; its field is ``name``.
+    """
     try:
         yield
     except OSError as error:

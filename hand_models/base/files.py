@@ -1,4 +1,4 @@
-"""Files that are read, plain ones that end, and files that are written whole or not at all."""
+"""Read plain files with errors that name the file, and write files atomically."""
 
 from __future__ import annotations
 
@@ -14,12 +14,18 @@ __all__ = ["reading_file", "whole_file"]
 
 @contextmanager
 def reading_file(path: Path) -> Iterator[None]:
-    """Make of whatever a reader raises an error that names the file, unless it is the project's.
+    """Context manager that turns any error of a file reader into one that names the file.
+
+    Parameters
+    ----------
+    path : Path
+        Must be a plain file: a folder, pipe, socket or device is refused before reading.
 
     Raises
     ------
     InvalidInputError
-        The field is ``file`` unless the reader named another.
+        In place of every error of the reader that is not a `CruxError`. The field is ``file``
+        unless the reader named another.
     """
     _check_plain(path)
     try:
@@ -52,9 +58,10 @@ def _check_plain(path: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Yield where to write what is to be a file, which it becomes at the end.
+    """Context manager for an atomic write: yields a temporary path, renamed to ``path`` on success.
 
-    What is not a plain file, such as a device, is written itself.
+    On an error the temporary file is deleted and ``path`` stays as it was. A ``path`` that exists
+    and is not a plain file, such as a device, is yielded itself.
 
     Parameters
     ----------
@@ -63,7 +70,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        That names the path, whatever did not work; nothing is left of what was written then.
+        If writing or renaming fails; the error names ``path``.
     """
     if path.exists() and not path.is_file():
         part = target = path

@@ -1,4 +1,4 @@
-"""Poses and the transport of wrenches between frames.
+"""Poses, and the transport of wrenches between frames.
 
 Wrenches are ``[fx, fy, fz, mx, my, mz]``: force first, moment about the frame's origin, SI units.
 """
@@ -32,7 +32,15 @@ Indices = NDArray[np.intp]
 
 
 def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
-    """Return ``value`` as a float array of shape ``(size,)``.
+    """Return ``value`` as a float array of shape ``(size,)``, checked to be finite.
+
+    Parameters
+    ----------
+    value : array_like
+    size : int
+        Required length.
+    field : str
+        Field path for the error message.
 
     Raises
     ------
@@ -52,13 +60,13 @@ def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
 
 
 def skew(v: ArrayLike) -> Array:
-    """Return the matrix ``[v]×`` of shape (3, 3), so that ``[v]× w`` is the cross product."""
+    """Return the cross product matrix ``[v]×``, shape (3, 3), of a vector v: ``[v]× w = v × w``."""
     x, y, z = np.asarray(v, dtype=float)
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def turns_about(vectors: ArrayLike) -> Array:
-    """Return the rotations about vectors (..., 3) by their lengths [rad], shape (..., 3, 3)."""
+    """Return rotation matrices (..., 3, 3) of rotation vectors (..., 3): axis times angle [rad]."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_rotvec(np.asarray(vectors, dtype=float)).as_matrix())
@@ -66,7 +74,7 @@ def turns_about(vectors: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Pose of a child frame in its parent.
+    """Pose of a child frame in its parent frame.
 
     Attributes
     ----------
@@ -75,8 +83,8 @@ class Pose:
     rotation : ndarray, shape (3, 3)
         Columns are the child's axes in the parent.
     proper : bool
-        Whether it is known to be finite, its axes orthonormal and right-handed; then its arrays are
-        read-only. False where nobody has looked.
+        Whether the pose was checked: finite, axes orthonormal and right-handed, arrays read-only.
+        False for a pose that has not been checked.
     """
 
     position: Array
@@ -96,12 +104,19 @@ class Pose:
     def from_quaternion(
         cls, position: Sequence[float] | Array, orientation: Sequence[float] | Array
     ) -> Pose:
-        """Return the pose with a quaternion ``[x, y, z, w]``, normalised.
+        """Return the pose with a position and the orientation of a quaternion, which is normalised.
+
+        Parameters
+        ----------
+        position : sequence of float, length 3
+            Origin of the child in the parent [m].
+        orientation : sequence of float, length 4
+            Quaternion ``[x, y, z, w]``.
 
         Raises
         ------
         InvalidInputError
-            If a number is not finite or the norm is off by more than
+            If a number is not finite or the quaternion's norm differs from 1 by more than
             `BaseTolerances.unit_norm`.
         """
         q = finite_vector(orientation, 4, "orientation").tolist()
@@ -132,12 +147,18 @@ class Pose:
     def from_quaternions(
         cls, given: Iterable[tuple[str, Sequence[float] | Array, Sequence[float] | Array]]
     ) -> list[Pose]:
-        """Return the poses of fields, each its path, its position and its orientation.
+        """Return the poses of several fields of a message.
+
+        Parameters
+        ----------
+        given : iterable of (str, sequence of float, sequence of float)
+            Path of the field, position [m] and quaternion ``[x, y, z, w]`` of each pose.
 
         Raises
         ------
         InvalidInputError
-            As of `from_quaternion`; the field begins with the path.
+            If a number is not finite or a quaternion's norm is not 1; the error's field begins with
+            the path.
         """
         found = []
         for path, position, orientation in given:
@@ -148,7 +169,7 @@ class Pose:
         return found
 
     def quaternion(self) -> Array:
-        """Return the orientation as ``[x, y, z, w]``, shape (4,), with w ≥ 0."""
+        """Return the orientation as a unit quaternion ``[x, y, z, w]``, shape (4,), with w ≥ 0."""
         rows = self.rotation.tolist()
         trace = rows[0][0] + rows[1][1] + rows[2][2]
         # from the largest of its components, which is never small
@@ -165,29 +186,29 @@ class Pose:
         return np.array(q) * (math.copysign(1.0, q[3]) / math.hypot(*q))
 
     def inverse(self) -> Pose:
-        """Return the pose of the parent in the child."""
+        """Return the pose of the parent frame in the child frame."""
         return Pose(-self.rotation.T @ self.position, self.rotation.T)
 
     def __matmul__(self, other: Pose) -> Pose:
         return Pose(self.position + self.rotation @ other.position, self.rotation @ other.rotation)
 
     def apply(self, point: ArrayLike) -> Array:
-        """Return a point (or an array (n, 3) of points) of the child in the parent [m]."""
+        """Transform a point (3,) or points (n, 3) from the child frame to the parent frame [m]."""
         return np.asarray(point, dtype=float) @ self.rotation.T + self.position
 
 
 def wrench_transport(pose: Pose) -> Array:
-    """Return the matrix that carries a wrench from the child frame to the parent.
+    """Return the matrix that transforms a wrench from the child frame to the parent frame.
 
     Parameters
     ----------
     pose : Pose
-        The child in the parent.
+        The child in the parent: position p, rotation R.
 
     Returns
     -------
     ndarray, shape (6, 6)
-        ``Ad`` with ``f' = R f`` and ``m' = R m + p × R f``.
+        ``Ad``, with ``f' = R f`` and ``m' = R m + p × R f`` for the force f and the moment m.
     """
     transport = np.zeros((6, 6))
     transport[:3, :3] = transport[3:, 3:] = pose.rotation
@@ -200,14 +221,19 @@ SKEW_MATRICES: Final = np.stack([skew(axis) for axis in np.eye(3)])
 
 
 def wrench_transports(body: Pose, poses: Sequence[Pose]) -> Array:
-    """Return the matrices that carry wrenches from some frames to a body's, shape (n, 6, 6).
+    """Return the matrices that transform wrenches from n frames to a body's frame.
 
     Parameters
     ----------
     body : Pose
         The body in the world.
-    poses : sequence of Pose
+    poses : sequence of Pose, length n
         The frames in the world.
+
+    Returns
+    -------
+    ndarray, shape (n, 6, 6)
+        See `wrench_transport`.
     """
     inverse = body.rotation.T
     rotations = inverse @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)

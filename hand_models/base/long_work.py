@@ -1,4 +1,4 @@
-"""Report the progress of long work, and let a caller stop it, however deep its calls go."""
+"""Progress reports and cancellation of long computations, however deep their calls go."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from contextvars import ContextVar
 __all__ = ["Progress", "broken_off_by", "go_on"]
 
 Progress = Callable[[int, int], None]
-"""Callback that gets the number of steps done, and of all steps."""
+"""Callback that gets the number of steps done and the number of all steps."""
 
 _check: ContextVar[Callable[[], object] | None] = ContextVar("_check", default=None)
 
 
 @contextmanager
 def broken_off_by(check: Callable[[], object] | None) -> Iterator[None]:
-    """Let long work inside call this again and again; what it raises ends the work.
+    """Context manager that makes long work inside it cancellable.
+
+    `go_on` calls ``check`` again and again; an exception that ``check`` raises ends the work.
 
     Parameters
     ----------
     check : callable or None
-        None lets the work go on to its end.
+        Called without arguments; None lets the work run to its end.
     """
     token = _check.set(check)
     try:
@@ -31,7 +33,7 @@ def broken_off_by(check: Callable[[], object] | None) -> Iterator[None]:
 
 
 def go_on() -> None:
-    """Go on with long work, unless who asked for it breaks it off."""
+    """Check for cancellation of long work: call the check of the enclosing `broken_off_by`."""
     check = _check.get()
     if check is not None:
         check()

@@ -1,7 +1,7 @@
-"""Types of the fields of requests, for all packages: strict structs and bounded numbers.
+"""Field types of requests, shared by all packages: strict structs and bounded numbers.
 
-Bounds are far beyond any climbing robot; they keep arithmetic finite. They hold for messages:
-a part that is built in Python has the checks of its own class.
+The bounds are far beyond any climbing robot and keep arithmetic finite. They apply to messages; a
+part that is built in Python has the checks of its class.
 """
 
 from __future__ import annotations
@@ -36,4 +36,4 @@ Name = Annotated[str, Meta(max_length=64)]
 
 
 class Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A part of a request: an unknown field in it is an error."""
+    """Base class of the parts of a request; decoding a part with an unknown field is an error."""

@@ -1,4 +1,4 @@
-"""Base tolerances: what rooms count as equal, as zero or as exact, where nothing else is said."""
+"""Base tolerances: differences that count as zero, unless a room has tolerances of its own."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["BASE_TOLERANCES", "BaseTolerances"]
 
 @dataclass(frozen=True, slots=True)
 class BaseTolerances:
-    """Tolerances that rooms use as they are, or derive their own from."""
+    """Tolerances shared by all rooms (sub-packages), which use them directly or derive others."""
 
     length: float = 1e-9
     """A distance that is none [m]: far below any part of a hand, far above the rounding of it."""

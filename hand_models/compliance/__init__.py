@@ -1,4 +1,4 @@
-"""A settled hand, or a gripper, whose wrist gives way: loads, set, search, limits."""
+"""A hand or gripper with a compliant wrist: its loads, wrench space, pose search and limits."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,14 +1,16 @@
-"""The loads of fingers whose bases move a little while their tiles stay in the rock (Section 5.3).
+"""Loads of fingers whose bases move a little while their tiles stay in the rock (Section 5.3).
 
-    base (x, z, ψ) → contacts and joints (`resettling`) → tendon and shears (`tendon_regimes`)
+    base (x, z, ψ) → contacts and joints (`rolling`) → tendon and shears (`TendonRegimes`)
       → normals from the balance of the joints (Eqs. 4–7) → the force and moment on the rock.
 
-Shears follow the contact stiffness of each tile and the tendon's friction (Appendix 9.3); each
-joint's pulley has the tension t_i of its own phalanx, so that joint i balances when
+Shears follow the contact stiffness of each tile and the tendon's friction (Appendix 9.3). Joint i
+with its pulley radius r_i, spring K_i, preload p_i and the tension t_i of its own phalanx balances
+when
 
-    Σ_{j ≥ i} [T_j (d_ij × u_j) − N_j (d_ij × n_j)] + t_i r_i − K_i q_i − p_i = 0.
+    Σ_{j ≥ i} [T_j (d_ij × u_j) − N_j (d_ij × n_j)] + t_i r_i − K_i q_i − p_i = 0,
 
-All fingers of a hand, or of many hands, are found in one call; one finger is a batch of one.
+with the shear T_j along −u_j and the normal load N_j along n_j at the place d_ij from joint i.
+All fingers of a hand, or of many hands, are computed in one call; one finger is a batch of one.
 """
 
 from __future__ import annotations
@@ -29,27 +31,27 @@ from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, pad_til
 __all__ = ["CompliantFingers", "FingerAtRest", "FingerLoads"]
 
 COMPLEX_STEP = 1e-30
-"""Size of complex steps, whose error is its square."""
+"""Size of the complex steps for derivatives; their error is its square."""
 
 
 class FingerAtRest(NamedTuple):
-    """A finger at rest on rock, about which its base may move.
+    """A closed finger before its base moves: contacts, rock, tendon and shears.
 
     Attributes
     ----------
     finger : SettledFinger
-        Its proximal joint at the origin of F.
+        Posture and contacts, the proximal joint at the origin of the finger frame F.
     section : Section or None
-        The rock in its plane.
+        Rock in the finger's plane; None if there is none.
     tendon : FingerTendon
-        With the friction that holds the tendon. One more tile than phalanges if a base tile comes
-        first.
+        Tendon with the friction of holding, over n tiles: the three phalanges' and, if there is a
+        base tile, that tile first.
     closing_friction : float
         μ of the tendon on closing.
     shears : ndarray, shape (n, 2)
-        Of each tile at zero tension [N], and per newton of tension; the base tile's first.
-    depths : sequence of float
-        How far the tiles of the three phalanges are pressed in [m].
+        Shear of each tile at zero tension [N], and per newton of tension; the base tile's first.
+    depths : sequence of float, length 3
+        Depth to which each phalanx's tile is pressed into its bed of springs [m].
     """
 
     finger: SettledFinger
@@ -61,46 +63,46 @@ class FingerAtRest(NamedTuple):
 
     @property
     def base_tile(self) -> bool:
-        """True if a tile on its base comes first on the tendon."""
+        """True if a tile on the finger's base comes first on the tendon."""
         return len(self.shears) > len(PHALANGES)
 
     @property
     def losses(self) -> Array:
-        """Tension in each phalanx at rest, per newton of the motor's (Eq. 8), shape (n,)."""
+        """Tendon tension at each tile over the motor's tension at rest (Eq. 8), shape (n,)."""
         return np.asarray((1.0 - self.closing_friction) ** np.arange(len(self.shears), dtype=float))
 
     @property
     def anchored(self) -> FingerTendon:
-        """The tendon without tiles under which there is no rock."""
+        """The tendon, with zero contact stiffness for the tiles that are off the rock."""
         stiffness = np.array(self.tendon.contact_stiffness)
         stiffness[-len(PHALANGES) :] *= self.finger.touching
         return replace(self.tendon, contact_stiffness=tuple(stiffness.tolist()))
 
 
 class FingerLoads(NamedTuple):
-    """Loads of F fingers at m places of their bases, shapes (F, m, …).
+    """Loads of F fingers at m displacements of their bases, shapes (F, m, …).
 
     Attributes
     ----------
     shears : ndarray, shape (F, m, 3)
-        T of each phalanx's tile [N].
+        T, shear of each phalanx's tile [N].
     base_shears : ndarray, shape (F, m)
-        T of base tiles; zero of fingers without one [N].
+        Shear of each base tile; zero for fingers without one [N].
     normals : ndarray, shape (F, m, 3)
-        N of each phalanx [N].
+        N, normal load of each phalanx [N].
     tensions : ndarray, shape (F, m, 3)
-        t of each phalanx [N].
+        t, tendon tension in each phalanx [N].
     motor_tensions : ndarray, shape (F, m)
-        t of the first tile from the motor [N].
+        Tendon tension at the first tile from the motor [N].
     stop_torques : ndarray, shape (F, m, 3)
-        What turns each joint that no contact holds, closing [N·m].
+        Torque on the stop of each joint that no contact supports, positive toward closing [N·m].
     points : ndarray, shape (F, m, 3, 2)
-        Contacts (x, z) in F, which stays where the base was at rest [m].
+        Contacts (x, z) in the finger's frame at rest [m].
     directions : ndarray, shape (F, m, 3, 2)
-        Unit vectors in F along which tiles drag away from the base: along the phalanges, but for
-        contacts that press aside.
+        Unit vectors (x, z) in that frame, opposite to each tile's drag: along the phalanx, turned
+        by the contact's ``tilt``.
     reached : ndarray of bool, shape (F, m)
-        Whether every phalanx still finds its rock.
+        Whether every phalanx with a contact still meets rock.
     """
 
     shears: Numbers
@@ -114,19 +116,25 @@ class FingerLoads(NamedTuple):
     reached: NDArray[np.bool_]
 
     def of(self, finger: int) -> FingerLoads:
-        """Return the loads of one finger, shapes (m, …)."""
+        """Return the loads of the finger with the index ``finger``, shapes (m, …)."""
         return FingerLoads(*(part[finger] for part in self))
 
     @property
     def forces(self) -> Numbers:
-        """F of each phalanx on the rock, (x, z) in F, shape (..., 3, 2) [N]; no base tile's."""
+        """Force of each phalanx on the rock without the base tile's, shape (..., 3, 2) [N].
+
+        (x, z) in the finger frame F.
+        """
         u = self.directions
         across = np.stack([-u[..., 1], u[..., 0]], axis=-1)
         return np.asarray(self.normals[..., None] * across - self.shears[..., None] * u)
 
     @property
     def planar_wrench(self) -> Numbers:
-        """F_x, F_z and M, from x toward z about the origin of F, shape (..., 3) [N, N·m]."""
+        """Wrench of each finger in its plane on the rock, shape (..., 3) [N, N·m].
+
+        F_x, F_z and the moment M from x toward z about the origin of the finger frame F.
+        """
         forces, points = self.forces, self.points
         moments = points[..., 0] * forces[..., 1] - points[..., 1] * forces[..., 0]
         sums = [forces.sum(axis=-2), moments.sum(axis=-1)[..., None]]
@@ -134,13 +142,13 @@ class FingerLoads(NamedTuple):
 
 
 class CompliantFingers:
-    """Fingers at rest on rock, about which their bases may move.
+    """F fingers at rest on rock, as functions from displacements of their bases to loads.
 
     Parameters
     ----------
     fingers : sequence of FingerAtRest, length F
     scheme : {'held', 'tension'}
-        What the motors do.
+        Whether the motors stand still, or keep their tension, while the bases move.
     """
 
     def __init__(self, fingers: Sequence[FingerAtRest], scheme: MotorScheme) -> None:
@@ -172,16 +180,18 @@ class CompliantFingers:
         tension: Numbers,
         base_slip: Numbers | None = None,
     ) -> FingerLoads:
-        """Return the loads after displacements of the bases.
+        """Return the loads of the fingers after displacements of their bases.
 
         Parameters
         ----------
-        x, z, turn : ndarray, shape (F, m)
-            As of `RollingContact.move` [m, rad].
+        x, z : ndarray, shape (F, m)
+            Displacement of each proximal joint in the finger frame F [m].
+        turn : ndarray, shape (F, m)
+            ψ, rotation of each base from x toward z [rad].
         tension : ndarray, shape (F, m)
-            At which the fingers have closed [N].
+            Tension at which the fingers have closed [N].
         base_slip : ndarray, shape (F, m), optional
-            Of base tiles along the rock, toward the base [m]; zero by default.
+            Displacement of base tiles along the rock, toward the base [m]; zero by default.
         """
         posture = self._rolling.move(x, z, turn)
         first = 0.0 * posture.slips[..., 0] if base_slip is None else base_slip

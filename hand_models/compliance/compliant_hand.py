@@ -1,19 +1,18 @@
-"""A hand whose wrist gives way while its motors stand still (Sections 5.3 and 5.4).
+"""A hand whose wrist is compliant (Sections 5.3 and 5.4).
 
 The hand is settled and its tendons hold a preload. Then the wrist moves by a small twist
 ξ = (v, ω), of the hand frame about its origin at rest. In its plane each finger settles anew
-(`compliant_finger`); out of it, its tiles give as springs on a beam that leaves the base along the
-finger (Section 5.3: linear elasticity),
+(`compliant_finger`); across its plane the tiles are springs on a beam that leaves the base along
+the finger (Section 5.3: linear elasticity),
 
     Y = (F + diag(1 / k))⁻¹ y,    F_ij = ℓ_i² (3 ℓ_j − ℓ_i) / (6 EI) + h_i h_j ℓ_i / GJ,  ℓ_i ≤ ℓ_j,
 
-with y the displacement of each tile across the finger's plane, k the stiffness of its spines on the
-rock, ℓ its distance along the finger from the joint and h its distance from the finger's axis. The
-engaged palm tiles drag the rock as their tendon shares the load when the palm moves toward −x, and
-press on it when it moves into it; they neither push nor pull.
+with Y the lateral load of each tile, y its displacement across the finger's plane, k the stiffness
+of its spines on the rock, ℓ its distance along the finger from the joint and h its distance from
+the finger's axis. The engaged palm tiles drag the rock and share that load on their tendon when the
+palm moves toward −x, and press on the rock when the palm moves into it; they neither push nor pull.
 
-Forces and places are in H *at rest*: the tiles are anchored in the rock, and it is the rock's side
-that stays.
+Forces and places are in H *at rest*: the tiles are anchored in the rock, which does not move.
 """
 
 from __future__ import annotations
@@ -41,24 +40,24 @@ __all__ = ["CompliantHand", "CompliantHands", "HandLoads"]
 
 
 class HandLoads(NamedTuple):
-    """A hand's loads at m twists of its wrist; n tiles in the order of `SettledHand.tiles`.
+    """Loads of a hand at m twists of its wrist; n tiles in the order of `SettledHand.tiles`.
 
     Attributes
     ----------
     shears, normals, laterals : ndarray, shape (m, n)
-        [N]
+        Loads of each tile [N].
     tensions : ndarray, shape (m, 4)
-        Of each tendon where it leaves its motor [N].
+        Tension of each tendon at the first tile from its motor [N].
     stop_torques : ndarray, shape (m, k)
-        What pushes each joint at a limit, in the order of `SettledHand.stops`, against it [N·m].
+        Torque against the stop of each joint at a limit, in the order of `SettledHand.stops` [N·m].
     palm : ndarray, shape (m, 2)
-        Shear along −x and pressing [N].
+        Shear of the palm along −x of the hand frame H, and its pressing along +z [N].
     positions : ndarray, shape (m, n, 3)
-        Of the contacts, in H at rest [m].
+        Contacts in H at rest [m].
     axes : ndarray, shape (m, n, 3, 3)
         Rows: the unit force on the rock of shear, normal and lateral load, in H at rest.
     reached : ndarray of bool, shape (m,)
-        Whether every phalanx still finds its rock.
+        Whether every phalanx with a contact still meets rock.
     """
 
     shears: Numbers
@@ -78,14 +77,16 @@ class HandLoads(NamedTuple):
 
 
 class CompliantHand:
-    """A settled hand about which its wrist may move.
+    """A settled hand as a function from twists of its wrist to loads.
 
     Parameters
     ----------
     settled : SettledHand
-        Not one that clings with its nails.
+        Not in a fingernail grasp.
     preload : array_like, shape (4,), optional
-        Tensions that the tendons hold before the wrist moves [N]; the closing tension by default.
+        Tension of each tendon before the wrist moves [N]; the closing tension by default.
+    scheme : {'held', 'tension'}, optional
+        Whether the motors stand still, or keep their tension, while the wrist moves.
 
     Raises
     ------
@@ -158,14 +159,15 @@ class CompliantHand:
         return np.asarray(np.linalg.solve(np.eye(len(own)) + springs @ flexibility, springs))
 
     def loads(self, twists: Numbers, tensions: Numbers | None = None) -> HandLoads:
-        """Return every load at some twists of the wrist.
+        """Return every load of the hand at m twists of its wrist.
 
         Parameters
         ----------
         twists : ndarray, shape (m, 6)
-            [m, rad]
+            Displacement v and rotation ω of the hand frame H about its origin at rest [m, rad].
         tensions : ndarray, shape (m, 4), optional
-            At which the hand has closed before its wrist moves [N]; the preload by default.
+            Tension at which each finger has closed before the wrist moves [N]; the preload by
+            default.
         """
         closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
         bases = self._bases(range(len(FINGERS)), twists, closed if tensions is None else tensions)
@@ -206,12 +208,38 @@ class CompliantHand:
         )
 
     def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
-        """Return the loads of one finger in its plane at some twists of the wrist."""
+        """Return the loads of one finger in its plane at twists of the wrist.
+
+        Parameters
+        ----------
+        i : int
+            Index of the finger in `FINGERS`.
+        twists : ndarray, shape (m, 6)
+            [m, rad]
+
+        Returns
+        -------
+        FingerLoads
+            Shapes (m, …).
+        """
         closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
         return self._alone[i].loads(*self._bases([i], twists, closed)).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
-        """Return the lateral loads of a finger's tiles at some twists, shape (m, n_i) [N]."""
+        """Return the lateral loads of one finger's tiles at twists of the wrist.
+
+        Parameters
+        ----------
+        i : int
+            Index of the finger in `FINGERS`.
+        twists : ndarray, shape (m, 6)
+            [m, rad]
+
+        Returns
+        -------
+        ndarray, shape (m, n_i)
+            For the n_i tiles of the finger, from the base outward [N].
+        """
         v, turn, across = twists[:, :3], twists[:, 3:], self.frames[i].across
         places = self.settled.positions[self.tiles_of(i)]
         # b · (v + ω × p + ω × (ω × p) / 2) for all places p at once
@@ -221,7 +249,7 @@ class CompliantHand:
         return np.asarray((first + 0.5 * second) @ self._across[i].T)
 
     def tiles_of(self, i: int) -> Indices:
-        """Return the tiles of a finger."""
+        """Return the indices of finger ``i``'s tiles in `SettledHand.tiles`."""
         return self._own[i]
 
     def _bases(
@@ -251,19 +279,30 @@ class CompliantHand:
         return np.stack(pushing, axis=-1) if pushing else nothing
 
     def palm_loads(self, twists: Numbers) -> Numbers:
-        """Return what the palm's shear and pressing would be as two-sided springs, (m, 2) [N].
+        """Return the palm's shear and pressing as two-sided springs, shape (m, 2) [N].
 
-        Negative where the palm moves away and so carries nothing.
+        A load is negative where the palm moves away from the rock and so carries nothing.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, 6)
+            [m, rad]
         """
         return self.palm_travel(twists) * self.palm_stiffness
 
     def palm_travel(self, twists: Numbers) -> Numbers:
-        """Return how far the palm moves toward −x and into the rock, shape (m, 2) [m]."""
+        """Return the palm's travel toward −x and into the rock, (m, 2) [m], at twists (m, 6)."""
         moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
         return np.asarray(moved[:, ::2] * (-1.0, 1.0))
 
     def wrenches(self, loads: HandLoads) -> Numbers:
-        """Return the wrenches on the rock, about H at rest and in its axes, shape (m, 6)."""
+        """Return the wrenches of the hand on the rock for given loads.
+
+        Returns
+        -------
+        ndarray, shape (m, 6)
+            Force and moment in the hand frame H at rest [N, N·m].
+        """
         forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)
         moments = np.cross(loads.positions, forces).sum(axis=1)
         shear, pressing = loads.palm[:, 0], loads.palm[:, 1]
@@ -273,9 +312,19 @@ class CompliantHand:
         )
 
     def stiffness(self, twist: ArrayLike | None = None) -> Array:
-        """Return K_g = ∂w_g/∂x_g (Eq. 11) at a twist of the wrist, shape (6, 6).
+        """Return the stiffness K_g = ∂w_g/∂x_g (Eq. 11) of the hand at a twist of the wrist.
 
-        By complex steps: exact but for rounding. At a kink, of one of its sides.
+        By complex steps, exact but for rounding. At a kink, the stiffness on one of its sides.
+
+        Parameters
+        ----------
+        twist : array_like, shape (6,), optional
+            [m, rad]; at rest by default.
+
+        Returns
+        -------
+        ndarray, shape (6, 6)
+            Derivative of the wrench on the rock by the twist [N/m, N/rad, N, N·m/rad].
         """
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
         loads = self.loads(at + 1j * COMPLEX_STEP * np.eye(6))
@@ -283,7 +332,7 @@ class CompliantHand:
 
 
 class CompliantHands:
-    """Hands whose loads are found in one call, each about its own pose.
+    """Several compliant hands whose loads are computed in one call, each at its own twists.
 
     Parameters
     ----------
@@ -297,7 +346,15 @@ class CompliantHands:
         self._together = CompliantFingers(fingers, hands[0].scheme)
 
     def loads(self, twists: Sequence[Numbers], tensions: Sequence[Numbers]) -> list[HandLoads]:
-        """Return the loads of each hand; arguments as of `CompliantHand.loads`, m the same."""
+        """Return the loads of each hand at m twists of its wrist.
+
+        Parameters
+        ----------
+        twists : sequence of ndarray, shape (m, 6)
+            Twists for each hand [m, rad].
+        tensions : sequence of ndarray, shape (m, 4)
+            Tensions at which each hand's fingers have closed [N].
+        """
         count = len(FINGERS)
         each = [
             hand._bases(range(count), own, closed)
@@ -312,7 +369,10 @@ class CompliantHands:
 
 
 def own_shears(found: FingerLoads, count: int) -> Numbers:
-    """Return the shears of a finger's tiles, its base tile's first if there are so many, (m, n)."""
+    """Return the shears of a finger's tiles at m poses, shape (m, count) [N].
+
+    ``count``: 3, or 4 with a base tile, whose shear then comes first.
+    """
     if count == len(PHALANGES):
         return found.shears
     return np.concatenate([found.base_shears[:, None], found.shears], axis=1)

@@ -1,12 +1,12 @@
-"""A hand whose tendons are driven while its wrist gives way: its limits and its WrenchSpace.
+"""Wrench space of a hand with driven tendons and a compliant wrist.
 
 The hand has closed at the tensions f of its tendons; then its wrist moves by a twist ξ, and each
-motor keeps its tension. What a finger carries is affine in f at a given ξ and curved in ξ, so that
-the set linearised about y = (f, ξ) is exact there, and good for about 1 mm and 20 N around.
+motor keeps its tension. The loads are affine in f at a given ξ and curved in ξ, so that the set
+linearised about y = (f, ξ) is exact there, and a good approximation within about 1 mm and 20 N.
 
-The palm stands where the wrist has brought it: each tile presses by how far it has travelled past
-its gap, and drags by the wrist's travel toward −x. Both springs are rounded where they set in,
-½ k (d + √(d² + δ²)), so that a search sees them coming.
+Each palm tile presses by its travel past its gap to the rock, and drags by the wrist's travel
+toward −x. Both springs set in with the smooth law ½ k (d + √(d² + δ²)) (stiffness k, travel d,
+rounding δ), so that a search finds their gradient before contact.
 """
 
 from __future__ import annotations
@@ -30,11 +30,17 @@ from hand_models.wrench_spaces import Row, WrenchSpace
 __all__ = ["CompliantWrist", "CompliantWrists", "DrivenHand"]
 
 TENDONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
-"""Columns of a driven hand's tensions [N]."""
+"""Columns of a driven hand's set for its tendon tensions f [N]."""
 
 
 class DrivenHand(CompliantHand):
-    """A settled hand whose motors keep their tensions while its wrist moves."""
+    """A settled hand whose motors keep their tensions while its wrist moves.
+
+    Parameters
+    ----------
+    settled : SettledHand
+        Not in a fingernail grasp.
+    """
 
     def __init__(self, settled: SettledHand) -> None:
         super().__init__(settled, scheme="tension")
@@ -58,7 +64,9 @@ def _set_in(travel: Numbers, rounding: float) -> Numbers:
 
 
 class CompliantWrist(FloatingWrist):
-    """The limits of a hand whose tendons are driven and whose wrist settles.
+    """Limits and wrench space of a hand with driven tendons and a compliant wrist.
+
+    A pose y of this grasp is (f, ξ): four tendon tensions [N], then the wrist's twist [m, rad].
 
     Parameters
     ----------
@@ -66,6 +74,7 @@ class CompliantWrist(FloatingWrist):
     tension_limit : float, optional
         A caller's cap on every tendon [N].
     travel : WristTravel, optional
+        Range of the wrist's twist; the default range if left out.
     """
 
     columns = (*TENDONS, *WRIST_COLUMNS)
@@ -101,7 +110,7 @@ class CompliantWrist(FloatingWrist):
         return PALM_MODES[self.palm_carries and shear > 0.0, self.palm_carries and inward > gap]
 
     def without_palm(self) -> CompliantWrist:
-        """Return the same with a palm that carries nothing; both keep the same loads."""
+        """Return a copy whose palm carries no load; both share one cache of loads."""
         idle = copy(self)
         idle.palm_carries = False
         return idle
@@ -162,7 +171,7 @@ def _travel_rows() -> tuple[tuple[Row, ...], Array]:
 
 
 class CompliantWrists:
-    """The compliant wrists of a stance, whose loads are found in one call.
+    """Compliant wrists of a stance, whose loads are computed in one call.
 
     Parameters
     ----------
@@ -174,7 +183,13 @@ class CompliantWrists:
         self._hands = CompliantHands([wrist.hand for wrist in wrists])
 
     def prepare(self, poses: Sequence[Array]) -> None:
-        """Find what `CompliantWrist.linearised_each` needs of some poses of each, (k, 10)."""
+        """Compute and cache the loads that `CompliantWrist.linearised_each` needs at given poses.
+
+        Parameters
+        ----------
+        poses : sequence of ndarray, shape (k, 10)
+            Poses (f, ξ) for each wrist [N, m, rad].
+        """
         if all(map(CompliantWrist.knows, self.wrists, poses)):
             return
         steps = [np.concatenate([complex_steps(at) for at in own]) for own in poses]

@@ -1,10 +1,10 @@
-"""Largest load of a compliant grasp in a direction, by successive linear programs.
+"""Largest wrench of a compliant grasp in a direction, by successive linear programs.
 
-The limiting wrench in a direction d (Section 5.5.2) is a maximum of d · w(ξ) over the poses of the
-wrist at which nothing lets go. About a pose everything is linear: a linear program over a small box
-gives the next pose, and the box grows or shrinks with how well the program predicted the result.
-Near the maximum, which is most often a corner of as many limits as the pose has components, the
-poses converge quadratically. The set is not convex: the maximum is a local one.
+The limiting wrench in a direction d (Section 5.5.2) is a maximum of d · w(ξ) over the poses ξ of
+the wrist within every limit. A trust region method finds it: about a pose everything is linearised,
+a linear program over a small box gives the next pose, and the box grows or shrinks with how well
+the program predicted the result. Near the maximum, most often a corner of as many limits as the
+pose has components, convergence is quadratic. The set is not convex: the maximum is a local one.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ __all__ = ["Farthest", "farthest", "linear_extreme", "pose_units"]
 
 @dataclass(frozen=True, eq=False)
 class Farthest:
-    """Pose and wrench at which a grasp lets go in a direction.
+    """Limiting pose and wrench of a grasp in a direction.
 
     Attributes
     ----------
     twist : ndarray, shape (d,)
         Pose of the wrist [m, rad].
     wrench : ndarray, shape (6,)
-        Wrench on the rock there [N, N·m].
+        Wrench on the rock at that pose [N, N·m].
     reach : float
-        d · w.
+        Product of the direction and the wrench.
     limiting : Row or None
-        The limit that is nearest; None if only hard rows bound the search.
+        The limit that is reached; None if only hard rows bound the search.
     """
 
     twist: Array
@@ -44,7 +44,18 @@ class Farthest:
 
 
 def pose_units(columns: tuple[str, ...]) -> Array:
-    """Return the unit of each component of a pose, from its name [m, rad]."""
+    """Return the unit (scale) of each component of a pose: 1e-3 m, 1e-2 rad or 100 N.
+
+    Parameters
+    ----------
+    columns : tuple of str, length d
+        Names of the components: displacements ``wrist/v…``, rotations ``wrist/w…``, tensions
+        ``…/tension``.
+
+    Returns
+    -------
+    ndarray, shape (d,)
+    """
     units = {"v": 1e-3, "w": 1e-2, "t": 100.0}  # of displacements and turns of a wrist
     return np.array([units[name.split("/")[1][0]] for name in columns])
 
@@ -52,20 +63,20 @@ def pose_units(columns: tuple[str, ...]) -> Array:
 def farthest(
     grasp: CompliantGrasp, direction: ArrayLike, start: ArrayLike | None = None
 ) -> Farthest:
-    """Return the wrench farthest in a direction at which nothing lets go.
+    """Return the wrench farthest in a direction that is within every limit (a local maximum).
 
     Parameters
     ----------
     grasp : CompliantGrasp
     direction : array_like, shape (6,)
-        d.
+        Direction d of the wrench.
     start : array_like, shape (d,), optional
-        Pose to begin at; rest by default.
+        Pose of the wrist to begin at; zeros by default.
 
     Raises
     ------
     EmptySetError
-        If no pose near the way taken holds.
+        If no pose within the limits is found on the way.
     SolverError
         If a linear program fails.
     """
@@ -95,7 +106,20 @@ def farthest(
 
 
 def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, float]:
-    """Return the pose of a linearised set with the largest d · w, and that; None, −∞ if empty.
+    """Return the pose of a linearised set with the largest d · w, and that product.
+
+    Parameters
+    ----------
+    space : WrenchSpace
+    direction : ndarray, shape (6,)
+        Direction d of the wrench w.
+
+    Returns
+    -------
+    pose : ndarray or None
+        None if the set is empty.
+    reach : float
+        d · w; −∞ if the set is empty.
 
     Raises
     ------

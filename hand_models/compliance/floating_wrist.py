@@ -1,13 +1,14 @@
-"""A hand whose motors stand still while its wrist gives way: its WrenchSpace (Eqs. 9–13, 17).
+"""Wrench space of a hand whose motors stand still and whose wrist is compliant (Eqs. 9–13, 17).
 
-A twist ξ of the wrist loads every tile, and what the hand holds is everything that some twist gives
-without a tile letting go. That set is not convex and not a polyhedron. Linearised at a wrist pose
-ξ₀ it is one,
+A twist ξ of the wrist loads every tile, and the hand can exert every wrench that some twist gives
+without exceeding a limit. That set is neither convex nor a polyhedron. Linearised about a wrist
+pose ξ₀ it is a polyhedron,
 
     w = w_g(ξ₀) + K_g(ξ₀) (ξ − ξ₀),    f_t = f_t(ξ₀) + ∂f_t/∂ξ (ξ − ξ₀),
 
-with rows like those of a fixed wrist. The palm carries only where it moves against the rock, so
-each of its ways of carrying is a set of its own. A tendon's stick and slip stay as they are at ξ₀.
+(w the wrench, K_g the hand's stiffness, f_t the tendon tensions), with rows like those of a fixed
+wrist. The palm carries only where it moves against the rock, so each of its modes is a set of its
+own. A tendon's stick and slip stay as they are at ξ₀.
 """
 
 from __future__ import annotations
@@ -37,10 +38,12 @@ from hand_models.wrench_spaces import WrenchSpace
 __all__ = ["PALM_MODES", "WRIST_COLUMNS", "FloatingWrist", "PalmMode"]
 
 WRIST_COLUMNS: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/wy", "wrist/wz")
-"""Columns of a floating hand's set: the twist of the wrist about H at rest [m, rad]."""
+"""Columns of a floating hand's set: the twist of its wrist, of H about its origin at rest [m, rad].
+"""
 
 PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
-"""Ways in which a palm carries: not at all, by moving toward −x, into the rock, or both."""
+"""Mode in which a palm carries: not at all, by moving toward −x, by moving into the rock, or both.
+"""
 
 PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
     (False, False): "off",
@@ -53,17 +56,18 @@ PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
 
 @dataclass(eq=False)
 class FloatingWrist(CompliantGrasp):
-    """The limits of a compliant hand.
+    """Limits and wrench space of a hand with a floating wrist: motors stand still, the wrist moves.
 
-    Its loads e are the tiles' shears, normals and laterals, tensions, the palm's, torques on stops.
+    Its loads e are the tiles' shears, normals and laterals, the tensions, the palm's shear and
+    pressing, and the torques on stops.
 
     Attributes
     ----------
     hand : CompliantHand
     tension_limit : float, optional
-        A caller's cap on every tendon [N]; the hand's own maximum if that is less.
+        A caller's cap on every tendon [N]; the hand's maximum if that is less.
     palm : {'off', 'drags', 'presses', 'drags_and_presses'}
-        How the palm carries in linearised sets, if nothing else is said.
+        Default mode of the palm in linearised sets.
     """
 
     hand: CompliantHand
@@ -73,7 +77,7 @@ class FloatingWrist(CompliantGrasp):
     columns: ClassVar[tuple[str, ...]] = WRIST_COLUMNS
     range_rows = rows_of_range(WRIST_COLUMNS)
     driven: ClassVar[bool] = False
-    """Whether its motors keep the tensions that a plan asks for, instead of standing still."""
+    """Whether the motors keep the tensions that a plan asks for (True), or stand still (False)."""
 
     def __post_init__(self) -> None:
         self.layout = layout_of(self.hand.settled, sticking=False)
@@ -139,15 +143,38 @@ class FloatingWrist(CompliantGrasp):
         return LoadRows(layout.rows, P, p, held, s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at some poses of the wrist, shape (m, d)."""
+        """Return loads e and wrenches w at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses of the wrist: its twist, in a subclass other components too.
+        """
         return self._grasp_loads(self.hand_loads(twists))
 
     def closed_at(self, y: Array) -> Array:
-        """Return the tensions at which the hand has closed for a pose (d,), shape (4,) [N]."""
+        """Return the tensions at which the hand has closed, for a pose of the wrist.
+
+        Parameters
+        ----------
+        y : ndarray, shape (d,)
+            The pose; here the tensions are the hand's preload whatever it is.
+
+        Returns
+        -------
+        ndarray, shape (4,)
+            Tension of each tendon [N].
+        """
         return self.hand.preload
 
     def hand_loads(self, y: Numbers) -> HandLoads:
-        """Return the hand's loads at some poses of the wrist, shape (m, d)."""
+        """Return the loads of tiles, tendons and palm at poses of the wrist.
+
+        Parameters
+        ----------
+        y : ndarray, shape (m, d)
+            m poses of the wrist.
+        """
         return self.hand.loads(y)
 
     def _grasp_loads(self, loads: HandLoads) -> GraspLoads:
@@ -159,7 +186,10 @@ class FloatingWrist(CompliantGrasp):
         )
 
     def sieve(self, twists: Array) -> Indices:
-        """Return which twists pass the limits of each finger's tiles, one finger after another."""
+        """Return the indices of the poses (m, d) that satisfy the limits of all finger tiles.
+
+        Fingers are tested one after another, each only at the poses that passed before.
+        """
         rows, n, left = self.load_rows, len(self.hand.settled.tiles), np.arange(len(twists))
         for i in self.layout.engaged:
             own, phalanges = self.hand.tiles_of(i), self.hand.tiles_of(i)[-len(PHALANGES) :]
@@ -182,11 +212,19 @@ class FloatingWrist(CompliantGrasp):
         return left
 
     def palm_mode(self, y: Array, given: PalmMode) -> PalmMode:
-        """Return how the palm carries at a pose; a mode that the set was linearised in."""
+        """Return the mode in which the palm carries at a pose.
+
+        Parameters
+        ----------
+        y : ndarray, shape (d,)
+            The pose.
+        given : PalmMode
+            Mode in which the set was linearised; here it is returned as it is.
+        """
         return given
 
     def palm_modes(self) -> tuple[PalmMode, ...]:
-        """Return the ways in which the palm can carry."""
+        """Return the palm's modes, each with its set; ``off`` alone if no palm tile is engaged."""
         if not self.hand.settled.palm.engaged:
             return ("off",)
         return tuple(PALM_MODES.values())
@@ -197,32 +235,47 @@ class FloatingWrist(CompliantGrasp):
         palm: PalmMode | None = None,
         within: ArrayLike | None = None,
     ) -> WrenchSpace:
-        """Return the set linearised at a wrist pose.
+        """Return the wrench space linearised about a pose of the wrist.
 
         Parameters
         ----------
         twist : array_like, shape (6,), optional
-            ξ₀ [m, rad]; at rest by default.
+            ξ₀, twist of the wrist [m, rad]; at rest by default.
         palm : {'off', 'drags', 'presses', 'drags_and_presses'}, optional
-            How the palm carries; the attribute of that name by default.
+            Mode of the palm; the attribute ``palm`` by default.
         within : array_like, shape (6,), optional
-            How far from ξ₀ each component of ξ may go [m, rad]; by default as far as the rows let.
+            Largest change of each component of ξ from ξ₀ [m, rad], added as hard rows; no such rows
+            by default.
 
         Returns
         -------
         WrenchSpace
-            Columns `WRIST_COLUMNS`; rows as of a fixed wrist, with hard rows that keep the palm's
-            way of carrying, and the wrist within its range.
+            Columns `WRIST_COLUMNS`; the limit rows of a fixed wrist, and hard rows that keep the
+            palm in its mode and the wrist within its range.
         """
         return self.linearised_each(self._pose(twist)[None], palm, within)[0]
 
     def linearised_each(
         self, twists: Array, palm: PalmMode | None = None, within: ArrayLike | None = None
     ) -> list[WrenchSpace]:
-        """Return the sets linearised at wrist poses of shape (k, 6), as `linearised` has each.
+        """Return the wrench space linearised about each of k poses of the wrist.
 
-        Their loads are found at once. Those of the poses that were asked for last are kept: other
-        ways of the palm and other ranges change nothing about them.
+        The loads at all poses are computed at once, and cached by pose: other palm modes and other
+        ranges reuse them.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (k, d)
+            Poses of the wrist.
+        palm : {'off', 'drags', 'presses', 'drags_and_presses'}, optional
+            Mode of the palm; the attribute ``palm`` by default.
+        within : array_like, shape (d,), optional
+            Largest change of each component from its pose, added as hard rows.
+
+        Returns
+        -------
+        list of WrenchSpace, length k
+            Each as from `linearised`.
         """
         palm = palm or self.palm
         carries = next(np.array(ways) for ways, mode in PALM_MODES.items() if mode == palm)
@@ -252,11 +305,23 @@ class FloatingWrist(CompliantGrasp):
         return [loads for key in keys if (loads := known[key]) is not None]
 
     def knows(self, poses: Array) -> bool:
-        """Return whether the loads about all of some poses are kept."""
+        """Return True if the loads about all of k poses, shape (k, d), are in the cache."""
         return None not in self._kept.find([at.tobytes() for at in poses])
 
     def keep(self, poses: Array, loads: HandLoads) -> list[tuple[bytes, HandLoads]]:
-        """Keep the loads at the complex steps from some poses (k, d), and return those of each."""
+        """Put the loads at the complex steps from k poses into the cache, and return them by pose.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (k, d)
+        loads : HandLoads
+            Loads at the `complex_steps` from each pose, one pose after the other, k d in all.
+
+        Returns
+        -------
+        list of (bytes, HandLoads), length k
+            Cache key of each pose, and its d loads.
+        """
         each = [np.split(part, len(poses)) for part in loads]
         made = [(at.tobytes(), HandLoads(*own)) for at, *own in zip(poses, *each, strict=True)]
         self._kept.keep(made)

@@ -1,11 +1,12 @@
-"""A grasp whose wrist gives way: its wrenches and limits at poses, and the set about a pose.
+"""A grasp with a compliant wrist: its wrenches and limits at poses, and the set about a pose.
 
-A pose ξ of the wrist gives loads e (of tiles, tendons, the palm) and the wrench w on the rock.
-Limit rows are affine in loads, or of the wrench itself, and hard rows linear in loads,
+A pose ξ of the wrist determines the loads e (of tiles, tendons, the palm) and the wrench w on the
+rock. Limit rows are affine in the loads, or linear in the wrench, with capacities s at the
+utilisation u; hard rows are linear in the loads:
 
-    P e + p ≤ u s,    D w ≤ u s,    Q e ≤ q,
+    P e + p ≤ u s,    D w ≤ u s,    Q e ≤ q.
 
-so that with e and w linearised about a pose they are a `WrenchSpace`.
+With e and w linearised about a pose they are a `WrenchSpace`.
 """
 
 from __future__ import annotations
@@ -33,16 +34,16 @@ __all__ = [
 
 
 class GraspLoads(NamedTuple):
-    """Loads of a grasp at m poses of its wrist.
+    """Loads and wrenches of a grasp at m poses of its wrist.
 
     Attributes
     ----------
     elements : ndarray, shape (m, k)
-        e, in an order of the grasp's own.
+        e, k loads in the order that the class of the grasp describes.
     wrenches : ndarray, shape (m, 6)
-        On the rock [N, N·m].
+        w, wrench on the rock [N, N·m].
     reached : ndarray of bool, shape (m,)
-        Whether every phalanx still finds its rock.
+        Whether every phalanx with a contact still meets rock.
     """
 
     elements: Numbers
@@ -56,13 +57,13 @@ class LoadRows(NamedTuple):
     Attributes
     ----------
     names : tuple of Row
-        Limit rows, then hard rows: those of the loads first.
+        Limit rows of the loads, limit rows of the wrench, then hard rows.
     P, p : ndarray, shapes (n, k), (n,)
-        Loads of the limit rows P e + p.
+        Limit rows P e + p ≤ u s, utilisation u.
     D : ndarray, shape (nd, 6)
-        Of the limit rows after them, D w.
+        Limit rows D w ≤ u s.
     s : ndarray, shape (n + nd,)
-        Capacities of both.
+        Capacities of all limit rows, those of the loads first.
     Q, q : ndarray, shapes (nh, k), (nh,)
         Hard rows Q e ≤ q.
     """
@@ -82,13 +83,13 @@ class Evaluation(NamedTuple):
     Attributes
     ----------
     wrenches : ndarray, shape (m, 6)
-        On the rock [N, N·m].
+        Wrench on the rock [N, N·m].
     utilisation : ndarray, shape (m,)
-        The largest of all limit rows; infinite where a phalanx finds no rock.
+        Largest load over capacity of all limit rows; infinite where a phalanx meets no rock.
     limiting : ndarray of int, shape (m,)
-        That row.
+        Index of the limit row with the largest utilisation.
     violation : ndarray, shape (m,)
-        By how much the hard rows are broken at most; not above zero where they hold [N].
+        Largest violation of the hard rows; not above zero where all are satisfied [N].
     """
 
     wrenches: Array
@@ -98,21 +99,21 @@ class Evaluation(NamedTuple):
 
     @property
     def holds(self) -> NDArray[np.bool_]:
-        """Return whether nothing lets go at each pose, shape (m,)."""
+        """Return whether each pose is within every limit and hard row, shape (m,)."""
         return (self.utilisation <= 1.0) & (self.violation <= 0.0)
 
 
 class CompliantGrasp(ABC):
-    """A grasp that gives way: a whole hand, or a gripper in a plane.
+    """Interface of a grasp with a compliant wrist: a whole hand, or a gripper in a plane.
 
     Attributes
     ----------
     columns : tuple of str, length d
         Names of the components of a pose of its wrist.
     range_rows : tuple of Row, length 2 d
-        Their `rows_of_range`.
+        Hard rows that keep a pose within a range, from `rows_of_range`.
     load_rows : LoadRows
-        What its loads and wrenches must keep to.
+        Limit rows and hard rows of its loads and wrenches.
     """
 
     columns: ClassVar[tuple[str, ...]]
@@ -121,15 +122,27 @@ class CompliantGrasp(ABC):
 
     @abstractmethod
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches at wrist poses of shape (m, d)."""
+        """Return loads and wrenches at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses, real or with complex steps.
+        """
 
     @property
     def limits(self) -> tuple[Row, ...]:
-        """Limit rows, which `Evaluation.limiting` counts."""
+        """Limit rows, in the order that `Evaluation.limiting` indexes."""
         return self.load_rows.names[: len(self.load_rows.s)]
 
     def evaluate(self, twists: Array) -> Evaluation:
-        """Return wrenches and limits at wrist poses of shape (m, d)."""
+        """Return wrenches, utilisation and violations of limits at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses.
+        """
         rows, found = self.load_rows, self.loads_at(twists)
         lost = ~found.reached[:, None]
         with np.errstate(invalid="ignore"):
@@ -140,20 +153,29 @@ class CompliantGrasp(ABC):
         return Evaluation(found.wrenches, used.max(axis=1), used.argmax(axis=1), most)
 
     def sieve(self, twists: Array) -> Indices:
-        """Return which poses may hold, where some are sooner known not to; all by default."""
+        """Return the indices of the poses that may be within the limits, by a quick test.
+
+        All of them by default; a subclass may rule out poses before their full evaluation.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, d)
+            m poses.
+        """
         return np.arange(len(twists))
 
     def linearised(
         self, twist: ArrayLike | None = None, *, within: ArrayLike | None = None
     ) -> WrenchSpace:
-        """Return the set linearised at a pose.
+        """Return the wrench space linearised about a pose of the wrist.
 
         Parameters
         ----------
         twist : array_like, shape (d,), optional
-            ξ₀ [m, rad]; at rest by default.
+            ξ₀, pose of the wrist [m, rad]; at rest by default.
         within : array_like, shape (d,), optional
-            How far from ξ₀ each component of ξ may go [m, rad]; by default as far as the rows let.
+            Largest change of each component of ξ from ξ₀ [m, rad], added as hard rows; no such rows
+            by default.
         """
         at = self._pose(twist)
         none = np.zeros((0, len(at))), np.zeros(0)
@@ -164,7 +186,7 @@ class CompliantGrasp(ABC):
 
     @property
     def at_rest(self) -> Array:
-        """Pose at which the grasp is at rest, shape (d,)."""
+        """Pose of the wrist at rest, shape (d,)."""
         return np.zeros(len(self.columns))
 
     def _about(
@@ -199,12 +221,34 @@ class CompliantGrasp(ABC):
 
 
 def complex_steps(at: Array) -> Numbers:
-    """Return a pose d times, each with one component a complex step aside, shape (d, d)."""
+    """Return copies of a pose for complex-step derivatives.
+
+    Parameters
+    ----------
+    at : ndarray, shape (d,)
+        The pose.
+
+    Returns
+    -------
+    ndarray of complex, shape (d, d)
+        Row i is the pose with an imaginary step in component i.
+    """
     return np.asarray(at + 1j * COMPLEX_STEP * np.eye(len(at)))
 
 
 def slopes(values: Numbers) -> Array:
-    """Return the derivatives that complex steps have found, a column for each."""
+    """Return derivatives from function values at `complex_steps`.
+
+    Parameters
+    ----------
+    values : ndarray of complex, shape (d, k)
+        Value of the function, k numbers, at each of the d steps.
+
+    Returns
+    -------
+    ndarray, shape (k, d)
+        Column i is the derivative by component i.
+    """
     return np.asarray(values.imag.T / COMPLEX_STEP)
 
 
@@ -216,7 +260,10 @@ def _affine(values: Numbers, at: Array) -> tuple[Array, Array]:
 
 
 def rows_of_range(columns: tuple[str, ...]) -> tuple[Row, ...]:
-    """Return the hard rows that keep the components of a wrist's pose within a range."""
+    """Return the names of 2 d hard rows that keep a pose within a range, upper bounds first.
+
+    ``columns``: names of the d components of the pose.
+    """
     return tuple(
         Row(None, None, "wrist_range", "hard", f"wrist_range/{name.removeprefix('wrist/')}{sign}")
         for sign in "+-"

@@ -1,9 +1,9 @@
-"""The floating-wrist wrench space by search over poses of the wrist (Fig. 9).
+"""Wrench space of a compliant wrist by grid search over poses of the wrist (Fig. 9).
 
-A grid of poses is tried, those at which nothing lets go are kept, and the hull of their wrenches is
-the wrench space. As in the paper the search space is first reduced (`wrist_box`). The outermost
-poses are then pushed along rays from the middle until something lets go, so that the hull's corners
-lie on the boundary, and each names the phalanx and the finger that fail there.
+A grid of poses is tried, those within every limit are kept, and the convex hull of their wrenches
+is the wrench space. As in the paper the search space is first reduced (`search_box`). The outermost
+poses are then pushed along rays from the middle until a limit is exceeded, so that the hull's
+corners are on the boundary, and each names the phalanx and the finger whose limit it is.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from hand_models.wrench_spaces import WRENCH_SCALE, Row
 __all__ = ["PLANAR_COMPONENTS", "WristSearch", "boundary", "search"]
 
 PLANAR_COMPONENTS: Final = (0, 2, 4)
-"""Components F_x, F_z, M_y of a wrench, of a grasp that moves in a plane."""
+"""Indices of F_x, F_z and M_y in a wrench: the components of a grasp that moves in a plane."""
 
 
 @dataclass(frozen=True, eq=False)
 class WristSearch:
-    """The wrenches found.
+    """Boundary of a wrench space, found by search over poses of the wrist.
 
     Attributes
     ----------
     box : SearchBox
+        Box of poses that was searched.
     tried, held : int
-        Poses of the grid; those of them at which nothing lets go.
+        Count of the grid's poses, and of those within every limit.
     poses, wrenches : ndarray, shapes (n, d) and (n, 6)
-        On the boundary: extreme wrenches, and where the wrist is then [m, rad, N, N·m].
-    limiting : tuple of Row, length n
-        What lets go there first.
+        Poses of the wrist on the boundary [m, rad], and the wrenches on the rock there [N, N·m].
+    limiting : tuple of Row or None, length n
+        Limit that is exceeded just beyond each pose; None for a hard row or a phalanx without rock.
     """
 
     box: SearchBox
@@ -51,7 +52,7 @@ class WristSearch:
 
     @property
     def hull(self) -> scipy.spatial.ConvexHull:
-        """The hull of the wrenches, in newtons (moments over a length, `WRENCH_SCALE`).
+        """Convex hull of the wrenches [N], moments divided by a length (`WRENCH_SCALE`).
 
         Raises
         ------
@@ -67,27 +68,30 @@ class WristSearch:
             ) from None
 
     def support(self, direction: ArrayLike) -> float:
-        """Return max { d · w } over the hull, d of shape (6,)."""
+        """Return the support function of the convex hull: the largest d · w over its wrenches w.
+
+        ``direction``: d, shape (6,).
+        """
         return float((self.wrenches @ np.asarray(direction, dtype=float)).max())
 
 
 def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = None) -> WristSearch:
-    """Return the wrench space found by a grid of poses.
+    """Return the wrench space of a grasp by grid search over poses of its wrist.
 
     Parameters
     ----------
     grasp : CompliantGrasp
     per_axis : int
-        Poses along each axis.
+        Poses along each axis of the box, at least 2.
     progress : callable, optional
-        Called with the number of poses done and of all.
+        Called with the number of poses done and the number of all poses.
 
     Raises
     ------
     EmptySetError
-        If no pose of the grid holds.
+        If no pose of the grid is within every limit.
     InvalidInputError
-        If there are fewer than two poses along an axis.
+        If ``per_axis`` is below 2.
     """
     if per_axis < 2:
         raise InvalidInputError(f"must be at least 2, got {per_axis}", field="per_axis")
@@ -139,18 +143,20 @@ def _extremes(points: Array, directions: Array | None) -> Indices:
 def boundary(
     grasp: CompliantGrasp, box: SearchBox, rays: int, toward: Array | None = None
 ) -> WristSearch:
-    """Return the wrench space by rays from the middle of a box, evenly spread over its axes.
+    """Return the boundary of a wrench space by rays of poses from the middle of a box.
 
-    Finer than a grid of as many poses where the poses that hold are seen from the middle.
+    The rays are evenly spread over the box's axes. Finer than a grid of as many poses, if every
+    feasible pose is visible from the middle.
 
     Parameters
     ----------
     grasp : CompliantGrasp
     box : SearchBox
     rays : int
+        Count of rays.
     toward : ndarray, shape (k, 6), optional
-        Directions of the wrench in which the set is looked at more closely: about the rays that
-        reach farthest more are sent, ever nearer to them.
+        Directions of the wrench to refine: three rounds of further rays, ever closer about the two
+        rays that reach farthest in each direction.
     """
     d = len(box.centre)
     ways = _sphere(rays, d)

@@ -1,8 +1,9 @@
 """The paper's test gripper: two of the hand's fingers, opposed, on a frame in a plane (Sec. 6.2).
 
-Its frame G has z into the rock and x along one finger; the proximal joints are at ±b. Tensions are
-kept by springs at the tendons' ends (the scheme ``tension``). Its wrist pose is (x, z, ω_y): ω_y is
-about y = z × x, as in the contract, whose M_y is minus the paper's.
+Its frame G has z into the rock and x along the right finger; the proximal joints are at x = ±b.
+Springs at the tendons' ends keep the tensions (the scheme ``tension``). A pose of its wrist is
+(x, z, ω_y): ω_y is a rotation about y = z × x, as everywhere in `crux`, where M_y is minus the
+paper's.
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ from hand_models.tile import Surface, inner_half_planes
 __all__ = ["GRIPPER_SIDES", "Gripper", "gripper_table"]
 
 GRIPPER_SIDES: Final = ("right", "left")
-"""Fingers: the one along +x of G, and the one along −x."""
+"""Names of the fingers: the one along +x of G, and the one along −x."""
 
 
 def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
-    """Return the gripper's numbers: the hand's, the experiment's in their place, a caller's on top.
+    """Return the parameters of the gripper: the experiment's take the place of the hand's.
 
     Parameters
     ----------
     hand : ParameterTable, optional
-        A hand's table. Its entries that differ from the bundled ones count as the caller's.
+        A caller's hand table. Its entries that differ from the bundled ones take precedence.
     """
     bundled, gripper = hand_table(), experiment_table().sections["gripper"]
     table = ParameterTable({**bundled.sections, "gripper": gripper})
@@ -59,27 +60,28 @@ def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
 
 
 class Gripper(CompliantGrasp):
-    """Two opposed fingers on a round surface, their wrist free to move in the plane.
+    """Gripper of two opposed fingers on a round surface, its wrist free to move in the plane.
 
-    Its loads e are the tiles' shears, then their normals, the right side's first.
+    A pose is (x, z, ω_y) [m, m, rad]. The loads e are the tiles' shears, then their normals, the
+    right side's first.
 
     Parameters
     ----------
     diameter : float
-        Of the round surface, without what is mounted on it [m].
+        Diameter of the round surface, without what is mounted on it [m].
     tension : float
-        Of both tendons, at which they closed [N].
+        Tension at which both tendons closed [N].
     surface : Surface, optional
-        What a tile holds; the experiment's sandpaper by default.
+        Strength of a tile; the experiment's sandpaper by default.
     table : ParameterTable, optional
-        From `gripper_table`.
+        Parameters from `gripper_table`; the bundled ones by default.
     most_pressing : float, optional
-        Of the wrenches that count as held, the largest F_z; any by default [N].
+        Largest pressing force F_z that counts as within the limits [N]; any by default.
 
     Raises
     ------
     InvalidInputError
-        If a number is out of range, or the fingers do not all lie on the surface.
+        If a number is out of range, or a phalanx of a finger does not touch the surface.
     """
 
     columns = ("wrist/vx", "wrist/vz", "wrist/wy")
@@ -155,7 +157,18 @@ class Gripper(CompliantGrasp):
         )
 
     def finger_loads(self, twists: Numbers) -> tuple[FingerLoads, FingerLoads]:
-        """Return the loads of both fingers, right first, at wrist poses of shape (m, 3)."""
+        """Return the loads of both fingers at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, 3)
+            m poses (x, z, ω_y) [m, m, rad].
+
+        Returns
+        -------
+        tuple of FingerLoads
+            Right finger, left finger; shapes (m, …).
+        """
         x, z, turn = np.moveaxis(np.asarray(twists), -1, 0)
         # the joints are at (±b, −origin_height) of the origin; ω_y turns z toward x
         cosine, sine = np.cos(turn) - 1.0, np.sin(turn)
@@ -171,7 +184,19 @@ class Gripper(CompliantGrasp):
         return found.of(0), found.of(1)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
-        """Return loads and wrenches, about G's origin in the contract's signs, at wrist poses."""
+        """Return loads e and wrenches at poses of the wrist.
+
+        Parameters
+        ----------
+        twists : ndarray, shape (m, 3)
+            m poses (x, z, ω_y) [m, m, rad].
+
+        Returns
+        -------
+        GraspLoads
+            Wrenches on the rock about the origin of the gripper's frame G; only F_x, F_z and M_y
+            differ from zero.
+        """
         loads = self.finger_loads(twists)
         right, left = (side.planar_wrench for side in loads)
         wrenches = np.zeros((len(right), 6), dtype=right.dtype)
@@ -186,13 +211,24 @@ class Gripper(CompliantGrasp):
 
 
 def sandpaper(table: ParameterTable) -> Surface:
-    """Return what a tile holds on the experiment's sandpaper: T + k P ≤ T_max and T ≥ μ P."""
+    """Return a tile's strength on the experiment's sandpaper: T + k P ≤ T_max and T ≥ μ P.
+
+    T is the shear, P the pull-off, k the slope ``pull_off_slope`` and μ the friction of the table.
+    """
     limit = table.scalar("gripper", "shear_limit")
     return pulled_off(Surface.from_values({"shear_limit": limit}), table)
 
 
 def pulled_off(surface: Surface, table: ParameterTable) -> Surface:
-    """Return a surface with the pull-off slope and friction that the experiments ask for."""
+    """Return a surface with its pull-off limit and friction replaced by those of the experiments.
+
+    Parameters
+    ----------
+    surface : Surface
+        Supplies the shear and lateral limits.
+    table : ParameterTable
+        Parameters from `gripper_table`.
+    """
     slope = table.scalar("gripper", "pull_off_slope")
     angle = surface.pull_off_angle
     values = {

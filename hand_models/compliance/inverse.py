@@ -1,12 +1,13 @@
-"""Pose of the wrist that gives a wrench, by least squares on exact stiffnesses (5.4.2).
+"""Wrist pose for a given wrench: the inverse of a hand's compliance, by least squares (5.4.2).
 
     min |w − w_g(ξ)|² over ξ, forces in newtons and moments over a length,
 
-by Powell's dogleg steps with the exact K_g, which converge quadratically where the paper's gradient
+with w the given wrench and w_g(ξ) that of the wrist's pose ξ, by Powell's dogleg steps (a trust
+region method) with the exact stiffness K_g. They converge quadratically where the paper's gradient
 descent creeps, and turn toward the gradient at a kink (a contact that runs out of its tile, a
-tendon that begins to slip). Where steps go back and forth over the kink of the palm, which carries
-much or nothing, it is taken as carrying or free throughout, in each way in turn. Where all that
-fails, steps begin anew at a few other poses.
+tendon that begins to slip). Where steps go back and forth over the kink of the palm, the palm is
+taken as carrying or free throughout, in each combination in turn. Where all that fails, steps
+start again at a few other poses.
 """
 
 from __future__ import annotations
@@ -31,15 +32,16 @@ __all__ = ["WristPose", "wrist_pose"]
 
 @dataclass(frozen=True, eq=False)
 class WristPose:
-    """A pose of the wrist found for a wrench.
+    """Pose of the wrist that was found for a wrench.
 
     Attributes
     ----------
     twist : ndarray, shape (6,)
-        ξ about H at rest [m, rad].
+        ξ, twist of the hand frame H about its origin at rest [m, rad].
     residual : ndarray, shape (6,)
-        w − w_g(ξ) [N, N·m].
+        Given wrench minus the wrench at the pose, w − w_g(ξ) [N, N·m].
     converged : bool
+        Whether the residual is below the tolerance of forces.
     """
 
     twist: Array
@@ -54,12 +56,18 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
     ----------
     hand : CompliantHand
     wrench : array_like, shape (6,)
-        In H at rest [N, N·m].
+        Wrench on the rock, in the hand frame H at rest [N, N·m].
 
     Returns
     -------
     WristPose
-        The nearest that was found from rest on, if none is exact; limits are not looked at.
+        The first that converged, searched from rest outward; else that of least residual. Limits
+        are not checked.
+
+    Raises
+    ------
+    InvalidInputError
+        If the wrench is not six finite numbers.
     """
     wanted = finite_vector(wrench, 6, "wrench")
     # poses that steps begin anew at, up to so far from the first in `pose_units`

@@ -1,9 +1,9 @@
-"""A floating wrist's wrench space as a list of linearised sets.
+"""Wrench space of a compliant wrist as a union of linearised sets.
 
-One linearisation at rest is right near rest only. A few more, each at a pose where a wrench is
-limiting and each for the poses about it, together cover the whole: the union of the list comes as
-close to the exact set's support function as is asked, in the directions that were looked at. A
-program that is linear in each set may choose the one that serves it best.
+One linearisation at rest is valid near rest only. A few more, each about a limiting pose and for
+poses near it, together cover the whole: the union's support function comes as close to the exact
+set's as is asked, in the directions that were compared. A program that is linear in each set may
+choose the best one for its objective.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ __all__ = ["Piece", "PieceList", "pieces"]
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A set linearised at a pose, for poses about it.
+    """Wrench space linearised about a pose, for poses near it.
 
     Attributes
     ----------
     twist, within : ndarray, shape (d,)
-        The pose, and how far from it each component may go [m, rad].
+        The pose, and the largest change of each of its components [m, rad].
     space : WrenchSpace
     """
 
@@ -41,16 +41,16 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class PieceList:
-    """Pieces, and how well their union stands for the exact set.
+    """Linearised sets, and how closely their union approximates the exact wrench space.
 
     Attributes
     ----------
     pieces : tuple of Piece
-        The one at rest first.
+        The one about rest first.
     directions : ndarray, shape (n, 6)
-        In which supports were compared.
+        Directions of the wrench in which support functions were compared.
     exact, covered : ndarray, shape (n,)
-        Support of the exact set and of the union, both from the wrench at rest.
+        Support function of the exact set and of the union, both from the wrench at rest.
     """
 
     pieces: tuple[Piece, ...]
@@ -60,7 +60,7 @@ class PieceList:
 
     @property
     def error(self) -> float:
-        """The largest relative difference of supports."""
+        """Largest relative difference between the union's support function and the exact one."""
         return float(np.abs(self.covered / self.exact - 1.0).max())
 
 
@@ -71,24 +71,25 @@ def pieces(
     most: int = 64,
     progress: Progress | None = None,
 ) -> PieceList:
-    """Return linearised sets whose union has the exact set's support function.
+    """Return linearised sets whose union has nearly the support function of the exact wrench space.
 
     Parameters
     ----------
     grasp : CompliantGrasp
     directions : array_like, shape (n, 6)
-        In which supports are compared; the more, the surer that others agree as well.
+        Directions of the wrench in which support functions are compared; more of them make other
+        directions more certain.
     tolerance : float, optional
-        Largest relative difference that is aimed at.
+        Largest relative difference to aim for.
     most : int, optional
-        Pieces at most.
+        Largest number of pieces.
     progress : callable, optional
-        Called with the number of directions that have their exact limit, and of all.
+        Called with the number of directions done and the number of all directions.
 
     Raises
     ------
     EmptySetError
-        If no pose near rest holds.
+        If no pose near rest is within every limit.
     """
     box = search_box(grasp)
     at = np.zeros(len(box.centre))

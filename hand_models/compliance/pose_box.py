@@ -1,8 +1,8 @@
-"""Box in which the poses of a compliant grasp's wrist are searched, in axes of its own.
+"""Box in which the poses of a compliant grasp's wrist are searched.
 
-The axes are those of the ellipsoid about the set linearised at rest, and the range along each is
-that set's, or grows and shrinks with sparse grids until it just covers the poses that hold (the
-reduction of the search space of Fig. 9).
+Its axes are those of an ellipsoid about the set linearised at rest. Its range along each axis is
+that of the linearised set, or is adapted by sparse grids until the box just covers the feasible
+poses (the reduction of the search space of Fig. 9).
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ __all__ = ["SearchBox", "linear_box", "search_box"]
 
 @dataclass(frozen=True, eq=False)
 class SearchBox:
-    """Poses ``centre + axes · t`` with |t_i| ≤ range_i.
+    """Box of poses ``centre + axes · t`` with ``|t_i| ≤ range_i``, coordinates t of shape (d,).
 
     Attributes
     ----------
     centre : ndarray, shape (d,)
-        A pose that holds [m, rad].
+        A pose within every limit [m, rad].
     axes : ndarray, shape (d, d)
-        A column for each axis [m, rad].
+        One column for each axis of the box [m, rad].
     range : ndarray, shape (d,)
+        Largest size of the coordinate along each axis.
     """
 
     centre: Array
@@ -38,11 +39,23 @@ class SearchBox:
     range: Array
 
     def poses(self, t: Array) -> Array:
-        """Return poses of coordinates t, shape (m, d)."""
+        """Return the poses ``centre + axes · t`` for m coordinates ``t``, shape (m, d)."""
         return np.asarray(self.centre + t @ self.axes.T)
 
     def grid(self, per_axis: int, start: int, end: int) -> Array:
-        """Return coordinates of the grid's poses from one number to another, shape (m, d)."""
+        """Return coordinates t of some poses of a regular grid over the box.
+
+        Parameters
+        ----------
+        per_axis : int
+            Poses along each axis.
+        start, end : int
+            Indices of the first pose and after the last, of per_axis ** d poses.
+
+        Returns
+        -------
+        ndarray, shape (end − start, d)
+        """
         d = len(self.centre)
         numbers = np.unravel_index(np.arange(start, end), (per_axis,) * d)
         steps = np.stack(numbers, axis=-1) * (2.0 / (per_axis - 1)) - 1.0
@@ -50,14 +63,17 @@ class SearchBox:
 
 
 def linear_box(grasp: CompliantGrasp) -> SearchBox:
-    """Return the ellipsoid about the set linearised at rest, its range that set's.
+    """Return the box of the set linearised at rest: its ellipsoid's axes, its range.
 
-    Where neither its centre nor rest holds, it is linearised at the centre again.
+    If neither the ellipsoid's centre nor rest is within every limit, the set is linearised about
+    the centre, up to six times.
 
     Raises
     ------
     EmptySetError
-        If no pose near rest holds.
+        If no pose near rest is within every limit.
+    SolverError
+        If the linearised set has no centre.
     """
     at = np.zeros(len(grasp.columns))
     for _ in range(6):  # linearised again, until its middle holds
@@ -71,12 +87,14 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
 
 
 def search_box(grasp: CompliantGrasp) -> SearchBox:
-    """Return where to search: the ellipsoid about the linearised set, its range by sparse grids.
+    """Return the `linear_box` of a grasp, its range adapted to feasible poses by sparse grids.
 
     Raises
     ------
     EmptySetError
-        If no pose near rest holds.
+        If no pose near rest is within every limit.
+    SolverError
+        If the linearised set has no centre.
     """
     box = linear_box(grasp)
     centre = box.centre

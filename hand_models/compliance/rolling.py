@@ -1,13 +1,13 @@
-"""Settle a finger again when its base moves a little: it rolls on the rock where it touches.
+"""Posture of a finger whose base moves a little: the finger rolls on the rock where it touches.
 
-A settled finger's contacts are kept, and around each of them the rock is taken as the circle that
-fits it there (a straight line where it is flat or hollow). A phalanx whose face touches rolls on
+A settled finger's contacts are kept, and the rock near each of them is approximated by the circle
+that fits it (a straight line where rock is flat or hollow). A phalanx whose face touches rolls on
 that circle; one that touches with an edge of its tile, or lies flat, slides with that point. Both
-have a closed form, so that thousands of positions of the base are solved at once.
+have a closed form, so that thousands of poses of the base are solved at once.
 
-A face touches the circle where it is tangent to it, at c⁰. Where its force acts is the middle of
-the pressures of the bed that the tile rests on (`hand_models.finger.phalanx_gaps`), which an end of
-the tile may cut short: as c⁰ rolls, that goes with it, but never beyond the tile.
+A face touches the circle where it is tangent to it, at c⁰. Its force acts at the centre of pressure
+of the tile's bed of springs (`hand_models.finger.phalanx_gaps`), which an end of the tile may cut
+short: as c⁰ rolls, the centre of pressure goes with it, but never beyond the tile.
 
 With the base displaced by (x, z) in the coordinates F of the settled finger and turned by ψ from x
 toward z, phalanx i slips along the rock by
@@ -15,7 +15,7 @@ toward z, phalanx i slips along the rock by
     δx_i = δc⁰_i − δs_i,
 
 positive toward the finger's base, with c⁰ its contact from the joint and s the arc length of the
-contact on the rock; its tile, anchored in the rock, makes up for that (Section 5.3).
+contact on the rock; its tile, anchored in the rock, makes up for the slip (Section 5.3).
 
 All functions here also take complex numbers, so that derivatives are found by complex steps.
 """
@@ -38,24 +38,24 @@ from hand_models.sections import Section, Vector2
 __all__ = ["MovedPosture", "Numbers", "RollingContact", "bearing_angle"]
 
 Numbers = NDArray[Any]
-"""Real numbers, or complex ones of a complex step."""
+"""Array of real numbers, or of complex numbers for complex-step derivatives."""
 
 
 class MovedPosture(NamedTuple):
-    """F fingers after their bases have moved, shapes (F, m, 3) or (F, m, 3, 2).
+    """Postures of F fingers after m displacements of their bases, shapes (F, m, 3) or (F, m, 3, 2).
 
     Attributes
     ----------
     angles : ndarray
-        θ of each phalanx [rad].
+        θ, angle of each phalanx from x toward z of F [rad].
     turns : ndarray
-        δq of each joint, closing [rad].
+        δq, change of each joint's angle, closing [rad].
     slips : ndarray
         δx of each phalanx along the rock, toward the base; 0 without contact [m].
     joints, points : ndarray
         (x, z) in F of each joint and of each contact [m].
     reached : ndarray of bool, shape (F, m)
-        Whether every phalanx still finds its rock.
+        Whether every phalanx with a contact still meets rock.
     """
 
     angles: Numbers
@@ -67,7 +67,7 @@ class MovedPosture(NamedTuple):
 
 
 def bearing_angle(x: Numbers, z: Numbers) -> Numbers:
-    """Return the angle of (x, z) from x toward z, analytic in both [rad]."""
+    """Return the angle of the vector (x, z) from x toward z [rad]; valid for complex steps."""
     angle = np.arctan2(z.real, x.real)
     if not (np.iscomplexobj(x) or np.iscomplexobj(z)):
         return np.asarray(angle)
@@ -189,16 +189,16 @@ def _within_half_a_turn(angle: Numbers) -> Numbers:
 
 
 class RollingContact:
-    """Settled fingers whose bases may move.
+    """F settled fingers as functions from displacements of their bases to postures.
 
     Parameters
     ----------
     fingers : sequence of SettledFinger, length F
-        At rest, each with its proximal joint at the origin of its F.
+        Fingers at rest, each with its proximal joint at the origin of its F.
     sections : sequence of Section or None
-        The rock in each finger's plane, in its F; None if there is none.
+        Rock in each finger's plane, in its F; None if there is none.
     depths : array_like, shape (F, 3), optional
-        How far their tiles are pressed in; not at all by default [m].
+        Depth to which tiles are pressed into their beds of springs [m]; zero by default.
     """
 
     def __init__(
@@ -223,14 +223,14 @@ class RollingContact:
         self._spacing = np.array([finger.model.joint_spacing for finger in fingers])[:, None]
 
     def move(self, x: Numbers, z: Numbers, turn: Numbers) -> MovedPosture:
-        """Return fingers after displacements of their bases.
+        """Return the postures of the fingers after m displacements of their bases.
 
         Parameters
         ----------
         x, z : ndarray, shape (F, m)
-            Of the proximal joint in F [m].
+            Displacement of the proximal joint in the finger frame F [m].
         turn : ndarray, shape (F, m)
-            ψ of the base, from x toward z [rad].
+            ψ, rotation of the base from x toward z [rad].
         """
         jx = x + 0.0 * (z + turn)
         jz, base = z + 0.0 * jx, turn + 0.0 * jx

@@ -1,4 +1,4 @@
-"""Close fingers on the rock, and report how they ended."""
+"""Close fingers on the rock along their paths, and return their postures and loads at rest."""
 
 from __future__ import annotations
 
@@ -34,15 +34,17 @@ __all__ = ["ClosedFinger", "Refused", "cling", "close_all"]
 
 
 class ClosedFinger(NamedTuple):
-    """A finger at rest, and its loads as affine functions of tension.
+    """A finger at rest on the rock, and its loads as affine functions of the tendon's tension.
 
     Attributes
     ----------
     finger : SettledFinger
     shears, normals, torques : ndarray, shape (3, 2)
-        Of `SettledFinger.shears`, `normals` and `stop_torques`.
-    touches : tuple of float
-        Tensions at which phalanges first came to the rock; NaN for those that did not [N].
+        Shear and normal load of each phalanx, at zero tension [N] and per newton; torque on each
+        joint's stop, at zero tension [N·m] and per newton [m]. See `SettledFinger.shears`,
+        `SettledFinger.normals` and `SettledFinger.stop_torques`.
+    touches : tuple of float, length 3
+        Tension at which each phalanx first touched the rock [N]; NaN if it never did.
     """
 
     finger: SettledFinger
@@ -53,15 +55,15 @@ class ClosedFinger(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """A finger that cannot be where it is.
+    """Reason why a finger cannot close: rock inside the open finger, or no equilibrium found.
 
     Attributes
     ----------
     depth : float
-        Of the rock in the open finger [m]; zero where it does not come to rest.
+        Depth of the rock inside the open finger [m]; zero if no equilibrium was found.
     lift : float
-        Of the finger out of the rock, along −z of F, that would clear it; infinite if none up to
-        the length of a finger does, NaN where it is not looked for [m].
+        Distance along −z of the finger frame F by which the finger would have to be lifted clear of
+        the rock [m]; infinite if a finger's length is not enough, NaN if not searched for.
     """
 
     depth: float
@@ -69,7 +71,19 @@ class Refused(NamedTuple):
 
 
 def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused:
-    """Return the straight finger, which carries nothing but by its nail, if no rock is there."""
+    """Return a straight, unloaded finger that is to cling with its nail; refuse rock inside it.
+
+    Parameters
+    ----------
+    model : FingerModel
+    section : Section or None
+        Rock in the finger's plane, in the finger frame F; None if there is none.
+
+    Returns
+    -------
+    ClosedFinger or Refused
+        All joints at angle 0, all loads zero; or the depth of the rock inside the finger.
+    """
     joints, _ = fan_out(np.zeros(JOINT_COUNT), model.joint_spacing)
     places = [(joint.real, joint.imag) for joint in joints.tolist()]
     if section is not None:
@@ -84,17 +98,18 @@ def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused
 
 
 def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[ClosedFinger | Refused]:
-    """Close fingers on the rock, all together.
+    """Close n fingers on the rock together, along their paths (`hand_models.finger.closing`).
 
     Parameters
     ----------
     model : FingerModel
-    closings : sequence of OpenFinger
+    closings : sequence of OpenFinger, length n
 
     Returns
     -------
-    list of ClosedFinger or Refused
-        In order.
+    list of ClosedFinger or Refused, length n
+        In the order of ``closings``; `Refused` for a finger that starts inside the rock even with
+        its joints fully open, or that finds no equilibrium.
     """
     shape = PhalanxShape.of(model)
     sections = [closing.section for closing in closings]

@@ -4,29 +4,29 @@ A finger's state is the turn q of its three joints at a tendon's tension f. Join
 
     f M_i r_i − p_i − K_i q_i + Σ_{j ≥ i} (T_j a_ij − N_j b_ij) + λ_i = 0,
 
-with the torque of the tendon, that of its spring, those of what the rock does to the phalanges j,
-and λ_i of its stop. With g_j(q) the gap between phalanx j and the rock:
+the sum of the torques of the tendon (friction loss M_i, pulley radius r_i), of the joint's spring
+(preload p_i, stiffness K_i), of the shear T_j and the normal load N_j of each phalanx j (lever arms
+a_ij, b_ij), and of the joint's stop (λ_i). With g_j(q) the gap between phalanx j and the rock:
 
-- what touches presses: g_j ≥ 0, and N_j > 0 only where g_j = 0;
-- spines hold across a gap as well: as the tile comes within their travel they catch, by a share φ_j
-  that grows to one where it touches (`hand_models.tile`), and do not let it off again: g_j ≤ m_j,
-  the least gap that there was, with N_j < 0 only where g_j = m_j;
-- a tile whose phalanx has come to the rock is dragged by the tendon with T_j = φ_j M_j τ_j f; those
-  whose spines reach across a gap are as well, last of all, at the closing tension (Section 3.2);
-- spines hold as long as (T_j, N_j)/φ_j is within the surface's limit curve, and M_j τ_j f is, at
+- a phalanx that touches presses: g_j ≥ 0, and N_j > 0 only where g_j = 0;
+- spines hold across a gap as well: they catch as the tile comes within their travel, by a share φ_j
+  that grows to one at touch (`hand_models.tile`), and keep the gap from growing again: g_j ≤ m_j,
+  the least gap so far, with N_j < 0 only where g_j = m_j;
+- a tile whose phalanx has touched the rock is dragged by the tendon with T_j = φ_j M_j τ_j f; a
+  tile whose spines reach across a gap is dragged last, at the closing tension (Section 3.2);
+- spines hold as long as (T_j, N_j)/φ_j is within the surface's limit curve and M_j τ_j f is, at
   the closing tension, at least μ times their pull. Beyond that they are pulled off, all ψ_j = φ_j
-  of them, and neither drag nor hold until the phalanx has been off the rock and touches again.
-  Others catch as the tile comes nearer than that: their share is φ_j − ψ_j, in place of φ_j above.
+  of them, and neither drag nor hold until the phalanx has left the rock and touches again.
+  More spines catch as the tile comes nearer: their share is φ_j − ψ_j, in place of φ_j above.
 
-So closing is a complementarity problem in f, and at last in the share of the drag across gaps. It
-is followed in increments: from the springs at rest and no tension (fingers in whose way there is
-rock, from their lower limits), always as far as its linearisation holds. A joint stops at its
-limits.
+So closing is a complementarity problem in f, and after that in the share of the drag across gaps.
+It is followed in increments, each as far as its linearisation is valid, from zero tension with the
+springs at rest (fingers with rock in their way start at their joints' lower limits).
 
 Increments are those of *pseudo-transient continuation*: the joints are damped by D q̇, and D falls
 as the increments agree with their linearisation. With D = 0 they are Newton's. Where a state loses
-its stability, the damped joints leave it along the torques that then move them: what is reached is
-what a finger would come to that is tightened slowly.
+its stability, the damped joints leave it along the torques that then move them, so that the finger
+ends where one that is tightened slowly would.
 """
 
 from __future__ import annotations
@@ -56,22 +56,25 @@ __all__ = ["follow"]
 def follow(
     rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array
 ) -> tuple[PathState, Around, Flags]:
-    """Follow the paths of fingers that close, to the closing tension.
+    """Follow the closing paths of n fingers up to their closing tensions.
 
     Parameters
     ----------
     rock : Outlines
+        Rock in the plane of each finger.
     shape : PhalanxShape
     drive : Drive
     q : ndarray, shape (n, 3)
-        Where they begin [rad].
+        Joint angles at the start [rad].
 
     Returns
     -------
-    State, Around
-        Of fingers at the ends of their paths.
-    ndarray of bool, shape (n,)
-        Which of them have come to rest.
+    state : PathState
+        State of each finger at the end of its path.
+    around : Around
+        Gaps, engagement and lever arms there.
+    resting : ndarray of bool, shape (n,)
+        Whether each finger came to rest.
     """
     end, beside = state, around = PathState.at(q), Around.of(rock, shape, drive, q)
     resting, going = np.zeros(len(q), dtype=bool), np.arange(len(q))

@@ -1,8 +1,8 @@
-"""Pose of a finger that is laid on rock from its base.
+"""Posture of a finger that is laid on rock phalanx by phalanx, from the base outward.
 
-A finger has three joints, so three conditions fix it. Bottom-up, each phalanx turns until its face
-meets the rock; with all three on the rock this is the paper's closing (Section 5.1).
-`hand_models.finger.closing` finds how a finger comes to other states.
+A finger has three joints, so three conditions determine its posture. Each phalanx turns until its
+face meets the rock; with all three on the rock this is the paper's closing (Section 5.1).
+`hand_models.finger.closing` finds the other ways in which a finger can end its closing.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ __all__ = ["settle_finger"]
 def settle_finger(model: FingerModel, section: Section | None, joint: Vector2) -> SettledFinger:
     """Close a finger on a section of rock, phalanx by phalanx from the base.
 
-    Each phalanx turns until its face meets the rock. Where it meets it beyond its tile, the spines
-    at the tile's far edge reach across the gap, if it is within their travel; otherwise the bare
-    frame rests there and only presses. A face that lies flat is held by its tile's centre. A
-    phalanx that finds no rock within its joint's range stops at the upper limit, one that has rock
-    in its way at the lower one.
+    Each phalanx turns until its face meets the rock. Where the face meets rock beyond the tile, the
+    spines at the tile's far edge reach across the gap, if it is within their travel; otherwise the
+    bare frame rests there and only presses. A face that lies flat has its contact at the tile's
+    centre. A phalanx that finds no rock within its joint's range stops at the upper limit, and one
+    with rock already in its way at the lower limit.
 
     Parameters
     ----------
@@ -30,7 +30,12 @@ def settle_finger(model: FingerModel, section: Section | None, joint: Vector2) -
     section : Section or None
         Rock in the finger's plane, in the coordinates (x, z) of F; None if there is none.
     joint : tuple of float
-        The proximal joint in the same coordinates [m].
+        (x, z) of the proximal joint in F [m].
+
+    Returns
+    -------
+    SettledFinger
+        Contacts of the three phalanges; the tendon's balance is not checked.
     """
     contacts: list[Contact] = []
     before = 0.0

@@ -1,11 +1,11 @@
 """Loads that the tendon puts on a finger that rests on all its phalanges.
 
-The equations of `hand_models.finger.model` with every joint free: the distal one's holds the distal
-normal load alone, the middle one's that and its own, and so on, so that they are solved from the
-tip back.
+The equations of `hand_models.finger.model` with no joint at a limit: the distal joint's equation
+has the distal normal load alone, the middle joint's the distal and the middle one, and so on, so
+that back substitution from the tip solves them.
 
-What is affine in the tendon's tension is one complex number here: a + i b is a at zero tension [N],
-and b per newton.
+A load that is affine in the tendon's tension is one complex number a + i b: a at zero tension [N],
+b per newton of tension.
 """
 
 from __future__ import annotations
@@ -20,23 +20,29 @@ from hand_models.tile import Surface
 __all__ = ["stays", "tendon_loads"]
 
 Loads = tuple[list[complex], list[complex]]
-"""Shears and normal loads of a finger's phalanges, proximal first, affine in its tension."""
+"""Shears and normal loads of a finger's phalanges, proximal first: a + i b, affine in tension."""
 
 
 def tendon_loads(
     model: FingerModel, laid: Sequence[ClosedPhalanx], closing: float, base_tile: bool
 ) -> Loads | None:
-    """Return the loads of a finger; None if its contacts cannot hold it.
+    """Return shear and normal load of each phalanx; None if a contact is not beyond its joint.
 
     Parameters
     ----------
     model : FingerModel
-    laid : sequence of ClosedPhalanx
-        All its phalanges.
+    laid : sequence of ClosedPhalanx, length 3
+        All phalanges of the finger.
     closing : float
         Tension at which the tiles caught the rock [N].
     base_tile : bool
         Whether a base tile comes first on the tendon.
+
+    Returns
+    -------
+    tuple of list of complex, or None
+        Shears, then normal loads, proximal first: a + i b with a the load at zero tension [N] and
+        b the load per newton of tension. None unless every contact is beyond its joint.
     """
     if not all(each.along > 0.0 for each in laid):
         return None
@@ -64,7 +70,20 @@ def tendon_loads(
 
 
 def stays(loads: Loads, surface: Surface, tension: float) -> bool:
-    """Return True if no contact of a finger breaks at a tension."""
+    """Return True if no contact of a finger breaks at a tension.
+
+    A contact that is pulled off the rock breaks if its drag is less than μ times the pull, or if
+    its load is beyond the tile's strength at that angle. A tile that slips, its shear above the
+    surface's ``shear_limit``, keeps its contact.
+
+    Parameters
+    ----------
+    loads : tuple of list of complex
+        From `tendon_loads`.
+    surface : Surface
+    tension : float
+        Tension of the tendon [N].
+    """
     for t, n in zip(*loads, strict=True):
         normal = n.real + n.imag * tension
         if normal >= 0.0:

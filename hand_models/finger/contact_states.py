@@ -1,10 +1,10 @@
-"""Find what touches and holds in an increment of closing fingers: a complementarity problem.
+"""Find the contact states of closing fingers in one increment: a complementarity problem.
 
-Of a contact state, which phalanges are on the rock or held by their spines, which joints stand at
-their limits and which spines are caught, the linearised torques give the turns of the joints and
-the forces of the contacts (`hand_models.finger.closing`). What then pulls more than it holds, would
-be in the rock or beyond a limit is switched, and the state tried again: of those fingers alone that
-have switched anything.
+A contact state says which phalanges touch the rock or are held by their spines, which joints are at
+their limits, and which spines are caught. For a given contact state the linearised torques give the
+turns of the joints and the forces of the contacts (`hand_models.finger.closing`). Then every
+contact that pulls beyond its strength, every phalanx that would enter the rock and every joint that
+would pass a limit is switched, and the state is solved again, until nothing switches.
 """
 
 from __future__ import annotations
@@ -34,11 +34,23 @@ from hand_models.tile import pull_strength
 __all__ = ["Linearised", "contact_states", "forces_on"]
 
 CODE_DIGITS: Final = 3 ** np.arange(4 * JOINT_COUNT)
-"""Place values of the codes of a contact state, each of which is one of three."""
+"""Place values (base 3) that turn a contact state into one integer."""
 
 
 class Forces(NamedTuple):
-    """Torques on fingers [N·m], their slopes in f and their −∂/∂q, and the tiles' shears [N]."""
+    """Torques and shears of n fingers in their contact states, and derivatives of the torques.
+
+    Attributes
+    ----------
+    torque : ndarray, shape (n, 3)
+        Torque on each joint of springs, tendon and drag [N·m].
+    slope : ndarray, shape (n, 3)
+        Derivative of ``torque`` by the path parameter s [m].
+    stiffness : ndarray, shape (n, 3, 3)
+        −∂(torque)/∂q [N·m/rad], contact forces included, for the joint angles q.
+    shears : ndarray, shape (n, 3)
+        Shear of each tile [N].
+    """
 
     torque: Array
     slope: Array
@@ -47,30 +59,33 @@ class Forces(NamedTuple):
 
 
 class Linearised(NamedTuple):
-    """Fingers in their contact states, a row each.
+    """Linearised solution of n fingers in their contact states, a row for each finger.
 
     Attributes
     ----------
     mode, stop, spines : ndarray of int, shape (n, 3)
+        Contact of each phalanx, stop of each joint, spines of each tile; codes as in `PathState`.
     off : ndarray, shape (n, 3)
-        As of `PathState`.
+        ψ, share of each tile's spines that were pulled off.
     settled : ndarray of bool, shape (n,)
-        Whether nothing of that is to be switched any more.
+        Whether the contact state needs no further switch.
     active, caught : ndarray of bool, shape (n, 3)
-        Which phalanges have a contact that bears, and which spines are on the rock.
+        Whether each phalanx has a contact, and whether spines of its tile hold on the rock.
     torque, slope : ndarray, shape (n, 3)
+        Torque on each joint [N·m], and its slope per newton of the path parameter s [m].
     stiffness : ndarray, shape (n, 3, 3)
-        As of `Forces`.
+        −∂(torque)/∂q [N·m/rad].
     damped : ndarray, shape (n, 3, 3)
-        Stiffness with damping.
+        ``stiffness`` plus damping.
     turn, normals : ndarray, shape (n, 3, 2)
-        Of joints [rad] and of contacts [N]: now, and per newton of s.
+        Turns of the joints [rad] and normal loads of the contacts [N]: in this increment, and per
+        newton of s.
     size : ndarray, shape (n,)
         The largest turn [rad].
     clear : ndarray, shape (n,)
-        Part of the turn up to which no other phalanx comes to the rock, at most 1.
+        Part of the turn, at most 1, before another phalanx reaches the rock.
     gap : ndarray, shape (n, 3)
-        After it, as far as the stride allows [m].
+        Gaps after the part of the turn that ``clear`` and the stride allow [m].
     """
 
     mode: Codes
@@ -94,20 +109,24 @@ class Linearised(NamedTuple):
 def contact_states(
     drive: Drive, state: PathState, around: Around, least: Array, length: float, slack: float
 ) -> Linearised:
-    """Return the contact states in which fingers go on.
+    """Return the contact state of each finger for its next increment, with its linearised solution.
+
+    Active-set iteration: contacts are switched until they agree with their forces and gaps, 20
+    times at most.
 
     Parameters
     ----------
     drive : Drive
     state : PathState
-        Where they are, and with what contacts to begin.
+        Joint angles, and the contact states to begin with.
     around : Around
+        Gaps, engagement and lever arms at these angles.
     least : ndarray, shape (n, 3)
-        Gaps at which spines hold, infinite for those that are not caught [m].
+        Gaps that spines keep from growing, infinite for tiles without caught spines [m].
     length : float
-        Of a tile [m].
+        Length of a tile [m].
     slack : float
-        By how much a gap may be negative without being closed [m].
+        Tolerance on negative gaps [m].
     """
     rows = np.arange(len(state.s))
     found = own = _tried(drive, state, around, least, length, slack)
@@ -214,7 +233,20 @@ def _tried(
 
 
 def forces_on(drive: Drive, state: PathState, around: Around) -> Forces:
-    """Return the torques of springs, tendons and drag in their contact states."""
+    """Return the torques of springs, tendons and drag on fingers in their contact states.
+
+    Parameters
+    ----------
+    drive : Drive
+    state : PathState
+        Joint angles, path parameter and contact states.
+    around : Around
+        Gaps, engagement and lever arms at these angles.
+
+    Returns
+    -------
+    Forces
+    """
     mode, f = state.mode, np.minimum(state.s, drive.closing)[:, None]
     share = held_share(state, around)
     caught = share > 0.0

@@ -1,17 +1,18 @@
 """The fingernail: an ultrashort phalanx at each fingertip, for shallow edges (Section 3.2).
 
-It turns about a pin at the end of the distal phalanx, from straight ahead (ψ = 0) toward the rock,
-on the softest spring of the finger, so the tendon moves it first. Where it meets rock on its way it
-*hooks*, with its tip or with its flank on an edge; where it meets none it turns by 180° and is out
-of the way.
+The nail turns about a pin at the end of the distal phalanx, from straight ahead (ψ = 0) toward the
+rock, on the softest spring of the finger, so the tendon moves the nail first. Where the nail meets
+rock on its way it *hooks*, with its tip or with its flank on an edge; where it meets none it turns
+by 180° and is out of the way.
 
 To cling, the finger stays straight and only the nails carry. With w the unit vector along the nail
 and v the one across it, in which the tendon turns it, a nail that touches at the distance c from
 its pin loads the rock with F = P v − A w. P follows from the tendon's tension f by the balance
 about the pin; A goes through the pin and is passive. The rock, with its normal n (of the nail's
-flank where that touches), holds F by friction, and F must not close the finger: its joints stand
-on stops against opening (``assumed``; nothing is published), and tendon and nail both turn them.
-With joint i at q_i and the local tensions f_i of Eq. 8,
+flank where that touches), carries F by friction, and F must not close the finger: its joints are
+at stops against opening (``assumed``; nothing is published), and tendon and nail both turn them.
+With joint i at q_i, local tensions f_i of Eq. 8, pulley radii r, spring stiffnesses K and preloads
+p (index n for the nail), and the nail's friction μ_n,
 
     P = (f_n r_n − K_n ψ − p_n) / c,
     |F along the rock| ≤ μ_n · (F into the rock),
@@ -37,14 +38,14 @@ __all__ = ["Cling", "Fingernail", "Hook"]
 
 
 class Hook(NamedTuple):
-    """A nail on the rock, in the coordinates (x, z) of F.
+    """Contact of a nail with the rock, in the coordinates (x, z) of F.
 
     Attributes
     ----------
     angle : float
-        ψ from straight ahead toward the rock [rad].
+        ψ, angle of the nail from straight ahead toward the rock [rad].
     distance : float
-        c, of the contact from the pin [m].
+        c, distance of the contact from the nail's pin [m].
     normal : tuple of float
         Unit vector out of the rock.
     """
@@ -55,29 +56,29 @@ class Hook(NamedTuple):
 
     @property
     def along(self) -> Array:
-        """w, shape (2,)."""
+        """w, unit vector (x, z) along the nail from its pin, shape (2,)."""
         return np.array([math.cos(self.angle), math.sin(self.angle)])
 
     @property
     def across(self) -> Array:
-        """v, shape (2,)."""
+        """v, unit vector (x, z) across the nail, in which the tendon turns it, shape (2,)."""
         return np.array([-math.sin(self.angle), math.cos(self.angle)])
 
 
 class Cling(NamedTuple):
-    """A nail that hooks, and what rock and finger bear of it.
+    """A hooked nail, its force P, and the conditions under which rock and finger can carry it.
 
     Attributes
     ----------
     hook : Hook
     force : tuple of float
-        P, affine in the tendon's tension: at zero [N], per newton.
+        P, force across the nail: at zero tension [N], and per newton of the tendon's tension.
     H : ndarray, shape (6, 2)
-        The rock and the straight finger bear tension f and A where H (f, A) ≤ h. First three rows
-        of the friction cone, the first of them that the nail cannot pull, then those of the
-        joints, proximal first, in newtons at the nail's pin.
+        The nail stays hooked at the tendon tension f and the axial force A if H (f, A) ≤ h. Three
+        rows of the friction cone, the first of which keeps the nail from pulling on the rock, then
+        one row for each joint, proximal first, as a force at the nail's pin.
     h : ndarray, shape (6,)
-        [N]
+        Right-hand side of ``H`` [N].
     """
 
     hook: Hook
@@ -86,7 +87,10 @@ class Cling(NamedTuple):
     h: Array
 
     def lasts(self, tension: float) -> bool:
-        """Return True if the nail gets to its hook at a tension, and some A keeps it there."""
+        """Return True if at a tension [N] the nail reaches its hook and can stay hooked.
+
+        The nail stays hooked if some axial force A satisfies ``H (f, A) ≤ h`` at the tension f.
+        """
         if self.force[0] + self.force[1] * tension < 0.0:
             return False
         slope, left = self.H[:, 1], self.h - self.H[:, 0] * tension
@@ -98,20 +102,20 @@ class Cling(NamedTuple):
 
 @dataclass(frozen=True)
 class Fingernail:
-    """The nail's numbers, alike for the four fingers. SI units.
+    """Geometry, spring and friction of a nail; the four nails are alike. SI units.
 
     Attributes
     ----------
     length : float
-        From the pin to the tip [m].
+        Distance from the pin to the tip [m].
     pulley_radius : float
-        r_n [m].
+        r_n, radius of the nail's pulley [m].
     stiffness, preload : float
-        K_n [N·m/rad], p_n [N·m].
+        Spring stiffness K_n [N·m/rad] and spring preload p_n [N·m].
     retraction : float
-        How far it turns to be out of the way [rad].
+        Angle at which the nail is out of the way [rad].
     friction : float
-        μ_n of it on rock.
+        μ_n, friction of the nail on rock.
     """
 
     length: float
@@ -123,7 +127,7 @@ class Fingernail:
 
     @classmethod
     def from_table(cls, table: ParameterTable) -> Fingernail:
-        """Read the nail from ``hand.toml``.
+        """Read the nail's numbers from a table of ``hand.toml``.
 
         Raises
         ------
@@ -144,25 +148,34 @@ class Fingernail:
         return Face(1e-4, self.length, 0.0)
 
     def stuck(self, section: Section | None, pin: Vector2) -> bool:
-        """Return True if rock is in the nail's way before it turns; arguments as of `hook`."""
+        """Return True if rock is already in the way of a nail that points straight ahead.
+
+        Parameters
+        ----------
+        section : Section or None
+            Rock in the finger's plane, in the coordinates (x, z) of F; None if there is none.
+        pin : tuple of float
+            (x, z) of the nail's pin, the finger straight along x [m].
+        """
         if section is None:
             return False
         return section.face_clearance(complex(*pin), 1.0, self._face) <= 0.0
 
     def hook(self, section: Section | None, pin: Vector2) -> Hook | None:
-        """Turn the nail until it meets the rock.
+        """Turn the nail from straight ahead until its tip or flank meets the rock.
 
         Parameters
         ----------
         section : Section or None
-            Rock in the finger's plane, in the coordinates (x, z) of F; it is not `stuck` there.
+            Rock in the finger's plane, in the coordinates (x, z) of F; the nail is not `stuck`
+            there.
         pin : tuple of float
             (x, z) of the nail's pin, the finger straight along x [m].
 
         Returns
         -------
         Hook or None
-            None if there is no rock on its way.
+            None if the nail turns to ``retraction`` without meeting rock.
         """
         if section is None:
             return None
@@ -179,23 +192,24 @@ class Fingernail:
     def cling(
         self, section: Section | None, finger: SettledFinger, tension: float, base_tile: bool
     ) -> Cling | None:
-        """Return how the nail of a straight finger clings.
+        """Return the hook, force and conditions of a straight finger's nail that clings to rock.
 
         Parameters
         ----------
         section : Section or None
-            As of `hook`.
+            Rock in the finger's plane, in the coordinates (x, z) of F; None if there is none.
         finger : SettledFinger
+            The straight finger.
         tension : float
-            Of closing [N].
+            Closing tension [N].
         base_tile : bool
             Whether a base tile comes first on the tendon.
 
         Returns
         -------
         Cling or None
-            None if there is no rock on the nail's way, or the nail does not stay on it at the
-            closing tension without closing the finger.
+            None if the nail meets no rock, or if it cannot stay on the rock at the closing tension
+            without closing the finger.
         """
         hook = self.hook(section, finger.pin)
         if hook is None:

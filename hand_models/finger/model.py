@@ -1,13 +1,15 @@
-"""One finger on a section of rock: how it settles, and what its tendon then loads.
+"""Model of one finger: its numbers, its contacts with the rock, and the loads of its tendon.
 
 In the finger's frame F (x along the finger, z into the rock; coordinates (x, z) here) phalanx i
 points along u = (cos θ, sin θ) with its tile's normal n = (−sin θ, cos θ), and touches the rock at
-``p_i + c_i u + h n``. The tile drags the rock with the shear T along −u and presses it with N along
-n; the rock pushes back equally, so that joint i balances when (Eq. 4, written out)
+``p_i + c_i u + h n``: p_i the joint, c_i the contact's distance along the phalanx, h the tile's
+height. The tile drags the rock with the shear T along −u and presses it with N along n; the rock
+pushes back equally, so that joint i balances when (Eq. 4, written out)
 
     Σ_{j ≥ i} [T_j (d_ij × u_j) − N_j (d_ij × n_j)] + f M_i r_i − K_i q_i − p_i = 0,
 
-with d_ij from joint i to contact j and a × b = a_x b_z − a_z b_x. The shear follows the tendon
+with d_ij from joint i to contact j, a × b = a_x b_z − a_z b_x, the tendon's tension f, the pulley
+radius r_i, the joint's angle q_i and its spring K_i with preload p_i. The shear follows the tendon
 alone (Eq. 5 with a tile that has caught the rock): ``T_i = M_i (τ_i f_close + g (f − f_close))``.
 Solving for N gives both loads as affine functions of the tension f (Eq. 14).
 """
@@ -29,41 +31,43 @@ __all__ = ["JOINT_STOPS", "PHALANGES", "Contact", "FingerModel", "SettledFinger"
 PHALANGES = ("proximal", "middle", "distal")
 
 Stop = Literal["upper", "lower", "balance"]
-"""What holds a joint that no contact holds: its limit of closing or of opening, or nothing."""
+"""Reason why a joint without a contact is at rest: its upper (closing) limit, its lower (opening)
+limit, or a balance of tendon and spring between the limits."""
 
 JOINT_STOPS: Final[tuple[Stop | None, ...]] = (None, "upper", "lower", "balance")
-"""These by code; None where contacts hold it."""
+"""Values of `Contact.stop` by integer code; None if contacts support the joint."""
 
 
 @dataclass(frozen=True)
 class FingerModel:
-    """A finger's numbers, alike for the four of them. SI units.
+    """Geometry, springs and friction of a finger; the four fingers are alike. SI units.
 
     Attributes
     ----------
     joint_spacing : float
-        From a joint to the next [m].
+        Distance from a joint to the next [m].
     tile_height, tile_centre, tile_length : float
-        The tile's face above the joint's axis, its centre from the joint, its length [m].
-    pulley_radii, joint_stiffness, joint_preload : tuple of float
-        r [m], K_r [N·m/rad], p_r [N·m] of each joint.
-    joint_lower, joint_upper : tuple of float
-        Limits of each joint, relative to the phalanx before it [rad].
-    engagement : tuple of float
-        τ, shear over closing tension at the moment of closing.
+        Height of the tile's face above the joint's axis, distance of the tile's centre from the
+        joint along the phalanx, length of the tile [m].
+    pulley_radii, joint_stiffness, joint_preload : tuple of float, length 3
+        Pulley radius r [m], spring stiffness K [N·m/rad] and spring preload p [N·m] of each joint.
+    joint_lower, joint_upper : tuple of float, length 3
+        Limits of each joint's angle, relative to the phalanx before it [rad].
+    engagement : tuple of float, length 3
+        τ, shear of each tile over closing tension at the moment of closing.
     base_engagement : float
-        The same for the tile on a rotating base.
-    shear_gain : tuple of float
-        g = c_p k_c / (k_c + K_p) of each phalanx, shear per newton of further tension; a tile on a
-        rotating base has the proximal one's.
+        τ of the tile on a rotating base.
+    shear_gain : tuple of float, length 3
+        g = c_p k_c / (k_c + K_p) of each tile, shear per newton of further tension (c_p strands of
+        tendon, contact stiffness k_c, spring K_p); a tile on a rotating base has the proximal g.
     spine_travel : float
-        How far spines reach [m].
+        Distance that spines reach out of their tile [m].
     frame_radius : float
-        Of the bare phalanx about the line of its joints [m].
+        Radius of the bare phalanx about the line of its joints [m].
     bed_stiffness : float
-        Of the bed of springs that a tile rests on, per tile [N/m].
+        Stiffness of the bed of springs under a tile, per tile [N/m].
     friction : float
-        μ of M = diag(1, 1 − μ, (1 − μ)², …) (Eq. 8).
+        μ of the tendon between phalanges, in M = diag(1, 1 − μ, (1 − μ)², …) (Eq. 8).
     """
 
     joint_spacing: float
@@ -152,27 +156,37 @@ class FingerModel:
 
     @property
     def reach(self) -> float:
-        """Largest distance from its first joint at which a finger may touch anything [m]."""
+        """Largest distance from the proximal joint at which a finger may touch anything [m]."""
         return len(self.pulley_radii) * self.joint_spacing + self.tile_height
 
     @property
     def tile_range(self) -> tuple[float, float]:
-        """Begin and end of a tile's face along its phalanx [m]."""
+        """Begin and end of a tile's face, as distances along the phalanx from its joint [m]."""
         half = self.tile_length / 2.0
         return self.tile_centre - half, self.tile_centre + half
 
     def depths(self, base_tile: bool) -> Array:
-        """Return how far tiles are pressed into their beds per newton of tension, (3,) [m/N].
+        """Return how far the tendon presses each tile into its bed of springs.
 
-        By what the tendon presses with at the tiles' centres.
+        The tendon's normal force is taken to act at the tiles' centres.
+
+        Parameters
+        ----------
+        base_tile : bool
+            Whether a base tile comes first on the tendon.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            Depth of each phalanx's tile per newton of tension, proximal first [m/N].
         """
         pull = self.losses(base_tile) * np.asarray(self.pulley_radii)
         return np.asarray(pull / (self.tile_centre * self.bed_stiffness))
 
     def losses(self, base_tile: bool) -> Array:
-        """Return the diagonal of M (Eq. 8) for the three phalanges, shape (3,).
+        """Return M, each phalanx's tendon tension over the motor's (diagonal of Eq. 8), shape (3,).
 
-        A tile on the base comes first on the tendon, so it shifts the others by one.
+        ``base_tile``: whether a base tile comes first on the tendon (one more factor 1 − μ).
         """
         first = 1 if base_tile else 0
         return np.asarray((1.0 - self.friction) ** np.arange(first, first + 3))
@@ -180,28 +194,28 @@ class FingerModel:
 
 @dataclass(frozen=True)
 class Contact:
-    """One phalanx on the rock.
+    """Pose of one phalanx, and its contact with the rock in the coordinates (x, z) of F.
 
     Attributes
     ----------
     angle : float
-        θ, of the phalanx from the finger's x toward z [rad].
+        θ, angle of the phalanx from the finger's x toward z [rad].
     joint : tuple of float
-        (x, z) of its joint [m].
+        (x, z) of the phalanx's joint [m].
     along : float
-        c, of the contact from the joint along the phalanx [m].
+        c, distance of the contact from the joint along the phalanx [m].
     kind : {'face', 'edge', 'frame', 'none'}
-        Whether the tile touches with its face or with one of its edges (or its spines hold it to
-        the rock there), or the bare phalanx only presses, or nothing does.
+        Contact state: the tile touches with its face; with an edge (or its spines reach the rock
+        there); the bare phalanx presses on the rock; or there is no contact.
     stop : {'upper', 'lower', 'balance'} or None
-        The limit at which the joint stands, or ``balance`` where tendon and springs hold it without
-        any contact; None where the contacts hold it.
+        Limit at which the joint is, or ``balance`` if tendon and spring alone balance the joint;
+        None if contacts support the joint.
     rise : float
-        Of the contact above the tile's face; negative on the bare frame [m].
+        Height of the contact above the tile's face; negative on the bare frame [m].
     tilt : float
-        From the phalanx's normal to the direction in which it presses, as θ grows [rad].
+        Angle from the phalanx's normal to the direction in which it presses, positive as θ [rad].
     engagement : float
-        Share of the tile's spines that are on the rock, if it touches.
+        Spine engagement: share of the tile's spines on the rock, if the tile touches.
     """
 
     angle: float
@@ -214,7 +228,7 @@ class Contact:
     engagement: float = 1.0
 
     def point(self, height: float) -> tuple[float, float]:
-        """Return the contact's place (x, z); ``height``: of the face above the joint's axis [m]."""
+        """Return the contact's place (x, z) in F [m]; ``height``: of the tile's face [m]."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         height += self.rise
         return (
@@ -223,7 +237,7 @@ class Contact:
         )
 
     def end(self, spacing: float) -> tuple[float, float]:
-        """Return the place (x, z) of the next joint, ``spacing`` from this one [m]."""
+        """Return the place (x, z) of the next joint in F [m]; ``spacing``: of the joints [m]."""
         return (
             self.joint[0] + spacing * math.cos(self.angle),
             self.joint[1] + spacing * math.sin(self.angle),
@@ -232,13 +246,13 @@ class Contact:
 
 @dataclass(frozen=True)
 class SettledFinger:
-    """A finger that has closed on the rock.
+    """Posture and contacts of a finger that has closed on the rock.
 
     Attributes
     ----------
     model : FingerModel
-    contacts : tuple of Contact
-        Proximal first.
+    contacts : tuple of Contact, length 3
+        Contact of each phalanx, proximal first.
     """
 
     model: FingerModel
@@ -246,61 +260,65 @@ class SettledFinger:
 
     @cached_property
     def touching(self) -> tuple[bool, ...]:
-        """True for each phalanx that has rock under its tile."""
+        """True for each phalanx whose tile is on rock (contact state ``face`` or ``edge``)."""
         return tuple(contact.kind in ("face", "edge") for contact in self.contacts)
 
     @cached_property
     def engagement(self) -> Array:
-        """Share of each tile's spines that are on the rock, shape (3,)."""
+        """Spine engagement: share of each tile's spines on the rock, shape (3,)."""
         shares = np.array([contact.engagement for contact in self.contacts])
         return np.where(self.touching, shares, 0.0)
 
     @cached_property
     def bearing(self) -> tuple[int, ...]:
-        """Phalanges that bear: that press on rock with their tiles or frames, or are held to it."""
+        """Indices of the phalanges with a contact: pressed on rock, or held to rock by spines."""
         return tuple(i for i, contact in enumerate(self.contacts) if contact.kind != "none")
 
     @cached_property
     def free(self) -> tuple[int, ...]:
-        """Joints that contacts hold; as many as phalanges that bear, if any do."""
+        """Indices of the joints that contacts support; as many as `bearing`, if that is not ()."""
         return tuple(i for i, contact in enumerate(self.contacts) if contact.stop is None)
 
     @cached_property
     def joint_angles(self) -> Array:
-        """q, each joint relative to the phalanx before it, shape (3,) [rad]."""
+        """q, angle of each joint relative to the phalanx before it, shape (3,) [rad]."""
         return np.diff([0.0, *(contact.angle for contact in self.contacts)])
 
     @cached_property
     def points(self) -> Array:
-        """Contacts in (x, z) of F, shape (3, 2) [m]."""
+        """Places (x, z) of the contacts in the finger frame F, shape (3, 2) [m]."""
         return np.array([contact.point(self.model.tile_height) for contact in self.contacts])
 
     @cached_property
     def directions(self) -> Array:
-        """Unit vectors along which tiles drag away from the base, in (x, z) of F, shape (3, 2).
-
-        Along the phalanges, u, but for contacts that press aside of their normals.
-        """
+        """Unit vectors (x, z) in F opposite to tiles' drag, shape (3, 2): u turned by ``tilt``."""
         angles = [contact.angle + contact.tilt for contact in self.contacts]
         return np.column_stack([np.cos(angles), np.sin(angles)])
 
     @property
     def pin(self) -> tuple[float, float]:
-        """(x, z) of the fingernail's pin in F, at the end of the last phalanx [m]."""
+        """Place (x, z) in F of the fingernail's pin, at the end of the distal phalanx [m]."""
         return self.contacts[-1].end(self.model.joint_spacing)
 
     @property
     def chain(self) -> Array:
-        """The finger's joints and its end in (x, z) of F, shape (4, 2) [m]."""
+        """Places (x, z) in F of the three joints and of the finger's end, shape (4, 2) [m]."""
         return np.array([*(contact.joint for contact in self.contacts), self.pin])
 
     def shears(self, closing_tension: float, base_tile: bool = False) -> Array:
-        """Return each tile's shear as an affine function of tension.
+        """Return each tile's shear T as an affine function of the tendon's tension.
+
+        Parameters
+        ----------
+        closing_tension : float
+            Tension at which the tiles caught the rock [N].
+        base_tile : bool, optional
+            Whether a base tile comes first on the tendon.
 
         Returns
         -------
         ndarray, shape (3, 2)
-            Columns: at zero tension [N], per newton of tension. Zero where nothing is touched.
+            Columns: shear at zero tension [N], per newton of tension. Zero for tiles off the rock.
         """
         model = self.model
         local = self.engagement * model.losses(base_tile)
@@ -311,8 +329,8 @@ class SettledFinger:
     def normals(self, shears: Array, base_tile: bool = False) -> Array:
         """Return each phalanx's normal load as an affine function of tension (Eqs. 4 and 14).
 
-        A joint at its limit makes one link of the phalanges on both sides: its equation drops out,
-        as the load of a phalanx without contact does, and the rest is square again (Section 5.7).
+        A joint at its limit joins the phalanges on both sides to one link: the joint's equation and
+        the load of a phalanx without contact drop out, and the rest is square again (Section 5.7).
 
         Parameters
         ----------
@@ -324,12 +342,12 @@ class SettledFinger:
         Returns
         -------
         ndarray, shape (3, 2)
-            Columns as in `shears`.
+            Columns: normal load at zero tension [N], and per newton of tension.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            If the contacts cannot hold the joints that are free.
+            If the contacts cannot balance the joints that are not at a limit.
         """
         normals = np.zeros_like(shears)
         if self.bearing:
@@ -339,10 +357,20 @@ class SettledFinger:
         return normals
 
     def stop_torques(self, shears: Array, normals: Array, base_tile: bool = False) -> Array:
-        """Return what turns each joint against its limit, affine in tension, shape (3, 2) [N·m].
+        """Return the torque that each joint's end stop carries, affine in tension.
 
-        Toward closing, so that an upper stop holds a torque that is not negative and a lower one a
-        torque that is not positive; zero at a joint that contacts hold.
+        Parameters
+        ----------
+        shears, normals : ndarray, shape (3, 2)
+            From `shears` and `normals`.
+        base_tile : bool, optional
+            Whether a base tile comes first on the tendon.
+
+        Returns
+        -------
+        ndarray, shape (3, 2)
+            At zero tension [N·m], and per newton [m]. Positive toward closing: not negative at an
+            upper stop, not positive at a lower one, zero at a joint that contacts support.
         """
         if len(self.free) == len(self.contacts):
             return np.zeros_like(shears)

@@ -1,4 +1,4 @@
-"""Fingers on their paths as arrays: what moves them, their rock beside them, their state."""
+"""State of closing fingers, their drive and the rock around them: arrays with a row per finger."""
 
 from __future__ import annotations
 
@@ -41,25 +41,26 @@ Rows = TypeVar("Rows", bound=tuple[Any, ...])
 SEEN_POSES: Final = np.concatenate(
     [np.zeros((1, JOINT_COUNT)), SETTINGS.derivative_turn * np.eye(JOINT_COUNT)]
 )
-"""Turns of the joints at which a finger is looked at: itself, and with each joint turned."""
+"""Joint turns for finite differences: none, and each joint in turn by a small step [rad]."""
 
 LATER_PHALANGES: Final = np.triu(np.ones((JOINT_COUNT, JOINT_COUNT)))
-"""1 at (i, j) where phalanx j turns joint i: its own and those beyond."""
+"""1 at (i, j) where a force on phalanx j has a torque about joint i: j ≥ i."""
 
 UNIT_MATRIX: Final = np.eye(JOINT_COUNT)
 
 
 class OpenFinger(NamedTuple):
-    """A finger that is to close.
+    """A finger before closing: rock in its plane, surface and closing tension.
 
     Attributes
     ----------
     section : Section or None
-        Rock in the finger's plane, the proximal joint at its origin.
+        Rock in the finger's plane, with the proximal joint at the origin of the finger frame F;
+        None if no rock.
     surface : Surface
-        What the tiles hold.
+        Strength of the tiles on the rock.
     tension : float
-        At which the tiles catch the rock [N].
+        Closing tension, at which the tiles catch the rock [N].
     base_tile : bool
         Whether a base tile comes first on the tendon.
     """
@@ -71,22 +72,24 @@ class OpenFinger(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Torques, drags and limits that move n fingers; SI units.
+    """Tendon torques, springs, joint limits and tile strengths of n closing fingers.
 
     Attributes
     ----------
     pull, drag : ndarray, shape (n, 3)
-        M r, torque about each joint, and M τ, shear of each tile, per newton of tension.
+        M r, the tendon's torque about each joint per newton of tension [m]; M τ, the shear of each
+        tile per newton of tension.
     closing : ndarray, shape (n,)
-        Tension at the end.
+        Closing tension [N].
     depth : ndarray, shape (n, 3)
-        Depth to which tiles are pressed in.
+        Depth to which the closing tension presses tiles into their beds of springs [m].
     limits : ndarray, shape (n, 5)
-        `Surface.straight_law` and μ of the surfaces.
+        Strength of each finger's surface: f_max [N], f_min [N], φ_max [rad], exponent p and
+        friction μ.
     torque : ndarray, shape (n,)
-        Torque about the proximal joint at the closing tension.
+        The tendon's torque about the proximal joint at the closing tension [N·m].
     stiffness, preload, lower, upper : ndarray, shape (n, 3)
-        Of the joints.
+        Spring stiffness [N·m/rad], spring preload [N·m] and angle limits [rad] of the joints.
     """
 
     pull: Array
@@ -102,7 +105,19 @@ class Drive(NamedTuple):
 
     @classmethod
     def of(cls, model: FingerModel, closings: Sequence[OpenFinger]) -> Drive:
-        """Gather what moves fingers of one model."""
+        """Return the drive of fingers of one model.
+
+        Parameters
+        ----------
+        model : FingerModel
+        closings : sequence of OpenFinger, length n
+            The fingers' surfaces and closing tensions.
+
+        Returns
+        -------
+        Drive
+            Arrays with a row for each finger, in the order of ``closings``.
+        """
         losses = np.array([model.losses(closing.base_tile) for closing in closings])
         closing = np.array([closing.tension for closing in closings])
         pull = losses * np.array(model.pulley_radii)
@@ -125,23 +140,29 @@ class Drive(NamedTuple):
 
     @property
     def end(self) -> Array:
-        """Place of the ends of the fingers' paths along them; see `PathState` [N]."""
+        """Path parameter s (see `PathState`) at the end of each finger's path, shape (n,) [N]."""
         return (1.0 + SETTINGS.catching_part) * self.closing
 
 
 class Around(NamedTuple):
-    """Fingers beside their rock, with derivatives in q, the last axis of those.
+    """Gaps, engagement and lever arms of n fingers beside their rock, with derivatives in q.
+
+    q are the three joint angles; the last axis of a derivative counts them.
 
     Attributes
     ----------
     gap, share : ndarray, shape (n, 3)
-        g_j [m] and φ_j.
+        g_j, gap of phalanx j to the rock [m], and φ_j, share of its tile's spines on the rock.
     a, b : ndarray, shape (n, 3, 3)
-        a_ij and b_ij: torques about joint i of unit forces at contact j [m].
+        Lever arms [m]: the torque about joint i of contact j is T_j a_ij − N_j b_ij, for the shear
+        T_j and the normal load N_j.
     d_gap, d_share : ndarray, shape (n, 3, 3)
+        Derivatives of ``gap`` [m/rad] and ``share`` [1/rad].
     d_a, d_b : ndarray, shape (n, 3, 3, 3)
+        Derivatives of ``a`` and ``b`` [m/rad].
     place, push : ndarray of complex, shape (n, 3)
-        As of `Beside`.
+        Place of each contact's force [m] and its unit vector toward the rock, in the phalanx's
+        axes: real part along it, imaginary part above it.
     """
 
     gap: Array
@@ -157,7 +178,18 @@ class Around(NamedTuple):
 
     @classmethod
     def of(cls, rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array) -> Around:
-        """Look at fingers turned by q."""
+        """Return gaps, engagement and lever arms at joint angles, and their finite differences.
+
+        Parameters
+        ----------
+        rock : Outlines
+            Rock in the plane of each of the n fingers.
+        shape : PhalanxShape
+        drive : Drive
+            Supplies the depths to which tiles are pressed in.
+        q : ndarray, shape (n, 3)
+            Joint angles [rad].
+        """
         turn = SETTINGS.derivative_turn
         near = nearest_points(rock, shape, q, drive.depth, turn)
         joints, u = fan_out(q + SEEN_POSES[:, None], shape.end)
@@ -179,34 +211,34 @@ class Around(NamedTuple):
 
 
 class PathState(NamedTuple):
-    """Fingers on their paths, a row each.
+    """State of n fingers on their closing paths.
 
     Attributes
     ----------
     q : ndarray, shape (n, 3)
-        [rad]
+        Joint angles [rad].
     s : ndarray, shape (n,)
-        How far along they are: the tension, up to that of closing, and then, as far again as
-        `catching_part` of it, how much of their drag tiles across gaps have [N].
+        Path parameter [N]: the tension, from 0 to the closing tension; beyond that, up to
+        ``catching_part`` of the closing tension more, the drag on spines across gaps grows to full.
     mode, stop, spines : ndarray of int, shape (n, 3)
-        Off, on or held; +1 at an upper limit, −1 at a lower one, or 0; caught, pulled or lost (by
-        `ContactCodes`).
+        Contact of each phalanx: off, on or held. Stop of each joint: +1 at the upper limit, −1 at
+        the lower, else 0. Spines of each tile: caught, pulled or lost. Codes of `ContactCodes`.
     been : ndarray of bool, shape (n, 3)
-        Whether phalanges have come to the rock since spines have caught.
+        Whether the phalanx has touched the rock since its spines caught.
     off : ndarray, shape (n, 3)
-        ψ, share of spines that were pulled off and have not caught again.
+        ψ, share of the tile's spines that were pulled off and have not caught again.
     least : ndarray, shape (n, 3)
-        m, the least gap since spines have caught or, if they were pulled off, then [m].
+        m, least gap since the spines caught; after a pull-off, the gap at which it happened [m].
     normals : ndarray, shape (n, 3)
-        [N]
+        Normal load of each contact [N].
     touches : ndarray, shape (n, 3)
-        Tension at which each phalanx first came to the rock; NaN where it did not [N].
+        Value of ``s`` at which the phalanx first touched the rock [N]; NaN if it never did.
     damping, stride : ndarray, shape (n,)
-        D [N·m/rad], and how far joints may turn at once [rad].
+        Damping D of the joints [N·m/rad]; largest turn of a joint in the next increment [rad].
     step : ndarray, shape (n, 3)
-        Turn of the last increment [rad].
+        Turn of the joints in the last increment [rad].
     left : ndarray, shape (n, 3)
-        Torque that should be left after it by its linearisation [N·m].
+        Torque residual that the linearisation predicts after the last increment [N·m].
     """
 
     q: Array
@@ -226,7 +258,13 @@ class PathState(NamedTuple):
 
     @classmethod
     def at(cls, q: Array) -> PathState:
-        """Return fingers turned by q that begin to close."""
+        """Return the start of closing: no tension, no contact, all spines ready to catch.
+
+        Parameters
+        ----------
+        q : ndarray, shape (n, 3)
+            Joint angles of the open fingers [rad].
+        """
         n = len(q)
         return cls(
             q=q,
@@ -247,23 +285,46 @@ class PathState(NamedTuple):
 
 
 def held_share(state: PathState, around: Around) -> Array:
-    """Return the share of each tile's spines that hold on the rock, φ less ψ, shape (n, 3)."""
+    """Return the share of each tile's spines that grip the rock, φ − ψ, shape (n, 3).
+
+    φ: share on the rock (`Around.share`); ψ: share that was pulled off (`PathState.off`).
+    """
     return engaged_share(1.0 - around.share + state.off, 1.0)
 
 
 def take(rows: Rows, fingers: Indices | Flags) -> Rows:
-    """Return some fingers of a tuple of arrays with a row each."""
+    """Return some fingers' rows of every array in a tuple of arrays.
+
+    Parameters
+    ----------
+    rows : tuple of ndarray
+        Arrays with a row for each finger.
+    fingers : ndarray of int or bool
+        Indices of the fingers, or a mask.
+
+    Returns
+    -------
+    tuple of ndarray
+        Of the same type as ``rows``.
+    """
     return type(rows)(*(values[fingers] for values in rows))
 
 
 def put(rows: Rows, fingers: Indices, own: Rows) -> None:
-    """Set some fingers."""
+    """Overwrite in place the rows of some fingers in each array of ``rows`` by those of ``own``."""
     for values, its in zip(rows, own, strict=True):
         values[fingers] = its
 
 
 def choose(chosen: Flags, those: Rows, others: Rows) -> Rows:
-    """Return those for fingers that are chosen, others for the rest."""
+    """Return the rows of ``those`` where ``chosen`` is true and the rows of ``others`` elsewhere.
+
+    Parameters
+    ----------
+    chosen : ndarray of bool, shape (n,)
+    those, others : tuple of ndarray
+        Same type; every array has n rows.
+    """
     if not chosen.any():
         return others
     return type(those)(
@@ -275,11 +336,11 @@ def choose(chosen: Flags, those: Rows, others: Rows) -> Rows:
 
 
 def times(A: Array, x: Array) -> Array:
-    """Return A x of each finger."""
+    """Return the matrix–vector product A x of each finger: (n, i, j) times (n, j) is (n, i)."""
     return np.asarray((A @ x[..., None])[..., 0])
 
 
 def largest(values: Array) -> Flags:
-    """Return which value of each finger is the largest, if that is above zero."""
+    """Return a mask (n, 3), true at each row's largest value, if that value is above zero."""
     most = values.max(axis=1, keepdims=True)
     return np.asarray((np.arange(JOINT_COUNT) == values.argmax(axis=1)[:, None]) & (most > 0.0))

@@ -1,25 +1,24 @@
-"""Gaps between the phalanges of fingers and rock, and the places where they would press on it.
+"""Gaps between the phalanges of fingers and rock, and the places where contact forces act.
 
-A phalanx is a bar of circular section about its *axis*: straight under the tile, lifted by so much
-that the tile's face is flat at its height, and from the tile's far end on down to the next joint.
-So its tile is flat, its corners are round, and its end is a disc about the next joint, as the
-frame's radius makes them.
+A phalanx is a bar of circular section about its *axis*: straight under the tile, lifted so that
+the tile's face is flat at its height, and from the tile's far end on down to the next joint. So
+the tile is flat, its corners are round, and the phalanx ends in a disc about the next joint, with
+the frame's radius.
 
-Rock is points along its boundary, each with its length w. A point's depth g is its distance from
-the axis less the bar's radius. Phalanx and rock touch when g is zero somewhere; so that this does
-not jump from one bump to another as the phalanx turns, the *gap* is the level h to which a bed of
-springs between them would sink that takes a small, fixed energy,
+Rock is a set of points along its boundary, each with its length w. A point's depth g is its
+distance from the axis less the bar's radius. Phalanx and rock touch where g is zero. So that the
+contact does not jump from one bump to another as the phalanx turns, the *gap* is the level h to
+which a bed of springs between phalanx and rock would sink under a small, fixed energy,
 
     Σ w max(0, h − g)² = tile length × fine²,
 
 less ``fine``: zero for a face that lies flat, and within a few ``fine`` of the least g elsewhere.
 
-**Where a contact's force acts.** A tile rests on what gives: on a bed of springs that is pressed in
-by ``depth`` beyond where it first touches. With p = w max(0, gap + depth − g) the force acts at
-the mean, weighted by p, of the places of the phalanx that points are nearest to, along the mean of
-their directions: in the middle of a face that lies flat, at the place of least distance on rock
-that bends away on both sides, at the face's end where the face stands on that. It goes from one to
-the other without a jump.
+**Where a contact's force acts.** A tile rests on a bed of springs that is pressed in by ``depth``
+beyond first touch. With p = w max(0, gap + depth − g) the force acts at the mean, weighted by p,
+of the places of the phalanx nearest to the rock's points, along the mean of their directions: in
+the middle of a face that lies flat, at the place of least distance on rock that bends away on both
+sides, at the face's end on rock under that end. The place changes without a jump.
 """
 
 from __future__ import annotations
@@ -50,18 +49,21 @@ Values = TypeVar("Values", Array, Complexes)
 
 
 class Beside(NamedTuple):
-    """Phalanges beside rock, shape (...); in a phalanx's axes, along + i above.
+    """Gap and contact force of phalanges beside rock, arrays of one shape (...).
+
+    Complex numbers are (along, above) in the phalanx's axes: real part along it from its joint,
+    imaginary part toward the rock.
 
     Attributes
     ----------
     gap : ndarray
-        From phalanx to rock, negative where it stands in it [m].
+        Distance from phalanx to rock [m]; negative where rock is inside the phalanx.
     tile_gap : ndarray
-        From the tile's face alone [m].
+        Distance from the tile's face to the rock [m].
     place : ndarray of complex
-        Where the force of a contact acts [m].
+        Place where the contact's force acts [m].
     push : ndarray of complex
-        Unit vector toward the rock along which it acts.
+        Unit vector of the contact's force, toward the rock.
     """
 
     gap: Array
@@ -71,18 +73,18 @@ class Beside(NamedTuple):
 
 
 class NearPoints(NamedTuple):
-    """Points of rock that phalanges may press on, one phalanx after the other.
+    """Points of rock that phalanges may press on, sorted by phalanx.
 
     Attributes
     ----------
     points : ndarray of complex, shape (p,)
-        [m]
+        x + i z of each point in its finger's F [m].
     lengths : ndarray, shape (p,)
-        [m]
+        Length w of the rock's boundary that each point represents [m].
     phalanx : ndarray of int, shape (p,)
-        Each one's.
+        Index of each point's phalanx.
     first : ndarray of int
-        Where those of each phalanx begin; every one has some.
+        Index of the first point of each phalanx; every phalanx has at least one point.
     """
 
     points: Complexes
@@ -91,7 +93,7 @@ class NearPoints(NamedTuple):
     first: Indices
 
     def of_poses(self, count: int) -> NearPoints:
-        """Return those of so many poses of all phalanges, one after the other."""
+        """Return the points repeated for ``count`` poses of all phalanges, pose after pose."""
         poses = np.arange(count)[:, None]
         return NearPoints(
             np.tile(self.points, count),
@@ -101,30 +103,30 @@ class NearPoints(NamedTuple):
         )
 
     def sums(self, values: Values) -> Values:
-        """Return the sum over the points of each phalanx."""
+        """Return the sum of values (p,) over the points of each phalanx, one number per phalanx."""
         total: Values = np.add.reduceat(values, self.first)
         return total
 
     def least(self, values: Array) -> Array:
-        """Return the least of the points of each phalanx."""
+        """Return the least of values (p,) over the points of each phalanx, one per phalanx."""
         return np.asarray(np.minimum.reduceat(values, self.first))
 
 
 class PhalanxShape(NamedTuple):
-    """Dimensions of a phalanx that meet rock, along it from its joint [m].
+    """Dimensions of a phalanx that meets rock, measured from its joint [m].
 
     Attributes
     ----------
     near, far : float
-        Begin and end of the tile's face.
+        Begin and end of the tile's face along the phalanx.
     end : float
-        End of the phalanx: the next joint.
+        End of the phalanx: distance to the next joint.
     lift : float
-        Height of the axis under the tile, above the line of the joints.
+        Height of the bar's axis under the tile, above the line of the joints.
     radius : float
         Radius of the bar.
     travel : float
-        Distance that spines reach from the tile.
+        Distance that spines reach out of the tile.
     """
 
     near: float
@@ -136,7 +138,7 @@ class PhalanxShape(NamedTuple):
 
     @classmethod
     def of(cls, model: FingerModel) -> PhalanxShape:
-        """Return the shape of a finger's phalanges."""
+        """Return the shape of the phalanges of a finger model."""
         radius = min(model.frame_radius, model.tile_height)
         lift = model.tile_height - radius
         return cls(*model.tile_range, model.joint_spacing, lift, radius, model.spine_travel)
@@ -148,31 +150,39 @@ class PhalanxShape(NamedTuple):
 
     @property
     def spacing(self) -> float:
-        """Largest spacing of the points that rock is made of [m]."""
+        """Largest spacing of the points that represent rock [m]."""
         # so near that the round end of a phalanx slides over points as over the rock between
         return self.length / 192
 
     @property
     def fine(self) -> float:
-        """Largest difference of the gap from the least distance, about [m]."""
+        """Smoothing length of the gap [m].
+
+        The gap differs from the least distance to the rock by about this length at most.
+        """
         return self.length / 4800.0
 
     @property
     def closes(self) -> float:
-        """Largest depth of a negative gap that need not be closed [m]."""
+        """Tolerance on negative gaps: rock inside a phalanx by less counts as touching [m]."""
         return self.length / 2.4e6
 
     def beside(self, near: NearPoints, joint: Complexes, u: Complexes, depth: Array) -> Beside:
-        """Return how phalanges are beside rock.
+        """Return gaps, and places and directions of contact forces, of phalanges beside rock.
 
         Parameters
         ----------
         near : NearPoints
-            Of all phalanges; see `nearest_points`.
+            Points of rock near all phalanges, from `nearest_points`.
         joint, u : ndarray of complex, shape (...)
-            Of the phalanges: their joints [m] and their directions.
+            x + i z of each phalanx's joint [m], and the unit vector along the phalanx.
         depth : ndarray, shape (...)
-            How far their tiles are pressed in [m].
+            Depth to which each tile is pressed into its bed of springs [m].
+
+        Returns
+        -------
+        Beside
+            Arrays of the same shape (...).
         """
         of = near.phalanx
         seen = (near.points - joint.ravel()[of]) * u.ravel().conj()[of]
@@ -194,16 +204,16 @@ class PhalanxShape(NamedTuple):
         )
 
     def may_press(self, seen: Complexes, near: NearPoints, within: Array) -> NearPoints:
-        """Choose the points on which `beside` depends.
+        """Return the points on which `beside` depends, a subset of those given.
 
         Parameters
         ----------
         seen : ndarray of complex, shape (p,)
-            Points, in the axes of their phalanges [m].
+            Points in the axes of their phalanges [m].
         near : NearPoints
-            The same.
+            The same points, in the finger frame F.
         within : ndarray
-            How far the tile of each phalanx is pressed in, and it may still be moved, at most [m].
+            Margin of each phalanx: its tile's depth plus the largest further motion [m].
         """
         away, from_tile = self._from_axis(seen)
         size = np.abs(away)
@@ -229,7 +239,10 @@ class PhalanxShape(NamedTuple):
         return np.where(distance <= np.abs(beyond), from_tile, beyond), distance
 
     def alone(self, lengths: Array) -> Array:
-        """Return how far beds sink that are nothing but one point each [m]."""
+        """Return how far a bed of springs sinks if it rests on a single point of rock [m].
+
+        ``lengths``: boundary length w that each point represents [m].
+        """
         return np.asarray(np.minimum(self._root / np.sqrt(lengths), self.far))
 
     @property
@@ -258,16 +271,19 @@ class PhalanxShape(NamedTuple):
 def middle_of_bed(
     reaches: Iterable[Pressed], bends: Iterable[float | Pressed], depth: float | Pressed
 ) -> Pressed:
-    """Return how far from where a face touches rock the middle of its bed's pressures is [m].
+    """Return the offset from a face's first touch to its bed's centre of pressure [m].
+
+    The offset is positive toward the face's end. The rock is a parabola on either side of the
+    touch; the tile's end may cut the pressed part short.
 
     Parameters
     ----------
     reaches : pair of float or of ndarray
-        How far the bed is pressed toward the beginning of the face, and toward its end [m].
+        Length of the pressed part toward the beginning of the face, and toward its end [m].
     bends : pair of float
         Curvature of the rock on either side [1/m].
     depth : float
-        How far the bed is pressed in where the face touches [m].
+        Depth to which the bed is pressed in at the touch [m].
     """
     load: Any = 0.0
     moment: Any = 0.0
@@ -280,7 +296,21 @@ def middle_of_bed(
 
 
 def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
-    """Return joints [m] and directions of the phalanges of fingers turned by q, shape (..., 3)."""
+    """Return the joints and directions of phalanges for joint angles (forward kinematics).
+
+    Parameters
+    ----------
+    q : ndarray, shape (..., 3)
+        Joint angles, each relative to the phalanx before it [rad].
+    spacing : float
+        Distance between joints [m].
+
+    Returns
+    -------
+    joints, directions : ndarray of complex, shape (..., 3)
+        x + i z of each joint in the finger frame F, the first at the origin [m]; unit vector along
+        each phalanx.
+    """
     u = np.exp(1j * np.cumsum(q, axis=-1))
     joints = np.zeros(u.shape, dtype=complex)
     joints[..., 1:] = spacing * np.cumsum(u[..., :-1], axis=-1)
@@ -290,18 +320,19 @@ def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
 def nearest_points(
     rock: Outlines, shape: PhalanxShape, q: Array, depth: Array, turn: float = 0.0
 ) -> NearPoints:
-    """Return the points that phalanges of fingers may press on.
+    """Return the points of rock that phalanges of fingers may press on.
 
     Parameters
     ----------
     rock : Outlines
+        Rock in the plane of each of the n fingers.
     shape : PhalanxShape
     q : ndarray, shape (n, 3)
-        Turns of the joints [rad].
+        Joint angles [rad].
     depth : ndarray, shape (n, 3)
-        How far their tiles are pressed in [m].
+        Depth to which each tile is pressed into its bed of springs [m].
     turn : float, optional
-        How far joints may turn from there [rad].
+        Largest further turn of any joint for which the points must still do [rad].
     """
     joints, u = fan_out(q, shape.end)
     # two points may come nearer to each other by the way of each

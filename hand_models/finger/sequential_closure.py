@@ -1,9 +1,9 @@
 """A finger laid on smooth rock, phalanx by phalanx from the base.
 
-This is `hand_models.finger.closure.settle_finger` for fingers whose phalanges all rest with the
-faces of their tiles, as those of a hand on smooth rock mostly do: there each has come to the rock
-and is held, and so they are at the ends of their paths (`hand_models.finger.closing`). What else
-may become of a finger is left to those.
+This is `hand_models.finger.closure.settle_finger` for fingers whose phalanges all rest on the faces
+of their tiles, as most fingers on smooth rock do: each phalanx has met the rock and holds there, so
+the finger is at the end of its path (`hand_models.finger.closing`). Fingers that end their closing
+otherwise are left to these two modules.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from hand_models.sections import Face, SmoothSection
 __all__ = ["CONTACT_KINDS", "ClosedPhalanx", "SequentialClosure"]
 
 CONTACT_KINDS: Final = ("face", "edge", "frame", "none")
-"""Part of a phalanx that touches the rock, by code."""
+"""Contact states of a phalanx by integer code: the part that touches the rock."""
 
 
 class ClosedPhalanx(NamedTuple):
-    """A phalanx on the rock.
+    """Pose and contact of a phalanx on the rock, in its finger's frame F.
 
     Attributes
     ----------
     angle : float
-        θ [rad].
+        θ, angle of the phalanx from x toward z [rad].
     u : complex
-        Along it, in F.
+        Unit vector x + i z along the phalanx.
     joint : complex
-        x + i z of its joint in F [m].
+        x + i z of the joint [m].
     along : float
-        c, of its contact from the joint [m].
+        c, distance of the contact from the joint along the phalanx [m].
     bends : tuple of float
         Curvature of the rock under the face, toward its beginning and its end [1/m].
     """
@@ -46,10 +46,16 @@ class ClosedPhalanx(NamedTuple):
     bends: tuple[float, float] = (0.0, 0.0)
 
     def pressed(self, face: Face, depth: float) -> ClosedPhalanx:
-        """Return it with the place where a bed of springs bears that is pressed in by a depth.
+        """Return the phalanx with its contact at the centre of pressure of the tile's bed.
 
-        As of `hand_models.finger.phalanx_gaps`: the middle of the pressures where these are cut
-        short by an end of the tile. ``face``: of the tile.
+        The contact moves where an end of the tile cuts the bed's pressure short (`middle_of_bed`).
+
+        Parameters
+        ----------
+        face : Face
+            Face of the tile.
+        depth : float
+            Depth to which the bed of springs is pressed in [m].
         """
         near, far = (
             min(end, math.sqrt(2.0 * depth / bend) if bend > 0.0 else math.inf)
@@ -61,7 +67,7 @@ class ClosedPhalanx(NamedTuple):
 
 
 class SequentialClosure:
-    """Lays fingers of one model.
+    """Solver that lays fingers of one model on smooth rock.
 
     Parameters
     ----------
@@ -80,13 +86,18 @@ class SequentialClosure:
         ]
 
     def lay(self, cut: SmoothSection) -> list[ClosedPhalanx]:
-        """Close a finger on rock, its proximal joint at the origin of F.
+        """Close a finger on smooth rock, with its proximal joint at the origin of F.
+
+        Parameters
+        ----------
+        cut : SmoothSection
+            Rock in the finger's plane.
 
         Returns
         -------
         list of ClosedPhalanx
-            Phalanges from the base on, as many as rest on rock with their tiles' faces one after
-            the other.
+            Phalanges from the base outward, up to the first that does not rest on its tile's face:
+            three for a finger that is laid, none where the section is ``skew``.
         """
         laid: list[ClosedPhalanx] = []
         joint, angle, u = 0j, 0.0, 1.0 + 0j

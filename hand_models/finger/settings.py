@@ -1,4 +1,4 @@
-"""Numbers by which the paths of closing fingers are followed."""
+"""Step sizes and tolerances of the increments by which fingers are closed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["CONTACT_CODES", "SETTINGS"]
 
 @dataclass(frozen=True, slots=True)
 class ContactCodes:
-    """Codes of a contact state: of the place of a phalanx, and of its tile's spines."""
+    """Integer codes of contact states: of a phalanx's contact, and of its tile's spines."""
 
     off: int = 0  # the phalanx is off the rock
     on: int = 1  # it touches the rock
@@ -23,70 +23,73 @@ class ContactCodes:
 
 @dataclass(frozen=True, slots=True)
 class FingerSettings:
-    """Sizes of increments, and tolerances.
+    """Sizes of increments, and tolerances, relative to a finger's own scales.
 
-    Of tensions in parts of the closing tension, of torques in parts of the proximal joint's at the
-    closing tension, of damping over a turn of one radian as well, of gaps in a tile's length.
+    Tensions are relative to the closing tension, torques to the proximal joint's torque at the
+    closing tension, damping to that torque over one radian, gaps to a tile's length.
     """
 
     most_increments: int = 1200
     long_path: int = 600
-    """Increments on a path, and from which on it is a long one; of 9,940 fingers on rough walls
-    that come to rest nine had more than 400, and one more than 900."""
+    """Largest number of increments on a path, and the number above which a path is long. Of
+    9,940 fingers on rough walls that come to rest nine took more than 400, and one more than
+    900."""
     most_tension: float = 2.0 / 37.0
-    """Most of the tension in an increment."""
+    """Largest growth of the tension in an increment."""
     least_tension: float = 1e-4
-    """Least growth of the tension where a contact changes."""
+    """Smallest growth of the tension where a contact changes."""
     first_stride: float = 0.06
     most_stride: float = 0.3
     least_stride: float = 1e-4
-    """How far joints turn in an increment: in the air, at most, after it was too far [rad]."""
+    """Largest turn of the joints in an increment: at the start, in general, and at least after
+    increments that went too far [rad]."""
     derivative_turn: float = 1e-7
     """Turn of a joint for derivatives [rad]."""
     catching_part: float = 0.25
-    """Part of the path, after the closing tension, in which spines across gaps are drawn in."""
+    """Length of the path beyond the closing tension, relative to that tension, on which spines
+    across gaps are drawn in."""
     still_turn: float = 1e-10
     """Turn that counts as none: at the end of the path, or past a limit [rad]."""
     damped_turn: float = 1e-7
     """Largest turn in an increment at which a damped finger rests at the end of its path [rad]."""
     path_turn: float = 3e-4
-    """Turn at one tension up to which joints are on their path where a gap begins to grow: its
-    spines hold at the least there was, and that of an increment may be out by a tenth of the turn's
-    square in metres, 10 nm [rad]."""
+    """Turn at one tension below which joints count as on their path when a gap begins to grow
+    [rad]. The gap's spines then hold at the least gap so far, whose error is a tenth of the
+    turn's square in metres, 10 nm."""
     balance_turn: float = 1e-3
-    """Turn at one tension up to which joints are in balance, so that what pulls spines off is no
-    error of an increment [rad]."""
+    """Turn at one tension below which joints count as balanced, so that a pull on spines is no
+    error of the increment [rad]."""
     damping: float = 0.1
     least_damping: float = 0.025
     most_damping: float = 1e3
     damping_growth: float = 4.0
-    """D at first and at last where it is needed, at most, and by how much it grows."""
+    """Damping D at first, the least that is kept, the largest, and the factor by which it grows."""
     slow_damping: float = 10.0
-    """Damping with which joints are slow."""
+    """Damping above which joints count as slow."""
     patience: int = 100
-    """After so many increments in a row with a tenth of the most damping there is no rest; those
-    that come to rest had 28 at most on 2,000 rough surfaces."""
+    """Number of increments in a row with more than a tenth of the largest damping after which a
+    finger counts as without rest; fingers that rest took 28 at most on 2,000 rough surfaces."""
     exact_torque: float = 0.003
     path_torque: float = 0.03
     damped_torque: float = 0.3
-    """Largest difference of torques from their linearisation: for larger strides, on the path, and
-    in parts of what is left by damping."""
+    """Largest difference between torques and their linearisation: to lengthen the stride, to
+    stay on the path, and as a share of the torque that damping leaves."""
     balance: float = 1e-8
     late_balance: float = 5e-7
-    """Torque left by damping at the end: as a rule, and where rest takes long."""
+    """Torque that damping may leave at the end: in general, and on long paths."""
     air_depth: float = 1.0 / 120.0
     rock_depth: float = 1.0 / 300.0
-    """Most additional depth of a phalanx in rock after an increment: of a finger that comes through
-    the air, and of one on the rock, which goes past its path with more."""
+    """Largest additional depth of a phalanx in rock after an increment: for a finger that was in
+    the air, and for one on the rock."""
     lost_gap: float = 1.0 / 240.0
-    """How far a tile goes from where it was pulled off to catch again."""
+    """Distance from the place of a pull-off beyond which a tile may catch again."""
     near_gap: float = 1.0 / 2400.0
-    """Gap up to which a phalanx may come to the rock in an increment in which others move as well:
-    one after the other, so that the least gaps are those of the path."""
+    """Gap below which a phalanx may reach the rock in an increment in which others move as well;
+    beyond it contacts close one after the other, so that the least gaps are those of the path."""
     held_gap: float = 1.0 / 4800.0
-    """Growth of gaps before their spines hold."""
+    """Growth of a gap before its spines hold."""
     contact_compliance: float = 1e-11
-    """Compliance of contacts, so that those that coincide have forces [m/N]."""
+    """Compliance of contacts, which makes the forces of coincident contacts unique [m/N]."""
     rounding: float = BASE_TOLERANCES.force
     """Rounding of forces [N] and torques [N·m]."""
 

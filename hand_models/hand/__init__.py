@@ -1,4 +1,4 @@
-"""Four fingers and a palm on a hold: numbers at the bottom, seating and settling at the top."""
+"""SpinyHand: its model, seating and closing on holds; four fingers and a palm on the rock."""
 
 import lazy_loader
 

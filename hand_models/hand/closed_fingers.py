@@ -1,8 +1,8 @@
-"""All fingers of some hands closed on the rock.
+"""Close all fingers of several hands on the rock.
 
 Fingers over smooth rock are laid on it (`hand_models.finger.sequential_closure`) and loaded by
-their tendons (`hand_models.finger.closure_loads`) one by one, of those that are alike one. Fingers
-that do not rest on all their phalanges, or whose contacts would break, are closed along their paths
+their tendons (`hand_models.finger.closure_loads`), identical fingers once. Fingers that do not rest
+on all their phalanges, or whose contacts would break, are closed along their paths
 (`hand_models.finger.closing`), as are fingers over other rock.
 """
 
@@ -36,7 +36,7 @@ from hand_models.hand.settled_hand import HandPostures
 __all__ = ["ClosedFingers", "close_fingers"]
 
 FingerNumbers = list[float]
-"""All numbers of a closed finger, phalanx by phalanx; see `ClosedFingers`."""
+"""Numbers of a closed finger, phalanx by phalanx: three times the `PHALANX_NUMBERS`."""
 
 PHALANX_NUMBERS: Final = 22
 """Numbers of a phalanx: its angle [rad], its contact's place along and above it [m] and tilt [rad],
@@ -47,30 +47,30 @@ load."""
 
 
 class ClosedFingers:
-    """The fingers of n hands, closed.
+    """Closed fingers of n hands, four for each hand, as arrays.
 
     Parameters
     ----------
     rows : sequence of list of float
-        Of fingers that differ.
+        Numbers of each distinct finger, three phalanges of `PHALANX_NUMBERS` each.
     row_of : sequence of int, length 4 n
-        Index of each finger's row, hand by hand.
+        Index into ``rows`` of each finger, hand by hand.
     alone : dict of int to ClosedFinger
-        Fingers that could not be left as they were laid.
+        Fingers that were closed along their paths, by their index in ``row_of``.
     lifts : dict of int to float
-        By how much hands would have to be lifted along −z of H whose open fingers have rock in
-        them [m].
+        By the index of each hand with rock inside an open finger: distance along −z of the hand
+        frame H that would clear it [m].
 
     Attributes
     ----------
     places : ndarray, shape (n, 4, 9, 3)
-        In each finger's plane, phalanx by phalanx, where its contact is [m] and its axes of shear
-        and of normal load; (x, z, 1) for places, (x, z, 0) for directions.
+        For each phalanx its contact [m], axis of shear and axis of normal load, in homogeneous
+        coordinates of the finger's plane: (x, z, 1) for places, (x, z, 0) for directions.
     tiles : ndarray, shape (n, 4, 3, 6)
-        Shear and normal load of each phalanx, each at zero tension [N] and per newton, the share of
-        its tile's spines that are on the rock, and the code of its contact.
+        For each phalanx shear and normal load, each at zero tension [N] and per newton, the share
+        of its tile's spines on the rock, and its contact state by code.
     postures : HandPostures
-        How the fingers of all hands stand, arrays of shape (n, 4, 3).
+        Postures and contacts of all fingers, arrays of shape (n, 4, 3).
     """
 
     def __init__(
@@ -97,7 +97,19 @@ class ClosedFingers:
         )
 
     def stops_of(self, index: int) -> tuple[tuple[int, int, Array], ...]:
-        """Return finger, joint and torque of each joint of a hand that stands at a limit."""
+        """Return finger, joint and torque of each joint of a hand that is at an angle limit.
+
+        Parameters
+        ----------
+        index : int
+            Index of the hand.
+
+        Returns
+        -------
+        tuple of (int, int, ndarray)
+            Index of the finger, index of the joint, and the torque on the stop, positive against
+            it: at zero tension [N·m] and per newton [m]. Fingers without a contact are left out.
+        """
         if not self.alone:
             return ()
         stops = []
@@ -119,18 +131,19 @@ def close_fingers(
     tensions: Sequence[float],
     errors: dict[int, InvalidInputError],
 ) -> ClosedFingers:
-    """Close the fingers of hands on their holds.
+    """Close the fingers of n hands on their holds.
 
     Parameters
     ----------
     placed : PlacedHands
     laid : sequence of sequence of list of ClosedPhalanx, lengths n and 4
-        Phalanges of their fingers that rest on smooth rock, one after the other; the same ones for
-        fingers that are alike.
+        Phalanges of each finger that rest on smooth rock one after the other; the same list for
+        identical fingers.
     tensions : sequence of float, length n
         Closing tension of each hand [N].
     errors : dict of int to InvalidInputError
-        Why hands cannot be where they are; those that cannot close are added.
+        Errors by index of the hand, changed in place: hands that have one are skipped, hands that
+        cannot close are added.
     """
     # the first stands for a finger of a hand that cannot be where it is
     rows = [[0.0] * (len(PHALANGES) * PHALANX_NUMBERS)]

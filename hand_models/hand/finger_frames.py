@@ -1,4 +1,4 @@
-"""Frames of a hand's fingers and tiles before it closes, for a rotation of its outer fingers."""
+"""Frames of a hand's fingers and tiles in H before closing, by the outer fingers' rotation."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from hand_models.sections import Section
 __all__ = ["HAND_Z", "OUTER_FINGERS", "STACK_ROWS", "TILE_COLUMNS", "FingerFrame", "FrameStack"]
 
 OUTER_FINGERS: Final = slice(0, len(FINGERS), len(FINGERS) - 1)
-"""Fingers with a base tile, the first and the last."""
+"""Slice of `FINGERS` with the two outer fingers, which have a base tile."""
 
 HAND_Z: Final = np.array([0.0, 0.0, 1.0])
-"""z of H."""
+"""Unit vector along z of H, into the rock."""
 
 HAND_Z.setflags(write=False)
 
 
 class StackRows(NamedTuple):
-    """Rows of `FrameStack.rows`, by what they are.
+    """Meaning of the rows of `FrameStack.rows`.
 
     Attributes
     ----------
     tiles : slice
-        Tiles which do not turn toward the rock: those of the bases, then the palm's.
+        Places of the tiles that do not turn toward the rock: base tiles, then palm tiles.
     base_count : int
-        How many are those of the bases.
+        Number of base tiles among them.
     joints, alongs : slice
-        The fingers' proximal joints, and their directions.
+        Places of the fingers' proximal joints, and directions of the fingers.
     into : int
-        The direction z of H, into the rock.
+        Row of the direction z of the hand frame H, into the rock.
     """
 
     tiles: slice = slice(0, -2 * len(FINGERS) - 1)
@@ -48,18 +48,19 @@ class StackRows(NamedTuple):
 
 
 class TileColumns(NamedTuple):
-    """Numbers of a tile, as of `SettledHand`.
+    """Columns of the arrays that hold 18 numbers for each tile.
 
     Attributes
     ----------
     position, axes : slice
-        Where it is [m], and its axes row by row.
+        Place of the contact [m]; unit forces of shear, normal and lateral load, row by row; in the
+        hand frame H.
     shear, normal : slice
-        Its loads at zero tension [N] and per newton.
+        Load at zero tension [N], and per newton of tension.
     engagement, kind : int
-        The share of its spines that are on the rock, and the code of its contact.
+        Spine engagement, and the contact state by code (`CONTACT_NAMES`).
     total : int
-        How many numbers these are.
+        Count of numbers for each tile.
     """
 
     position: slice = slice(0, 3)
@@ -77,14 +78,31 @@ TILE_COLUMNS = TileColumns()
 
 @dataclass(frozen=True)
 class FingerFrame:
-    """A finger's frame in H: the proximal joint, and unit vectors along and across the finger."""
+    """Frame of a finger in the hand frame H.
+
+    Attributes
+    ----------
+    joint : ndarray, shape (3,)
+        Place of the proximal joint [m].
+    along, across : ndarray, shape (3,)
+        Unit vectors along the open finger, and across its plane (z × along).
+    """
 
     joint: Array
     along: Array
     across: Array
 
     def cut(self, hold: Hold, hand_in_hold: Pose, *, raw: bool = False) -> Section | None:
-        """Return the rock in the finger's plane, in its coordinates F; raw as `Hold` has it."""
+        """Return the rock in the finger's plane, in its coordinates F; None if there is none.
+
+        Parameters
+        ----------
+        hold : Hold
+        hand_in_hold : Pose
+            H in the hold's frame.
+        raw : bool, optional
+            Whether to use `Hold.raw_section`, with steps and edges smaller than a tile.
+        """
         cut = hold.raw_section if raw else hold.section
         rotation = hand_in_hold.rotation
         return cut(hand_in_hold.apply(self.joint), rotation @ self.along, rotation[:, 2])
@@ -97,17 +115,17 @@ class FrameStack:
     Attributes
     ----------
     hands : tuple of tuple of FingerFrame
-        Of each hand, in the order of `FINGERS`.
+        Frames of each hand, in the order of `FINGERS`.
     rows : ndarray, shape (n, t + 11, 4)
-        All that is seen from a hold, see `StackRows`, in homogeneous coordinates: (p, 1)
-        for a place p [m], (d, 0) for a direction d.
+        Places p as (p, 1) [m] and directions d as (d, 0), homogeneous coordinates in H; the order
+        is that of `StackRows`. t palm tiles.
     planes : ndarray, shape (n, 4, 3, 3)
-        Fingers' planes F: along, into the rock, the joint; (x, z, 1) there is the place x, z, and
-        (x, z, 0) is a direction.
+        Plane F of each finger, rows: along, into the rock, joint. A place (x, z, 1) or a direction
+        (x, z, 0) in the finger frame F times these rows is the place or direction in H.
     across : ndarray, shape (n, 4, 3, 3)
-        Across the fingers, for each of their phalanges.
+        Unit vector across each finger's plane, repeated for its three phalanges.
     base_tiles : ndarray, shape (n, 2, 18)
-        `TileColumns` of the base tiles where they touch nothing.
+        Numbers of the base tiles without contact, in the order of `TileColumns`.
     """
 
     hands: tuple[tuple[FingerFrame, ...], ...]
@@ -123,11 +141,11 @@ class FrameStack:
         Parameters
         ----------
         joints, alongs : ndarray, shape (n, 4, 3)
-            Proximal joints of their fingers [m], and the fingers' directions.
+            Proximal joints [m] and directions of the fingers, in the hand frame H.
         bases : ndarray, shape (n, 2, 3)
-            Base tiles of the outer fingers, left first [m].
+            Base tiles of the outer fingers, left first, in H [m].
         palm : ndarray, shape (t, 3)
-            The palm's tiles [m].
+            Tiles of the palm, in H [m].
         """
         count, into = len(joints), np.broadcast_to(HAND_Z, alongs.shape)
         acrosses = np.stack(

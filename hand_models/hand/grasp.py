@@ -1,4 +1,4 @@
-"""Grasp of a hold: what is chosen before a hand closes."""
+"""Settings chosen before a hand closes on a hold: the grasp and the travel of a compliant wrist."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Grasp", "WristTravel"]
 
 @dataclass(frozen=True, slots=True)
 class RotationTolerances:
-    """Tolerances of an outer rotation near π [rad]."""
+    """Tolerances on an outer rotation of π, at which the fingers pinch [rad]."""
 
     pinch: float = 1e-6
     """How close to π it counts as a pinch."""
@@ -37,19 +37,19 @@ OuterRotation = Annotated[
 
 
 class Grasp(Strict, frozen=True):
-    """Grasp of a hand on its hold: what is chosen before it closes.
+    """Settings of a hand chosen before it closes on its hold.
 
     Attributes
     ----------
     outer_rotation : float
         Rotation of the outer fingers, in [0, π] [rad]; up to 5e-4 above π counts as π.
     closing_tension : float, optional
-        Tension of each tendon at the moment the tiles caught the rock [N]; by default that of the
+        Tension of each tendon at the moment the tiles catch the rock [N]; by default that of the
         parameter file.
     palm : bool
         Whether the palm may carry load.
     lateral : bool
-        Whether engaged spines may resist sideways.
+        Whether engaged spines may carry lateral load.
     fingernail : bool
         Whether the fingers stay straight and cling with their nails alone.
     """
@@ -74,7 +74,7 @@ class Grasp(Strict, frozen=True):
 
     @property
     def pinch(self) -> bool:
-        """True if the outer fingers oppose the inner ones."""
+        """True if the outer fingers oppose the inner ones: ``outer_rotation`` is π."""
         return self.outer_rotation >= math.pi - ROTATION_TOLERANCES.pinch
 
 
@@ -83,17 +83,17 @@ Turn = Annotated[float, Meta(ge=0.0, le=0.3)]
 
 
 class WristTravel(Strict, frozen=True):
-    """The range in which a compliant wrist may settle, about its place at rest.
+    """Range of the displacement and rotation of a compliant wrist, about its pose at rest.
 
     Attributes
     ----------
     position : float
-        Along each axis of H, either way [m].
+        Largest displacement along each axis of the hand frame H, in both directions [m].
     inward : float
-        Toward the rock, +z of H, if that is less [m]. Contact states stay those of the closed
-        hand, and moving inward is what they bear least.
+        Largest displacement toward the rock, +z of H, if less than ``position`` [m]. Contact states
+        stay those of the closed hand, and are least valid for motion toward the rock.
     angle : float
-        About each axis of H, either way [rad].
+        Largest rotation about each axis of H, in both directions [rad].
     """
 
     position: Annotated[Travel, Meta(description="along each axis of H, either way [m]")] = 0.004
@@ -109,7 +109,10 @@ class WristTravel(Strict, frozen=True):
 
     @property
     def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and largest of each component of the twist [m, rad]."""
+        """Least and largest value of each component of the wrist's twist, two tuples of 6.
+
+        Displacement along x, y, z of the hand frame H [m], then rotation about them [rad].
+        """
         most = (self.position,) * 3 + (self.angle,) * 3
         least = tuple([-end for end in most])
         return least, (*most[:2], min(self.inward, self.position), *most[3:])

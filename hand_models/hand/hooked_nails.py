@@ -1,4 +1,4 @@
-"""The nails of hands that cling with them."""
+"""Fingernails of hands that cling with them: whether they hook, and their conditions."""
 
 from __future__ import annotations
 
@@ -18,15 +18,20 @@ __all__ = ["Nails", "hook_nails"]
 
 
 class Nails(NamedTuple):
-    """The nails of one hand; attributes as of `SettledHand`.
+    """Nails of one hand.
 
     Attributes
     ----------
     angles : ndarray, shape (4,)
+        Angle of each finger's nail; fully retracted if it does not hook [rad].
     normals : ndarray, shape (4, 3)
+        Unit vector out of the rock at each nail's hook, in the hand frame H; zero if the nail does
+        not hook.
     rows : tuple of (ndarray, ndarray)
+        ``H`` and ``h`` of the `Cling` of each nail that hooks, in the order of `FINGERS`.
     tiles : ndarray, shape (4, 18)
-        `TileColumns` of the nails as tiles; empty of a hand that does not cling with them.
+        Numbers of the nails as tiles, in the order of `TileColumns`; empty without a fingernail
+        grasp.
     """
 
     angles: Array
@@ -36,21 +41,21 @@ class Nails(NamedTuple):
 
 
 def hook_nails(placed: PlacedHands, closed: ClosedFingers, index: int, closing: float) -> Nails:
-    """Return where the nails of a hand hook; out of the way unless it clings with them.
+    """Return the nails of a hand: hooked on the rock in a fingernail grasp, else retracted.
 
     Parameters
     ----------
     placed : PlacedHands
     closed : ClosedFingers
     index : int
-        Of the hand.
+        Index of the hand.
     closing : float
-        Its closing tension [N].
+        Closing tension of the hand [N].
 
     Raises
     ------
     InvalidInputError
-        If the rock is in the way of a nail.
+        If rock is in the way of a nail that points straight ahead.
     """
     nail = placed.hand.nail
     angles, normals = np.full(len(FINGERS), nail.retraction), np.zeros((len(FINGERS), 3))

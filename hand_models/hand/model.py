@@ -1,13 +1,13 @@
-"""SpinyHand in numbers: four fingers and a palm, placed in the hand frame H.
+"""Hand model: four fingers and a palm in the hand frame H.
 
 H has its origin at the centre of the palm's tile grid, on the tiles' surface: x along the two inner
 fingers, z out of the palm into the rock, y = z × x. The two outer fingers turn on their bases by
-``outer_rotation``, outward through ±y: 0 puts all four alike, π opposes them (a pinch).
+``outer_rotation``, outward through ±y: 0 makes all four parallel, π opposes them (a pinch).
 
-A *base tile* sits on the rotating base of each outer finger, under the same tendon. It cannot turn
-toward the rock, so like a palm tile it engages where rock is within the spines' travel of it; then
-the tendon drags it as it drags the others, and it carries shear and its share of the lateral
-reaction, but no normal load (``assumed``).
+A *base tile* is on the rotating base of each outer finger, under the same tendon. It cannot turn
+toward the rock, so like a palm tile it engages where rock is within its spines' travel; then the
+tendon drags it like the other tiles, and it carries shear and its share of the lateral reaction,
+but no normal load (``assumed``).
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ __all__ = ["HandModel"]
 
 
 class HandModel:
-    """The hand's geometry and mechanics: what is known of it before it takes a hold.
+    """Geometry, mechanics and limits of a hand, independent of any hold.
 
-    Hands of the same numbers are equal.
+    Models of equal parameter tables are equal and have the same hash.
 
     Parameters
     ----------
     table : ParameterTable, optional
-        The numbers; ``parameters/hand.toml`` by default.
+        The hand's numbers; ``parameters/hand.toml`` by default.
 
     Raises
     ------
@@ -143,11 +143,17 @@ class HandModel:
         return self is other or (isinstance(other, HandModel) and self.table == other.table)
 
     def frames(self, outer_rotation: float) -> tuple[FingerFrame, ...]:
-        """Return the four fingers' frames in H, in the order of `FINGERS`."""
+        """Return the frames of the four fingers in the hand frame H, in the order of `FINGERS`.
+
+        ``outer_rotation``: rotation of the outer fingers, from 0 to π [rad].
+        """
         return self.frame_stack((outer_rotation,)).hands[0]
 
     def frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
-        """Return the frames of hands whose outer fingers are turned outward by these angles."""
+        """Return the finger frames of n hands with these rotations of their outer fingers [rad].
+
+        The last 64 results are kept in an LRU cache.
+        """
         return self._frames.get(outer_rotations, partial(self._frame_stack, outer_rotations))
 
     def _frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
@@ -164,12 +170,31 @@ class HandModel:
         return FrameStack.of(joints, alongs, bases, self.palm_tiles)
 
     def palm_share(self, engaged: tuple[int, ...], tile_limit: float) -> float:
-        """Return what shear palm tiles share of which one holds ``tile_limit`` [N]."""
+        """Return the shear of a palm when the first of its engaged tiles reaches its limit [N].
+
+        Parameters
+        ----------
+        engaged : tuple of int
+            Indices of the engaged palm tiles, which share the load on one tendon.
+        tile_limit : float
+            Shear strength of one tile [N].
+        """
         stiffness = tuple([self.palm_contact[i] for i in engaged])
         friction = self.palm_friction, tile_limit, self.palm_own_friction
         return shear_capacity(stiffness, self.palm_spring, *friction)
 
     def section(self, finger: str, hold: Hold, grasp: Grasp, hold_in_hand: Pose) -> Section | None:
-        """Return the rock in a finger's plane, in its coordinates F; raw under one that clings."""
+        """Return the rock in a finger's plane, in its coordinates F; None if there is none.
+
+        Parameters
+        ----------
+        finger : str
+            One of `FINGERS`.
+        hold : Hold
+        grasp : Grasp
+            In a fingernail grasp the section is `Hold.raw_section`.
+        hold_in_hand : Pose
+            The hold's frame in the hand frame H.
+        """
         frame = self.frames(grasp.outer_rotation)[FINGERS.index(finger)]
         return frame.cut(hold, hold_in_hand.inverse(), raw=grasp.fingernail)

@@ -1,4 +1,4 @@
-"""Hands at their holds before they close: what is under their fingers and their flat tiles."""
+"""Hands at their holds before closing: the rock under their fingers, base tiles and palm tiles."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ __all__ = ["PlacedHands", "Placement", "PlacementKey"]
 
 
 class Placement(NamedTuple):
-    """Hold on which a hand is to close, with its surface, grasp and place.
+    """Question to the closing of one hand: hold, surface, grasp and pose.
 
     Attributes
     ----------
     hold : Hold
     surface : Surface
-        What a tile holds on it.
+        Strength of a tile on the hold.
     grasp : Grasp
     hold_in_hand : Pose or None
-        The hold's frame in H; None if the hand is to be seated.
+        The hold's frame in the hand frame H; None to have the hand seated.
     at : Pose or None
-        Where on the hold it is then seated: a frame, in the hold's, that takes that one's place;
-        None for that itself.
+        Frame on the hold, in the hold's frame, on which a hand without ``hold_in_hand`` is seated;
+        None for the hold's own frame.
     """
 
     hold: Hold
@@ -44,9 +44,9 @@ class Placement(NamedTuple):
 
 
 class PlacementKey:
-    """A placement as a key: equal where hands close alike; places are the same by their digits.
+    """Hashable cache key of a placement: equal keys are hands that close alike.
 
-    Its hash is worked out once, and asked for again and again.
+    Poses are compared by their bytes. The hash is computed once.
     """
 
     __slots__ = ("_hash", "_parts")
@@ -70,19 +70,19 @@ def _digits(pose: Pose | None) -> Hashable:
 
 
 class PlacedHands:
-    """Hands of one kind at their holds.
+    """n hands of one model at their holds, not yet closed.
 
     Parameters
     ----------
     hand : HandModel
     placements : sequence of Placement, length n
     seatings : sequence of Seating, length n
-        Where their holds are.
+        Pose of each hold in its hand.
 
     Attributes
     ----------
     frames : FrameStack
-        Of the hands.
+        Finger frames and tiles of the hands, in the hand frame H.
     """
 
     def __init__(
@@ -110,10 +110,15 @@ class PlacedHands:
         self._seen: list[list[list[float]]] = (seen * swept[:, None, :3]).tolist()
 
     def cuts(self, index: int) -> tuple[Swept, list[FingerPlane]] | None:
-        """Return what the rock in the planes of a hand's fingers depends on, as `cut_of` takes it.
+        """Return a smooth hold's shape and the planes of a hand's fingers; None on other rock.
 
-        Planes are equal for fingers that are mirror images of one another. None if the rock is not
-        smooth.
+        `cut_of` computes the rock in each finger's plane from both. Planes are equal for fingers
+        that are mirror images of each other, so that each rock section is computed once.
+
+        Parameters
+        ----------
+        index : int
+            Index of the hand.
         """
         shape, rows = self._shapes[index], self._seen[index]
         if shape is None:
@@ -132,9 +137,10 @@ class PlacedHands:
 
     @cached_property
     def gaps(self) -> list[list[float]]:
-        """Gaps from the base tiles and the palm's tiles of each hand to the rock, along z of H [m].
+        """Distances from the two base tiles, then the palm's tiles, of each hand to the rock [m].
 
-        Infinite where there is no rock.
+        One list for each hand; along z of the hand frame H, negative inside the rock, infinite
+        without rock.
         """
         tiles, into = STACK_ROWS.tiles, STACK_ROWS.into
         return [
@@ -151,7 +157,20 @@ class PlacedHands:
         return [hold.entry(place, into) for place in places]
 
     def section(self, index: int, finger: int) -> Section | None:
-        """Return the rock in the plane of a finger of one hand; raw under one that clings."""
+        """Return the rock in a finger's plane, in its coordinates F; None if there is none.
+
+        Parameters
+        ----------
+        index : int
+            Index of the hand.
+        finger : int
+            Index of the finger in `FINGERS`.
+
+        Returns
+        -------
+        Section or None
+            `Hold.raw_section` in a fingernail grasp, else `Hold.section`.
+        """
         hold, grasp = self.placements[index].hold, self.placements[index].grasp
         hand_in_hold = self.seatings[index].pose.inverse()
         frame = self.frames.hands[index][finger]

@@ -1,17 +1,17 @@
-"""Find a seat for a hand on a hold for which no place is given.
+"""Find a seat for a hand on a hold: the hold's pose in the hand frame H, if none is given.
 
 Axes of the hold are parallel to H's. The proximal tiles of the inner fingers touch at
 ``seated_contact`` (c₁) from their joints: of the hold's place (x, z) in H one number is given by
 the grasp, and the other follows.
 
-- In a *pinch* the crest lies midway between the opposed finger bases, and the palm's stand-off z
+- In a *pinch* the crest is midway between the opposed finger bases, and the palm's stand-off z
   follows.
 - Otherwise the *palm rests on the rock*, and the crest's place along x follows.
-- Where that cannot be had the palm rests on the rock with the crest under its centre.
-- On rock known by its outline only the palm rests on the highest rock found under it, on a few
-  lines along it; the crest of a pinch is the hold's origin; c₁ is the mean of both inner fingers'.
-- A seat in which rock would stand in an open finger backs off along −z of H until that is clear, as
-  far as `HandModel.back_off` at most.
+- Where neither is possible the palm rests on the rock with the crest under its centre.
+- On rock known only by its outline the palm rests on the highest rock found under it, on a few
+  lines along it; the crest of a pinch is the hold's origin; c₁ is the mean of both inner fingers.
+- A seat with rock inside an open finger backs off along −z of H until the finger is clear, by
+  ``HandModel.back_off`` at most.
 - On a plane every tile lies flat: the palm stands off by the tiles' height, within the spines'
   travel.
 """
@@ -42,17 +42,17 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True)
 class Seating:
-    """Pose of a hold in the hand, and how it was found. Arrays are read-only.
+    """Pose of a hold in the hand, and the rule that chose it. Arrays are read-only.
 
     Attributes
     ----------
     pose : Pose
-        The hold's frame in H.
+        The hold's frame in the hand frame H.
     rule : {'given', 'pinch', 'palm_on_rock', 'palm_on_rock_centred', 'flat'}
-        How it was found.
+        How the pose was found.
     backed_off : float
-        How far along −z of H the hand then backed off, so that its open fingers are clear of the
-        rock [m].
+        Distance along −z of H by which the hand then backed off, so that its open fingers are
+        clear of the rock [m].
     """
 
     pose: Pose
@@ -60,14 +60,17 @@ class Seating:
     backed_off: float = 0.0
 
     def off(self, distance: float) -> Seating:
-        """Return the seating of a hand that backs off by a distance [m]."""
+        """Return the seating after the hand has backed off from the rock.
+
+        ``distance``: along −z of the hand frame H [m].
+        """
         position = self.pose.position + np.array([0.0, 0.0, distance])
         position.setflags(write=False)
         return Seating(Pose(position, self.pose.rotation), self.rule, distance)
 
 
 def seating_given(pose: Pose) -> Seating:
-    """Return the seating of a hold whose place is given, a copy that nobody can change."""
+    """Return the seating for a given pose of the hold in the hand frame H, as a read-only copy."""
     position, rotation = np.array(pose.position, dtype=float), np.array(pose.rotation, dtype=float)
     position.setflags(write=False)
     rotation.setflags(write=False)
@@ -75,7 +78,7 @@ def seating_given(pose: Pose) -> Seating:
 
 
 CENTRED_SEATING: Final = Seating(Pose.identity(), "palm_on_rock_centred")
-"""The palm on the rock, with the crest under its centre."""
+"""Seating with the palm on the rock and the crest under the palm's centre."""
 
 CENTRED_SEATING.pose.position.setflags(write=False)
 CENTRED_SEATING.pose.rotation.setflags(write=False)
@@ -88,9 +91,7 @@ def propose(
     at: Pose | None = None,
     known: dict[Hashable, RockUnder] | None = None,
 ) -> tuple[Seating, bool]:
-    """Return where a hand would be seated, and whether c₁ is meant to be a contact there.
-
-    If it is, and the hand does not touch there (`touches_seat`), it is seated centred instead.
+    """Return the proposed seat of a hand on a hold, and whether to check it for contact.
 
     Parameters
     ----------
@@ -98,10 +99,19 @@ def propose(
     hold : Hold
     grasp : Grasp
     at : Pose, optional
-        A frame, in the hold's, that takes that one's place.
+        Frame on the hold, in the hold's frame, on which to seat the hand; the hold's own frame by
+        default.
     known : dict, optional
-        Rock under hands like this one that was cut already; what is cut is added. It is the same
-        for whatever grasp a hand has at a place.
+        Cache of the rock cut under hands of this model, by hold and ``at``; new cuts are added. The
+        cut rock does not depend on the grasp.
+
+    Returns
+    -------
+    seating : Seating
+    on_contact : bool
+        Whether the seat assumes that the inner fingers' proximal tiles touch at the distance
+        ``hand.seated_contact`` from their joints. If so, and `touches_seat` is False for the closed
+        finger, the caller uses `CENTRED_SEATING` instead.
     """
     _, y, z = hand.inner_place
     if at is not None:
@@ -128,7 +138,11 @@ def propose(
 
 
 def touches_seat(hand: HandModel, along: float) -> bool:
-    """Return True if an inner finger's proximal tile touches where a seat meant it to."""
+    """Return True if an inner finger's proximal contact is where its seat assumed it.
+
+    ``along``: distance of the contact from the proximal joint, compared with ``seated_contact``
+    [m].
+    """
     return abs(along - hand.seated_contact) < 1e-6  # [m]
 
 
@@ -183,12 +197,19 @@ def _smooth(hand: HandModel, hold: Hold, crest: float | None) -> Place | None:
 
 
 class RockUnder:
-    """Rock under a palm and the inner fingers as seen from a frame: outlines along x.
+    """Outlines of the rock under a palm and the inner fingers, in planes y = const of a frame.
+
+    Parameters
+    ----------
+    hand : HandModel
+    hold : Hold
+    at : Pose
+        The frame, in the hold's frame.
 
     Attributes
     ----------
     under : list of PolylineSection
-        Of the rock under the inner fingers.
+        Rock in the planes of the two inner fingers; planes without rock are left out.
     """
 
     def __init__(self, hand: HandModel, hold: Hold, at: Pose) -> None:
@@ -219,11 +240,17 @@ class RockUnder:
         return PolylineSection(pieces) if pieces else None
 
     def top(self, x: Array) -> Array:
-        """Return z of the highest rock under a palm if the frame is at x of the hand; NaN if none.
+        """Return z of the highest rock under the palm, for places of the frame along x of the hand.
 
         Parameters
         ----------
         x : ndarray, shape (n,)
+            x of the frame in the hand frame H [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            z of the highest rock in the frame [m]; NaN where there is no rock.
         """
         tops = [line.highest(-self._half - x, self._half - x) for line in self._lines]
         least = np.min(tops, axis=0)

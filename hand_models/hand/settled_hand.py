@@ -1,4 +1,4 @@
-"""A hand closed on a hold: where its tiles are, and what tension loads them with."""
+"""A hand closed on a hold: places of its tiles, and their loads per newton of tendon tension."""
 
 from __future__ import annotations
 
@@ -25,19 +25,21 @@ __all__ = ["HandPostures", "SettledHand", "SettledPalm", "SettledTile"]
 
 
 class HandPostures(NamedTuple):
-    """Postures of four fingers, and their contacts; arrays have shape (4, 3).
+    """Postures and contacts of the four fingers in the order of `FINGERS`, arrays of shape (4, 3).
+
+    The second axis counts the phalanges, proximal first.
 
     Attributes
     ----------
     angles : ndarray
-        θ of each phalanx [rad].
+        θ, angle of each phalanx from x toward z of its finger's F [rad].
     joints : ndarray of complex
-        x + i z of each joint in F [m].
+        x + i z of each phalanx's joint in the finger frame F [m].
     alongs, rises, tilts, engagement : ndarray
-        Of each contact: along its phalanx from the joint, above the tile's face [m], from the
-        phalanx's normal [rad], and the share of the tile's spines on the rock.
+        Contact of each phalanx: distance from the joint [m], height above the tile's face [m],
+        angle of its force from the phalanx's normal [rad], share of the tile's spines on the rock.
     kinds, stops : ndarray of int8
-        Codes of `CONTACT_NAMES` and `hand_models.finger.JOINT_STOPS`.
+        Codes: indices into `CONTACT_NAMES`, and into `hand_models.finger.JOINT_STOPS`.
     """
 
     angles: Array
@@ -50,7 +52,10 @@ class HandPostures(NamedTuple):
     stops: NDArray[np.int8]
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
-        """Return the fingers one by one."""
+        """Return the posture of each finger as a `SettledFinger`, in the order of `FINGERS`.
+
+        ``model``: the model that the four fingers share.
+        """
         return tuple(
             SettledFinger(
                 model,
@@ -75,15 +80,16 @@ class HandPostures(NamedTuple):
 
 
 class SettledTile(NamedTuple):
-    """One finger tile's place among the hand's rows and columns.
+    """Name and contact state of one finger tile.
 
     Attributes
     ----------
     finger : str
+        One of `FINGERS`.
     phalanx : str
-        ``base``, ``proximal``, ``middle`` or ``distal``; ``nail`` where the hand clings with it.
+        ``base``, ``proximal``, ``middle``, ``distal``, or ``nail`` in a fingernail grasp.
     contact : {'face', 'edge', 'frame', 'nail', 'none'}
-        What of it touches the rock; ``frame`` if its phalanx only rests beside the tile.
+        Part that touches the rock; ``frame`` if the bare phalanx beside the tile does.
     """
 
     finger: str
@@ -92,23 +98,25 @@ class SettledTile(NamedTuple):
 
 
 class SettledPalm(NamedTuple):
-    """The palm on its rock.
+    """The palm on its rock: engaged tiles and their strength.
 
     Attributes
     ----------
     gaps : ndarray, shape (8,)
-        From each tile to the rock along z, infinite where there is none [m].
+        Distance from each tile to the rock along z of the hand frame H, infinite where there is
+        none [m].
     engaged : tuple of int
-        Tiles with spines on the rock: it is within their travel.
+        Indices of the tiles with rock within their spines' travel.
     engagement : tuple of float
-        Share φ of the spines of each of these that are on the rock (`engaged_share`).
+        Spine engagement φ of each engaged tile (`engaged_share`).
     centre : ndarray, shape (3,)
-        Of the engaged tiles, each by its share, where shear and pressing act [m]; the origin if
-        none are engaged.
+        Mean place of the engaged tiles in H, weighted by φ, where the palm's shear and pressing
+        act [m]; the origin if no tile is engaged.
     shear_limit : float
-        Along −x of H on the rock, by load sharing of whole tiles, as the mean over `layers` [N].
+        Largest shear, along −x of H on the rock: load sharing of whole tiles, averaged over
+        `layers` [N].
     pressing_limit : float
-        Along +z, of each tile its share [N].
+        Largest pressing along +z of H, the sum over the engaged tiles, each by its φ [N].
     """
 
     gaps: Array
@@ -120,11 +128,11 @@ class SettledPalm(NamedTuple):
 
     @property
     def layers(self) -> list[tuple[float, tuple[int, ...]]]:
-        """Return the palm as sets of whole tiles, one in another, each with its weight.
+        """Palm as nested sets of whole tiles: pairs (weight, indices of the tiles).
 
-        What whole tiles share among them becomes that of tiles engaged in part as the mean over
-        these sets (the Choquet integral over the shares): the same where all shares are one, and
-        without a jump where one of them becomes zero.
+        Load sharing is known for whole tiles. For partly engaged tiles it is averaged over these
+        sets (the Choquet integral over φ): exact if every φ is 1, and continuous where a φ becomes
+        zero.
         """
         order = sorted(zip(self.engagement, self.engaged, strict=True), key=lambda each: -each[0])
         shares = [share for share, _ in order] + [0.0]
@@ -137,7 +145,7 @@ class SettledPalm(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SettledHand:
-    """A hand closed on a hold: where every tile is and what each newton of tension loads.
+    """A hand closed on a hold: place of every tile, and its load per newton of tendon tension.
 
     Attributes
     ----------
@@ -146,38 +154,39 @@ class SettledHand:
     grasp : Grasp
     surface : Surface
     closing_tension : float
-        [N]
+        Tension of each tendon at closing [N].
     seating : Seating
+        Pose of the hold in the hand.
     postures : HandPostures
-        Of the fingers, in the order of `FINGERS`.
-    tiles : tuple of SettledTile
-        The 14 finger tiles, finger by finger, from the base outward; after each finger's, where the
-        hand clings, its nail.
+        Postures of the fingers, in the order of `FINGERS`.
+    tiles : tuple of SettledTile, length n
+        The 14 finger tiles, finger by finger, from the base outward; in a fingernail grasp each
+        finger's nail follows its tiles.
     finger_of : ndarray of int, shape (n,)
         Index of each tile's finger.
     positions : ndarray, shape (n, 3)
-        Of each tile's contact in H [m].
+        Place of each tile's contact in the hand frame H [m].
     axes : ndarray, shape (n, 3, 3)
-        Rows: the unit force on the rock of shear, of normal and of lateral load, in H.
+        Rows: unit force on the rock of shear, of normal and of lateral load, in H.
     loads : ndarray, shape (n, 2, 2)
-        Shear and normal load, each at zero tension [N] and per newton of tension. A nail's normal
-        load is P across it; its shear A, along it, is passive.
+        Shear and normal load (second axis), each at zero tension [N] and per newton of tension. For
+        a nail the normal load is P, across it; its shear A, along it, is passive.
     engagement : ndarray, shape (n,)
-        Share φ of each tile's spines that are on the rock (`engaged_share`): above 0, at most 1,
-        where its contact is ``face`` or ``edge``, 0 of all others and of nails. A tile has φ times
-        the shear that its tendon would give the whole of it, holds φ times as much, and carries
-        its finger's lateral reaction in proportion to φ. See `limit_shares`, too.
+        Spine engagement φ of each tile (`engaged_share`): in (0, 1] for contacts ``face`` and
+        ``edge``, else 0. A tile has φ times the shear of a whole tile, φ times its strength, and a
+        part of its finger's lateral reaction in proportion to φ. See also `limit_shares`.
     nail_angles : ndarray, shape (4,)
-        How far each finger's nail has turned; all the way where it does not hook [rad].
+        Angle of each finger's nail; fully retracted if it does not hook [rad].
     nail_normals : ndarray, shape (4, 3)
-        Out of the rock where each finger's nail hooks, in H; zero where none does.
+        Unit vector out of the rock at each nail's hook, in H; zero if the nail does not hook.
     nail_rows : tuple of (ndarray, ndarray)
-        H and h of `Fingernail.rows` of each nail that hooks, in the order of the tiles.
+        ``H`` and ``h`` of the `Cling` of each nail that hooks, in the order of the tiles.
     stops : tuple of (int, int, ndarray)
-        Finger, joint and the torque on its stop, affine in tension, of joints at their limits.
+        For each joint at a limit, of fingers with a contact: index of the finger, index of the
+        joint, and the torque against its stop at zero tension [N·m] and per newton [m].
     palm : SettledPalm
     sets : BoundedStore of float to WrenchSpace
-        What `fixed_wrist.wrench_spaces` found for a largest tension [N], the last few.
+        Cache of `fixed_wrist.wrench_spaces` by the largest tension [N], the last few.
     """
 
     hand: HandModel
@@ -204,16 +213,17 @@ class SettledHand:
 
     @cached_property
     def fingers(self) -> tuple[SettledFinger, ...]:
-        """The fingers, in the order of `FINGERS`."""
+        """Posture of each finger, in the order of `FINGERS`."""
         return self.postures.fingers(self.hand.finger)
 
     @cached_property
     def closures(self) -> tuple[str, ...]:
-        """Closure of each finger.
+        """Closure of each finger, in the order of `FINGERS`.
 
-        Laid with all of its tiles on the rock; hooked with some of them; wedged with bare phalanges
-        or its tip only; curled in the air between its springs and its tendon; stopped there with
-        all joints at limits; or held straight to cling with its nail.
+        ``laid``: the tiles of all three phalanges on the rock; ``hooked``: some of them;
+        ``wedged``: only bare phalanges touch; ``curled``: no contact, tendon and springs in
+        balance; ``stopped``: no contact, all joints at their limits; ``straight``: to cling with
+        the nail.
         """
         if self.grasp.fingernail:
             return ("straight",) * len(FINGERS)
@@ -236,22 +246,25 @@ class SettledHand:
 
     @cached_property
     def touching(self) -> Array:
-        """True for tiles that have rock under them, shape (n,)."""
+        """True for tiles that are on rock (contact ``face`` or ``edge``), shape (n,)."""
         return np.array([tile.contact in ("face", "edge") for tile in self.tiles])
 
     @cached_property
     def lateral_shares(self) -> Array:
-        """Share of its finger's lateral reaction that each tile carries, as its φ, shape (n,)."""
+        """Share of its finger's lateral reaction that each tile carries, shape (n,).
+
+        The tile's spine engagement φ over the sum of φ of the finger's tiles.
+        """
         sums = np.where(self._whole_tiles > 0.0, self._whole_tiles, 1.0)
         return np.asarray(self.engagement / sums[self.finger_of])
 
     @cached_property
     def limit_shares(self) -> Array:
-        """Part of a whole tile's strength that limits each tile's load, shape (n,).
+        """Share of a whole tile's strength that limits each tile's load, shape (n,).
 
-        φ, and below φ₀, the hand's ``least_share``, φ + (φ₀ − φ)² / (2 φ₀): a tile's load goes to
-        zero with φ, its limit does not, so that a tile with fewer and fewer spines on the rock
-        limits the hand less and less. Zero where it has none.
+        φ from φ₀ on, the hand's ``least_share``; below that φ + (φ₀ − φ)² / (2 φ₀), and zero at φ =
+        0. A tile's load goes to zero with φ but its limit does not, so that a tile that loses its
+        spines limits the hand less and less.
         """
         least, share = self.hand.least_share, self.engagement
         more = np.maximum(least - share, 0.0) ** 2 / (2.0 * least)
@@ -261,13 +274,13 @@ class SettledHand:
     def drag_allowances(self) -> Array:
         """Force beyond friction by which each tile may be dragged backwards, shape (n,) [N].
 
-        Shear strength times what its part of `limit_shares` is more than φ: zero from φ₀ on.
+        Shear strength times (`limit_shares` − φ): zero for φ ≥ φ₀.
         """
         return self.surface.shear_limit * (self.limit_shares - self.engagement)
 
     @cached_property
     def lateral_limits(self) -> Array:
-        """Lateral force that the tiles of each finger hold together, shape (4,) [N]."""
+        """Lateral strength of each finger, the sum over its tiles by engagement, shape (4,) [N]."""
         return self.surface.lateral_limit * self._whole_tiles
 
     @cached_property
@@ -278,17 +291,20 @@ class SettledHand:
 
     @cached_property
     def nails(self) -> Array:
-        """True for tiles that are nails that hook, shape (n,)."""
+        """True for nails that hook, shape (n,)."""
         return np.array([tile.contact == NAIL for tile in self.tiles])
 
     @cached_property
     def holding(self) -> Array:
-        """True for tiles and nails that are on rock that they hold, shape (n,)."""
+        """True for tiles that are on rock and for nails that hook, shape (n,)."""
         return np.logical_or(self.touching, self.nails)
 
     @cached_property
     def rock_ends(self) -> tuple[float, ...]:
-        """Distance from each finger's joint to the rock's end in its plane, or infinity [m]."""
+        """Distance from each finger's joint to the hold's border in the finger's plane [m].
+
+        Infinite where the hold has no border or the plane does not cut it.
+        """
         border = self.hold.border
         if not len(border):
             return (math.inf,) * len(FINGERS)
@@ -303,7 +319,18 @@ class SettledHand:
         return tuple(found)
 
     def nail_limits(self, tile: int) -> tuple[HalfPlane, HalfPlane]:
-        """Return the limits of a nail's force, toward its finger's base and into the rock."""
+        """Return two limits of a nail's force: toward its finger's base, and into the rock.
+
+        Parameters
+        ----------
+        tile : int
+            Index of the nail in ``tiles``.
+
+        Returns
+        -------
+        tuple of HalfPlane
+            ``nail_shear`` with the capacity ``finger_shear``, and ``fingertip_force`` [N].
+        """
         structure = self.hand.structure
         base = -self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]].along
         into = np.array([0.0, 0.0, 1.0])
@@ -318,21 +345,21 @@ class SettledHand:
     def tile_loads(
         self, tensions: Array, laterals: Array | None = None, axials: Array | None = None
     ) -> Array:
-        """Return shear, normal and lateral load of each finger tile.
+        """Return shear, normal and lateral load of each finger tile for given tendon tensions.
 
         Parameters
         ----------
         tensions : ndarray, shape (4,)
-            Of the tendons [N].
+            Tensions of the tendons [N].
         laterals : ndarray, shape (4,), optional
-            Lateral reaction of each finger on the rock [N].
+            Lateral reaction of each finger on the rock [N]; zero by default.
         axials : ndarray, shape (4,), optional
-            A of each finger's nail [N].
+            A, axial force of each finger's nail [N]; zero by default.
 
         Returns
         -------
         ndarray, shape (n, 3)
-            [N]; c_sys + f c_act of Eq. 14.
+            Loads of each tile [N]; c_sys + f c_act of Eq. 14.
         """
         f = np.asarray(tensions, dtype=float)[self.finger_of]
         y = np.zeros(len(FINGERS)) if laterals is None else np.asarray(laterals, dtype=float)

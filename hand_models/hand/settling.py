@@ -1,8 +1,8 @@
-"""Many hands closed on their holds at once: seated, with their palms and their fingers on the rock.
+"""Close many hands on their holds together: seat them, then place their palms and fingers on rock.
 
-What is alike for all hands is worked out for all together, on arrays: where they are in the axes of
-their holds, the places and axes of their tiles. How each finger rests is found one by one
-(`hand_models.hand.closed_fingers`), for those that are mirror images once.
+The parts that all hands have in common are computed on arrays: their poses at their holds, and the
+places and axes of their tiles. Each finger's closing is found on its own
+(`hand_models.hand.closed_fingers`), mirror images once.
 """
 
 from __future__ import annotations
@@ -39,18 +39,19 @@ __all__ = ["seated", "settle_hands"]
 def settle_hands(
     hand: HandModel, placements: Sequence[Placement]
 ) -> list[SettledHand | InvalidInputError]:
-    """Close hands on their holds.
+    """Close hands of one model on their holds.
 
     Parameters
     ----------
     hand : HandModel
-        Which all of them are.
+        Model of all the hands.
     placements : sequence of Placement
 
     Returns
     -------
     list of SettledHand or InvalidInputError
-        In order; an error in place of a hand that cannot be where it is, see `SpinyHand.settle`.
+        In the order of ``placements``; for a hand that cannot close, the error that
+        `SpinyHand.settle` would raise.
     """
     tensions = [each.grasp.closing_tension or hand.closing_tension for each in placements]
     placed, laid = _seated(hand, placements)
@@ -73,7 +74,18 @@ def settle_hands(
 
 
 def seated(hand: HandModel, placements: Sequence[Placement]) -> Sequence[Seating]:
-    """Return where hands are at their holds, seated where these have no place."""
+    """Return the seating of each hand: the pose of its hold in it, found where none is given.
+
+    Parameters
+    ----------
+    hand : HandModel
+    placements : sequence of Placement
+
+    Returns
+    -------
+    sequence of Seating
+        In the order of ``placements``.
+    """
     return _seated(hand, placements)[0].seatings
 
 

@@ -1,4 +1,4 @@
-"""SpinyHand: a hand that can be seated and closed on holds, and keeps those it closed on last."""
+"""SpinyHand: close the hand on holds, with an LRU cache of the hands settled last."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ __all__ = ["NearbyClosure", "SpinyHand", "nearby_closures", "spiny_hand"]
 
 
 class NearbyClosure(NamedTuple):
-    """Closures of a finger where the rock is a little elsewhere.
+    """Other closures of a finger if the rock is moved by a small distance.
 
     Attributes
     ----------
     closures : tuple of str
-        Ends other than where it is, as of `SettledHand.closures`, and ``refused`` where the hand
-        cannot be there.
+        Closures other than the finger's present one, from `SettledHand.closures`, sorted; with
+        ``refused`` if the whole hand could not close on the moved rock.
     turn : float
-        Largest change of the angle at which any of its joints ends [rad].
+        Largest change of any of the finger's joint angles [rad].
     """
 
     closures: tuple[str, ...]
@@ -37,12 +37,14 @@ class NearbyClosure(NamedTuple):
 
 
 class SpinyHand(HandModel):
-    """A hand that closes on holds.
+    """The hand with its closing: seats a hand on a hold and closes its fingers on the rock.
+
+    Hands that were settled last are kept in LRU caches.
 
     Parameters
     ----------
     table : ParameterTable, optional
-        The numbers; ``parameters/hand.toml`` by default.
+        The hand's numbers; ``parameters/hand.toml`` by default.
 
     Raises
     ------
@@ -52,10 +54,10 @@ class SpinyHand(HandModel):
     Attributes
     ----------
     settled, settled_scans : BoundedStore
-        Hands that were settled last on holds given by numbers, and on meshes and profiles;
-        `settle_each` looks there first.
+        Caches of settled hands: on holds given by numbers, and on meshes and profiles.
+        `settle_each` looks here first.
     seated_best : BoundedStore
-        Hands whose best seats were searched for last (`hand_models.fixed_wrist.seat_search`).
+        Cache of hands in the best seats found by `hand_models.fixed_wrist.seat_search`.
     """
 
     def __init__(self, table: ParameterTable | None = None) -> None:
@@ -82,26 +84,33 @@ class SpinyHand(HandModel):
         hold_in_hand: Pose | None = None,
         at: Pose | None = None,
     ) -> SettledHand:
-        """Close the hand on a hold.
+        """Close the hand on one hold.
 
         Parameters
         ----------
         hold : Hold
         surface : Surface
-            What a tile holds on it.
+            Strength of a tile on the hold.
         grasp : Grasp, optional
+            Default grasp if left out.
         hold_in_hand : Pose, optional
-            The hold's frame in H; without it the hand is seated (see
-            `hand_models.hand.seating`), and backs off rock that would stand in its open fingers, as
-            far as ``back_off``.
+            The hold's frame in the hand frame H. If left out, the hand is seated (see
+            `hand_models.hand.seating`), and backs off by at most ``back_off`` from rock inside its
+            open fingers.
         at : Pose, optional
-            Where it is then seated: a frame, in the hold's, that takes that one's place.
+            Frame on the hold, in the hold's frame, on which to seat the hand; the hold's own frame
+            by default. Only used without ``hold_in_hand``.
+
+        Returns
+        -------
+        SettledHand
 
         Raises
         ------
         InvalidInputError
-            If the rock stands deeper in the palm than the spines can retract, or in a finger
-            wherever its joints turn.
+            If rock is deeper in the palm than the spines can retract, or inside a finger even with
+            its joints fully open; if the closing tension is above the tendon's maximum or too small
+            to close the fingers; or if no equilibrium of a finger is found.
         """
         asked = Placement(hold, surface, grasp or Grasp(), hold_in_hand, at)
         (settled,) = self.settle_each([asked])
@@ -110,12 +119,11 @@ class SpinyHand(HandModel):
         return settled
 
     def settle_each(self, placements: Sequence[Placement]) -> list[SettledHand | InvalidInputError]:
-        """Close hands like this one on their holds, all at once.
+        """Close copies of this hand on many holds together.
 
-        Of the hands that were settled last, 256 are kept, and found again where hold, place,
-        grasp and surface are the same: holds given by numbers where these are equal, meshes and
-        profiles where they are the same object (fewer if these have more than 150 MB in
-        all). Their arrays are read-only.
+        The last 256 settled hands are kept in an LRU cache. The key is hold, pose, grasp and
+        surface: holds given by numbers are compared by value, meshes and profiles by identity
+        (fewer hands are kept if these exceed 150 MB in all). Arrays of the results are read-only.
 
         Parameters
         ----------
@@ -124,8 +132,8 @@ class SpinyHand(HandModel):
         Returns
         -------
         list of SettledHand or InvalidInputError
-            In order; the error that `settle` would raise in place of a hand that cannot be where
-            it is.
+            In the order of ``placements``; for a hand that cannot close, the error that `settle`
+            would raise.
         """
         scanned = [each.hold.scanned for each in placements]
         if not any(scanned):
@@ -168,20 +176,20 @@ def _rock_bytes(hands: Iterable[SettledHand]) -> int:
 
 
 def nearby_closures(settled: SettledHand, distance: float = 1e-4) -> tuple[NearbyClosure, ...]:
-    """Return how each finger of a settled hand ends where the rock is a little elsewhere.
+    """Return how each finger of a settled hand would close if the rock were slightly elsewhere.
 
-    Closed anew with the hold moved by a distance to and fro along each axis of H. Where two
-    equilibria are close, fingers end in one here and in the other there.
+    The hand closes again with the hold moved by ``distance`` to and fro along each axis of the hand
+    frame H. Fingers with two equilibria close to each other change their closure.
 
     Parameters
     ----------
     settled : SettledHand
     distance : float, optional
-        [m]
+        Displacement of the hold [m].
 
     Returns
     -------
-    tuple of NearbyClosure
+    tuple of NearbyClosure, length 4
         In the order of `FINGERS`.
     """
     pose = settled.seating.pose
@@ -206,7 +214,12 @@ def nearby_closures(settled: SettledHand, distance: float = 1e-4) -> tuple[Nearb
 
 
 def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:
-    """Return the SpinyHand of a table, built once; of the bundled one by default.
+    """Return the `SpinyHand` of a parameter table, built once per table and kept in an LRU cache.
+
+    Parameters
+    ----------
+    table : ParameterTable, optional
+        The bundled ``parameters/hand.toml`` by default.
 
     Raises
     ------
@@ -217,4 +230,4 @@ def spiny_hand(table: ParameterTable | None = None) -> SpinyHand:
 
 
 _built = stored("hands", 32)(SpinyHand)
-"""Hands by their tables, those asked for last."""
+"""Cached constructor: the hands of the last 32 tables."""

@@ -1,14 +1,14 @@
-"""Bound the load by what the hand's structure bears, whatever its spines hold (Sections 2, 3.2).
+"""Bounds on load from the strength of the hand's structure, not of its spines (Sections 2, 3.2).
 
-Three figures are printed: a finger sustains 500 N of shear, produces 600 N at its tip, and a hand
-grips under loads of up to 50 kg. The last limits the whole force F that a hand *holds*, across the
-rock and away from it,
+The paper prints three figures: a finger sustains 500 N of shear, produces 600 N at its tip, and a
+hand grips under loads of up to 50 kg. The last limits the force F that a hand exerts on the rock,
+across the rock and away from it,
 
     |(F_x, F_y, min(F_z, 0))| ≤ R,
 
-but not how hard it presses. As rows of a wrench space that is a polyhedron inside of it: ``d_k · F
-≤ R`` for the `HELD_DIRECTIONS` directions d_k, longer than unit vectors by the little that puts the
-polyhedron's corners on the ball.
+but not how hard the hand presses. As rows of a wrench space that ball is a polyhedron inside it:
+``d_k · F ≤ R`` for the `HELD_DIRECTIONS` d_k, longer than unit vectors just so that the
+polyhedron's corners are on the ball.
 """
 
 from __future__ import annotations
@@ -48,24 +48,24 @@ def _held() -> Array:
 
 
 HELD_DIRECTIONS: Final = _held()
-"""Directions (17, 3) in H whose largest product with a hand's force is at least what the hand
-holds, and at most 1.12 times as much; 1.04 times straight along x or y."""
+"""Directions d_k of the rows that bound a hand's force F, in the hand frame H, shape (17, 3).
+The largest d_k · F is at least the length of (F_x, F_y, min(F_z, 0)), and at most 1.12 times as
+much (1.04 times straight along x or y)."""
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Strengths of a finger and of a hand.
+    """Structural strengths of a finger and of a hand.
 
     Attributes
     ----------
     finger_shear : float
-        Of the shears of a finger's tiles together, the base tile's too [N].
+        Largest sum of the shears of a finger's tiles, the base tile's included [N].
     fingertip_force : float
-        Of the distal phalanx pressing on rock [N]. The paper's 600 N are what a finger *can
-        produce* at its tip, and its shear has a figure of its own, so it is read as what the tip
-        bears in pressing.
+        Largest force with which the distal phalanx may press on rock [N]. The paper's 600 N are
+        what a finger *can produce* at its tip, read here as a limit on pressing.
     hand_load : float
-        R, of what a hand holds [N].
+        R, largest force of a hand across the rock and away from it [N].
     """
 
     finger_shear: float
@@ -74,7 +74,7 @@ class Structure:
 
     @classmethod
     def from_table(cls, table: ParameterTable) -> Structure:
-        """Read the strengths from ``hand.toml``.
+        """Read the strengths from a table of ``hand.toml``.
 
         Raises
         ------

@@ -1,14 +1,15 @@
-"""Order in which a hand closes as its tendons are tightened, from its springs (Section 3.2).
+"""Order in which a hand's parts move as its tendons are tightened (Section 3.2).
 
-Each moving part of a finger holds against the tendon with a preload p and a spring K, and moves by
-x when the tendon's tension f at it, times its pulley's radius or ratio r, is more than both:
+Each moving part of a finger resists the tendon with a preload p and a spring K, and moves by x when
+the tendon's tension f, times the friction loss M and the part's pulley radius or ratio r, exceeds
+both:
 
     f M r = p + K x.
 
-So it starts at p / (M r), and is at rest, at its end of travel or on the rock, at (p + K x)/(M r).
-The fingernail turns until it is retracted (or hooks), each joint until its phalanx rests; the tiles
-slide until they catch the rock at the closing tension. The springs are meant to do this one after
-the other: nail, then joints from the base outward, then tiles.
+So the part starts at p / (M r), and is at rest, at its end of travel or on the rock, at
+(p + K x)/(M r). The fingernail turns until it is retracted (or hooks), each joint until its phalanx
+rests; the tiles slide until they catch the rock at the closing tension. The springs are meant to
+order these: nail, then joints from the base outward, then tiles.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ __all__ = ["ClosingSequence", "ClosingStage", "closing_sequence", "resting_tensi
 
 
 class ClosingStage(NamedTuple):
-    """One part of a finger on its way.
+    """Motion of one part of a finger while its tendon is tightened.
 
     Attributes
     ----------
     part : str
         ``nail``, a phalanx (for its joint), or ``tiles``.
     starts, ends : float
-        Tension of the tendon at which it begins to move and is at rest [N].
+        Tension of the tendon at which the part begins to move and is at rest [N].
     """
 
     part: str
@@ -43,18 +44,19 @@ class ClosingStage(NamedTuple):
 
 
 class ClosingSequence(NamedTuple):
-    """Stages in which one finger closes.
+    """Order in which the parts of one finger close.
 
     Attributes
     ----------
     finger : str
+        One of `FINGERS`.
     stages : tuple of ClosingStage
         Nail, joints from the base outward, tiles.
     in_order : bool
-        Whether nail and joints move one after the other, as Section 3.2 wants it: each starts no
+        Whether nail and joints move one after the other, as Section 3.2 intends: each starts no
         sooner than the one before it ends.
     closure : str
-        How it has ended, as of `SettledHand.closures`.
+        How the finger has ended its closing; see `SettledHand.closures`.
     """
 
     finger: str
@@ -64,30 +66,41 @@ class ClosingSequence(NamedTuple):
 
 
 def resting_tensions(model: FingerModel, turns: Array, losses: Array) -> Array:
-    """Return the tensions at which joints are at rest that have turned so far [N].
+    """Return the tendon tensions that balance the joints' springs at angles q: (p + K q) / (M r).
 
     Parameters
     ----------
     model : FingerModel
+        Preloads p, stiffnesses K and pulley radii r of the joints.
     turns : ndarray, shape (..., 3)
-        q of each joint [rad].
+        q, angle of each joint [rad].
     losses : ndarray, shape (..., 3)
-        Diagonals of M (Eq. 8).
+        Diagonals of M, friction losses of the tendon (Eq. 8).
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Tension for each joint [N].
     """
     springs = np.asarray(model.joint_preload) + np.asarray(model.joint_stiffness) * turns
     return np.asarray(springs / (losses * np.asarray(model.pulley_radii)))
 
 
 def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
-    """Return how each finger of a settled hand has closed, in the order of `FINGERS`.
+    """Return the order in which each finger of a settled hand has closed, with its tensions.
 
-    A joint that the rock has pushed open, or that stands at its lower limit, has not been closed by
-    the tendon: its stage is over where it starts. The tiles' preload is not published, so it is
-    taken as zero and their start is not judged.
+    A joint that the rock has pushed open, or that is at its lower limit, has not been closed by the
+    tendon: its stage ends where it starts. The tiles' preload is not published, so it is taken as
+    zero, and ``in_order`` ignores the tiles.
 
     Parameters
     ----------
     settled : SettledHand
+
+    Returns
+    -------
+    tuple of ClosingSequence, length 4
+        In the order of `FINGERS`.
     """
     hand = settled.hand
     nail = hand.nail

@@ -1,6 +1,6 @@
-"""Places of the tiles of closed hands in H, the axes along which they load the rock, and the loads.
+"""Tiles of closed hands: their places in H, their axes of load, and their loads.
 
-For palms it finds which of their tiles are engaged, and what these bear together.
+For palms: which tiles are engaged, and the strength of these together.
 """
 
 from __future__ import annotations
@@ -49,7 +49,22 @@ def _order(*, nails: bool) -> tuple[Indices, Indices]:
 
 
 class HandTiles(NamedTuple):
-    """The tiles of one hand; attributes as of `SettledHand`."""
+    """Tiles of one hand.
+
+    Attributes
+    ----------
+    tiles : tuple of SettledTile, length n
+    finger_of : ndarray of int, shape (n,)
+        Index of each tile's finger.
+    positions : ndarray, shape (n, 3)
+        Place of each tile's contact in the hand frame H [m].
+    axes : ndarray, shape (n, 3, 3)
+        Rows: unit force on the rock of shear, of normal and of lateral load, in H.
+    loads : ndarray, shape (n, 2, 2)
+        Shear and normal load, each at zero tension [N] and per newton of tension.
+    engagement : ndarray, shape (n,)
+        Spine engagement φ of each tile.
+    """
 
     tiles: tuple[SettledTile, ...]
     finger_of: Indices
@@ -60,7 +75,7 @@ class HandTiles(NamedTuple):
 
 
 def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence[float]) -> Array:
-    """Return the tiles of hands that are closed: the base tiles, then the others.
+    """Return the numbers of all finger tiles of n closed hands.
 
     Parameters
     ----------
@@ -72,6 +87,8 @@ def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence
     Returns
     -------
     ndarray, shape (n, 14, 18)
+        The two base tiles, then the tiles of the phalanges finger by finger; the last axis in the
+        order of `TileColumns`.
     """
     count, frames = len(tensions), placed.frames
     # each phalanx's contact, axis of shear and axis of normal load, from the finger's plane to H
@@ -103,7 +120,15 @@ def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
 
 
 def hand_tiles(tiles: Array, nails: Mapping[int, Nails]) -> list[HandTiles]:
-    """Return the tiles of each hand, arrays read-only; of those that cling, their nails too."""
+    """Return the finger tiles of each hand, arrays read-only; in a fingernail grasp with the nails.
+
+    Parameters
+    ----------
+    tiles : ndarray, shape (n, 14, 18)
+        From `tiles_on_rock`.
+    nails : mapping of int to Nails
+        Nails by the index of their hand.
+    """
     gripping = tiles.take(_order(nails=False)[0], axis=1)
     made = _each_hand(gripping, nails=False)
     for i, each in nails.items():
@@ -143,7 +168,10 @@ def _named(kinds: bytes, nails: bool) -> tuple[SettledTile, ...]:
 
 
 def palms_on_rock(placed: PlacedHands) -> list[SettledPalm]:
-    """Return the palm of each hand; a tile is engaged with rock within the spines' travel."""
+    """Return the palm of each hand: its engaged tiles and their strength.
+
+    A tile is engaged if rock is within its spines' travel. A grasp without ``palm`` engages none.
+    """
     hand = placed.hand
     gaps = np.array(placed.gaps)[:, STACK_ROWS.base_count :]
     shares = engaged_share(gaps, hand.spine_travel)

@@ -1,4 +1,4 @@
-"""One tendon, many tiles: load sharing with friction, stick and slip, the drive."""
+"""Tendons with friction: stick and slip in a finger, load sharing in a palm, motor and winch."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,9 +1,9 @@
-"""Linear complementarity, w = M z + q, w ≥ 0, z ≥ 0, wᵀz = 0, and stick–slip of a tendon as one.
+"""Linear complementarity problems by Lemke's method, and stick–slip of a tendon as one.
 
-Lemke's method: a covering vector c ≥ 0 makes (M, q + c z₀) easy for a large z₀; complementary
-pivots then lead z₀ down to zero along a path that, with lexicographic ties, never comes back to a
-basis. So there is no iteration that may cycle: the path ends after finitely many pivots, at a
-solution or on a ray.
+Find z ≥ 0 with w = M z + q ≥ 0 and wᵀz = 0. Lemke's method: a covering vector c ≥ 0 makes
+(M, q + c z₀) easy for a large z₀; complementary pivots then lead z₀ down to zero along a path that,
+with lexicographic ties, never comes back to a basis. So there is no iteration that may cycle: the
+path ends after finitely many pivots, at a solution or on a ray.
 
 A tendon under tension runs over pulleys p = 1, 2, …. From s before a pulley its tension becomes
 s′ = λ s + ω a with 0 ≤ a ≤ s: λ s where the tendon runs toward its first strand (a = 0), (λ + ω) s
@@ -36,17 +36,17 @@ def solve_lcp(M: Array, q: Array, cover: Array) -> Array:
         Scaled so that its entries are of order one.
     q : ndarray, shape (n,)
     cover : ndarray, shape (n,)
-        Not negative, and above zero wherever q is negative.
+        Covering vector: not negative, and above zero wherever q is negative.
 
     Returns
     -------
     ndarray, shape (n,)
-        Checked against the problem.
+        z, checked against the three conditions.
 
     Raises
     ------
     SolverError
-        If the path ends on a ray, or in rounding errors.
+        If the path ends on a ray, or rounding errors violate the conditions.
     """
     n = len(q)
     if q.min(initial=0.0) >= 0.0:
@@ -107,7 +107,9 @@ def _ratio_test(tableau: Array, basis: list[int], entering: int) -> int | None:
 
 
 def stick_slip(travel: tuple[Array, Array], before: tuple[Array, Array]) -> Array:
-    """Return where each pulley is between its two ways of slipping, a.
+    """Return a for each pulley, its place between the two directions of slip.
+
+    The tension after a pulley is λ s + ω a, with s the tension before it (see the module).
 
     Parameters
     ----------
@@ -115,12 +117,13 @@ def stick_slip(travel: tuple[Array, Array], before: tuple[Array, Array]) -> Arra
         (V, v_0): the tendon's travels past the pulleys are v = V a + v_0.
     before : tuple of ndarray, shapes (n, m) and (n,)
         (S, s_0): the tensions before the last n pulleys are s = S a + s_0, and s_0 ≥ 0. The first
-        m − n unknowns have no upper bound: v ≥ 0 ⊥ a ≥ 0 is all that holds there.
+        m − n unknowns have no upper bound: v ≥ 0 ⊥ a ≥ 0 is their only condition.
 
     Returns
     -------
     ndarray, shape (m,)
-        0 where the tendon runs toward its first strand, s where it runs toward its last.
+        a: 0 where the tendon runs toward its first strand, s where it runs toward its last, and
+        between the two where it sticks.
 
     Raises
     ------

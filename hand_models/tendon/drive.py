@@ -1,19 +1,22 @@
-"""The drive of a tendon: from its tension to its motor's torque and current, and its winch's angle.
+"""Drive of a tendon: motor torque, current and winch angle for a tendon tension.
 
 A winch of radius r_w on a gear of ratio N, both of efficiency η together, pulls with the tension f
 when its motor gives the torque and draws the current
 
     τ = f r_w / (N η),    I = τ / k_t + I_0,
 
-while it tightens the tendon; to hold a tension needs less, since friction then helps. Both are
-affine in f, so their limits are rows of a hand's wrench space as a tendon's own limit is.
+while it tightens the tendon (k_t the torque constant, I_0 the no-load current); less is needed to
+keep a tension, since friction then helps. Both are affine in f, so their limits are rows of a
+hand's wrench space as a tendon's limit is.
 
-The tendon drawn in is that of the joints' pulleys and of the tiles' (two strands each, c_p = 2),
-whose travel d follows from the tiles' balance (Eq. 5, preload not known and taken as zero):
+The length e of tendon drawn in is that of the joints' pulleys and of the tiles' (two strands each,
+c_p = 2), whose travel d follows from the tiles' balance (Eq. 5, preload not known and taken as
+zero):
 
     e = r_n ψ + Σ r_i q_i + c_p Σ d_i,    K_p d = c_p M f − T,
 
-with the fingernail's pulley r_n and angle ψ.
+with the fingernail's pulley r_n and angle ψ, the joints' pulleys r_i and angles q_i, the tiles'
+springs K_p and shears T, and the friction losses M (Eq. 8).
 """
 
 from __future__ import annotations
@@ -29,12 +32,12 @@ from hand_models.parameters import ParameterTable
 __all__ = ["TendonDrive"]
 
 Values = TypeVar("Values", float, Array)
-"""One tendon's number, or an array of several's."""
+"""One tendon's number, or an array with a number for each tendon."""
 
 
 @dataclass(frozen=True)
 class TendonDrive:
-    """Motor, gear and winch of a tendon, alike for the four of them. SI units.
+    """Motor, gear and winch of a tendon; the four drives are alike. SI units.
 
     Attributes
     ----------
@@ -45,17 +48,17 @@ class TendonDrive:
     winch_radius : float
         r_w [m].
     torque_constant : float
-        k_t [N·m/A].
+        k_t of the motor [N·m/A].
     no_load_current : float
-        I_0 [A].
+        I_0 of the motor [A].
     maximum_torque : float
-        What the motor gives continuously [N·m].
+        Largest continuous torque of the motor [N·m].
     maximum_current : float
-        What motor and driver bear continuously, the less of the two [A].
+        Largest continuous current of motor and driver, the less of the two [A].
     pulley_ratio : float
-        c_p of a tile.
+        c_p, strands of tendon at each tile's pulley.
     tile_stiffness : float
-        K_p [N/m].
+        K_p, stiffness of each tile's springs [N/m].
     """
 
     gear_ratio: float
@@ -70,7 +73,7 @@ class TendonDrive:
 
     @classmethod
     def from_table(cls, table: ParameterTable) -> TendonDrive:
-        """Build the drive from ``hand.toml``.
+        """Return the drive with the numbers of a ``hand.toml`` table.
 
         Raises
         ------
@@ -105,7 +108,14 @@ class TendonDrive:
 
     @property
     def limits(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Per newton of tension, at none and at most: of the torque [N·m], of the current [A]."""
+        """Limits of torque and of current as affine functions of the tendon's tension.
+
+        Returns
+        -------
+        tuple of tuple
+            (torque per newton [m], torque at zero tension [N·m], largest torque [N·m]) and (current
+            per newton [A/N], current at zero tension [A], largest current [A]).
+        """
         return (
             (self.torque_per_newton, 0.0, self.maximum_torque),
             (self.current_per_newton, self.no_load_current, self.maximum_current),
@@ -113,31 +123,31 @@ class TendonDrive:
 
     @property
     def torque_per_newton(self) -> float:
-        """τ / f [m]."""
+        """τ / f, motor torque per newton of tension [m]."""
         return self.winch_radius / (self.gear_ratio * self.efficiency)
 
     @property
     def current_per_newton(self) -> float:
-        """(I − I_0) / f [A/N]."""
+        """(I − I_0) / f, motor current beyond no load per newton of tension [A/N]."""
         return self.torque_per_newton / self.torque_constant
 
     def torque(self, tension: Values) -> Values:
-        """Return the motor's torque τ that tightens a tendon to a tension [N·m]."""
+        """Return the motor's torque τ [N·m] that tightens a tendon to ``tension`` [N]."""
         return tension * self.torque_per_newton
 
     def current(self, tension: Values) -> Values:
-        """Return the current I that the motor draws then [A]."""
+        """Return the motor's current I [A] while it tightens a tendon to ``tension`` [N]."""
         return tension * self.current_per_newton + self.no_load_current
 
     def driven(self, tensions: Array, wound: tuple[Array, Array, Array, Array, Array]) -> Array:
-        """Return torque [N·m] and current [A] of motors, and angle [rad] of winches, (3, F).
+        """Return motor torques [N·m], motor currents [A] and winch angles [rad], shape (3, F).
 
         Parameters
         ----------
         tensions : ndarray, shape (F,)
-            That the motors hold [N].
+            Tension of each tendon [N].
         wound : tuple of ndarray
-            What `winch_angle` takes.
+            The five arguments of `winch_angle`.
         """
         return np.array([self.torque(tensions), self.current(tensions), self.winch_angle(*wound)])
 
@@ -149,11 +159,11 @@ class TendonDrive:
         losses: Values,
         nail_drawn: Values | float = 0.0,
     ) -> Values:
-        """Return how far winches turn from the open finger to a tension [rad].
+        """Return the angle by which winches turn from the open finger to a tension [rad].
 
         The open finger is straight (q = 0), its tiles at rest. The motor turns ``gear_ratio`` times
-        as far. A tile's end stop is not published and none is modelled, so a tile that touches
-        nothing slides as far as its spring lets it.
+        as far. A tile's end stop is not published and none is modelled, so a tile off the rock
+        slides until its spring balances the tendon.
 
         Parameters
         ----------
@@ -162,8 +172,8 @@ class TendonDrive:
         tension : float or ndarray
             f [N].
         shears, losses : float or ndarray
-            T [N] and the diagonal of M (Eq. 8), each summed over the tendon's tiles, the base
-            tile's too if there is one.
+            Shear T [N] and diagonal of M (Eq. 8), each summed over the tendon's tiles, with the
+            base tile if there is one.
         nail_drawn : float or ndarray, optional
             r_n ψ of the fingernail [m].
         """

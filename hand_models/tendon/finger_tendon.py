@@ -12,10 +12,12 @@ its joint turns by δq_i, and its tile by δd_i toward the base relative to the 
     δT_i = k_i (δx_i + δd_i)                       (shear on the rock, Eq. 20)
     c_p δt_i = δT_i + K_p δd_i                     (balance of the tile, Eq. 5)
     v_i > 0 ⇒ t_i = (1 − μ_i) t_{i−1},   v_i < 0 ⇒ t_i = (1 + μ_i) t_{i−1},
-    v_i = 0 ⇒ between the two                      (the bounds 1 ± μ of Section 5.2).
+    v_i = 0 ⇒ between the two                      (the bounds 1 ± μ of Section 5.2),
 
-Where nothing slips, δd_i = −r_i δq_i / c_p is the δl of Eq. 20. Either the motor's tension f is
-given, or the motor is held: v_1 = 0, or the tendon goes slack (f = 0, v_1 > 0).
+with c_p strands at each tile's pulley, pulley radii r_i, contact stiffnesses k_i, tile springs K_p
+and friction μ_i. Where nothing slips, δd_i = −r_i δq_i / c_p is the δl of Eq. 20. Either the
+motor's tension f is given, or the motor is held: v_1 = 0, or the tendon goes slack (f = 0,
+v_1 > 0).
 
 There is one solution. Take two, and their differences Δ: where Δv_i > 0, Δt_i is at most
 (1 − μ_i) Δt_{i−1} or (1 + μ_i) Δt_{i−1}, so Δt_{i−1} ≤ 0 brings Δt_i ≤ 0; and
@@ -38,19 +40,19 @@ from hand_models.tendon.complementarity import stick_slip
 __all__ = ["FingerTendon", "TendonState"]
 
 LEAST_FRICTION = 10.0 * BASE_TOLERANCES.relative
-"""A coefficient of friction up to it is as good as none: such a boundary never sticks."""
+"""Largest coefficient of friction that counts as none: such a boundary never sticks."""
 
 
 @dataclass(frozen=True, eq=False)
 class TendonState:
-    """A finger's tendon and tiles after a change of load.
+    """Tensions of a finger's tendon and shears of its tiles.
 
     Attributes
     ----------
     motor_tension : float
-        f [N].
+        f, tension at the motor [N].
     tensions, shears : ndarray, shape (n,)
-        t_i and T_i [N].
+        t_i in each phalanx, and T_i of each tile on the rock [N].
     """
 
     motor_tension: float
@@ -67,7 +69,7 @@ class FingerTendon:
     pulley_ratio : float
         c_p, strands of tendon at each tile's pulley.
     contact_stiffness : tuple of float, length n
-        k_i of each tile on the rock, 0 where it touches nothing [N/m].
+        k_i of each tile on the rock, 0 for a tile off the rock [N/m].
     spring_stiffness : float
         K_p of each tile's springs [N/m].
     pulley_radii : tuple of float, length n
@@ -82,7 +84,7 @@ class FingerTendon:
     Raises
     ------
     InvalidInputError
-        If a number is out of range, or their numbers differ.
+        If a number is out of range, or the two tuples differ in length.
     """
 
     pulley_ratio: float
@@ -94,7 +96,7 @@ class FingerTendon:
 
     @classmethod
     def from_table(cls, table: ParameterTable, base_tile: bool = False) -> FingerTendon:
-        """Build the tendon from ``hand.toml``, all its tiles on the rock.
+        """Return the tendon with the numbers of a ``hand.toml`` table, all its tiles on the rock.
 
         Parameters
         ----------
@@ -116,7 +118,7 @@ class FingerTendon:
         )
 
     def engaged(self, shares: Sequence[float] | Array) -> FingerTendon:
-        """Return the tendon where only some spines of its tiles are on the rock.
+        """Return the tendon for tiles with only a share of their spines on the rock.
 
         A tile gives φ times the shear of a whole one, for tendon and slip alike: k_i becomes what
         in series with K_p is φ times as stiff, φ k K_p / (K_p + (1 − φ) k).
@@ -124,7 +126,7 @@ class FingerTendon:
         Parameters
         ----------
         shares : sequence of float, length n
-            φ of each tile.
+            Spine engagement φ of each tile.
         """
         k, phi = np.array(self.contact_stiffness), self._of_phalanges("shares", shares)
         springs = self.spring_stiffness + (1.0 - phi) * k
@@ -144,14 +146,14 @@ class FingerTendon:
             _check(name, mu, 0.0 <= mu < 1.0, "in [0, 1)")
 
     def closed(self, tension: float, shears: Sequence[float] | Array) -> TendonState:
-        """Return the finger as it has closed, its tensions by Eq. 8.
+        """Return the state of tendon and tiles at closing, with the tensions of Eq. 8.
 
         Parameters
         ----------
         tension : float
-            f at which it closed [N].
+            f at which the finger closed [N].
         shears : sequence of float, length n
-            What each tile then drags the rock with [N].
+            Shear of each tile on the rock at closing [N].
         """
         _check("tension", tension, 0.0 <= tension < np.inf, "finite and not negative [N]")
         n = len(self.pulley_radii)
@@ -168,19 +170,19 @@ class FingerTendon:
         shift: Sequence[float] | Array | None = None,
         turn: Sequence[float] | Array | None = None,
     ) -> TendonState:
-        """Change the load with the motor held.
+        """Return the state after a change of load with the motor standing still.
 
-        The tendon gives no length past the first boundary, whatever its friction; the motor's own
-        strand keeps its tension as far as that friction can hold the difference. Exact for a step
-        at whose end every boundary that slipped on the way still slips.
+        The tendon gives no length past the first boundary, whatever its friction; the motor's
+        strand keeps its tension as far as that friction can balance the difference. Exact for a
+        step at whose end every boundary that slipped on the way still slips.
 
         Parameters
         ----------
         state : TendonState
             At rest, not slack.
         shift, turn : sequence of float, length n, optional
-            δx_i, of each phalanx along the rock toward the finger's base [m]; δq_i, of each joint,
-            closing [rad].
+            δx_i, displacement of each phalanx along the rock toward the finger's base [m]; δq_i,
+            turn of each joint, closing [rad]. Zero by default.
 
         Raises
         ------
@@ -200,7 +202,23 @@ class FingerTendon:
         shift: Sequence[float] | Array | None = None,
         turn: Sequence[float] | Array | None = None,
     ) -> TendonState:
-        """Change the load while the motor keeps its tension; parameters and errors as `held`."""
+        """Return the state after a change of load while the motor keeps its tension.
+
+        Parameters
+        ----------
+        state : TendonState
+            At rest.
+        shift, turn : sequence of float, length n, optional
+            δx_i, displacement of each phalanx along the rock toward the finger's base [m]; δq_i,
+            turn of each joint, closing [rad]. Zero by default.
+
+        Raises
+        ------
+        InvalidInputError
+            If a number is not finite or missing.
+        SolverError
+            If rounding errors keep the solution from being found.
+        """
         after, shears = self._changed(state, shift, turn, state.motor_tension)
         return TendonState(state.motor_tension, after, shears)
 

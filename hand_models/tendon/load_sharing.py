@@ -15,7 +15,7 @@ before a pulley and s′ after it obey (Eq. 19)
 
 with ρ = (1 − μ/2)/(1 + μ/2), at the tiles' pulleys with one μ, at the palm's with another, which
 Eq. 18 leaves out (μ = 0: A_{i+1} = B_i). The directions are unknown: each change of load is a
-linear complementarity problem. From rest, as here, everything is proportional to x.
+linear complementarity problem. From rest, as here, all results are proportional to x.
 """
 
 from __future__ import annotations
@@ -36,21 +36,24 @@ __all__ = ["PalmSharing", "check_palm", "share_load", "shear_capacity"]
 
 @dataclass(frozen=True, eq=False)
 class PalmSharing:
-    """Shares of a palm's load that its tiles carry from rest, per unit of palm travel.
+    """Load and travel of each palm tile, per unit of palm travel from rest.
 
     Attributes
     ----------
     tile_stiffness : ndarray, shape (N,)
-        Load of each tile, k_i x_i / x [N/m].
+        Load of each tile over the palm's travel, k_i x_i / x [N/m].
     tile_travel : ndarray, shape (N,)
-        x_i / x.
+        Travel of each tile over the palm's travel, x_i / x.
     """
 
     tile_stiffness: Array
     tile_travel: Array
 
     def capacity(self, tile_limits: Sequence[float] | Array) -> float:
-        """Return the palm's load when its first tile reaches its limit [N]."""
+        """Return the palm's load when its first tile reaches its limit [N].
+
+        ``tile_limits``: strength of each of the N tiles [N].
+        """
         limits = np.asarray(tile_limits, dtype=float)
         return float(np.min(limits / self.tile_stiffness) * self.tile_stiffness.sum())
 
@@ -61,7 +64,22 @@ def check_palm(
     friction: float,
     own_friction: float,
 ) -> None:
-    """Refuse numbers that no palm can have; parameters and errors as of `share_load`."""
+    """Raise if stiffnesses or frictions of a palm are impossible.
+
+    Parameters
+    ----------
+    contact_stiffness : sequence of float, length N
+        k_i of each tile on the rock [N/m].
+    spring_stiffness : float
+        k_p of each tile's preload springs [N/m].
+    friction, own_friction : float
+        μ at the tiles' pulleys, and at the palm's pulleys between tiles.
+
+    Raises
+    ------
+    InvalidInputError
+        If a k_i is not above zero, k_p is negative, or a friction is not in [0, 2).
+    """
     k = [float(k_i) for k_i in contact_stiffness]
     if not k or not all(math.isfinite(k_i) and k_i > 0.0 for k_i in k):
         raise InvalidInputError(
@@ -82,23 +100,24 @@ def share_load(
     friction: float,
     own_friction: float = 0.0,
 ) -> PalmSharing:
-    """Return how N tiles on one tendon share the load from rest.
+    """Return how N palm tiles on one tendon share a load from rest.
 
-    Tensions are in units of the mean contact stiffness (so they are lengths), the palm's travel is
-    one. The unknowns are the a of `complementarity`, one for each pulley with friction,
-    s′ = ρ s + ω a with ω = 1/ρ − ρ. They give all the strands s = G a + g s_0, with s_0 by the
-    tendon's length, and from these the slips δ = (k x − A − B)/(k + k_p) and the travels V δ.
+    Solved as a linear complementarity problem. Tensions are in units of the mean contact stiffness
+    (so they are lengths), the palm's travel is one. The unknowns are the a of `complementarity`,
+    one for each pulley with friction, s′ = ρ s + ω a with ω = 1/ρ − ρ. They give all the strands s
+    = G a + g s_0, with s_0 by the tendon's length, and from these the slips δ = (k x − A − B)/(k +
+    k_p) and the travels V δ.
 
     Parameters
     ----------
     contact_stiffness : sequence of float, length N
-        k_i in the tendon's order [N/m].
+        k_i of each tile on the rock, in the tendon's order [N/m].
     spring_stiffness : float
-        k_p [N/m].
+        k_p of each tile's preload springs [N/m].
     friction : float
-        μ between the strands of a tile, in [0, 2).
+        μ at the tiles' pulleys, in [0, 2).
     own_friction : float, optional
-        The same at the palm's N − 1 pulleys between the tiles.
+        μ at the palm's N − 1 pulleys between the tiles, in [0, 2).
 
     Raises
     ------
@@ -173,7 +192,20 @@ def shear_capacity(
 ) -> float:
     """Return the shear that a palm carries when its first tile reaches ``tile_limit`` [N].
 
-    Parameters as of `share_load`, hashable; the last few thousand answers are kept.
+    The last 4096 results are kept in an LRU cache.
+
+    Parameters
+    ----------
+    contact_stiffness : tuple of float, length N
+        k_i of each engaged tile on the rock, in the tendon's order [N/m].
+    spring_stiffness : float
+        k_p of each tile's preload springs [N/m].
+    friction : float
+        μ at the tiles' pulleys, in [0, 2).
+    tile_limit : float
+        Shear strength of one tile [N].
+    own_friction : float, optional
+        μ at the palm's pulleys between the tiles, in [0, 2).
     """
     sharing = share_load(contact_stiffness, spring_stiffness, friction, own_friction)
     return sharing.capacity(np.full(len(contact_stiffness), tile_limit))

@@ -6,11 +6,13 @@ affine function of the change,
 
     t = a f + B_x (k δx) + B_q (r δq),
 
-linear, too, in the motor's tension f at rest. Exactly one regime is consistent for each change of
-load, all of them on their seams. There are 3ⁿ regimes of n boundaries, few enough to try them all.
+also linear in the motor's tension f at rest (k the contact stiffnesses, δx the phalanges'
+displacements along the rock, r the pulley radii, δq the joints' turns). Exactly one regime is
+consistent for each change of load, or several with equal tensions where two regimes meet. There are
+3ⁿ regimes of n boundaries, few enough to try them all.
 
-Tendons over fewer tiles than others get padded ones at their ends, which take up nothing. All
-arrays may be complex, so that derivatives are found by complex steps; they are those of the regime.
+Tendons over fewer tiles than others are padded at their ends with tiles of zero stiffness. All
+arrays may be complex, for derivatives by complex steps; these are derivatives within the regime.
 """
 
 from __future__ import annotations
@@ -28,19 +30,20 @@ from hand_models.tendon.finger_tendon import LEAST_FRICTION, FingerTendon
 __all__ = ["MotorScheme", "TendonRegimes", "TendonResponse", "pad_tiles"]
 
 MotorScheme = Literal["held", "tension"]
-"""Motor while the load changes: it stands still (held), or keeps its tension."""
+"""Motor while the load changes: it stands still (``held``), or keeps its tension (``tension``)."""
 
 
 class TendonResponse(NamedTuple):
-    """Tensions and shears of F fingers' tendons, shapes (F, m, n); ``regime`` has shape (F, m).
+    """Tensions and shears of F fingers' tendons after m changes of load.
 
     Attributes
     ----------
-    tensions : ndarray
-        t_i [N].
-    shears : ndarray
-        T_i on the rock [N].
-    regime : ndarray of int
+    tensions : ndarray, shape (F, m, n)
+        t_i, tension at each tile [N].
+    shears : ndarray, shape (F, m, n)
+        T_i, shear of each tile on the rock [N].
+    regime : ndarray of int, shape (F, m)
+        Index of the regime of stick and slip.
     """
 
     tensions: NDArray[Any]
@@ -49,21 +52,29 @@ class TendonResponse(NamedTuple):
 
 
 def pad_tiles(rows: Sequence[Sequence[float] | Array], fill: float) -> Array:
-    """Return numbers of each finger's tiles as one array, padded at the end, shape (F, n)."""
+    """Return numbers of tiles as one array (F, n), from rows of different lengths.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of float, length F
+        One number for each tile of each finger.
+    fill : float
+        Number put at the end of rows with fewer than n tiles.
+    """
     count = max(map(len, rows))
     return np.array([[*row, *[fill] * (count - len(row))] for row in rows], dtype=float)
 
 
 class TendonRegimes:
-    """Tendons and tiles of F fingers about states of rest, which are linear in motors' tensions.
+    """Tendons and tiles of F fingers at rest, as functions from changes of load to tensions.
 
     Parameters
     ----------
-    tendons : sequence of FingerTendon
+    tendons : sequence of FingerTendon, length F
     losses : ndarray, shape (F, n)
-        Tension in each phalanx at rest, per newton of the motor's.
+        Tension at each tile at rest, over the motor's tension.
     scheme : {'held', 'tension'}
-        What motors do.
+        Whether motors stand still or keep their tension.
     """
 
     def __init__(self, tendons: Sequence[FingerTendon], losses: Array, scheme: MotorScheme) -> None:
@@ -135,13 +146,13 @@ class TendonRegimes:
         Parameters
         ----------
         slips : ndarray, shape (F, m, n)
-            δx_i of each phalanx along the rock, toward the finger's base [m].
+            δx_i, displacement of each phalanx along the rock, toward the finger's base [m].
         turns : ndarray, shape (F, m, n)
-            δq_i of each joint, closing [rad].
+            δq_i, turn of each joint, closing [rad].
         tension : ndarray, shape (F, m)
-            Of each motor at rest [N].
+            Tension of each motor at rest [N].
         at_rest : ndarray, shape (F, m, n)
-            Shears at rest [N].
+            Shear of each tile at rest [N].
         """
         pushed = slips * self._stiffness[:, None]
         given = [pushed, turns * self._radii[:, None], tension[..., None]]

@@ -1,12 +1,13 @@
-"""Directions of a tile's load in boxes, and the largest value of a function over them, bounded.
+"""Boxes of load directions, and a bound on the largest value of a function over them.
 
-A direction is seen from the side at ω and out of the finger plane by η,
+A direction of a tile's load is given by two angles: ω, seen from the side in the finger's plane
+(from shear toward pull-off), and η, out of that plane,
 
     d = (cos η cos ω, cos η sin ω, sin η),    sin φ = cos η sin ω,
 
-so that the trigonometric factors of a box each lie between their values at two of its corners. A
-function that is bounded in each box is bounded over all of them: those boxes are divided whose
-bound is above what was found by more than is allowed for.
+with φ the angle from the tile's plane toward pull-off, so that each trigonometric factor of a box
+lies between its values at two of the box's corners. A function that is bounded in each box is
+bounded over all of them. Branch and bound: boxes are divided whose bound is larger than allowed.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ __all__ = ["DirectionBoxes", "bounded"]
 
 
 class DirectionBoxes(NamedTuple):
-    """Directions seen from the side at ω and out of the finger plane by η, in n boxes of them.
+    """n boxes of load directions, each a range of ω (in the finger's plane) and of η (out of it).
 
     Attributes
     ----------
@@ -40,7 +41,14 @@ class DirectionBoxes(NamedTuple):
 
     @classmethod
     def over(cls, sides: tuple[float, float], turns: tuple[float, float]) -> DirectionBoxes:
-        """Return boxes that fill two ranges, of ω and of η; either may be one value."""
+        """Return boxes that fill a range of ω and a range of η, 256 in all.
+
+        Parameters
+        ----------
+        sides, turns : tuple of float
+            Least and largest ω, and least and largest η [rad]; one of the two ranges may be one
+            value.
+        """
         wide = [low < high for low, high in (sides, turns)]
         # side by side, to begin with; of rectangles the square root of it along each side
         count = round(256 ** (1.0 / sum(wide)))
@@ -56,30 +64,48 @@ class DirectionBoxes(NamedTuple):
 
     @property
     def flat(self) -> Array:
-        """The least φ in each box [rad]."""
+        """Least φ (angle from the tile's plane toward pull-off) in each box, shape (n,) [rad]."""
         return _steepness(self.first, self.far)
 
     @property
     def steep(self) -> Array:
-        """The largest φ in each box [rad]."""
+        """Largest φ (angle from the tile's plane toward pull-off) in each box, shape (n,) [rad]."""
         return _steepness(self.last, self.near)
 
     def line(self, a: float, b: float) -> tuple[Array, Array]:
-        """Return the least and the largest ``a cos ω + b sin ω``, where it is positive."""
+        """Return bounds of ``a cos ω + b sin ω`` in each box, where it is positive.
+
+        Parameters
+        ----------
+        a, b : float
+            Coefficients of shear and pull-off, seen from the side.
+
+        Returns
+        -------
+        least, largest : ndarray, shape (n,)
+        """
         ends = [a * np.cos(side) + b * np.sin(side) for side in (self.first, self.last)]
         top = math.atan2(b, a)
         within = (self.first < top) & (top < self.last)
         return np.minimum(*ends), np.where(within, math.hypot(a, b), np.maximum(*ends))
 
     def aside(self) -> tuple[Array, Array]:
-        """Return the least and the largest cos φ (1 − cos θ) / sin η, which is at most 1."""
+        """Return bounds of cos φ (1 − cos θ) / sin η in each box, at most 1.
+
+        φ: angle from the tile's plane toward pull-off; θ: azimuth in that plane, from the drag to
+        the side.
+
+        Returns
+        -------
+        least, largest : ndarray, shape (n,)
+        """
         least = np.sin(self.near) / (np.cos(self.flat) + np.cos(self.near) * np.cos(self.first))
         with np.errstate(divide="ignore", invalid="ignore"):
             most = np.sin(self.far) / (np.cos(self.steep) + np.cos(self.far) * np.cos(self.last))
         return least, np.fmin(most, 1.0)
 
     def divided(self, count: int) -> DirectionBoxes:
-        """Return so many parts of each box, across its longer side."""
+        """Return ``count`` parts of each box, divided along its longer side."""
         flat = self.last - self.first > self.far - self.near
         w, e = (
             low + np.where(along, high - low, 0.0) * np.arange(count + 1)[:, None] / count
@@ -100,15 +126,20 @@ def _steepness(side: Array, turn: Array) -> Array:
 
 
 def bounded(bound: Callable[[DirectionBoxes], Array], boxes: DirectionBoxes, most: float) -> float:
-    """Return what no value of a function over boxes is larger than: ``most``, or more if need be.
+    """Return an upper bound of a function over boxes by branch and bound.
 
     Parameters
     ----------
     bound : callable
-        Not less than any value in each box, and the nearer to them the smaller it is.
+        Returns for each box a number that no value in it exceeds, the closer the smaller the box.
     boxes : DirectionBoxes
     most : float
-        What the values are thought not to be larger than, by a margin.
+        Proposed bound, a little above the values: boxes above it are divided.
+
+    Returns
+    -------
+    float
+        ``most`` if no box exceeds it, else the larger bound that was proved.
     """
     parts, most_boxes = 8, 20_000
     # what is still open after 24 divisions is bounded all the same

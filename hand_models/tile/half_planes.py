@@ -3,22 +3,23 @@
 The surface r = F(d), d a direction of the load, is boat-shaped and not convex: the region
 { r d : r ≤ F(d) } has dents, at φ_max in the finger plane and, deeper, where the load turns
 sideways while it pulls off. A planner needs a convex region inside it. In the finger plane that is
-bounded by chords a T + b P ≤ c of the curve of Eq. 21 (P = −N is the pull). Each chord answers for
-the loads that lie, seen from the side, between its two ends: there it takes as much lateral load Y
-as keeps them all inside,
+bounded by chords a T + b P ≤ c of the curve of Eq. 21 (T the shear, P = −N the pull). Each chord
+bounds the loads that, seen from the side, are between its two ends: it takes as much lateral load Y
+as keeps all of them inside,
 
     a_Y = c max_d ((1 / F(d) − (a t + b p) / c) / y),    d = (t, p, y).
 
 The chord itself is moved inward where the curve between its ends has a dent (c = the least of
-F(φ) (a cos φ + b sin φ)), as under laws that fall fast at first.
+F(φ) (a cos φ + b sin φ)), as for laws that fall fast at first.
 
 Both extremes are bounded, not sampled (`hand_models.tile.direction_boxes`): f_s and λ never rise
-with φ, so that in a box of directions F lies between two bounds. Half-planes lie inside the surface
+with φ, so that in a box of directions F is between two bounds. Half-planes are inside the surface
 by construction, whatever its law.
 
-A convex region runs straight from its farthest lateral load to its farthest pull, so what a tile
-loses sideways under pull-off is lost in pure lateral load too; pressing gives it back. The outer
-region has the same normals, moved out until they touch: c = max_d F(d) (a t + b p + a_Y y).
+A convex region runs straight from its farthest lateral load to its farthest pull, so the lateral
+strength that a tile loses under pull-off is lost in pure lateral load too; pressing gives it back.
+The outer region has the same normals, moved out until they touch: c = max_d F(d) (a t + b p +
+a_Y y).
 """
 
 from __future__ import annotations
@@ -45,13 +46,14 @@ __all__ = [
 ]
 
 SEARCH_MARGIN: Final = 1e-4
-"""Relative allowance for what a search may have missed, and up to which bounds are brought."""
+"""Relative margin added to a maximum found on grids, within which it is then proved."""
 
 
 class TileLaw(Protocol):
-    """Protocol of a law for half-planes: numbers of `Surface`, and F and its parts, f_s and λ.
+    """Protocol of a limit surface F(φ, θ), with the numbers of `Surface` and its factors f_s and λ.
 
-    Neither part may rise with φ. Laws that are equal have equal hashes.
+    φ is the load's angle from shear toward pull-off, θ its azimuth from the drag [rad]. Neither
+    factor may rise with φ. Laws that are equal have equal hashes.
     """
 
     @property
@@ -69,15 +71,24 @@ class TileLaw(Protocol):
     def __hash__(self) -> int: ...
 
     def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """Return F(φ, θ) [N]."""
+        """Return F(φ, θ), the largest load of a tile in a direction [N].
+
+        ``angle``: φ from shear toward pull-off; ``azimuth``: θ from the drag [rad].
+        """
         ...
 
     def straight_strength(self, angle: ArrayLike) -> Array:
-        """Return f_s(φ) [N]."""
+        """Return f_s(φ), the largest load of a tile in the finger's plane [N].
+
+        ``angle``: φ from shear toward pull-off [rad].
+        """
         ...
 
     def sideways_share(self, angle: ArrayLike) -> Array:
-        """Return λ(φ)."""
+        """Return λ(φ), strength straight sideways over strength along the drag.
+
+        ``angle``: φ from shear toward pull-off [rad].
+        """
         ...
 
 
@@ -87,9 +98,9 @@ class HalfPlane(NamedTuple):
     Attributes
     ----------
     limit : str
-        ``shear`` for the side that pressing governs, ``pull_off`` for the others.
+        ``shear`` for the half-plane that bounds shear under pressing, ``pull_off`` for the others.
     a_shear, a_normal, a_lateral : float
-        Coefficients of the tile's shear T, normal N (> 0 pressing) and lateral load Y.
+        Coefficients of the tile's shear T, normal load N (> 0 pressing) and lateral load Y.
     capacity : float
         Right-hand side [N].
     """
@@ -104,12 +115,15 @@ class HalfPlane(NamedTuple):
 class BoundsGap(NamedTuple):
     """Gap between half-planes and the limit surface, for loads that pull off (T ≥ 0, N ≤ 0).
 
+    T is the shear of a tile, N its normal load (> 0 pressing).
+
     Attributes
     ----------
     inner_volume, outer_volume : float
-        Volumes within the inner and the outer half-planes, over that within the surface.
+        Volume within the inner and within the outer half-planes, over that within the surface.
     inner_worst, outer_worst : float
-        The least and the largest ratio of a reach to the surface's, over all directions.
+        Over all directions of load: the least ratio of the inner half-planes' strength to the
+        surface's, and the largest ratio of the outer half-planes' strength to it.
     """
 
     inner_volume: float
@@ -120,14 +134,22 @@ class BoundsGap(NamedTuple):
 
 @lru_cache(maxsize=256)
 def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
-    """Return half-planes whose intersection lies inside the limit surface, for shear T ≥ 0.
+    """Return half-planes whose intersection is inside the limit surface, for shear T ≥ 0.
+
+    The last 256 results are kept in an LRU cache.
+
+    Parameters
+    ----------
+    surface : TileLaw
+        Such as a `Surface`.
 
     Returns
     -------
     tuple of HalfPlane
-        The one that bounds shear, then the chords from pure shear to φ_max, moved inward where the
-        curve has a dent. The last chord runs on beyond φ_max; where it would leave the curve there
-        (which stays at f_min), one more chord, down to pure pull-off, closes the region.
+        The half-plane that bounds shear, then the chords of the curve of Eq. 21 from pure shear to
+        the pull-off angle φ_max, moved inward where the curve has a dent. The last chord runs on
+        beyond φ_max; where it would leave the curve there (which stays at f_min), one more chord,
+        down to pure pull-off, closes the region.
     """
     nodes = _nodes(surface)
     # a gain steeper than the first chord would cut into the side of pull-off
@@ -149,9 +171,15 @@ def inner_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
 
 
 def outer_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
-    """Return half-planes of the inner ones' normals that hold the whole limit surface, for T ≥ 0.
+    """Return half-planes that contain the limit surface, for shear T ≥ 0.
 
-    Where pressing raises the strength faster than a normal allows, it is tilted as far as needed.
+    Their normals are those of `inner_half_planes`. Where pressing raises the strength faster than a
+    normal allows, the normal is tilted as needed.
+
+    Parameters
+    ----------
+    surface : TileLaw
+        Such as a `Surface`.
     """
     pieces = []
     for piece in inner_half_planes(surface):
@@ -163,18 +191,18 @@ def outer_half_planes(surface: TileLaw) -> tuple[HalfPlane, ...]:
 
 
 def directional_strength(pieces: Sequence[HalfPlane], directions: Array) -> Array:
-    """Return how far half-planes let a load go.
+    """Return the largest load in each direction that half-planes allow.
 
     Parameters
     ----------
     pieces : sequence of HalfPlane
     directions : ndarray, shape (n, 3)
-        Unit vectors of shear T, normal N and lateral load Y.
+        Unit vectors of shear T, normal load N and lateral load Y.
 
     Returns
     -------
     ndarray, shape (n,)
-        [N]; infinite where nothing bounds the load.
+        [N]; infinite where no half-plane bounds the load.
     """
     found = np.full(len(directions), np.inf)
     for piece in pieces:
@@ -194,7 +222,7 @@ def bounds_gap(surface: TileLaw, directions: Array) -> BoundsGap:
     ----------
     surface : Surface
     directions : ndarray, shape (n, 3)
-        Unit vectors of T ≥ 0, N ≤ 0 and Y, evenly spread, for the volumes are sums over them.
+        Unit vectors (T, N, Y) with T ≥ 0 and N ≤ 0, evenly spread: volumes are sums over them.
     """
     angle = np.arctan2(-directions[:, 1], np.hypot(directions[:, 0], directions[:, 2]))
     azimuth = np.arctan2(np.abs(directions[:, 2]), directions[:, 0])

@@ -1,21 +1,23 @@
-"""A tile as an array of linearly constrained spines: what it holds, by Monte Carlo.
+"""Strength of a tile as an array of linearly constrained spines, by Monte Carlo simulation.
 
 The laws are those of Wang, Jiang, Cutkosky (IJRR 2017), the model [16] behind Section 5.5 and
 Appendix 9.4. Spines slide freely along channels, tilted by β from the tile's normal, and are
-dragged together. A spine that finds an asperity holds up to Φ_i (a Gaussian cut to what asperities
-and the shaft can bear), after the play S_i ~ U(0, backlash) of its channel is taken up. The first
-spine to reach its limit ends the travel X of all, and the tile holds
+dragged together. A spine that finds an asperity carries up to Φ_i (a Gaussian cut to the strength
+of asperities and of the shaft), after the play S_i ~ U(0, backlash) of its channel is taken up. The
+first spine to reach its limit ends the travel X of all, and the tile carries
 
-    X = min_i (Φ_i / k + S_i),     F = Σ_i k max(X − S_i, 0).
+    X = min_i (Φ_i / k + S_i),     F = Σ_i k max(X − S_i, 0),
+
+with k the stiffness of a spine on its asperity.
 
 Asperities have slopes ψ with a linear density f on [ψ_min, ψ_max] that is zero at ψ_max. Loaded at
 the angle φ toward pull-off, a spine stays on those with ψ ≥ φ + π/2 − atan μ; on those steeper than
-β + π/2 − α/2 its shaft is in touch, not its tip, and it holds c_i of its strength (C_i); and beyond
-the friction cone of its channel, φ > β + atan μ_s, it slips there and holds
+β + π/2 − α/2 its shaft is in touch, not its tip, and it carries c_i of its strength (C_i); and
+beyond the friction cone of its channel, φ > β + atan μ_s, it slips there and carries
 
     C_c = cos(φ − β + atan μ_s) (1 + μ_s²).
 
-Loaded at the azimuth θ from the drag, β becomes asin(sin β cos θ). Spine i of a trial then holds
+Loaded at the azimuth θ from the drag, β becomes asin(sin β cos θ). Spine i of a trial then carries
 
     w_i F_i,   w_i = C_c C_i(ψ_i) [ψ_i ≥ φ + π/2 − atan μ] / ∫ C_i f dψ |_(φ = θ = 0),
 
@@ -44,14 +46,14 @@ __all__ = ["SpineArray", "Statistics", "spine_forces", "statistics"]
 
 
 class Statistics(NamedTuple):
-    """Strength of simulated tiles, direction by direction.
+    """Mean, standard deviation and quantiles of simulated tile strengths, for each direction.
 
     Attributes
     ----------
     mean, deviation : ndarray
         Mean and standard deviation [N].
-    quantiles : ndarray
-        5, 50 and 95 % quantiles, along the first axis [N].
+    quantiles : ndarray, first axis of length 3
+        5, 50 and 95 % quantiles [N].
     """
 
     mean: Array
@@ -60,7 +62,7 @@ class Statistics(NamedTuple):
 
 
 def statistics(strengths: Array) -> Statistics:
-    """Return mean, scatter and quantiles over the trials, the first axis [N]."""
+    """Return mean, standard deviation and quantiles of strengths [N] over their first axis."""
     return Statistics(
         strengths.mean(axis=0),
         strengths.std(axis=0, ddof=1),
@@ -69,14 +71,14 @@ def statistics(strengths: Array) -> Statistics:
 
 
 def spine_forces(limits: Array, play: Array, stiffness: float) -> Array:
-    """Return the force of every spine as the first of its tile reaches its limit.
+    """Return the force of every spine at the moment when the first of its tile reaches its limit.
 
     Parameters
     ----------
     limits : ndarray, shape (..., spines)
-        Φ_i [N]; infinite where a spine found no asperity.
+        Φ_i, strength of each spine on its asperity [N]; infinite where it found none.
     play : ndarray, shape (..., spines)
-        S_i [m].
+        S_i, play of each spine in its channel [m].
     stiffness : float
         k of one spine on its asperity [N/m].
 
@@ -93,29 +95,31 @@ def spine_forces(limits: Array, play: Array, stiffness: float) -> Array:
 
 @dataclass(frozen=True)
 class SpineArray:
-    """One tile's spines and the rock's asperities, named as in ``parameters/spines.toml``.
+    """Spines of one tile and asperities of the rock, with the names of ``parameters/spines.toml``.
 
     Attributes
     ----------
     spines : int
+        Count of spines.
     backlash : float
         Largest play of a spine in its channel [m].
     contact_stiffness : float
-        k [N/m].
+        k, stiffness of a spine on its asperity [N/m].
     channel_tilt, tip_cone : float
-        β and α [rad].
+        β, tilt of the channels from the tile's normal; α, cone angle of the tips [rad].
     shaft_strength : float
-        What a shaft bears [N].
+        Largest force on a shaft [N].
     channel_friction, asperity_friction, tile_friction : float
-        μ_s, μ and μ_t.
+        μ_s in the channel, μ between spine and asperity, μ_t between tile and rock.
     shaft_contact : float
-        c_i, from 0 to 1.
+        c_i, share of its strength that a spine has on its shaft, from 0 to 1.
     slope_min, slope_max : float
-        ψ_min and ψ_max [rad].
+        ψ_min and ψ_max, range of the asperities' slopes [rad].
     asperity_fraction : float
-        The chance that a spine finds an asperity.
+        Probability that a spine finds an asperity.
     strength_mean, strength_deviation : float
-        Of the Gaussian of an asperity's strength before it is cut to (0, shaft_strength) [N].
+        Mean and standard deviation of an asperity's strength, a Gaussian before it is cut to
+        (0, shaft_strength) [N].
 
     Raises
     ------
@@ -162,12 +166,12 @@ class SpineArray:
 
     @classmethod
     def named(cls, surface: str) -> SpineArray:
-        """Return a SpinyHand tile on a preset surface.
+        """Return the spine array of a SpinyHand tile on a preset surface.
 
         Raises
         ------
         InvalidInputError
-            If there is no such preset.
+            If no preset has that name; the message lists the names.
         """
         table = spine_table()
         own = table.sections.get(surface, {})
@@ -193,7 +197,7 @@ class SpineArray:
         Returns
         -------
         ndarray
-            F(φ, θ) / F(0, 0); infinite where pressing adds more friction than the load uses.
+            F(φ, θ) / F(0, 0); infinite where pressing adds more friction than the load needs.
         """
         phi, theta = np.broadcast_arrays(np.asarray(angle, float), np.asarray(azimuth, float))
         pull = np.maximum(phi, 0.0)
@@ -211,22 +215,22 @@ class SpineArray:
         angle: ArrayLike = 0.0,
         azimuth: ArrayLike = 0.0,
     ) -> Array:
-        """Return what simulated tiles hold.
+        """Return Monte Carlo samples of a tile's strength in given directions of load.
 
-        Each trial puts the tile on a new place of the rock, and pulls it from there in every
-        direction.
+        Each trial puts the tile on a new place of the rock, and loads it there in every direction.
 
         Parameters
         ----------
         rng : numpy.random.Generator
         trials : int
+            Count of samples.
         angle, azimuth : array_like
-            φ and θ, as for `share` [rad].
+            φ and θ of the load, as for `share` [rad].
 
         Returns
         -------
         ndarray, shape (trials, ...)
-            Force magnitude [N]; infinite where the friction of pressing holds any load.
+            Largest force [N]; infinite where the friction of pressing alone carries any load.
         """
         phi, theta = np.broadcast_arrays(np.asarray(angle, float), np.asarray(azimuth, float))
         size = (trials, self.spines)
@@ -243,7 +247,9 @@ class SpineArray:
         return strengths.reshape(trials, *phi.shape)
 
     def simulate_drag(self, rng: np.random.Generator, trials: int) -> Array:
-        """Return ΣF_i of simulated tiles, whose mean is that of `simulate` in pure drag.
+        """Return Monte Carlo samples of a tile's strength Σ F_i in pure drag.
+
+        Their mean is that of `simulate` at φ = θ = 0.
 
         Returns
         -------

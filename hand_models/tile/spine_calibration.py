@@ -1,7 +1,8 @@
 """Published strengths of tiles, and fits of the planner's limit laws to the spine array.
 
-The tile strengths are those of Wang, Jiang, Cutkosky (IJRR 2017), Fig. 7. What asperities hold is
-not printed; ``parameters/spines.toml`` has what meets those of tiles with 20 spines or more.
+The tile strengths are those of Wang, Jiang, Cutkosky (IJRR 2017), Fig. 7. The strength of
+asperities is not printed; ``parameters/spines.toml`` has one that reproduces tiles with 20 spines
+or more.
 """
 
 from __future__ import annotations
@@ -26,19 +27,20 @@ __all__ = [
 ]
 
 LEAST_SPINES: Final = 20
-"""Smaller tiles are not fitted: their bars are as long as their means."""
+"""Smallest tile that is fitted: error bars of smaller ones are as long as their means."""
 
 
 class TileShear(NamedTuple):
-    """A tile's measured strength in shear.
+    """Measured shear strength of a tile.
 
     Attributes
     ----------
     spines : int
+        Count of spines.
     backlash : float
-        [m]
+        Largest play of a spine in its channel [m].
     mean, error : float
-        Mean and half the length of its bar [N].
+        Mean, and half the length of the error bar [N].
     """
 
     spines: int
@@ -48,16 +50,16 @@ class TileShear(NamedTuple):
 
 
 class LineFit(NamedTuple):
-    """Eq. 21 fitted to strengths.
+    """Straight line of Eq. 21, fitted to strengths in the finger plane.
 
     Attributes
     ----------
     shear_limit, pull_off_limit : float
-        f_max and f_min [N].
+        f_max, strength in pure shear, and f_min, strength at the pull-off angle φ_max [N].
     rms, worst : float
         Root mean square and largest residual [N].
     r_squared : float
-        Part of the variance that the line explains.
+        R², share of the variance that the line explains.
     """
 
     shear_limit: float
@@ -68,14 +70,16 @@ class LineFit(NamedTuple):
 
 
 class LateralFit(NamedTuple):
-    """The lateral law of `Surface` fitted to the spine array.
+    """Lateral law of `Surface`, fitted to a spine array.
+
+    F(φ, θ) is the strength at the angle φ toward pull-off and the azimuth θ from the drag.
 
     Attributes
     ----------
     lateral_ratio : float
-        Strength sideways over strength in drag.
+        Lateral strength over strength in drag, at φ = 0.
     lateral_pull_off_ratio : float
-        What pulling at φ_max leaves of that share.
+        λ at φ_max over λ at φ = 0, with λ the lateral strength over that along the drag.
     rms, worst : float
         Root mean square and largest error of F(φ, θ) / F(φ, 0), over 0 ≤ φ ≤ φ_max, 0 ≤ θ ≤ π/2.
     """
@@ -87,11 +91,21 @@ class LateralFit(NamedTuple):
 
 
 def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
-    """Return the cells of Fig. 7 for a concrete.
+    """Return the measured shear strengths of Fig. 7 for one kind of concrete.
 
     Parameters
     ----------
     concrete : {'fine', 'coarse'}
+
+    Returns
+    -------
+    tuple of TileShear
+        Tiles of all spine counts with tight channels, then with loose ones.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``concrete`` is neither of the two.
     """
     table, section = spine_table(), f"fig07-{concrete}"
     if section not in table.sections:
@@ -110,7 +124,20 @@ def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
 
 
 def within_law(angles: Array, pull_off_angle: float) -> Array:
-    """Return which loading angles are in [0, φ_max], where Eq. 21 is published."""
+    """Return which loading angles are in [0, φ_max], the range for which Eq. 21 is published.
+
+    Parameters
+    ----------
+    angles : ndarray
+        φ of each load, from shear toward pull-off [rad].
+    pull_off_angle : float
+        φ_max [rad].
+
+    Returns
+    -------
+    ndarray of bool
+        The shape of ``angles``.
+    """
     return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + BASE_TOLERANCES.angle))
 
 
@@ -120,9 +147,9 @@ def fit_line(angles: Array, strengths: Array, pull_off_angle: float) -> LineFit:
     Parameters
     ----------
     angles : ndarray, shape (n,)
-        φ; those outside [0, φ_max] are left out [rad].
+        φ of each load; those outside [0, φ_max] are left out [rad].
     strengths : ndarray, shape (n,)
-        [N]
+        Strength at each angle [N].
     pull_off_angle : float
         φ_max [rad].
     """
@@ -142,11 +169,12 @@ def fit_line(angles: Array, strengths: Array, pull_off_angle: float) -> LineFit:
 
 
 def fit_lateral(array: SpineArray, pull_off_angle: float, count: int = 46) -> LateralFit:
-    """Fit the lateral law of `Surface` to the array.
+    """Fit the lateral law of `Surface` to a spine array.
 
     The law is F(φ, θ) / F(φ, 0) = 1 − (1 − λ(φ)) cos φ (1 − cos θ), with λ falling linearly from
-    ``lateral_ratio`` at φ = 0 to that times ``lateral_pull_off_ratio`` at φ_max. The former is the
-    array's own F(0, π/2) / F(0, 0); the latter is found by least squares over a grid of directions.
+    ``lateral_ratio`` at φ = 0 to ``lateral_ratio`` times ``lateral_pull_off_ratio`` at φ_max. The
+    former is the array's F(0, π/2) / F(0, 0); the latter is found by least squares over a grid of
+    directions.
 
     Parameters
     ----------
@@ -154,7 +182,7 @@ def fit_lateral(array: SpineArray, pull_off_angle: float, count: int = 46) -> La
     pull_off_angle : float
         φ_max [rad].
     count : int
-        Angles φ, and azimuths θ, of the grid.
+        Count of angles φ, and of azimuths θ, of the grid.
     """
     share = np.linspace(0.0, 1.0, count)[:, None]
     angle, azimuth = share * pull_off_angle, np.linspace(0.0, math.pi / 2, count)[None, :]

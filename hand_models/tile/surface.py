@@ -1,32 +1,31 @@
 """Strength of one spine tile: a limit surface over the direction of its load.
 
-A tile loaded in the finger plane at the angle φ from pure shear toward pull-off lets go at (Eq. 21)
+A tile loaded in the finger plane at the angle φ from pure shear toward pull-off fails at (Eq. 21)
 
     f_s(φ) = f_max − (f_max − f_min) (φ / φ_max)ᵖ,        0 ≤ φ ≤ φ_max,
 
 with p = 1, and at f_min beyond φ_max (``assumed``: nothing is published there); other exponents p
-are other laws. Out of the finger plane, at the
-azimuth θ in the tile's plane from the drag, it holds
+are other laws. Out of the finger plane, at the azimuth θ in the tile's plane from the drag, its
+strength is
 
     F(φ, θ) = f_s(φ) [1 − (1 − λ(φ)) cos φ (1 − cos θ)],
 
-a fit to the spine array (``spine_array.py``): channels lean along the drag, so that spines hold
-less sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
+a fit to the spine array (``spine_array.py``): channels lean along the drag, so that spines are
+weaker sideways, above all under pull-off. λ falls linearly from f_lateral / f_max at φ = 0 to that
 times ``lateral_pull_off_ratio`` at φ_max, and stays; with cos φ, θ loses its effect at pure
-pull-off, where it has no meaning. Pressed into the rock, a tile holds F(0, θ) + γ N in its plane,
-with γ the compression gain.
+pull-off, where it has no meaning. Pressed into the rock with the normal load N, a tile carries
+F(0, θ) + γ N in its plane, with γ the compression gain.
 
-Spines cling only while they are dragged toward the finger's base. A tile that is dragged the other
-way is held by Coulomb friction alone, as far as it is pressed, and one that is pulled off needs the
-drag in proportion: both are
+Spines grip only while they are dragged toward the finger's base. A tile that is dragged the other
+way carries Coulomb friction alone, in proportion to its pressing, and one that is pulled off needs
+the drag in proportion: both are, for the shear T,
 
     T ≥ −μ N
 
 (Section 6.1 has Coulomb friction for pressed tiles; that the same μ ends the pull-off at the angle
-atan(1 / μ) is ``assumed``, and the published data leave μ open). A base tile, which bears no
-normal of its own, is pressed as its finger's proximal phalanx is, by as much of it as it has spines
-on the rock (``assumed``). Half-planes inside and outside the surface are in
-`hand_models.tile.half_planes`.
+atan(1 / μ) is ``assumed``, and the published data leave μ open). A base tile, which carries no
+normal load, counts as pressed by its finger's proximal phalanx, times its spine engagement
+(``assumed``). Half-planes inside and outside the surface are in `hand_models.tile.half_planes`.
 """
 
 from __future__ import annotations
@@ -48,25 +47,26 @@ __all__ = ["Surface", "engaged_share", "pull_strength", "surface_names"]
 
 @dataclass(frozen=True)
 class Surface:
-    """Strength of a tile on a kind of rock.
+    """Strength of a tile on one kind of rock, as a limit surface over the direction of the load.
 
     Attributes
     ----------
     shear_limit : float
-        f_max, the tile's strength in pure shear [N].
+        f_max, strength in pure shear [N].
     pull_off_limit : float
-        f_min, its strength at ``pull_off_angle`` [N].
+        f_min, strength at ``pull_off_angle`` [N].
     pull_off_angle : float
-        φ_max, at most π/2 [rad].
+        φ_max, angle from shear toward pull-off at which the strength is least, at most π/2 [rad].
     lateral_limit : float
-        Its strength in its own plane straight sideways [N].
+        Strength in the tile's plane straight sideways [N].
     compression_gain : float
         γ, shear strength gained per newton of pressing.
     half_planes : int
-        How many straight pieces stand for the curve from pure shear to φ_max; one is the paper's
-        straight line, more come closer to the curve from inside.
+        Count of straight pieces that approximate the curve from pure shear to φ_max; one is the
+        paper's straight line, more come closer to the curve from inside.
     lateral_pull_off_ratio : float
-        What is left at ``pull_off_angle`` of the share λ that holds sideways; above 0, at most 1.
+        λ at ``pull_off_angle`` over λ at pure shear, with λ the lateral share of the strength; in
+        (0, 1].
     shear_scatter : float
         Standard deviation of ``shear_limit`` from place to place [N].
     friction : float
@@ -75,8 +75,12 @@ class Surface:
         p, how strength falls from ``shear_limit`` to ``pull_off_limit``: 1 is Eq. 21's straight
         line over the angle.
     name : str or None
-        Of the preset; None for a caller's own numbers. Surfaces of equal numbers are equal whatever
-        their names.
+        Name of the preset; None for a caller's numbers. Not part of equality.
+
+    Raises
+    ------
+    InvalidInputError
+        If a number is not finite or out of its range.
     """
 
     shear_limit: float
@@ -142,24 +146,29 @@ class Surface:
 
     @property
     def strongest_tile(self) -> float | None:
-        """Load that all spines of a tile bear [N], if the surface asks for more; else None."""
+        """Bound on the strength of a tile [N] if ``shear_limit`` exceeds the bound, else None.
+
+        At the bound (``tile_strength`` of ``parameters/surfaces.toml``) the shafts of all spines
+        break.
+        """
         most = _bound("tile_strength")
         return most if self.shear_limit > most else None
 
     @classmethod
     def named(cls, name: str, table: ParameterTable | None = None) -> Surface:
-        """Return a preset of ``parameters/surfaces.toml``.
+        """Return a preset surface of ``parameters/surfaces.toml``.
 
         Parameters
         ----------
         name : str
+            One of `surface_names`.
         table : ParameterTable, optional
             All numbers of the surfaces; the bundled ones by default.
 
         Raises
         ------
         InvalidInputError
-            If there is no such preset; the message lists them.
+            If no preset has that name; the message lists the names.
         """
         if name not in surface_names():
             raise InvalidInputError(
@@ -169,13 +178,18 @@ class Surface:
 
     @classmethod
     def from_values(cls, values: Mapping[str, float]) -> Surface:
-        """Return a surface of a caller's own numbers.
+        """Return a surface of a caller's numbers.
 
         Parameters
         ----------
         values : mapping
-            ``shear_limit`` [N], and any other attribute; those left out follow from it by the
-            default ratios of ``parameters/surfaces.toml``.
+            ``shear_limit`` [N], and any other numeric attribute. Those left out are ``shear_limit``
+            times the default ratios of ``parameters/surfaces.toml``, or its defaults.
+
+        Raises
+        ------
+        InvalidInputError
+            If a name is unknown, ``shear_limit`` is missing or a number is out of its range.
         """
         known = cls._numbers()
         for key in values:
@@ -191,20 +205,20 @@ class Surface:
         return cls(**(numbers | dict(values)))  # type: ignore[arg-type]
 
     def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
-        """Return the force at which a tile lets go, F(φ, θ); f_s(φ) of Eq. 21 in the finger plane.
+        """Return the largest load of a tile in a direction, F(φ, θ); f_s(φ) of Eq. 21 if θ = 0.
 
         Parameters
         ----------
         angle : array_like
             φ from the tile's plane toward pull-off, in (−π/2, π/2]; negative is pressing [rad].
         azimuth : array_like
-            θ in the tile's plane from the drag to either side; broadcast with ``angle``. Beyond
-            π/2 a tile is dragged backwards, and the strength straight sideways is returned [rad].
+            θ in the tile's plane from the drag to either side; broadcast with ``angle``. Beyond π/2
+            a tile is dragged backwards, and the strength straight sideways is returned [rad].
 
         Returns
         -------
         ndarray
-            Force magnitude [N]; infinite where pressing alone grows faster than the strength used.
+            Force magnitude [N]; infinite where pressing adds more strength than the load uses.
         """
         phi = np.asarray(angle, dtype=float)
         sideways = 1.0 - np.maximum(np.cos(azimuth), 0.0)
@@ -217,27 +231,35 @@ class Surface:
         return np.where(phi >= 0.0, pulling, pressing)
 
     def straight_strength(self, angle: ArrayLike) -> Array:
-        """Return f_s(φ) [N], which never rises with φ [rad]; f_max under pressing."""
+        """Return f_s(φ), strength in the finger's plane [N].
+
+        ``angle``: φ from shear toward pull-off [rad]; f_s never rises with φ, and is f_max if φ ≤
+        0.
+        """
         return pull_strength(*self.straight_law, angle)
 
     @property
     def straight_law(self) -> tuple[float, float, float, float]:
-        """Numbers of f_s(φ), as `pull_strength` takes them: f_max, f_min, φ_max and p."""
+        """Parameters f_max, f_min [N], φ_max [rad] and p of Eq. 21, in `pull_strength`'s order."""
         return self.shear_limit, self.pull_off_limit, self.pull_off_angle, self.pull_off_exponent
 
     def sideways_share(self, angle: ArrayLike) -> Array:
-        """Return λ(φ), strength sideways over that along the drag; it never rises with φ [rad]."""
+        """Return λ(φ), strength straight sideways over strength along the drag.
+
+        ``angle``: φ from shear toward pull-off [rad]; λ never rises with φ.
+        """
         ratio = np.clip(np.asarray(angle) / self.pull_off_angle, 0.0, 1.0)
         kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
         return np.asarray(self.lateral_limit / self.shear_limit * kept)
 
     def excess(self, shear: ArrayLike, normal: ArrayLike, lateral: ArrayLike = 0.0) -> Array:
-        """Return by how much loads of a whole tile are beyond the surface [N], negative inside.
+        """Return the excess of a whole tile's load over the limit surface [N]; negative inside.
 
         Parameters
         ----------
         shear, normal, lateral : array_like
-            T, N and Y [N]; broadcast. Dragged backwards, a tile holds what it holds without drag.
+            T, N (> 0 pressing) and Y of the tile [N]; broadcast. A tile that is dragged backwards
+            (T < 0) is taken to be as strong as one without drag.
         """
         forward, pull = np.maximum(shear, 0.0), -np.asarray(normal, dtype=float)
         angle = np.arctan2(pull, np.hypot(forward, lateral))
@@ -245,7 +267,7 @@ class Surface:
         return np.asarray(np.hypot(np.hypot(shear, lateral), pull) - strength)
 
     def inner(self, count: int | None = None) -> tuple[HalfPlane, ...]:
-        """Return half-planes inside the surface, `inner_half_planes`.
+        """Return half-planes inside the limit surface; see `inner_half_planes`.
 
         ``count``: straight pieces from pure shear to φ_max; ``half_planes`` by default.
         """
@@ -259,7 +281,7 @@ def pull_strength(
     pull_off_exponent: ArrayLike,
     angle: ArrayLike,
 ) -> Array:
-    """Return f_s(φ) of Eq. 21 for tiles of many surfaces [N]; f_max under pressing.
+    """Return f_s(φ) of Eq. 21 for tiles on several surfaces [N]; f_max if φ ≤ 0.
 
     Parameters
     ----------
@@ -270,7 +292,7 @@ def pull_strength(
     pull_off_exponent : array_like
         p.
     angle : array_like
-        φ [rad]; broadcast with the others.
+        φ, angle of the load from shear toward pull-off [rad]; all arguments broadcast.
     """
     most = np.asarray(shear_limit)
     ratio = np.clip(np.asarray(angle) / np.asarray(pull_off_angle), 0.0, 1.0)
@@ -278,18 +300,18 @@ def pull_strength(
 
 
 def engaged_share(gap: ArrayLike, travel: float) -> Array:
-    """Return what share of a tile's spines are on the rock, φ = 1 − gap / travel in [0, 1].
+    """Return the spine engagement of a tile at a gap to the rock: φ = 1 − gap / travel, in [0, 1].
 
     Spines slide out of their tile by up to their travel; the farther they have to, the fewer find
-    an asperity that is near enough. All are on the rock where the tile itself is; a millionth of
-    them counts as none.
+    an asperity that is near enough. φ is 1 where the tile touches; below a millionth it counts as
+    0.
 
     Parameters
     ----------
     gap : array_like
-        From the tile's face to the rock, infinite where there is none [m].
+        Distance from the tile's face to the rock, infinite where there is none [m].
     travel : float
-        How far spines reach, ``spine_travel`` of ``hand.toml`` [m].
+        Distance that spines reach, ``spine_travel`` of ``hand.toml`` [m].
 
     Returns
     -------
@@ -329,7 +351,7 @@ def _bound(name: str) -> float:
 
 
 def surface_names() -> tuple[str, ...]:
-    """Return the names of the surface presets."""
+    """Return the names of the surface presets, for `Surface.named`."""
     no_rock = ("bounds", "defaults")
     return tuple(name for name in surface_table().sections if name not in no_rock)
 
