@@ -51,7 +51,7 @@ class Hold(ABC):
 
     @property
     def oddities(self) -> tuple[str, ...]:
-        """Warnings about the hold's data, which is used nevertheless; each begins with its field."""
+        """Warnings about the hold's data, which is used nevertheless; each begins with a field."""
         return ()
 
     @property

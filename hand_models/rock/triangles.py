@@ -41,9 +41,9 @@ def edges_of(faces: Indices) -> Indices:
 
 
 def connected(pairs: Indices, count: int) -> Indices:
-    """Return the connected component, from 0, of each of ``count`` nodes of a graph, shape (count,).
+    """Return the connected component of each of ``count`` nodes of a graph, numbered from 0.
 
-    The graph's edges are ``pairs`` of nodes, shape (n, 2).
+    The graph's edges are ``pairs`` of nodes, shape (n, 2); the result has shape (count,).
     """
     graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
     return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
