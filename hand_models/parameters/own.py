@@ -28,7 +28,7 @@ from hand_models.parameters.tables import (
 __all__ = ["load_own_hand", "own_hand", "own_surfaces"]
 
 LARGEST_BY_UNIT: Final = {"m": 1.0, "rad": 2.0 * math.pi}
-"""Largest magnitude of a hand's parameter, by unit; larger numbers are in millimetres or degrees."""
+"""Largest magnitude of a hand's parameter, by unit; a larger one is in millimetres or degrees."""
 
 
 def load_own_hand(path: Path) -> ParameterTable:

@@ -198,7 +198,7 @@ class BlockSum:
 
     @cached_property
     def vertices(self) -> Array:
-        """Vertices (n, r) of the sum in coordinates of `axes` about `base`; `LimitError` if too many."""
+        """Vertices (n, r) in coordinates of `axes` about `base`; `LimitError` if too many."""
         parts = self._parts()
         if not parts:
             return np.zeros((1, 0))
