@@ -42,7 +42,7 @@ ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
 
 
 class ParameterSample(NamedTuple):
-    """One Monte Carlo sample of uncertain parameters: the entries of hand and surfaces that it changes.
+    """One Monte Carlo sample of uncertain parameters: changed entries of hand and surfaces.
 
     Attributes
     ----------

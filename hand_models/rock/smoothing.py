@@ -275,7 +275,7 @@ class OutlinedHold(Hold):
     def raw_section(
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
-        """Cut the hold without smoothing, for a nail; pieces shorter than a bridged gap are dropped."""
+        """Cut the hold without smoothing, for a nail; the shortest pieces are dropped."""
         runs = map(_distinct, _reached(self._pieces(origin, s_axis, t_axis), self._scale))
         least = self._scale.bridged_gap
         reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= least]

@@ -1,4 +1,4 @@
-"""Polylines that bound the rock in a finger's plane: nearest segments, distances, parts near a place.
+"""Polylines that bound the rock in a finger's plane: nearest segments, distances, windows.
 
 A boundary is one or more polylines, open or closed, that have the rock on their left (turning from
 s toward t), convex or not. Places are complex numbers s + i t [m].
@@ -81,7 +81,7 @@ class Boundary:
         return np.stack([first, middle, last])
 
     def window(self, places: Complexes, reach: float) -> Window:
-        """Return the part of the boundary within ``reach`` [m] of any of the places, and some more."""
+        """Return a part of the boundary that has all within ``reach`` [m] of any place."""
         centre, spread = _middle(places)
         near = np.abs(self._middle - centre) <= reach + spread + self._half
         kept = np.zeros(len(self._vertices), dtype=bool)
@@ -130,7 +130,7 @@ class Boundary:
         return segment[at], part[at], away[at]
 
     def clearances(self, points: Complexes) -> Array:
-        """Return the signed distances of points, of any shape, from the rock, negative inside [m]."""
+        """Return the signed distance of each point from the rock, negative inside [m]."""
         segment, part, away = self.nearest(points)
         normal = self._outward[np.where(part <= 0.0, 0, np.where(part >= 1.0, 2, 1)), segment]
         distance = np.abs(away)

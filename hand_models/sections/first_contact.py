@@ -31,7 +31,7 @@ FACE_PARTS: Final = np.linspace(0.0, 1.0, 17)[:, None]
 
 
 Meetings = tuple[Array, Indices]
-"""First contact of each of n faces, or of their ends, with a boundary, shape (n,) each: the angle by
+"""First contact of n faces, or of their ends, with a boundary, shape (n,) each: the angle by
 which the phalanx turns until then, infinite without contact [rad]; and the index of the vertex, or
 of the vertex after an end's contact.
 """

@@ -1,4 +1,4 @@
-"""Rock in the planes of many fingers as points along its boundary, each with a length of boundary."""
+"""Rock in the planes of many fingers as points, each of which represents a length of boundary."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Outlines"]
 
 
 class Outlines(NamedTuple):
-    """Points on the rock in the planes of n fingers, p for each, in blocks of 16 (`points_per_circle`).
+    """Points on the rock in the planes of n fingers: p for each, in blocks of 16.
 
     Attributes
     ----------

@@ -87,9 +87,9 @@ class Section(ABC):
 
     @abstractmethod
     def distance(self, point: complex) -> float:
-        """Return the approximate signed distance of a point s + i t from the rock, negative inside [m].
+        """Return the approximate signed distance of a point s + i t from the rock [m].
 
-        The distance is exact on flat and round sections; its sign is exact on all.
+        Negative inside. The distance is exact on flat and round sections, its sign on all.
         """
 
     @abstractmethod

@@ -93,7 +93,7 @@ class SmoothSection(Section):
         return self.face_clearance(joint, u, face) > 0.0
 
     def straight(self, point: complex) -> bool:
-        """Return True if the rock's boundary beside a point is straight: a face may lie flat there."""
+        """Return True if the rock beside a point is straight: a face may lie flat there."""
         return False
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:

@@ -32,7 +32,7 @@ Vector3 = Sequence[float]
 """Three numbers."""
 
 FingerPlane = tuple[float, float, float, float, float, float, float, float, float]
-"""Nine numbers: the axes of a finger's plane, along the finger and into the rock, and its origin from
+"""Nine numbers: axes of a finger's plane, along the finger and into the rock, and its origin from
 the centre of the hold's ball, all multiplied by the scales.
 """
 
