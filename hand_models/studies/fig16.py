@@ -1,7 +1,8 @@
 """Fig. 16: force limits over the pulley radii of the middle and the distal joint.
 
 The gripper closes with 46 N on fine concrete, on 300 mm (A) and on 700 mm (B); the proximal radius
-stays. Blue cells fail by closing alone, dark blue ones push themselves off the rock.
+is fixed. In blue cells closing alone overloads a tile; in dark blue cells the gripper ejects
+itself.
 """
 
 from __future__ import annotations
