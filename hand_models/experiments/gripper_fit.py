@@ -167,16 +167,24 @@ class GripperFit:
             yield Datum(f"M_y : F_x best for {kind}", "m", arm, 0.4 * arm, False)
 
     def start(self) -> Array:
-        """Return the table's parameters as shares x (n,) of their ranges, clipped to 0…1."""
+        """Return the values in `table` as shares x, shape (n,), of their plausible ranges.
+
+        Values outside a range are clipped to its ends, 0 and 1.
+        """
         now = [number.current(self.table) for number in self.numbers]
         return np.asarray(np.clip((np.array(now) - self.low) / self.width, 0.0, 1.0))
 
     def values(self, x: Array) -> Array:
-        """Return the parameters in SI units, shape (n,), from shares x of their ranges."""
+        """Convert shares x (n,) of plausible ranges to parameters in SI units, shape (n,)."""
         return np.asarray(self.low + self.width * x)
 
     def gripper(self, x: Array) -> Gripper:
-        """Return the gripper with parameters x (n,), on the surface of Fig. 13.
+        """Return the gripper with given parameters, on the surface of Fig. 13.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+            Parameters as shares of their plausible ranges.
 
         Raises
         ------
@@ -215,13 +223,19 @@ class GripperFit:
         return with_mirrored(in_paper_signs(found.wrenches) * 1.008)
 
     def model(self, x: Array, *, fine: bool = False) -> Array:
-        """Return the model's value of each datum, shape (k,), for parameters x (n,).
+        """Return the model's value of each of the paper's data, for a set of parameters.
 
         Parameters
         ----------
         x : ndarray, shape (n,)
+            Parameters as shares of their plausible ranges.
         fine : bool, optional
             As in `wrenches`.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            In the units of the data.
 
         Raises
         ------
@@ -247,9 +261,19 @@ class GripperFit:
         return np.array([*lines, *extents(held), *along_z, off, *side, *arms])
 
     def residuals(self, x: Array, *, fine: bool = False) -> Array:
-        """Return the residual of each datum, in tolerances, shape (k,), for parameters x (n,).
+        """Return the residuals of the data for a set of parameters: (model − wanted) / tolerance.
 
-        Limited to ±30, which is also the residual of all data where no gripper holds.
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+            Parameters as shares of their plausible ranges.
+        fine : bool, optional
+            As in `wrenches`.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            Clipped to ±30; all are 30 where the parameters give no gripper that holds.
         """
         hopeless = 30.0  # of every datum where a set of numbers gives no gripper that holds
         try:
@@ -259,5 +283,11 @@ class GripperFit:
         return np.asarray(np.nan_to_num(np.clip(off, -hopeless, hopeless), nan=hopeless))
 
     def misfit(self, residuals: Array) -> float:
-        """Return the largest absolute residual of the data with ``first`` [tolerances]."""
+        """Return the largest absolute residual of those data that count in the misfit.
+
+        Parameters
+        ----------
+        residuals : ndarray, shape (k,)
+            Result of `residuals` [tolerances].
+        """
         return float(np.abs(residuals[self.first]).max())

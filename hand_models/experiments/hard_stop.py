@@ -37,7 +37,13 @@ class PalmExperiment:
 
     @classmethod
     def from_tables(cls, hand: ParameterTable) -> PalmExperiment:
-        """Return the experiment with the palm of a hand and the paper's springs."""
+        """Read the experiment's parameters from tables.
+
+        Parameters
+        ----------
+        hand : ParameterTable
+            Parameters of the hand, for the palm; the springs are those of ``experiments.toml``.
+        """
         return cls(
             springs=experiment_table().vector("load_sharing", "contact_springs"),
             preload_stiffness=hand.scalar("palm", "spring_stiffness"),
@@ -67,11 +73,16 @@ class PalmExperiment:
         return float(sharing.tile_stiffness.sum() / sharing.tile_travel[softest].max())
 
     def gain(self, sequence: Sequence[int]) -> float:
-        """Return the relative change of the load if rods replace the tiles' bearings.
+        """Return the relative gain of the palm's load by friction: fixed rods in place of bearings.
 
         Parameters
         ----------
         sequence : sequence of int
             Numbers of the springs, 1 to 3, from the left.
+
+        Returns
+        -------
+        float
+            0.1 for a load that is 10 % larger with rods at the tiles' pulleys.
         """
         return self.load(sequence, self.friction) / self.load(sequence, 0.0) - 1.0

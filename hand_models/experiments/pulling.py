@@ -112,12 +112,12 @@ def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSea
 
 
 def held_wrenches(gripper: Gripper) -> Array:
-    """Search the outermost wrenches that a gripper holds, with their mirror images.
+    """Search a gripper's poses, and return the outermost wrenches that it can hold.
 
     Returns
     -------
     ndarray, shape (n, 3)
-        [N, N, N·m]
+        Wrenches (F_x, F_z, M_y) and their mirror images, in the paper's signs [N, N, N·m].
     """
     found = search(gripper, PULLING_SETTINGS.poses_per_axis)
     return with_mirrored(in_paper_signs(found.wrenches))

@@ -133,13 +133,26 @@ class StudyText:
         axes.set(**{key: text.format(**values) for key, text in self._words["axes"][name].items()})
 
     def result(self, data: dict[str, Any]) -> StudyResult:
-        """Return the study's result: its data, and the claims checked so far."""
+        """Return the study's result: data, title from ``studies.toml``, and the claims checked.
+
+        Parameters
+        ----------
+        data : dict
+            Data of the study; ``not_tested`` is added from ``studies.toml``.
+        """
         data = {**data, "not_tested": self._words["not_tested"]}
         return StudyResult(self._name, self._words["title"], data, tuple(self.claims))
 
 
 def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
-    """Yield items, and report to a progress callback how many of them are done."""
+    """Yield the items of a sequence, and report progress before each item and at the end.
+
+    Parameters
+    ----------
+    progress : Progress
+        Called with (items done, items in all).
+    items : sequence
+    """
     for done, item in enumerate(items):
         progress(done, len(items))
         yield item
@@ -147,5 +160,13 @@ def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
 
 
 def part(progress: Progress, start: int, end: int, total: int) -> Progress:
-    """Return a progress callback for a part of the work: ``start`` to ``end`` of ``total``."""
+    """Return a progress callback for one part of a longer work.
+
+    Parameters
+    ----------
+    progress : Progress
+        Callback of the whole work, called with (steps done, ``total``).
+    start, end, total : int
+        The part begins and ends at these steps of the total.
+    """
     return lambda done, of: progress(start + (end - start) * done // of, total)

@@ -222,7 +222,13 @@ class GripperSweep:
         return StudyResult("sweep", f"{x.entry} and {y.entry}: what the gripper holds", data, ())
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
-        """Draw a map for each measure, as one figure ``sweep``."""
+        """Draw a map of force limits for each measure, side by side.
+
+        Returns
+        -------
+        dict of str to Figure
+            One figure, ``sweep``.
+        """
         data = result.data
         measures: list[Measure] = list(data["limits"])
         figure, shown = panels(1, len(measures), (6.2 * len(measures), 5.6), grid="none")

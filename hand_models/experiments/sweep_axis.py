@@ -102,7 +102,7 @@ class Axis:
 
     @property
     def entry(self) -> str:
-        """Name of the entry as a caller writes it: ``section.name`` or ``section.name[i]``."""
+        """Name of the axis's entry: ``section.name``, or ``section.name[i]`` in a list."""
         place = "" if self.index is None else f"[{self.index}]"
         return f"{self.section}.{self.name}{place}"
 
@@ -160,12 +160,12 @@ class Axis:
         return replace(axis, values=tuple(np.linspace(low, high, count).tolist()))
 
     def set(self, table: ParameterTable, value: float) -> ParameterTable:
-        """Return a copy of a table in which the entry has another value."""
+        """Return a copy of a table in which the axis's entry has the given value, in SI units."""
         quantity = table.quantity(self.section, self.name).changed(value, self.index)
         return table.replaced(ParameterTable({self.section: {self.name: quantity}}))
 
     def current(self, table: ParameterTable) -> float:
-        """Return the entry's value in a table."""
+        """Return the value that the axis's entry has in a parameter table, in SI units."""
         value = table.quantity(self.section, self.name).value
         return float(value[self.index or 0] if isinstance(value, list) else value)
 

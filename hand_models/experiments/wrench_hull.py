@@ -57,18 +57,40 @@ class Extents(NamedTuple):
 
 
 def in_paper_signs(wrenches: Array) -> Array:
-    """Convert wrenches (n, 6) to (F_x, F_z, M_y) in the paper's signs (n, 3), with −M_y."""
+    """Convert wrenches to the paper's planar components and signs: M_y changes its sign.
+
+    Parameters
+    ----------
+    wrenches : ndarray, shape (n, 6)
+        Forces and moments [N, N·m].
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        F_x, F_z, M_y [N, N, N·m].
+    """
     return wrenches[:, PLANAR_COMPONENTS] * (1.0, 1.0, -1.0)
 
 
 def extents(points: Array) -> Extents:
-    """Return the extents of wrenches (F_x, F_z, M_y), shape (n, 3)."""
+    """Return the largest |F_x|, least F_z and largest |M_y| of wrenches, shape (n, 3)."""
     largest = np.abs(points).max(axis=0)
     return Extents(float(largest[0]), float(points[:, 1].min()), float(largest[2]))
 
 
 def with_mirrored(points: Array) -> Array:
-    """Return wrenches (n, 3) and their mirror images (−F_x, F_z, −M_y), shape (2 n, 3)."""
+    """Return wrenches of a symmetric gripper together with their mirror images.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        F_x, F_z, M_y.
+
+    Returns
+    -------
+    ndarray, shape (2 n, 3)
+        The wrenches, then (−F_x, F_z, −M_y) of each.
+    """
     return np.vstack([points, points * (-1.0, 1.0, -1.0)])
 
 

@@ -31,7 +31,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class ScatterSettings:
-    """Settings of a scatter of places."""
+    """Settings of the scatter of a hand's place: number of places, percentiles of results."""
 
     places: int = 128
     """Number of places of a hand by default: a power of two, as Sobol sequences need. With 64 the

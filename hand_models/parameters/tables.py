@@ -161,19 +161,19 @@ class ParameterTable:
 
     @property
     def units(self) -> dict[str, dict[str, str]]:
-        """Unit of every entry, by section and name."""
+        """Unit of every entry, as dictionaries by section and then by name."""
         return {
             section: {name: quantity.unit for name, quantity in quantities.items()}
             for section, quantities in self.sections.items()
         }
 
     def quantity(self, section: str, name: str) -> Quantity:
-        """Return the quantity of a section and name.
+        """Return the number, unit and source of an entry, by its section and name.
 
         Raises
         ------
         InvalidInputError
-            If the table has no such entry.
+            If the table has no such entry; the field is its section and name.
         """
         try:
             return self.sections[section][name]
@@ -326,5 +326,5 @@ def spine_table() -> ParameterTable:
 
 
 def draw_table() -> ParameterTable:
-    """Return the samples of parameter values that meet the published data, from ``draws.toml``."""
+    """Return the fitted sets and the ranges from which samples are made, from ``draws.toml``."""
     return _bundled("draws.toml")

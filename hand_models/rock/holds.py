@@ -56,7 +56,7 @@ class Hold(ABC):
 
     @property
     def swept(self) -> Swept | None:
-        """The hold as a ball swept along two faces (`Swept`); None for a hold of another kind."""
+        """A smooth hold as a ball that is swept along two faces; None for other holds."""
         return None
 
     @abstractmethod
@@ -188,7 +188,7 @@ class Hold(ABC):
 
 
 class SweptHold(Hold):
-    """A smooth hold: the base class of shapes that a ball leaves when swept along two faces."""
+    """A smooth hold: base class of shapes described as a ball that is swept along two faces."""
 
     @property
     @abstractmethod

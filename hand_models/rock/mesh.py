@@ -110,10 +110,24 @@ class Mesh(OutlinedHold):
         return tuple(found)
 
     def surface(self, low: Array, high: Array) -> Triangles:
-        """Return the whole repaired mesh, whatever the region."""
+        """Return the whole repaired mesh, in the hold's frame, whatever the region."""
         return self.triangles
 
     def check_place(self, at: Pose | None = None) -> None:
+        """Check that rock lies at the origin of the frame that a palm is to take, and faces it.
+
+        Parameters
+        ----------
+        at : Pose, optional
+            The palm's frame in the hold's frame, z into the rock; by default the hold's frame.
+
+        Raises
+        ------
+        InvalidInputError
+            If no rock is near the frame's origin, or the triangles there face away from a palm; the
+            field is ``vertices`` or ``faces`` for the hold's frame, else ``place.point`` or
+            ``place.approach``.
+        """
         there, table = at or Pose.identity(), scan_table()
         near, view = table.scalar("scan", "near"), table.vector("scan", "view")
         box = there.position - near, there.position + near
@@ -156,9 +170,13 @@ class Mesh(OutlinedHold):
         return TriangleCells(self.triangles)
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
-        """Cast a ray: return the distance from a point at which it enters the rock [m].
+        """Cast a ray: return the distance from a point, along a direction, at which rock begins.
 
-        Negative where the point is inside the rock; infinite where the ray's line misses the rock.
+        Returns
+        -------
+        float
+            Negative where the point is inside the rock; infinite where the ray meets no front side
+            of a triangle [m].
         """
         where, entering = self._hits(point, direction)
         behind = np.flatnonzero(where <= 0.0)

@@ -61,10 +61,15 @@ class Scale:
 
     @classmethod
     def of(cls, hand: ParameterTable | None = None) -> Scale:
-        """Return the lengths for a hand that grips the hold; for the bundled hand by default.
+        """Return the lengths of smoothing for the hand that is to grip a hold.
 
         The reach is that of ``scan.toml`` or, if larger, of the hand's finger, nail and half its
         palm; ``longest`` grows in proportion.
+
+        Parameters
+        ----------
+        hand : ParameterTable, optional
+            All parameters of the hand; the bundled ones by default.
         """
         hand, table = hand or hand_table(), scan_table()
         usual = table.scalar("cut", "reach")
@@ -260,7 +265,9 @@ class OutlinedHold(Hold):
         """Return the raw outlines in a plane, rock on their left; arguments as of `section`."""
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
-        """Cut the hold with a plane and smooth the cut, as far as a finger reaches.
+        """Cut the hold with a finger's plane, and smooth the cut to the scale of a tile.
+
+        Only rock within a finger's reach of the plane's origin is returned.
 
         Raises
         ------
@@ -275,7 +282,10 @@ class OutlinedHold(Hold):
     def raw_section(
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
-        """Cut the hold without smoothing, for a nail; the shortest pieces are dropped."""
+        """Cut the hold with a finger's plane without smoothing, for a nail.
+
+        Pieces shorter than ``Scale.bridged_gap`` are dropped.
+        """
         runs = map(_distinct, _reached(self._pieces(origin, s_axis, t_axis), self._scale))
         least = self._scale.bridged_gap
         reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= least]

@@ -343,7 +343,7 @@ def bridge(pieces: list[Array], gap: float) -> list[Array]:
 
 
 class TriangleCells:
-    """Spatial index of a mesh's triangles: a grid of cells in which a box finds its candidates.
+    """Spatial index of a mesh: finds the triangles in a box through a grid of cells.
 
     Parameters
     ----------

@@ -43,7 +43,15 @@ class Gaps:
 
     @classmethod
     def between(cls, triangles: Array, beside: NDArray[np.int32]) -> Gaps:
-        """Compute the gaps of triangles (m, 3, 3) [m] with neighbours (m, 3), −1 for none."""
+        """Compute the width that each triangle bridges, and its area.
+
+        Parameters
+        ----------
+        triangles : ndarray, shape (m, 3, 3)
+            Corners of each triangle [m].
+        beside : ndarray of int, shape (m, 3)
+            Neighbour opposite to each corner, −1 for none.
+        """
         edges = _edges(triangles)
         across, area = np.hypot(edges[..., 0], edges[..., 1]), _areas(edges)
         # hardly any area, as a part of the longest edge's square
@@ -54,11 +62,14 @@ class Gaps:
         return cls(triangles, beside, width, area)
 
     def open_(self, hole: float) -> NDArray[np.bool_]:
-        """Return True for each triangle that bridges more than a length [m], shape (m,)."""
+        """Return True for each triangle that bridges more than ``hole`` [m], shape (m,)."""
         return np.asarray(self.bridged > hole)
 
     def covered(self, hole: float) -> float:
-        """Return the share of the area across z in gaps no wider than ``hole`` [m]."""
+        """Return the share of the area across z that closed triangles cover.
+
+        Closed are the triangles that bridge no more than ``hole`` [m].
+        """
         return float(self.area[~self.open_(hole)].sum() / self.area.sum())
 
     def left(self, hole: float) -> tuple[tuple[Hole, ...], tuple[Step, ...]]:

@@ -199,12 +199,12 @@ def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputEr
 
 
 def too_large(extent: float) -> str:
-    """Return a warning about rock larger than a hold may be, with its probable cause.
+    """Return a warning, in words, about rock larger than a hold may be, with its probable cause.
 
     Parameters
     ----------
     extent : float
-        Length of the longest side [m].
+        Length of the rock's longest side [m].
     """
     largest = scan_table().scalar("scan", "largest")
     unit = _fitting(extent)

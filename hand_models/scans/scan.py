@@ -46,7 +46,7 @@ UP_ROTATIONS: Final[Mapping[Up, Array]] = {
 
 @dataclass(frozen=True, slots=True)
 class ScanSettings:
-    """Settings that several functions of the scans share."""
+    """Settings that functions for scans share: steps of progress, size of the smallest rock."""
 
     mesh_steps: int = 3
     """Steps of meshing that are reported to a progress callback: thin, triangulate, find holes."""
@@ -138,7 +138,7 @@ class Scan:
 
     @property
     def dropped(self) -> int:
-        """Number of points of the file that are not finite."""
+        """Number of points in the file that were left out because they are not finite."""
         return self.read - len(self.points) - self.outliers
 
     def direction(self) -> Array:
@@ -180,9 +180,12 @@ class Scan:
         )
 
     def shown(self) -> Array | None:
-        """Return the unit vector of the side that the triangles face together, shape (3,).
+        """Return the unit vector toward the side that most of the triangles' area faces.
 
-        None if they form a closed surface.
+        Returns
+        -------
+        ndarray, shape (3,), or None
+            None if the triangles form a closed surface.
         """
         assert self.faces is not None
         areas = areas_of(self.points, self.faces)

@@ -81,7 +81,15 @@ class Boundary:
         return np.stack([first, middle, last])
 
     def window(self, places: Complexes, reach: float) -> Window:
-        """Return a part of the boundary that has all within ``reach`` [m] of any place."""
+        """Return the part of the boundary near places, to search less of it.
+
+        Parameters
+        ----------
+        places : ndarray of complex
+            s + i t [m].
+        reach : float
+            All of the boundary within this distance of a place is in the window, and some more [m].
+        """
         centre, spread = _middle(places)
         near = np.abs(self._middle - centre) <= reach + spread + self._half
         kept = np.zeros(len(self._vertices), dtype=bool)
@@ -130,7 +138,10 @@ class Boundary:
         return segment[at], part[at], away[at]
 
     def clearances(self, points: Complexes) -> Array:
-        """Return the signed distance of each point from the rock, negative inside [m]."""
+        """Return the signed distance of each point s + i t from the rock [m].
+
+        Negative inside the rock; of the same shape as the points.
+        """
         segment, part, away = self.nearest(points)
         normal = self._outward[np.where(part <= 0.0, 0, np.where(part >= 1.0, 2, 1)), segment]
         distance = np.abs(away)
@@ -150,7 +161,18 @@ def _middle(places: Complexes) -> tuple[complex, float]:
 
 
 def stretch_minima(values: Array, first: Indices) -> Indices:
-    """Return the index of the least value in each stretch; stretches begin at ``first``, from 0."""
+    """Return the index of the least value in each of several stretches of an array.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    first : ndarray of int, shape (k,)
+        Index at which each stretch begins; the first is 0.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+    """
     least = np.minimum.reduceat(values, first)
     lengths = np.diff(first, append=len(values))
     at = (values == np.repeat(least, lengths)).nonzero()[0]

@@ -244,14 +244,35 @@ def arc(
 
 
 def radii(linear: tuple[complex, complex], rho: float) -> tuple[complex, complex]:
-    """Return the vectors v that the map v → A v + B v̄ takes to ρ and iρ: half-diameters [m]."""
+    """Return two conjugate half-diameters of the ellipse |A v + B v̄| = ρ, as complex numbers.
+
+    Parameters
+    ----------
+    linear : tuple of complex
+        A and B.
+    rho : float
+        ρ.
+
+    Returns
+    -------
+    tuple of complex
+        The vectors v for which A v + B v̄ is ρ and iρ [m].
+    """
     A, B = linear
     part = rho / (abs(A) ** 2 - abs(B) ** 2)
     return part * (A.conjugate() - B), 1j * part * (A.conjugate() + B)
 
 
 def rock_left(places: Complexes, axes: tuple[complex, complex]) -> Complexes:
-    """Return places of `arc` in the order in which they have the rock on their left."""
+    """Return points of an ellipse in the order in which the ellipse is on their left.
+
+    Parameters
+    ----------
+    places : ndarray of complex
+        Result of `arc`.
+    axes : tuple of complex
+        Half-diameters e₁ and e₂ of the arc.
+    """
     return places if (axes[0].conjugate() * axes[1]).imag > 0.0 else places[::-1]
 
 

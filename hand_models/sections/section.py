@@ -112,17 +112,25 @@ class Section(ABC):
         """
 
     def clearance(self, point: Vector2) -> float:
-        """Return the signed `distance` of a point (s, t) from the rock [m]."""
+        """Return the approximate signed distance of a point (s, t) from the rock [m]."""
         return self.distance(complex(*point))
 
     def clearances(self, places: Complexes) -> Array:
-        """Return the signed distances of places s + i t, of any shape, from the rock [m]."""
+        """Return the signed distance of each place s + i t from the rock, negative inside [m]."""
         return np.array(list(map(self.distance, places.ravel().tolist()))).reshape(places.shape)
 
     def face_clearance(self, joint: complex, u: complex, face: Face) -> float:
-        """Return the approximate clearance between the rock and the face of a phalanx along u [m].
+        """Return the approximate distance between the rock and the face of a phalanx [m].
 
         Negative where the face cuts into the rock.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint of the phalanx, s + i t [m].
+        u : complex
+            Unit direction of the phalanx.
+        face : Face
         """
         along = np.linspace(face.start, face.end, 9).tolist()
         return min(self.distance(joint + complex(a, face.height) * u) for a in along)

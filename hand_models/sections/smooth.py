@@ -80,20 +80,42 @@ class SmoothSection(Section):
         """
 
     def partings(self, joint: complex, u: complex, face: Face) -> Iterator[complex]:
-        """Yield normals, into the rock, of lines that separate the rock from the face of a phalanx.
+        """Yield separating lines between the rock and the face of a phalanx, by their normals.
 
-        The phalanx points along u. Only lines that are known without search are tried.
+        Only lines that are known without search are tried.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint of the phalanx, s + i t [m].
+        u : complex
+            Unit direction of the phalanx.
+        face : Face
+
+        Yields
+        ------
+        complex
+            Unit normal of a line, into the rock.
         """
         return iter(())
 
     def clear(self, joint: complex, u: complex, face: Face) -> bool:
-        """Return True if the face of a phalanx that points along u is clear of the rock."""
+        """Return True if the face of a phalanx does not touch the rock.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint of the phalanx, s + i t [m].
+        u : complex
+            Unit direction of the phalanx.
+        face : Face
+        """
         for _ in self.partings(joint, u, face):
             return True
         return self.face_clearance(joint, u, face) > 0.0
 
     def straight(self, point: complex) -> bool:
-        """Return True if the rock beside a point is straight: a face may lie flat there."""
+        """Return True if the rock beside a point s + i t is flat: a face may lie flat there."""
         return False
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:

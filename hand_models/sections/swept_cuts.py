@@ -114,7 +114,19 @@ def _entries_of_face(
 
 
 def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
-    """Cut a smooth hold with a finger's plane; None if the plane misses the rock."""
+    """Cut a smooth hold with a finger's plane, and return the rock in the plane.
+
+    Parameters
+    ----------
+    shape : Swept
+    plane : tuple of float, length 9
+        See `FingerPlane`.
+
+    Returns
+    -------
+    SmoothSection or None
+        None if the plane misses the rock.
+    """
     a, b, c, d, e, f, x, y, z = plane
     if not shape.radius:
         steep = math.hypot(c, f)

@@ -151,7 +151,11 @@ def farthest_apart(sets: Array, count: int) -> list[int]:
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the gripper's parameters, keep sets that meet the data, and compute the variants."""
+    """Fit the gripper's parameters to Figs. 12 to 14, and keep sets that meet the data.
+
+    The data of the result are the best set's residuals, the kept sets, and the variants of the
+    search with a parameter held or a datum required more closely.
+    """
     fit = GripperFit(gripper_table(hand))
     n, effort = len(fit.numbers), STUDY_SETTINGS
     searched = effort.calibrate_starts * effort.calibrate_evaluations
@@ -346,7 +350,7 @@ def _columns(sets: Sequence[Mapping[str, Any]]) -> list[list[float]]:
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the residuals, the range of each parameter over the sets, and the variants' misfits."""
+    """Draw the residuals, each parameter's range over the kept sets, and the variants' misfits."""
     figure, (left, middle, right) = panels(
         1, 3, (17.0, 7.0), grid="x", width_ratios=(1.1, 1.2, 0.8)
     )

@@ -27,7 +27,7 @@ Loaded = list[dict[str, Any]]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Compute the loads of all sequences of springs, with and without friction.
+    """Compute the palm's maximum load for every sequence of springs, with and without friction.
 
     A sequence and its mirror image count once. The gains are also computed for other preload
     stiffnesses k_p.
@@ -142,7 +142,7 @@ def _discrepancy_correlations(
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw loads and gains of all sequences, and how the gains depend on springs and stiffness."""
+    """Draw the maximum loads and gains of all sequences, and the gains over springs and k_p."""
     return {
         "fig07": _draw_sequences(result.data),
         "fig07-dependence": _draw_dependence(result.data),

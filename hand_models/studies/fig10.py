@@ -40,9 +40,9 @@ __all__ = ["plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Simulate the trials and their mean, and compute the table of strengths and the surface.
+    """Simulate pulls of tiles on sandpaper, fit the limit curve to them, and check the claims.
 
-    All concern one tile's spines and the rock, so no parameter of ``hand`` has an effect.
+    All of this concerns one tile's spines and the rock, so no parameter of ``hand`` has an effect.
     """
     surface, array = Surface.named("sandpaper-36"), SpineArray.named("sandpaper-36")
     progress(0, 1)
@@ -202,7 +202,7 @@ def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str,
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the limit curve, the table of strengths, and the limit surface."""
+    """Draw the limit curve of a tile, the table of strengths, and the limit surface."""
     return {
         "fig10": _draw_curve(result.data),
         "fig10_tile_shear": _draw_table(result.data),

@@ -35,7 +35,10 @@ __all__ = ["balance_matrix", "plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Pull the gripper straight off, and along other directions of (F_x, F_z)."""
+    """Pull the gripper straight off until a tile slips, and record the forces on the phalanges.
+
+    The gripper is also pulled along other directions of (F_x, F_z), for the shift of its base.
+    """
     progress(0, 1)
     table = experiment_table()
     conditions = Conditions.of_figure("fig12")
@@ -182,7 +185,7 @@ def _listed(values: Array) -> str:
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw shear and normal forces over the pull, and the condition number of A."""
+    """Draw the phalanges' shear and normal forces over the pull, and the condition number of A."""
     data, slip, text = result.data, result.data["slip"], StudyText("fig12")
     figure, (shear, normal, condition) = panels(1, 3, (14.0, 4.4))
     for axes, kind in ((shear, "shear"), (normal, "normal")):

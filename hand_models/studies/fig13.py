@@ -47,7 +47,7 @@ __all__ = ["plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the poses of the wrist for the hull of wrenches, and pull along directions."""
+    """Compute the hull of the gripper's wrenches over poses of the wrist, and pulls to failure."""
     table = experiment_table()
     conditions, numbers = Conditions.of_figure("fig13"), gripper_table(hand)
     gripper = conditions.gripper(numbers)
@@ -227,7 +227,7 @@ def _check(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the hull from the side, from above and along F_x, and the map of pull-off strengths."""
+    """Draw the hull of wrenches from the side, from above and along F_x, and the pull-off map."""
     data, text = result.data, StudyText("fig13")
     figure = Figure(figsize=(14.0, 10.0), layout="constrained")
     points, pulled = data["hull_vertices"], data["pulls"]["wrenches"]

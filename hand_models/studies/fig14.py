@@ -40,7 +40,7 @@ __all__ = ["loading_planes", "plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the wrench spaces of all diameters and tensions, and pull along directions."""
+    """Compute failing phalanges and best planes of loading for each diameter and tension."""
     table = experiment_table()
     diameters, tension = table.vector("fig14", "diameters"), table.scalar("fig14", "tension")
     larger = max(diameters)
@@ -219,7 +219,7 @@ def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any])
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the failing phalanges over the wrench spaces, and force and moment over the planes."""
+    """Draw the failing phalanges over the wrench spaces, and the force and moment in each plane."""
     surfaces = result.data["surfaces"]
     of_diameters = surfaces[:2]
     return {"fig14": _draw_failures(of_diameters), "fig14_planes": _draw_planes(surfaces)}

@@ -39,7 +39,7 @@ __all__ = ["plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Compute the force limits at evenly spaced tensions, on both diameters.
+    """Compute the gripper's shear and normal limits at evenly spaced tensions, on both diameters.
 
     Raises
     ------
@@ -203,7 +203,7 @@ class _Curve:
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the limits over the tension, dotted where closing alone fails."""
+    """Draw the shear and normal limits over the tension, dotted where closing alone fails."""
     data, tension, text = result.data, result.data["tension"], StudyText("fig15")
     figure, both = panels(1, 2, (12.0, 4.8))
     for axes, force in zip(both, ("shear", "normal"), strict=True):

@@ -56,7 +56,7 @@ class StudySettings:
 
     @property
     def calibrate_looks(self) -> int:
-        """Number of sets whose residuals are computed on the fine hull."""
+        """Number of sets whose residuals the calibration computes on the fine hull."""
         return 3 * self.calibrate_sets
 
 

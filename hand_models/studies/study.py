@@ -52,7 +52,13 @@ class Study(Protocol):
         """Compute the study's data and check its claims, for a hand's table."""
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
-        """Draw the study's pictures, by the names of their files."""
+        """Draw the study's pictures from its result.
+
+        Returns
+        -------
+        dict of str to Figure
+            By the names of the files, without ending.
+        """
 
 
 def load_study(name: str) -> Study:

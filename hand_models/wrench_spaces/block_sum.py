@@ -108,7 +108,7 @@ class BlockSum:
 
     @property
     def base(self) -> Array:
-        """A scaled wrench of the set, shape (6,) [N]: origin of the coordinates of `axes`."""
+        """A scaled wrench of the set, shape (6,) [N]: the origin of coordinates along `axes`."""
         start = self.origin * WRENCH_SCALE
         return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
 
@@ -168,12 +168,26 @@ class BlockSum:
 
     @property
     def rounding(self) -> float:
-        """Distance that rounding may move points in coordinates of `axes`; larger if thin."""
+        """Largest distance by which rounding may move a point, in coordinates along `axes`.
+
+        The distance is larger for a thin set.
+        """
         reach = self.axes[1]
         return max(SETTINGS.tolerance, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
 
     def extreme(self, slopes: Array) -> Array:
-        """Return the loads y (m,) with the largest product slopes · y in the sum; slopes (m,)."""
+        """Return the loads with the largest product slopes · y over the sum (support mapping).
+
+        Parameters
+        ----------
+        slopes : ndarray, shape (m,)
+            Value of a unit of each load.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            Loads y.
+        """
         y = np.zeros(self.generators.shape[1])
         for columns, vertices, *_ in self.blocks:
             y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
@@ -181,7 +195,13 @@ class BlockSum:
 
     @cached_property
     def facets(self) -> Facets:
-        """Facets of the sum in coordinates of `axes` about `base`; `LimitError` if too many."""
+        """Facets of the sum, in coordinates along `axes` about `base`.
+
+        Raises
+        ------
+        LimitError
+            If the sum has too many candidate vertices.
+        """
         parts, r = self._parts(), len(self.axes[1])
         if r == 0:
             return Facets(np.zeros((0, 0)), np.zeros(0))
@@ -198,7 +218,13 @@ class BlockSum:
 
     @cached_property
     def vertices(self) -> Array:
-        """Vertices (n, r) in coordinates of `axes` about `base`; `LimitError` if too many."""
+        """Vertices of the sum, shape (n, r), in coordinates along `axes` about `base`.
+
+        Raises
+        ------
+        LimitError
+            If the sum has too many candidate vertices.
+        """
         parts = self._parts()
         if not parts:
             return np.zeros((1, 0))

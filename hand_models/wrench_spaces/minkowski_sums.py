@@ -196,7 +196,18 @@ def _choices(
 
 
 def sums(parts: list[Summand]) -> Array:
-    """Return all sums of one point of each part, shape (n, r): candidates for vertices."""
+    """Return all sums of one point from each part: candidates for the vertices of a Minkowski sum.
+
+    Parameters
+    ----------
+    parts : list of Summand
+        Points in r dimensions.
+
+    Returns
+    -------
+    ndarray, shape (n, r)
+        n is the product of the parts' numbers of points.
+    """
     total = np.zeros((1, parts[0].points.shape[1]))
     for part in parts:
         total = (total[:, None, :] + part.points[None, :, :]).reshape(-1, total.shape[1])

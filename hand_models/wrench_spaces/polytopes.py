@@ -176,7 +176,10 @@ def _irredundant(A: Array, b: Array) -> Indices:
 
 
 def distinct(points: Array, slack: float) -> Array:
-    """Return points (n, d) without near duplicates, equal up to 10 ``slack`` in each coordinate."""
+    """Return points (n, d) without near duplicates.
+
+    Points are duplicates if all their coordinates differ by no more than about 10 ``slack``.
+    """
     if len(points) < 2:
         return points
     # of very many alike the tree would list all pairs

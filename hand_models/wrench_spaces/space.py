@@ -121,20 +121,20 @@ class WrenchSpace:
 
     @property
     def A(self) -> Array:
-        """Coefficients of limit rows, then hard rows, of A y ≤ b at u = 1, shape (nl + nh, m)."""
+        """Coefficients A of all rows in A y ≤ b at u = 1, limit rows first, shape (nl + nh, m)."""
         return np.vstack([self.L, self.H])
 
     @property
     def b(self) -> Array:
-        """Right-hand sides of A y ≤ b at u = 1, shape (nl + nh,)."""
+        """Right-hand sides b of all rows in A y ≤ b at u = 1, limit rows first (nl + nh,)."""
         return np.concatenate([self.s - self.l0, self.h])
 
     def wrench(self, y: ArrayLike) -> Array:
-        """Return the wrench o + V y of loads y (m,), shape (6,) [N, N·m]."""
+        """Return the wrench o + V y, shape (6,) [N, N·m], that loads y, shape (m,), exert."""
         return np.asarray(self.origin + self.generators @ np.asarray(y, dtype=float))
 
     def utilisations(self, y: ArrayLike) -> Array:
-        """Return each limit row's load over its capacity, shape (nl,), for loads y (m,)."""
+        """Return the utilisation (load / capacity) of each limit row (nl,), for loads y (m,)."""
         return np.asarray((self.L @ np.asarray(y, dtype=float) + self.l0) / self.s)
 
     # Views at u = 1 -----------------------------------------------------------------------------
@@ -303,7 +303,7 @@ class WrenchSpace:
         )
 
     def vertices(self) -> Array:
-        """Return the set's vertices at u = 1, shape (n, 6) [N, N·m]; raises as `half_spaces`."""
+        """Return the vertices (n, 6) of the set at u = 1 [N, N·m]; raises as `half_spaces`."""
         directions, reach = self._sum.axes
         return np.asarray(((self._vertices * reach) @ directions + self._sum.base) / WRENCH_SCALE)
 
