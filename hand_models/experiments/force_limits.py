@@ -244,13 +244,17 @@ def _farther(grasp: Gripper, points: HullPoints, found: Limit, starts: int) -> F
 def rest_state(grasp: Gripper) -> State:
     """Return the state of a closed gripper without external load.
 
+    Parameters
+    ----------
+    grasp : Gripper
+
     Returns
     -------
     {'holds', 'contact fails', 'ejects'}
-        ``ejects``: the fingers push the wrist off the rock, and `unloaded_pose` finds no pose
-        with every tile holding. ``contact fails``, otherwise: with the wrist as placed
-        (Section 5.5.1), or where it would rest unloaded, a tile exceeds its limit or is dragged
-        backwards. ``holds``: neither.
+        ``ejects``: the fingers push the wrist off the rock, and `unloaded_pose` finds no pose with
+        every tile holding. ``contact fails``, otherwise: with the wrist as placed (Section 5.5.1),
+        or where it would rest unloaded, a tile exceeds its limit or is dragged backwards.
+        ``holds``: neither.
     """
     at_rest = grasp.evaluate(np.zeros((1, 3)))
     held, pushed = bool(at_rest.holds[0]), float(at_rest.wrenches[0, 2]) > 0.0

@@ -44,7 +44,7 @@ def panels(
     grid: Literal["x", "y", "both", "none"] = "both",
     **options: Any,
 ) -> tuple[Figure, list[Any]]:
-    """Return a figure with a grid of axes, and the axes as a list, row by row.
+    """Return a figure with a grid of axes.
 
     Parameters
     ----------
@@ -55,6 +55,11 @@ def panels(
         Grid lines of the axes.
     **options
         Keyword arguments of `matplotlib.figure.Figure.subplots`.
+
+    Returns
+    -------
+    tuple of (Figure, list of Axes)
+        The axes row by row.
     """
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()

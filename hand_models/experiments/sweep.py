@@ -142,6 +142,11 @@ def radius_axes(table: ParameterTable, points: int = 15) -> tuple[Axis, Axis]:
         The gripper's, for the unit.
     points : int, optional
         Number of radii on each axis.
+
+    Returns
+    -------
+    tuple of (Axis, Axis)
+        For the middle and for the distal joint.
     """
     low, high = experiment_table().vector("fig16", "radii")
     values = tuple(np.linspace(low, high, points).tolist())

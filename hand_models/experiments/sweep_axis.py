@@ -51,7 +51,7 @@ class Conditions:
 
     @classmethod
     def of_fig16(cls) -> tuple[Conditions, ...]:
-        """Return the conditions of Fig. 16, those of surface A first."""
+        """Return the two conditions of Fig. 16: surface A, then surface B."""
         settings = experiment_table()
         tension = settings.scalar("fig16", "tension")
         return tuple(cls(d, tension) for d in settings.vector("parameter_studies", "diameters"))

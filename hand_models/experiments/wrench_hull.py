@@ -44,11 +44,11 @@ class Extents(NamedTuple):
     Attributes
     ----------
     force_x : float
-        Largest |F_x| [N].
+        Largest magnitude of F_x [N].
     force_z : float
         Least F_z [N].
     moment : float
-        Largest |M_y| [N·m].
+        Largest magnitude of M_y [N·m].
     """
 
     force_x: float
@@ -73,7 +73,13 @@ def in_paper_signs(wrenches: Array) -> Array:
 
 
 def extents(points: Array) -> Extents:
-    """Return the largest |F_x|, least F_z and largest |M_y| of wrenches, shape (n, 3)."""
+    """Return the extents of a set of wrenches.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        F_x, F_z, M_y [N, N, N·m].
+    """
     largest = np.abs(points).max(axis=0)
     return Extents(float(largest[0]), float(points[:, 1].min()), float(largest[2]))
 
@@ -129,14 +135,28 @@ def vertices(points: Array) -> Array:
 
 
 def volume(points: Array) -> float:
-    """Return the volume of the convex hull of wrenches (F_x, F_z, M_y), shape (n, 3) [N³·m]."""
+    """Return the volume of the convex hull of wrenches, over F_x, F_z and M_y [N³·m].
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        F_x, F_z, M_y [N, N, N·m].
+    """
     return float(hull(points * PLANAR_SCALE).volume / np.prod(PLANAR_SCALE))
 
 
 def clipped_vertices(points: Array) -> Array:
-    """Return the vertices of the part of a hull with F_z ≤ 0, which the paper shows, shape (k, 3).
+    """Return the vertices of the part of a convex hull with F_z ≤ 0, which the paper shows.
 
-    Empty, (0, 3), if no vertex of the hull has F_z < 0.
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches F_x, F_z, M_y whose hull it is [N, N, N·m].
+
+    Returns
+    -------
+    ndarray, shape (k, 3)
+        Empty, (0, 3), if no vertex of the hull has F_z < 0.
     """
     height, slack = points[:, 1], _slack(points)
     if not (height < -slack).any():

@@ -38,13 +38,21 @@ class TensionLimit(NamedTuple):
 
 
 def tension_limits(settled: SettledHand) -> tuple[TensionLimit, ...]:
-    """Return f_t(max) of each finger and the phalanx that fails first (Eqs. 14–15).
+    """Return the tension f_t(max) of each finger at which its first tile fails (Eqs. 14–15).
 
     Tiles have the linear law itself, not its half-planes, and no lateral load. Eq. 15 is a fixed
     point ``f ← f · f_s(φ(f)) / |f_c(f)|``; here it is found by bracketing upward from the closing
-    tension, which does not depend on the loading angle staying nearly constant. A tile that
-    exceeds its limit by closing alone gives the largest safe tension below that, zero if there is
-    none.
+    tension, which does not depend on the loading angle staying nearly constant.
+
+    Parameters
+    ----------
+    settled : SettledHand
+
+    Returns
+    -------
+    tuple of TensionLimit
+        One for each finger, in the order of `FINGERS`. A tile that exceeds its limit by closing
+        alone gives the largest safe tension below that, zero if there is none.
     """
     limits = []
     for i, finger in enumerate(FINGERS):

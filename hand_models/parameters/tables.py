@@ -181,7 +181,12 @@ class ParameterTable:
             raise InvalidInputError("missing parameter", field=f"{section}.{name}") from None
 
     def scalar(self, section: str, name: str) -> float:
-        """Return an entry that is a single number, in SI units.
+        """Return the value of an entry that is a single number, in SI units.
+
+        Parameters
+        ----------
+        section, name : str
+            Section and name of the entry.
 
         Raises
         ------
@@ -194,7 +199,12 @@ class ParameterTable:
         return float(value)
 
     def positive(self, section: str, name: str) -> float:
-        """Return an entry that is a single number above 0, in SI units.
+        """Return the value of an entry that is a single number above 0, in SI units.
+
+        Parameters
+        ----------
+        section, name : str
+            Section and name of the entry.
 
         Raises
         ------
@@ -207,7 +217,12 @@ class ParameterTable:
         return value
 
     def vector(self, section: str, name: str) -> tuple[float, ...]:
-        """Return an entry that is a list of numbers, in SI units.
+        """Return the values of an entry that is a list of numbers, in SI units.
+
+        Parameters
+        ----------
+        section, name : str
+            Section and name of the entry.
 
         Raises
         ------

@@ -38,9 +38,14 @@ class FilledCells(NamedTuple):
 
 
 def filled_cells(triangles: Triangles) -> list[FilledCells]:
-    """Find vertices of a mesh that seem to be cells without a height, one entry for each value.
+    """Find vertices of a mesh that seem to be cells of a grid without a height.
 
     Thresholds are in ``scan.toml``.
+
+    Returns
+    -------
+    list of FilledCells
+        One entry for each value of a coordinate that many vertices share.
     """
     table = scan_table()
     least, steep, share = (table.scalar("filled", name) for name in ("least", "steep", "share"))

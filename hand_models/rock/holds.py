@@ -158,12 +158,12 @@ class Hold(ABC):
             )
 
     def crest_circle(self, offset: float) -> tuple[float, float] | None:
-        """Return the circle that a hold's crest has in the plane y = ``offset`` [m].
+        """Return the circle that the rock's outline has at its crest in the plane y = ``offset``.
 
         Returns
         -------
         tuple of (float, float) or None
-            Depth of the centre and radius [m]; None if the crest is not a circle there.
+            Depth of the centre and radius [m]; None if the outline is not round there.
         """
         return None
 

@@ -267,7 +267,10 @@ class OutlinedHold(Hold):
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
         """Cut the hold with a finger's plane, and smooth the cut to the scale of a tile.
 
-        Only rock within a finger's reach of the plane's origin is returned.
+        Returns
+        -------
+        Section or None
+            Only rock within a finger's reach of the plane's origin; None if there is none.
 
         Raises
         ------
@@ -284,7 +287,16 @@ class OutlinedHold(Hold):
     ) -> Section | None:
         """Cut the hold with a finger's plane without smoothing, for a nail.
 
-        Pieces shorter than ``Scale.bridged_gap`` are dropped.
+        Returns
+        -------
+        Section or None
+            Only rock within a finger's reach, without pieces shorter than ``Scale.bridged_gap``;
+            None if there is none.
+
+        Raises
+        ------
+        InvalidInputError
+            If the outline is too long to be a surface of rock; the field is ``hold``.
         """
         runs = map(_distinct, _reached(self._pieces(origin, s_axis, t_axis), self._scale))
         least = self._scale.bridged_gap

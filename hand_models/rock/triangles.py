@@ -50,10 +50,10 @@ def connected(pairs: Indices, count: int) -> Indices:
 
 
 def grouped(some: Indices, parts: Indices) -> list[Indices]:
-    """Return items (n,) grouped by the part that each belongs to, as a list of arrays.
+    """Return items grouped by the part that each belongs to, parts ascending, as a list of arrays.
 
-    ``parts`` gives each item's part, as `connected` returns it. Parts ascend; the items of a part
-    stay in the order given.
+    Items ``some`` (n,) index ``parts``, which has each one's part as `connected` returns it; the
+    items of a part stay in the order given.
     """
     order = some[np.argsort(parts[some], kind="stable")]
     return np.split(order, np.flatnonzero(np.diff(parts[order])) + 1) if len(order) else []
@@ -225,7 +225,7 @@ def cut(
     origin, s_axis, t_axis : ndarray, shape (3,)
         Origin [m] and orthonormal axes of the plane's coordinates (s, t).
     reach : float
-        Triangles outside the square |s|, |t| ≤ reach are left out [m].
+        Triangles outside the square −reach ≤ s, t ≤ reach are left out [m].
 
     Returns
     -------

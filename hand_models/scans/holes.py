@@ -110,7 +110,7 @@ class Gaps:
 
 
 def empty_circles(triangles: Array) -> Array:
-    """Return the largest empty circle with its centre in each triangle, as diameters (m,) [m].
+    """Return the diameter of the largest empty circle with its centre in each triangle.
 
     An empty circle has no corner inside. It is the circumscribed circle, unless the triangle is
     obtuse; then its centre is on the longest edge, equally far from two corners.
@@ -119,6 +119,11 @@ def empty_circles(triangles: Array) -> Array:
     ----------
     triangles : ndarray, shape (m, 3, 3)
         Triangles of a Delaunay triangulation across z [m].
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        [m]
     """
     edges = _edges(triangles[:, :, :2])
     a, b, c = np.sort(np.linalg.norm(edges, axis=2), axis=1).T

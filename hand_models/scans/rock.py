@@ -103,7 +103,7 @@ class ScannedRock:
 
 
 def write_rock(rock: ScannedRock, path: Path) -> None:
-    """Write rock as a PLY file with normals [m], which a mesh hold can be read from."""
+    """Write scanned rock to a PLY file with normals [m], which `read_mesh` can read for a hold."""
     mesh = trimesh.Trimesh(rock.vertices, rock.faces, process=False)
     with whole_file(path) as part:
         part.write_bytes(export_ply(mesh, vertex_normal=True))

@@ -210,7 +210,7 @@ class Scan:
 
 
 def axes_along(view: Array) -> Array:
-    """Return the axes of scanned rock as columns (3, 3): z along the view, x as upward as can be.
+    """Return the axes of a frame for scanned rock: z along the view, x as upward as can be.
 
     Where the view is up or down, x is as nearly along y as can be.
 
@@ -218,6 +218,11 @@ def axes_along(view: Array) -> Array:
     ----------
     view : ndarray, shape (3,)
         Unit vector in which the scanner looked, z up.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Unit vectors x, y and z as columns, in the scan's axes.
     """
     for upward in (np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])):
         x = upward - (upward @ view) * view

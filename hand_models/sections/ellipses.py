@@ -2,12 +2,12 @@
 
 About a centre c an ellipse is the preimage of a disc,
 
-    |A v + B v̄| ≤ ρ,   v = q − c,
+    abs(A v + B v̄) ≤ ρ,   v = q − c,
 
-whose square is G(v) = m |v|² + Re(κ v²), with m = |A|² + |B|² and κ = 2 A B̄. Contacts are found by
-iteration over circles fitted to the ellipse: at the point foremost in the direction n, with the
-support h = √(n·En) and E = ρ² G⁻¹, the ellipse has the radius of curvature det E / h³. From one
-circle to the next the error is squared.
+whose square is ``G(v) = m |v|² + Re(κ v²)``, with ``m = |A|² + |B|²`` and κ = 2 A B̄. Contacts are
+found by iteration over circles fitted to the ellipse: at the point foremost in the direction n,
+with the support h = √(n·En) and E = ρ² G⁻¹, the ellipse has the radius of curvature det E / h³.
+From one circle to the next the error is squared.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class _Nearest(NamedTuple):
 
 
 class Ellipse(SmoothSection):
-    """An ellipse of rock, |A v + B v̄| ≤ ρ with v = q − c.
+    """An ellipse of rock, ``|A v + B v̄| ≤ ρ`` with v = q − c for points q.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ class Ellipse(SmoothSection):
 def arc(
     centre: complex, axes: tuple[complex, complex], most: float, reach: float, spacing: float
 ) -> Complexes:
-    """Return places centre + e₁ sin φ − e₂ cos φ, |φ| ≤ most, dense where they are within reach.
+    """Return points centre + e₁ sin φ − e₂ cos φ of an ellipse, dense where they are within reach.
 
     Parameters
     ----------
@@ -223,11 +223,11 @@ def arc(
     axes : tuple of complex
         e₁ and e₂ [m].
     most : float
-        Largest |φ| [rad].
+        φ goes from −most to most [rad].
     reach : float
-        Distance from the origin within which places are dense [m].
+        Distance from the origin within which points are dense [m].
     spacing : float
-        Approximate distance of neighbouring places there [m].
+        Approximate distance of neighbouring points there [m].
     """
 
     def places(turns: Array) -> Complexes:
@@ -244,7 +244,7 @@ def arc(
 
 
 def radii(linear: tuple[complex, complex], rho: float) -> tuple[complex, complex]:
-    """Return two conjugate half-diameters of the ellipse |A v + B v̄| = ρ, as complex numbers.
+    """Return two conjugate half-diameters of the ellipse ``|A v + B v̄| = ρ``, as complex numbers.
 
     Parameters
     ----------

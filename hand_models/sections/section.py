@@ -116,7 +116,18 @@ class Section(ABC):
         return self.distance(complex(*point))
 
     def clearances(self, places: Complexes) -> Array:
-        """Return the signed distance of each place s + i t from the rock, negative inside [m]."""
+        """Return the signed distance of each of several places from the rock, negative inside.
+
+        Parameters
+        ----------
+        places : ndarray of complex
+            s + i t [m].
+
+        Returns
+        -------
+        ndarray
+            Of the places' shape; approximate, as `distance` [m].
+        """
         return np.array(list(map(self.distance, places.ravel().tolist()))).reshape(places.shape)
 
     def face_clearance(self, joint: complex, u: complex, face: Face) -> float:

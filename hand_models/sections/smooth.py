@@ -74,9 +74,14 @@ class SmoothSection(Section):
         Parameters
         ----------
         joint : complex
-            [m]
+            s + i t [m].
         arm : float
             Distance of the point from the joint [m].
+
+        Returns
+        -------
+        list of complex
+            Unit vectors from the joint to the places of entry; empty if the point meets no rock.
         """
 
     def partings(self, joint: complex, u: complex, face: Face) -> Iterator[complex]:

@@ -97,7 +97,8 @@ def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -
 def loading_planes(points: Array) -> dict[str, Any]:
     """Return the greatest force and moment of a hull in planes M_y = a F_x, and the best planes.
 
-    Both √(F_x² + F_z²) and |M_y| are convex, so that the best are at vertices of the hull.
+    Both √(F_x² + F_z²) and the magnitude of M_y are convex, so that the best are at vertices of the
+    hull.
 
     Parameters
     ----------
