@@ -39,7 +39,7 @@ def sweep_cell(
     Parameters
     ----------
     table : ParameterTable
-        The gripper's.
+        Parameters of the gripper.
     conditions : Conditions
     measures : sequence of str
         Keys of `MEASURE_UNITS`.
@@ -87,7 +87,7 @@ def sweep_map(
     Parameters
     ----------
     table : ParameterTable
-        The gripper's.
+        Parameters of the gripper.
     x, y : Axis
         Parameters of the columns and of the rows.
     conditions : Conditions
@@ -139,7 +139,7 @@ def radius_axes(table: ParameterTable, points: int = 15) -> tuple[Axis, Axis]:
     Parameters
     ----------
     table : ParameterTable
-        The gripper's, for the unit.
+        Parameters of the gripper, for the unit of the radii.
     points : int, optional
         Number of radii on each axis.
 

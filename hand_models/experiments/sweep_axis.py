@@ -62,7 +62,7 @@ class Conditions:
         Parameters
         ----------
         table : ParameterTable
-            The gripper's.
+            Parameters of the gripper.
         most_pressing : float, optional
             Largest force with which the gripper presses on the rock [N].
 
@@ -115,7 +115,7 @@ class Axis:
         text : str
             LOW and HIGH in SI units, and N, the number of values from LOW to HIGH.
         table : ParameterTable
-            The gripper's.
+            Parameters of the gripper.
         surface : str
             Name of the surface, which decides which entries a gripper reads.
 
