@@ -1,7 +1,8 @@
-"""Find how much a gripper holds: limits of its wrench hull in shear, pull-off and moment, or none.
+"""Force limits of a gripper: the largest shear, pull-off and moment of its wrench hull.
 
-Signs are the paper's. A limit is a linear program over the points of which the hull is made; its
-multipliers give the direction in which a farther point would raise it, and a point is sought there.
+Signs are the paper's. A limit is a linear program over the points that make the hull; its
+multipliers (shadow prices) give the direction in which a farther point would raise the limit, and a
+point is sought there.
 """
 
 from __future__ import annotations
@@ -47,25 +48,27 @@ MEASURE_UNITS: Final[dict[Measure, str]] = {
     "moment": "N·m",
     "volume": "N³·m",
 }
-"""Units of what is measured of the part of a hull with F_z ≤ 0.
+"""Units of the measures of the part of a hull with F_z ≤ 0.
 
 ``shear`` is the largest F_x in the loading plane, the printed ratio of F_x to M_y; ``normal`` the
-largest −F_z, which in a skew symmetric hull has no F_x and no M_y; ``moment`` the largest M_y.
+largest −F_z, which in a skew symmetric hull has no F_x and no M_y; ``moment`` the largest M_y;
+``volume`` the volume.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class HullPoints:
-    """Wrenches at poses of the wrist at which every tile holds, each beside its mirror image.
+    """Wrenches at poses of the wrist at which every tile holds, with their mirror images.
 
     Attributes
     ----------
     wrenches : ndarray, shape (n, 3)
         F_x, F_z, M_y in the paper's signs [N, N, N·m].
     poses : ndarray, shape (n, 3)
-        [m, rad].
+        Poses of the wrist, (x, z, ω_y) [m, m, rad].
     phalanges : tuple of (str or None), length n
-        Whose contact fails there first; None where a tile is about to be dragged backwards.
+        Phalanx whose contact fails first at the pose; None where a tile is about to be dragged
+        backwards.
     """
 
     wrenches: Array
@@ -74,19 +77,33 @@ class HullPoints:
 
     @classmethod
     def explored(cls, grasp: Gripper, rays: int) -> HullPoints:
-        """Follow rays from the middle of the poses that hold.
+        """Find wrenches along rays from the middle of the poses at which every tile holds.
+
+        Parameters
+        ----------
+        grasp : Gripper
+        rays : int
+            Number of rays in the space of poses.
 
         Raises
         ------
         EmptySetError
-            If no pose near rest holds.
+            If tiles hold at no pose near rest.
         """
         found = boundary(grasp, search_box(grasp), rays)
         points = cls(np.zeros((0, 3)), np.zeros((0, 3)), ())
         return points.joined(in_paper_signs(found.wrenches), found.poses, found.limiting)
 
     def joined(self, wrenches: Array, poses: Array, limiting: Sequence[Row | None]) -> HullPoints:
-        """Return these points, and some more with their mirror images."""
+        """Return these points with further points and their mirror images added.
+
+        Parameters
+        ----------
+        wrenches, poses : ndarray, shape (k, 3)
+            In the form of the attributes.
+        limiting : sequence of (Row or None), length k
+            Row of the limit that is reached first at each pose.
+        """
         phalanges = tuple(None if row is None else row.phalanx for row in limiting)
         return HullPoints(
             np.vstack([self.wrenches, with_mirrored(wrenches)]),
@@ -98,18 +115,19 @@ class HullPoints:
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """The farthest wrench of a hull in the sense of a measure.
+    """The wrench of a hull at which a measure is largest.
 
     Attributes
     ----------
     value : float
-        Of the measure.
+        Largest value of the measure, in its unit (`MEASURE_UNITS`).
     direction : ndarray, shape (3,)
-        A wrench farther in it than every point would raise the limit.
-    corners : ndarray of int
-        Of the points, those between which that wrench lies.
-    weights : ndarray
-        Of the corners; their sum is 1.
+        Direction in (F_x, F_z, M_y): a wrench that is farther along it than every point of the hull
+        would raise the limit.
+    corners : ndarray of int, shape (k,)
+        Indices of the points between which the wrench lies.
+    weights : ndarray, shape (k,)
+        Weights of these points in the wrench; their sum is 1.
     """
 
     value: float
@@ -119,18 +137,20 @@ class Limit:
 
 
 def limit(points: Array, measure: Measure) -> Limit:
-    """Return how far the hull of some wrenches goes.
+    """Return the largest shear, pull-off or moment of a hull of wrenches (a linear program).
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        In the paper's signs.
+        Wrenches (F_x, F_z, M_y) in the paper's signs [N, N, N·m].
     measure : {'shear', 'normal', 'moment'}
 
     Raises
     ------
     EmptySetError
-        If no wrench of the hull is in question.
+        If the part of the hull that is measured is empty.
+    SolverError
+        If the linear program fails.
     """
     # the direction in which the hull's farthest wrench is the measure
     goal = np.array(
@@ -164,9 +184,9 @@ def limit(points: Array, measure: Measure) -> Limit:
 def sharpened(
     grasp: Gripper, points: HullPoints, measure: Measure, cuts: int, starts: int
 ) -> tuple[HullPoints, Limit]:
-    """Add points until the hull goes as far as local search finds, and return how far that is.
+    """Raise a force limit by adding points to the hull, found by local search.
 
-    The search begins at the point farthest in the direction that matters.
+    The search begins at the point farthest in the direction that raises the limit.
 
     Parameters
     ----------
@@ -174,15 +194,20 @@ def sharpened(
     points : HullPoints
     measure : {'shear', 'normal', 'moment'}
     cuts : int
-        How many points are added at most.
+        Largest number of points to add.
     starts : int
-        At how many points the search begins at most: where that one leads nowhere, at the farthest
-        points at which other phalanges fail.
+        Largest number of starts of each search: if the first leads nowhere, at the farthest points
+        at which other phalanges fail.
+
+    Returns
+    -------
+    tuple of (HullPoints, Limit)
+        All points, and the limit over them.
 
     Raises
     ------
     EmptySetError
-        If no wrench of the hull is in question.
+        If the part of the hull that is measured is empty.
     """
     found = limit(points.wrenches, measure)
     for _ in range(cuts):
@@ -217,12 +242,19 @@ def _farther(grasp: Gripper, points: HullPoints, found: Limit, starts: int) -> F
 
 
 def rest_state(grasp: Gripper) -> State:
-    """Return what closing the fingers alone does, before any external load.
+    """Return the state of a closed gripper without external load.
 
-    ``ejects``: the fingers push the wrist off the rock, and there is no pose at which they cease to
-    with every tile holding: the gripper cannot rest unloaded. ``contact fails``, otherwise: with
-    the wrist where it is (Section 5.5.1), or where it would rest unloaded, a tile is loaded beyond
-    its limit or dragged backwards.
+    Parameters
+    ----------
+    grasp : Gripper
+
+    Returns
+    -------
+    {'holds', 'contact fails', 'ejects'}
+        ``ejects``: the fingers push the wrist off the rock, and `unloaded_pose` finds no pose with
+        every tile holding. ``contact fails``, otherwise: with the wrist as placed (Section 5.5.1),
+        or where it would rest unloaded, a tile exceeds its limit or is dragged backwards.
+        ``holds``: neither.
     """
     at_rest = grasp.evaluate(np.zeros((1, 3)))
     held, pushed = bool(at_rest.holds[0]), float(at_rest.wrenches[0, 2]) > 0.0
@@ -234,10 +266,15 @@ def rest_state(grasp: Gripper) -> State:
 
 
 def unloaded_pose(grasp: Gripper) -> Array | None:
-    """Return the pose nearest to rest, straight off the rock or toward it, of no wrench.
+    """Return the pose at which a gripper exerts no wrench: the first along z from rest.
 
-    By symmetry only F_z is to vanish. None if it does not within the printed shift of the base, or
-    only where a phalanx has lost the rock.
+    By symmetry only F_z is to vanish.
+
+    Returns
+    -------
+    ndarray, shape (3,), or None
+        Pose (0, z, 0) [m, m, rad]; None if F_z does not vanish within the printed shift of the
+        base, or only where a phalanx has lost the rock.
     """
     far = experiment_table().scalar("parameter_studies", "base_shift")
 

@@ -1,11 +1,11 @@
-"""Data of Figs. 12 to 14 on the paper's gripper, and the residuals of a set of its numbers.
+"""Data of Figs. 12 to 14 on the paper's gripper, and the residuals of the model's parameters.
 
-Each datum has a tolerance, and a residual is what the model is off in tolerances. First come the
-ends of Fig. 12's lines (a tenth, or 0.3 N), the extents of Fig. 13 (a tenth) and the edge of its
-surface seen along F_z (0.2 N·m everywhere, 0.1 on average); the misfit of a set is the largest of
-these residuals. Where it can, a set is also to have the surface's side view and the best planes of
-loading, whose tolerances are wide. Wrenches are those really held, as far as the paper's surface
-goes: none that press more than that.
+Each datum has a tolerance, and a residual is the model's difference from the datum in tolerances.
+First come the ends of Fig. 12's lines (a tenth, or 0.3 N), the extents of Fig. 13 (a tenth) and the
+edge of its surface seen along F_z (0.2 N·m everywhere, 0.1 on average); the misfit of a set of
+parameters is the largest of these residuals. Further data, with wide tolerances, do not count in
+the misfit: the surface's side view and the best planes of loading. Wrenches are those really held,
+as far as the paper's surface goes: none that press more than that.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ __all__ = ["FIT_TOLERANCES", "Datum", "FitTolerances", "GripperFit"]
 
 @dataclass(frozen=True, slots=True)
 class FitTolerances:
-    """Tolerances of what is read off Figs. 12 and 13."""
+    """Tolerances of the data that are read off Figs. 12 and 13."""
 
     force_share: float = 0.1
-    """Of a force of Fig. 12 or an extent of Fig. 13, as a share of it."""
+    """Tolerance of a force of Fig. 12 or an extent of Fig. 13, as a share of its value."""
     least_force: float = 0.3
     """Least tolerance of a force of Fig. 12 [N]."""
     edge: float = 0.2
     edge_on_average: float = 0.1
-    """Of the edge of Fig. 13's surface, at every point and on average [N·m]."""
+    """Tolerances of the edge of Fig. 13's surface, at every point and on average [N·m]."""
 
 
 FIT_TOLERANCES: Final = FitTolerances()
@@ -61,18 +61,21 @@ DATA_DIRECTIONS: Final = np.array(
         (1.0, -0.5, 0.3),
     ]
 )
-"""Directions of the data over the extents: along F_x, F_z and M_y, of the paper's signs."""
+"""Directions (15, 3) along F_x, F_z and M_y over the extents of Fig. 13, in the paper's signs, in
+which `GripperFit.wrenches` searches.
+"""
 
 
 class Datum(NamedTuple):
-    """One number that the figures give.
+    """One number that the paper's figures give.
 
     Attributes
     ----------
     label, unit : str
     wanted, tolerance : float
+        Value in the figure, and its tolerance, in the unit.
     first : bool
-        Whether it counts in the misfit.
+        True if the datum counts in the misfit.
     """
 
     label: str
@@ -102,12 +105,25 @@ def _numbers() -> tuple[Axis, ...]:
 
 
 class GripperFit:
-    """Residuals of the data over the gripper's numbers, each in its plausible range from 0 to 1.
+    """Residuals of the paper's data as functions of the gripper's uncertain parameters.
+
+    A set of parameters is x, shape (n,): each parameter as a share, 0 to 1, of its plausible range.
 
     Parameters
     ----------
     table : ParameterTable, optional
-        From `gripper_table`, with all other numbers.
+        From `gripper_table`, with all other parameters.
+
+    Attributes
+    ----------
+    numbers : tuple of Axis, length n
+        The parameters, with the ends of their plausible ranges.
+    names : list of str, length n
+    low, width : ndarray, shape (n,)
+        Lower end and width of each range, in SI units.
+    data : tuple of Datum, length k
+    wanted, tolerance, first : ndarray, shape (k,)
+        Attributes of the data, as arrays.
     """
 
     def __init__(self, table: ParameterTable | None = None) -> None:
@@ -151,29 +167,49 @@ class GripperFit:
             yield Datum(f"M_y : F_x best for {kind}", "m", arm, 0.4 * arm, False)
 
     def start(self) -> Array:
-        """Return where the table is."""
+        """Return the values in `table` as shares x, shape (n,), of their plausible ranges.
+
+        Values outside a range are clipped to its ends, 0 and 1.
+        """
         now = [number.current(self.table) for number in self.numbers]
         return np.asarray(np.clip((np.array(now) - self.low) / self.width, 0.0, 1.0))
 
     def values(self, x: Array) -> Array:
-        """Return the numbers in SI units."""
+        """Convert shares x (n,) of plausible ranges to parameters in SI units, shape (n,)."""
         return np.asarray(self.low + self.width * x)
 
     def gripper(self, x: Array) -> Gripper:
-        """Return the gripper of some numbers, on the surface of Fig. 13."""
+        """Return the gripper with given parameters, on the surface of Fig. 13.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+            Parameters as shares of their plausible ranges.
+
+        Raises
+        ------
+        InvalidInputError
+            If the fingers do not lie on the surface.
+        """
         table, settings = self.table, self._settings
         for number, value in zip(self.numbers, self.values(x).tolist(), strict=True):
             table = number.set(table, value)
         return Conditions.of_figure("fig13").gripper(table, settings.scalar("fig13", "top"))
 
     def wrenches(self, gripper: Gripper, *, fine: bool = False) -> Array:
-        """Return the outermost wrenches held, (F_x, F_z, M_y) in the paper's signs, shape (n, 3).
+        """Return the outermost wrenches that a gripper holds, (F_x, F_z, M_y) in the paper's signs.
 
         Parameters
         ----------
         gripper : Gripper
         fine : bool, optional
-            Whether by the grid of the studies; else by rays, sooner and some per cent off.
+            True to search on the grid of the studies; False to follow rays, which is faster and
+            some per cent less accurate.
+
+        Returns
+        -------
+        ndarray, shape (k, 3)
+            [N, N, N·m]
         """
         if fine:
             return held_wrenches(gripper)
@@ -187,12 +223,24 @@ class GripperFit:
         return with_mirrored(in_paper_signs(found.wrenches) * 1.008)
 
     def model(self, x: Array, *, fine: bool = False) -> Array:
-        """Return what the model has for the data.
+        """Return the model's value of each of the paper's data, for a set of parameters.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+            Parameters as shares of their plausible ranges.
+        fine : bool, optional
+            As in `wrenches`.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            In the units of the data.
 
         Raises
         ------
         CruxError
-            If the fingers do not lie on the surface, or nothing holds.
+            If the fingers do not lie on the surface, or no pose of the wrist holds.
         """
         gripper, settings = self.gripper(x), self._settings
         pull = settings.scalar("fig12", "pull")
@@ -213,7 +261,20 @@ class GripperFit:
         return np.array([*lines, *extents(held), *along_z, off, *side, *arms])
 
     def residuals(self, x: Array, *, fine: bool = False) -> Array:
-        """Return how many tolerances each datum is off."""
+        """Return the residuals of the data for a set of parameters: (model − wanted) / tolerance.
+
+        Parameters
+        ----------
+        x : ndarray, shape (n,)
+            Parameters as shares of their plausible ranges.
+        fine : bool, optional
+            As in `wrenches`.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            Clipped to ±30; all are 30 where the parameters give no gripper that holds.
+        """
         hopeless = 30.0  # of every datum where a set of numbers gives no gripper that holds
         try:
             off = (self.model(x, fine=fine) - self.wanted) / self.tolerance
@@ -222,5 +283,11 @@ class GripperFit:
         return np.asarray(np.nan_to_num(np.clip(off, -hopeless, hopeless), nan=hopeless))
 
     def misfit(self, residuals: Array) -> float:
-        """Return the largest residual of the data that come first."""
+        """Return the largest absolute residual of those data that count in the misfit.
+
+        Parameters
+        ----------
+        residuals : ndarray, shape (k,)
+            Result of `residuals` [tolerances].
+        """
         return float(np.abs(residuals[self.first]).max())

@@ -1,7 +1,7 @@
-"""The palm experiments of Section 4.2: springs for contacts, a hard stop on the softest.
+"""The palm experiments of Section 4.2: springs for contacts, the softest with a hard stop.
 
-The stop's travel is not printed. Everything is proportional to it, so loads are given per metre of
-it; a gain by friction does not depend on it.
+The stop's travel is not printed. All loads are proportional to the travel, so they are given per
+metre of it; a gain by friction does not depend on it.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ __all__ = ["PalmExperiment"]
 
 @dataclass(frozen=True)
 class PalmExperiment:
-    """Numbers of the palm experiment that all configurations of its springs share.
+    """Parameters of the palm experiment that all configurations of its springs share.
 
     Attributes
     ----------
     springs : tuple of float
         Contact stiffness of springs 1, 2, 3 [N/m].
     preload_stiffness : float
-        k_p [N/m].
+        Stiffness k_p of each tile's preload spring [N/m].
     friction : float
-        μ of pulleys that are fixed rods.
+        Coefficient μ of pulleys that are fixed rods.
     """
 
     springs: tuple[float, ...]
@@ -37,7 +37,13 @@ class PalmExperiment:
 
     @classmethod
     def from_tables(cls, hand: ParameterTable) -> PalmExperiment:
-        """Take the springs from ``experiments.toml``, the palm from a hand's table."""
+        """Read the experiment's parameters from tables.
+
+        Parameters
+        ----------
+        hand : ParameterTable
+            Parameters of the hand, for the palm; the springs are those of ``experiments.toml``.
+        """
         return cls(
             springs=experiment_table().vector("load_sharing", "contact_springs"),
             preload_stiffness=hand.scalar("palm", "spring_stiffness"),
@@ -45,19 +51,21 @@ class PalmExperiment:
         )
 
     def load(self, sequence: Sequence[int], friction: float, own_friction: float = 0.0) -> float:
-        """Return the palm's load when the first of its softest contacts is at its stop.
+        """Return the palm's load when the first of its softest contacts reaches its stop.
 
         Parameters
         ----------
         sequence : sequence of int
-            Numbers of the springs from the left, from 1.
-        friction, own_friction : float
-            At the tiles' pulleys, and at the palm's own.
+            Numbers of the springs, 1 to 3, from the left.
+        friction : float
+            Friction coefficient of the tiles' pulleys.
+        own_friction : float
+            Friction coefficient of the palm's pulleys between the tiles.
 
         Returns
         -------
         float
-            Per metre of the stop's travel [N/m].
+            Load per metre of the stop's travel [N/m].
         """
         stiffness = [self.springs[number - 1] for number in sequence]
         sharing = share_load(stiffness, self.preload_stiffness, friction, own_friction)
@@ -65,5 +73,16 @@ class PalmExperiment:
         return float(sharing.tile_stiffness.sum() / sharing.tile_travel[softest].max())
 
     def gain(self, sequence: Sequence[int]) -> float:
-        """Return what rods in place of the tiles' bearings do to the load, as a share of it."""
+        """Return the relative gain of the palm's load by friction: fixed rods in place of bearings.
+
+        Parameters
+        ----------
+        sequence : sequence of int
+            Numbers of the springs, 1 to 3, from the left.
+
+        Returns
+        -------
+        float
+            0.1 for a load that is 10 % larger with rods at the tiles' pulleys.
+        """
         return self.load(sequence, self.friction) / self.load(sequence, 0.0) - 1.0

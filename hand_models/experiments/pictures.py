@@ -1,4 +1,4 @@
-"""Draw what the pictures of studies have in common: panels, solids of wrenches, maps of sweeps."""
+"""Helpers for the pictures of studies: panels, solids of wrenches, maps of sweeps."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ __all__ = [
 ]
 
 PHALANX_COLOURS: Final = dict(zip(PHALANGES, ("tab:red", "tab:green", "tab:blue"), strict=True))
-"""Colours of phalanges, in every picture; for failures the paper's are red and blue, too."""
+"""Colour of each phalanx in every picture; for failures the paper also uses red and blue."""
 
 STATE_COLOURS: Final = {
     "contact fails": ("tab:blue", "closing alone overloads a tile"),
     "ejects": ("navy", "the gripper ejects itself"),
     "no grasp": ("0.6", "no such grasp"),
 }
-"""Colour and legend of cells without limits."""
+"""Colour and legend of a map's cells without limits, by state."""
 
 
 def panels(
@@ -44,9 +44,22 @@ def panels(
     grid: Literal["x", "y", "both", "none"] = "both",
     **options: Any,
 ) -> tuple[Figure, list[Any]]:
-    """Return a figure of some inches, and its axes row by row, with lines across them.
+    """Return a figure with a grid of axes.
 
-    ``options`` are matplotlib's for subplots.
+    Parameters
+    ----------
+    rows, columns : int
+    size : tuple of float
+        Width and height of the figure [inches].
+    grid : {'x', 'y', 'both', 'none'}
+        Grid lines of the axes.
+    **options
+        Keyword arguments of `matplotlib.figure.Figure.subplots`.
+
+    Returns
+    -------
+    tuple of (Figure, list of Axes)
+        The axes row by row.
     """
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options).ravel().tolist()
@@ -56,7 +69,7 @@ def panels(
 
 
 def label_solid(axes: Any, title: str) -> None:
-    """Label three-dimensional axes (F_x, M_y, F_z), drawn with F_z downward: pull-off is up."""
+    """Label three-dimensional axes (F_x, M_y, F_z), with F_z downward so that pull-off is up."""
     axes.set(xlabel="F_x [N]", ylabel="M_y [N·m]", zlabel="F_z [N]", title=title)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(5))
@@ -72,7 +85,13 @@ def label_solid(axes: Any, title: str) -> None:
 
 
 def conditions_title(conditions: dict[str, Any]) -> str:
-    """Return conditions in words."""
+    """Return a title such as ``300 mm, tendons at 46 N, concrete-fine``.
+
+    Parameters
+    ----------
+    conditions : dict
+        The fields of `Conditions`: ``diameter`` [m], ``tension`` [N] and ``surface``.
+    """
     return (
         f"{1e3 * conditions['diameter']:g} mm, tendons at {conditions['tension']:g} N, "
         f"{conditions['surface']}"
@@ -80,7 +99,7 @@ def conditions_title(conditions: dict[str, Any]) -> str:
 
 
 def entry_name(entry: str) -> str:
-    """Return an entry in words, such as ``middle pulley radius`` of ``finger.pulley_radii[1]``."""
+    """Return an entry in words: ``middle pulley radius`` for ``finger.pulley_radii[1]``."""
     section, _, name = entry.partition(".")
     name, _, place = name.partition("[")
     words = {"pulley_radii": "pulley radius"}.get(name, name.replace("_", " "))
@@ -91,14 +110,17 @@ def entry_name(entry: str) -> str:
 
 
 def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
-    """Draw a map of a measure, cells without limits by their state, the table's own values white.
+    """Draw a map of a measure over two parameters; a white diamond marks the table's values.
+
+    Cells without limits have the colour of their state (`STATE_COLOURS`).
 
     Parameters
     ----------
     axes : Axes
     data : dict
-        From `sweep_map`.
+        Result of `sweep_map`.
     measure : str
+        A key of ``data["limits"]``.
     """
     states, values = data["state"], data["limits"][measure]
     handier = {"m": (1e3, "mm"), "N/m": (1e-3, "N/mm")}
@@ -123,7 +145,14 @@ def draw_map(axes: Axes, data: dict[str, Any], measure: Measure) -> None:
 
 
 def legend(figure: Figure, maps: Sequence[dict[str, Any]]) -> None:
-    """Draw the legend of colours and the diamond below the maps of a figure."""
+    """Draw a legend of the states' colours and of the diamond below the maps of a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+    maps : sequence of dict
+        Results of `sweep_map` in the figure.
+    """
     met = {state for data in maps for state in data["state"].flat}
     handles: list[Any] = [
         Patch(color=colour, label=text)

@@ -1,9 +1,9 @@
-"""A planar gripper loaded along directions of the wrench until a tile lets go (Section 5.5.2).
+"""Pull a planar gripper along directions of the wrench until a tile's limit (Section 5.5.2).
 
 The pose of the wrist follows the load in small increments, each solved by Newton steps on exact
-stiffnesses (Section 5.4.2). Where the hull of a wrench space fills the hollows of the set, this
-finds the set's own boundary, and what fails there. Wrenches are (F_x, F_z, M_y) in the paper's
-signs.
+stiffnesses (Section 5.4.2). A set of wrenches need not be convex; its hull does not show the
+boundary of the set, nor the limit that is exceeded there, and these pulls do. Wrenches are
+(F_x, F_z, M_y) in the paper's signs.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class PullingSettings:
-    """Resolution with which a gripper's poses are searched and balanced."""
+    """Resolution of the search for a gripper's poses, and tolerance of their balance."""
 
     poses_per_axis: int = 60
-    """Poses of the wrist along each axis of a search."""
+    """Number of poses of the wrist along each axis of a search."""
     balance_tolerance: float = 1e-8
-    """Largest part of a wrench that a pose may leave over [N]."""
+    """Largest residual of a wrench at a balanced pose, its moment over 0.1 m [N]."""
 
 
 PULLING_SETTINGS: Final = PullingSettings()
@@ -58,19 +58,19 @@ PULLING_SETTINGS: Final = PullingSettings()
 
 @dataclass(frozen=True, eq=False)
 class Pulled:
-    """Wrenches and poses at which a gripper lets go.
+    """The last wrenches and poses along m directions before a gripper exceeds a limit.
 
     Attributes
     ----------
     wrenches : ndarray, shape (m, 3)
         Last wrenches that hold [N, N, N·m].
     poses : ndarray, shape (m, 3)
-        Poses of the wrist there, (x, z, ω_y) [m, rad].
+        Poses of the wrist there, (x, z, ω_y) [m, m, rad].
     side, phalanx : tuple of (str or None), length m
         The tile that fails; None where no pose balances the next load.
     way : tuple of str, length m
         The name of the tile's limit, or ``dragged_backwards`` where a tile has less drag than it
-        needs (`Surface`), or ``no_pose`` where nothing balances.
+        needs (`Surface`), or ``no_pose`` where no pose balances the next load.
     """
 
     wrenches: Array
@@ -81,14 +81,26 @@ class Pulled:
 
 
 def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSearch, Pulled, Array]:
-    """Search a gripper's poses, then pull it along about ``count`` directions.
+    """Search the poses of a gripper's wrist, then pull it along about ``count`` directions.
 
-    Also returned are the outermost wrenches of the search and those of the pulls, shape (n, 3).
+    Parameters
+    ----------
+    gripper : Gripper
+    count : int
+        Approximate number of directions.
+    progress : Progress
+
+    Returns
+    -------
+    search : WristSearch
+    pulled : Pulled
+    wrenches : ndarray, shape (n, 3)
+        Outermost wrenches of the search, and those of the pulls [N, N, N·m].
 
     Raises
     ------
     EmptySetError
-        If it does not hold without load.
+        If the closed gripper exceeds a limit without load.
     """
     unloaded(gripper)
     found = search(gripper, PULLING_SETTINGS.poses_per_axis, part(progress, 0, 1, 10))
@@ -100,27 +112,35 @@ def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSea
 
 
 def held_wrenches(gripper: Gripper) -> Array:
-    """Return the outermost wrenches held by a gripper and its mirror image, shape (n, 3)."""
+    """Search a gripper's poses, and return the outermost wrenches that it can hold.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Wrenches (F_x, F_z, M_y) and their mirror images, in the paper's signs [N, N, N·m].
+    """
     found = search(gripper, PULLING_SETTINGS.poses_per_axis)
     return with_mirrored(in_paper_signs(found.wrenches))
 
 
 def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array, Array]:
-    """Return the poses at which a gripper exerts some wrenches on the rock, by Newton steps.
+    """Find the poses at which a gripper exerts given wrenches on the rock, by Newton steps.
 
     Parameters
     ----------
     gripper : Gripper
     wrenches : ndarray, shape (m, 3)
+        [N, N, N·m]
     start : ndarray, shape (m, 3)
-        Poses to begin at, near the solutions.
+        Poses (x, z, ω_y) to begin at, near the solutions [m, m, rad].
 
     Returns
     -------
     poses : ndarray, shape (m, 3)
+        [m, m, rad]
     residual : ndarray, shape (m,)
-        Largest part of each wrench that is left over; not a number where a phalanx lost its rock
-        [N].
+        Largest component of each wrench that is not balanced, its moment over 0.1 m; NaN where a
+        phalanx lost its rock [N].
     """
     poses, m = start.copy(), len(start)
     steps = 1j * COMPLEX_STEP * np.eye(3)
@@ -142,12 +162,12 @@ def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array,
 
 
 def unloaded(gripper: Gripper) -> Array:
-    """Return the pose of a closed gripper that nothing loads, shape (3,) [m, rad].
+    """Return the pose of a closed gripper without load, (x, z, ω_y), shape (3,) [m, m, rad].
 
     Raises
     ------
     EmptySetError
-        If it does not hold itself.
+        If the closed gripper exceeds a limit without load.
     """
     poses = pulled_off_poses(gripper, np.zeros(1))
     if not (len(poses) and gripper.evaluate(poses).holds[0]):
@@ -158,9 +178,20 @@ def unloaded(gripper: Gripper) -> Array:
 
 
 def pulled_off_poses(gripper: Gripper, pulls: Array) -> Array:
-    """Return the poses at ascending pulls straight off [N], up to the last that can be balanced.
+    """Return the poses of a gripper at pulls straight off the rock, up to the last one in balance.
 
-    Limits are not looked at.
+    Limits of the tiles are not checked.
+
+    Parameters
+    ----------
+    gripper : Gripper
+    pulls : ndarray, shape (n,)
+        Ascending values of −F_z [N].
+
+    Returns
+    -------
+    ndarray, shape (k, 3)
+        (x, z, ω_y) for the first k ≤ n pulls [m, m, rad].
     """
     at, poses = np.zeros((1, 3)), []
     for force in pulls:
@@ -172,20 +203,20 @@ def pulled_off_poses(gripper: Gripper, pulls: Array) -> Array:
 
 
 def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) -> Pulled:
-    """Load a gripper along directions of the wrench until something lets go.
+    """Load a gripper along directions of the wrench until a limit is exceeded.
 
     Parameters
     ----------
     gripper : Gripper
     directions : ndarray, shape (m, 3)
-        Of any length.
+        In (F_x, F_z, M_y), of any length.
     progress : callable, optional
         Called with (directions done, directions in all) after each increment.
 
     Raises
     ------
     EmptySetError
-        If it does not hold without load.
+        If the closed gripper exceeds a limit without load.
     """
     m = len(directions)
     unit = directions / np.linalg.norm(directions * PLANAR_SCALE, axis=1)[:, None]
@@ -227,20 +258,21 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
 
 
 def even_pulls(count: int, size: Array) -> Array:
-    """Return directions with F_z < 0, evenly spread where wrenches are measured by ``size``.
+    """Return directions of wrenches with F_z < 0, evenly spread in units of ``size``.
 
-    On a spiral over half of a half sphere, and the same mirrored, (F_x, M_y) → (−F_x, −M_y).
+    They lie on a spiral over half of a half sphere, and mirrored: (F_x, M_y) → (−F_x, −M_y).
 
     Parameters
     ----------
     count : int
-        About how many.
+        Approximate number of directions.
     size : ndarray, shape (3,)
-        Wrenches that count alike.
+        Units of F_x, F_z and M_y.
 
     Returns
     -------
     ndarray, shape (m, 3)
+        [N, N, N·m]
     """
     k = np.arange(count)
     height = (k + 0.5) / count

@@ -1,4 +1,4 @@
-"""Result of a study: data, and claims of the paper beside what the model gives."""
+"""Result of a study: its data, and the paper's claims beside the model's values."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ __all__ = ["Claim", "Role", "StudyResult", "StudyText", "part", "track"]
 Item = TypeVar("Item")
 
 Role: TypeAlias = Literal["test", "calibration"]
-"""Whether a claim tests the model, or a parameter was fitted to it."""
+"""'test' for a claim that tests the model; 'calibration' if a parameter was fitted to the claim."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper, and what the model gives.
+    """A claim of the paper, with the paper's value and the model's.
 
     Attributes
     ----------
     claim : str
         In the paper's words, or close to them, with the place.
     claimed, got : str or float
-        The paper's figure and ours.
+        The paper's value and the model's.
     holds : bool
+        True if the model confirms the claim.
     role : {'test', 'calibration'}
-        Whether a parameter was fitted to the claim, so that it proves nothing.
+        'calibration' if a parameter was fitted to the claim, so that the claim proves nothing.
     """
 
     claim: str
@@ -47,14 +48,14 @@ class StudyResult:
     Attributes
     ----------
     name, title : str
-        Its name, such as ``fig06``, and what it is about.
+        Name, such as ``fig06``, and subject of the study.
     data : dict
-        The figure's data, SI units: what JSON can write, and arrays. ``not_tested``, if there,
-        lists in words what the paper says and nothing published can decide; ``summary`` what else
-        a person should read.
+        The figure's data in SI units: JSON values, and arrays. ``not_tested``, if there, lists in
+        words the statements of the paper that nothing published can decide; ``summary`` lists
+        further remarks for a reader.
     claims : tuple of Claim
     hand : dict
-        By section and name, the entries in which the hand is not the bundled one; filled in by
+        By section and name, the hand's entries that differ from the bundled hand; filled in by
         `run_study`.
     """
 
@@ -66,17 +67,17 @@ class StudyResult:
 
 
 class StudyText:
-    """The words of a study in ``studies.toml``, and its claims as they are checked.
+    """The texts of a study from ``studies.toml``, and the claims that were checked.
 
     Parameters
     ----------
     study : str
-        Its table there.
+        Name of the study's table in the file.
 
     Attributes
     ----------
     claims : list of Claim
-        Those checked so far.
+        Claims checked so far.
     """
 
     def __init__(self, study: str) -> None:
@@ -94,20 +95,22 @@ class StudyText:
         role: Role | None = None,
         **values: Any,
     ) -> None:
-        """Add a claim by its name.
+        """Add a checked claim, with its text from ``studies.toml``.
 
         Parameters
         ----------
         name : str
+            Name of the claim in the file.
         got : str or float
-            What the model gives.
+            The model's value.
         holds : bool
+            True if the model confirms the claim.
         claimed : float, optional
-            The paper's figure, of a claim that has it from a parameter.
+            The paper's value, in place of the file's.
         role : {'test', 'calibration'}, optional
-            In place of the entry's, which is ``test`` where it has none.
+            In place of the file's, which is ``test`` by default.
         **values
-            Of the placeholders in its words.
+            Values of the placeholders in the text.
         """
         entry = self._words["claims"][name]
         paper: str | float = entry["claimed"] if claimed is None else claimed
@@ -117,17 +120,39 @@ class StudyText:
         self.claims.append(Claim(entry["claim"].format(**values), paper, got, bool(holds), role))
 
     def label(self, axes: Any, name: str, **values: Any) -> None:
-        """Write title and labels of axes by their name; ``values`` are of the placeholders."""
+        """Set the title and labels of axes from ``studies.toml``.
+
+        Parameters
+        ----------
+        axes : Axes
+        name : str
+            Name of the axes in the file.
+        **values
+            Values of the placeholders in the texts.
+        """
         axes.set(**{key: text.format(**values) for key, text in self._words["axes"][name].items()})
 
     def result(self, data: dict[str, Any]) -> StudyResult:
-        """Return the study's result, with the claims checked."""
+        """Return the study's result: data, title from ``studies.toml``, and the claims checked.
+
+        Parameters
+        ----------
+        data : dict
+            Data of the study; ``not_tested`` is added from ``studies.toml``.
+        """
         data = {**data, "not_tested": self._words["not_tested"]}
         return StudyResult(self._name, self._words["title"], data, tuple(self.claims))
 
 
 def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
-    """Yield items, and report how many of them are done."""
+    """Yield the items of a sequence, and report progress before each item and at the end.
+
+    Parameters
+    ----------
+    progress : Progress
+        Called with (items done, items in all).
+    items : sequence
+    """
     for done, item in enumerate(items):
         progress(done, len(items))
         yield item
@@ -135,5 +160,13 @@ def track(progress: Progress, items: Sequence[Item]) -> Iterator[Item]:
 
 
 def part(progress: Progress, start: int, end: int, total: int) -> Progress:
-    """Return a callback for a part of the work: ``start`` to ``end`` of ``total`` steps."""
+    """Return a progress callback for one part of a longer work.
+
+    Parameters
+    ----------
+    progress : Progress
+        Callback of the whole work, called with (steps done, ``total``).
+    start, end, total : int
+        The part begins and ends at these steps of the total.
+    """
     return lambda done, of: progress(start + (end - start) * done // of, total)

@@ -1,4 +1,4 @@
-"""Map what the gripper holds over any two entries of its table.
+"""Map the force limits of the gripper over any two entries of its table (parameter sweep).
 
 Fig. 16 is such a map, over the pulley radii of the middle and the distal joint.
 """
@@ -34,13 +34,22 @@ __all__ = ["GripperSweep", "plot", "radius_axes", "run", "sweep_cell", "sweep_ma
 def sweep_cell(
     table: ParameterTable, conditions: Conditions, measures: Sequence[Measure]
 ) -> dict[str, Any]:
-    """Return what a gripper of some numbers holds.
+    """Return the state and the force limits of a gripper with the parameters of a table.
+
+    Parameters
+    ----------
+    table : ParameterTable
+        Parameters of the gripper.
+    conditions : Conditions
+    measures : sequence of str
+        Keys of `MEASURE_UNITS`.
 
     Returns
     -------
     dict
-        ``state``: of `force_limits.State`, or ``no grasp`` where the fingers do not lie on the
-        rock. ``limits`` by measure: empty unless the state is ``holds``.
+        ``state``: 'holds', 'contact fails' or 'ejects' (`rest_state`), or 'no grasp' where the
+        fingers do not lie on the rock. ``limits`` by measure, in the unit of `MEASURE_UNITS`: empty
+        unless the state is 'holds'.
     """
     limits: dict[Measure, float] = {}
     try:
@@ -73,28 +82,30 @@ def sweep_map(
     measures: Sequence[Measure],
     progress: Progress,
 ) -> dict[str, Any]:
-    """Return what a gripper holds over two of its numbers, enough to draw it again.
+    """Return the states and force limits of a gripper on a grid over two of its parameters.
 
     Parameters
     ----------
     table : ParameterTable
-        The gripper's.
+        Parameters of the gripper.
     x, y : Axis
-        Of the columns and of the rows.
+        Parameters of the columns and of the rows.
     conditions : Conditions
     measures : sequence of str
+        Keys of `MEASURE_UNITS`.
     progress : Progress
 
     Returns
     -------
     dict
-        ``state`` of each cell, ``limits`` by measure, not a number where there are none, the share
-        of cells that are ``failing``, and of what: ``conditions``, ``x``, ``y``.
+        ``state``: array of str, a row for each value of y, a column for each of x. ``limits`` by
+        measure: arrays of that shape, NaN in cells without limits. ``failing``: share of cells not
+        in the state 'holds'. ``conditions``, ``x`` and ``y``: the inputs, as dictionaries.
 
     Raises
     ------
     InvalidInputError
-        If there is no grasp with the table's own values.
+        If the gripper has no grasp with the table's values.
     """
     conditions.gripper(table)
     cells = [
@@ -123,7 +134,20 @@ def sweep_map(
 
 
 def radius_axes(table: ParameterTable, points: int = 15) -> tuple[Axis, Axis]:
-    """Return the axes of Fig. 16: radii of the middle and the distal pulley."""
+    """Return the axes of Fig. 16: radii of the middle and the distal pulley.
+
+    Parameters
+    ----------
+    table : ParameterTable
+        Parameters of the gripper, for the unit of the radii.
+    points : int, optional
+        Number of radii on each axis.
+
+    Returns
+    -------
+    tuple of (Axis, Axis)
+        For the middle and for the distal joint.
+    """
     low, high = experiment_table().vector("fig16", "radii")
     values = tuple(np.linspace(low, high, points).tolist())
     unit = table.quantity("finger", "pulley_radii").unit
@@ -133,16 +157,16 @@ def radius_axes(table: ParameterTable, points: int = 15) -> tuple[Axis, Axis]:
 
 @dataclass(frozen=True)
 class GripperSweep:
-    """A map that a caller asks for, as a study.
+    """A caller's map of force limits, as a study.
 
     Attributes
     ----------
     x, y : str, optional
-        As `Axis.parse` reads them; the axes of Fig. 16 by default.
+        Text for `Axis.parse`; the axes of Fig. 16 by default.
     conditions : Conditions, optional
-        Those of Fig. 16 by default, on the first of its surfaces.
+        The first of Fig. 16 by default.
     measures : tuple of str
-        Of `force_limits.MEASURE_UNITS`.
+        Keys of `MEASURE_UNITS`.
     """
 
     x: str | None = None
@@ -151,12 +175,13 @@ class GripperSweep:
     measures: tuple[Measure, ...] = ("shear", "normal")
 
     def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
-        """Compute the map.
+        """Compute the map for a hand's table.
 
         Raises
         ------
         InvalidInputError
-            If there is no such measure, entry or surface, a range cannot be, or there is no grasp.
+            If a measure, entry or surface is unknown, a range is not possible, or there is no
+            grasp.
         """
         for measure in self.measures:
             if measure not in MEASURE_UNITS:
@@ -202,7 +227,13 @@ class GripperSweep:
         return StudyResult("sweep", f"{x.entry} and {y.entry}: what the gripper holds", data, ())
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
-        """Draw a map for each measure."""
+        """Draw a map of force limits for each measure, side by side.
+
+        Returns
+        -------
+        dict of str to Figure
+            One figure, ``sweep``.
+        """
         data = result.data
         measures: list[Measure] = list(data["limits"])
         figure, shown = panels(1, len(measures), (6.2 * len(measures), 5.6), grid="none")

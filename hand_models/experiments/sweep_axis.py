@@ -1,4 +1,4 @@
-"""Axes and fixed conditions of a sweep: entries of the gripper's table, and the rock."""
+"""Axes and fixed conditions of a sweep: entries of the gripper's table, rock and tension."""
 
 from __future__ import annotations
 
@@ -25,7 +25,17 @@ __all__ = ["Axis", "Conditions"]
 
 @dataclass(frozen=True)
 class Conditions:
-    """Rock and tension of a gripper: diameter [m], tension of both tendons [N], surface's name."""
+    """Rock and tension of a gripper in a sweep.
+
+    Attributes
+    ----------
+    diameter : float
+        Diameter of the round rock [m].
+    tension : float
+        Tension of both tendons [N].
+    surface : str
+        Name of the preset surface.
+    """
 
     diameter: float
     tension: float
@@ -33,7 +43,7 @@ class Conditions:
 
     @classmethod
     def of_figure(cls, figure: str) -> Conditions:
-        """Return those of a figure of the experiments on sandpaper, such as ``fig12``."""
+        """Return the conditions of a figure of the experiments on sandpaper, such as ``fig12``."""
         settings = experiment_table()
         return cls(
             settings.scalar(figure, "diameter"), settings.scalar(figure, "tension"), "sandpaper-36"
@@ -41,18 +51,26 @@ class Conditions:
 
     @classmethod
     def of_fig16(cls) -> tuple[Conditions, ...]:
-        """Return those of Fig. 16, surface A first."""
+        """Return the two conditions of Fig. 16: surface A, then surface B."""
         settings = experiment_table()
         tension = settings.scalar("fig16", "tension")
         return tuple(cls(d, tension) for d in settings.vector("parameter_studies", "diameters"))
 
     def gripper(self, table: ParameterTable, most_pressing: float = math.inf) -> Gripper:
-        """Return a gripper of these numbers, which presses no more than ``most_pressing`` [N].
+        """Return a gripper under these conditions.
+
+        Parameters
+        ----------
+        table : ParameterTable
+            Parameters of the gripper.
+        most_pressing : float, optional
+            Largest force with which the gripper presses on the rock [N].
 
         Raises
         ------
         InvalidInputError
-            If a number is out of range, there is no such surface, or the fingers do not lie on it.
+            If a number is out of range, there is no such surface, or the fingers do not lie on the
+            rock.
         """
         surface = None
         # what the paper's experiments publish of sandpaper replaces the preset's numbers
@@ -64,13 +82,13 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Axis:
-    """An entry of the gripper's table, and the values that it takes.
+    """An entry of the gripper's table, and the values that it takes in a sweep.
 
     Attributes
     ----------
     section, name : str
     index : int or None
-        Of a list's number.
+        Index of the number, for an entry that is a list.
     values : tuple of float
         Ascending, in SI units.
     unit : str
@@ -84,28 +102,28 @@ class Axis:
 
     @property
     def entry(self) -> str:
-        """Its name as a caller writes it."""
+        """Name of the axis's entry: ``section.name``, or ``section.name[i]`` in a list."""
         place = "" if self.index is None else f"[{self.index}]"
         return f"{self.section}.{self.name}{place}"
 
     @classmethod
     def parse(cls, text: str, table: ParameterTable, surface: str) -> Axis:
-        """Read ``SECTION.NAME=LOW:HIGH:N``, or ``SECTION.NAME[i]=LOW:HIGH:N`` of a list.
+        """Parse ``SECTION.NAME=LOW:HIGH:N``, or ``SECTION.NAME[i]=LOW:HIGH:N`` of a list.
 
         Parameters
         ----------
         text : str
-            LOW and HIGH in SI units.
+            LOW and HIGH in SI units, and N, the number of values from LOW to HIGH.
         table : ParameterTable
-            The gripper's.
+            Parameters of the gripper.
         surface : str
-            What it holds on to, on which it depends which numbers it reads.
+            Name of the surface, which decides which entries a gripper reads.
 
         Raises
         ------
         InvalidInputError
-            If it is not of this form, the gripper reads no such number, or the number cannot have
-            such values.
+            If the text is not of this form, the gripper reads no such entry, or the entry cannot
+            have such values.
         """
         entry, _, span = text.partition("=")
         try:
@@ -142,12 +160,12 @@ class Axis:
         return replace(axis, values=tuple(np.linspace(low, high, count).tolist()))
 
     def set(self, table: ParameterTable, value: float) -> ParameterTable:
-        """Return a table in which the entry has a value."""
+        """Return a copy of a table in which the axis's entry has the given value, in SI units."""
         quantity = table.quantity(self.section, self.name).changed(value, self.index)
         return table.replaced(ParameterTable({self.section: {self.name: quantity}}))
 
     def current(self, table: ParameterTable) -> float:
-        """Return the value in a table."""
+        """Return the value that the axis's entry has in a parameter table, in SI units."""
         value = table.quantity(self.section, self.name).value
         return float(value[self.index or 0] if isinstance(value, list) else value)
 

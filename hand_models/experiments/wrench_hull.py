@@ -1,12 +1,12 @@
 """Convex hulls of a planar gripper's wrenches: extents, cuts, sections, limits along directions.
 
-Wrenches are rows (F_x, F_z, M_y) in the paper's signs: its M_y is minus the contract's. A hull is
-given by any points whose convex hull it is; what comes back are vertices.
+Wrenches are rows (F_x, F_z, M_y) in the paper's signs: its M_y is minus that of other modules.
+A hull is given by any points whose convex hull it is; results are vertices.
 
 A cut through the origin leaves the origin on a face, where "inside" and "beyond" differ by rounding
-alone. So what is within the base tolerance of a plane, as a share of the hull's size, counts as
-lying on it, and what lies on a face counts as within: nothing jumps where a wrench crosses a face
-by less.
+alone. So points within the base tolerance of a plane, as a share of the hull's size, count as lying
+on the plane, and points on a face count as inside: no result jumps where a wrench crosses a face by
+less.
 """
 
 from __future__ import annotations
@@ -35,11 +35,21 @@ __all__ = [
 ]
 
 PLANAR_SCALE: Final = WRENCH_SCALE[list(PLANAR_COMPONENTS)]
-"""Per newton, newton and newton metre: what makes wrenches commensurate."""
+"""Factors for F_x, F_z and M_y that make wrenches commensurate: moments over 0.1 m [N]."""
 
 
 class Extents(NamedTuple):
-    """Extents of a set of wrenches: largest |F_x|, least F_z, largest |M_y| [N, N, N·m]."""
+    """Extents of a set of wrenches.
+
+    Attributes
+    ----------
+    force_x : float
+        Largest magnitude of F_x [N].
+    force_z : float
+        Least F_z [N].
+    moment : float
+        Largest magnitude of M_y [N·m].
+    """
 
     force_x: float
     force_z: float
@@ -47,34 +57,63 @@ class Extents(NamedTuple):
 
 
 def in_paper_signs(wrenches: Array) -> Array:
-    """Return (F_x, F_z, M_y) in the paper's signs of wrenches (n, 6) in the contract's."""
+    """Convert wrenches to the paper's planar components and signs: M_y changes its sign.
+
+    Parameters
+    ----------
+    wrenches : ndarray, shape (n, 6)
+        Forces and moments [N, N·m].
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        F_x, F_z, M_y [N, N, N·m].
+    """
     return wrenches[:, PLANAR_COMPONENTS] * (1.0, 1.0, -1.0)
 
 
 def extents(points: Array) -> Extents:
-    """Return how far some wrenches, shape (n, 3), go."""
+    """Return the extents of a set of wrenches.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        F_x, F_z, M_y [N, N, N·m].
+    """
     largest = np.abs(points).max(axis=0)
     return Extents(float(largest[0]), float(points[:, 1].min()), float(largest[2]))
 
 
 def with_mirrored(points: Array) -> Array:
-    """Return wrenches (n, 3) of a symmetric gripper, and their images (−F_x, F_z, −M_y)."""
+    """Return wrenches of a symmetric gripper together with their mirror images.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        F_x, F_z, M_y.
+
+    Returns
+    -------
+    ndarray, shape (2 n, 3)
+        The wrenches, then (−F_x, F_z, −M_y) of each.
+    """
     return np.vstack([points, points * (-1.0, 1.0, -1.0)])
 
 
 def edge(points: Array, at: Array) -> Array:
-    """Return the largest second coordinate of a plane hull at some first ones.
+    """Return the upper edge of a plane hull: the largest second coordinate at given first ones.
 
     Parameters
     ----------
     points : ndarray, shape (n, 2)
-        Whose hull it is.
+        Points whose hull it is.
     at : ndarray, shape (m,)
+        First coordinates.
 
     Returns
     -------
     ndarray, shape (m,)
-        Not a number beside the hull.
+        Second coordinates; NaN beside the hull.
     """
     size = np.abs(points).max(axis=0)
     normals, offsets = hull_facets(points / size)
@@ -85,7 +124,7 @@ def edge(points: Array, at: Array) -> Array:
 
 
 def vertices(points: Array) -> Array:
-    """Return the vertices of a hull, shape (k, 3).
+    """Return the vertices of the convex hull of wrenches (n, 3), shape (k, 3).
 
     Raises
     ------
@@ -96,14 +135,28 @@ def vertices(points: Array) -> Array:
 
 
 def volume(points: Array) -> float:
-    """Return the volume of a hull over F_x, F_z and M_y [N³·m]."""
+    """Return the volume of the convex hull of wrenches, over F_x, F_z and M_y [N³·m].
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        F_x, F_z, M_y [N, N, N·m].
+    """
     return float(hull(points * PLANAR_SCALE).volume / np.prod(PLANAR_SCALE))
 
 
 def clipped_vertices(points: Array) -> Array:
-    """Return the vertices of the part of a hull with F_z ≤ 0, which the paper shows, shape (k, 3).
+    """Return the vertices of the part of a convex hull with F_z ≤ 0, which the paper shows.
 
-    None, shape (0, 3), if no vertex of the hull is below.
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Wrenches F_x, F_z, M_y whose hull it is [N, N, N·m].
+
+    Returns
+    -------
+    ndarray, shape (k, 3)
+        Empty, (0, 3), if no vertex of the hull has F_z < 0.
     """
     height, slack = points[:, 1], _slack(points)
     if not (height < -slack).any():
@@ -116,16 +169,19 @@ def clipped_vertices(points: Array) -> Array:
 
 
 def section(points: Array, normal: ArrayLike) -> Array:
-    """Return the polygon in which the plane normal · w = 0 meets a hull, in order, shape (k, 3).
-
-    A face, an edge's two ends or one vertex where the plane only touches the hull; no corners,
-    shape (0, 3), if it misses it.
+    """Return the polygon in which the plane normal · w = 0 cuts a hull of wrenches w, in order.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
         Wrenches [N, N, N·m].
     normal : array_like, shape (3,)
+
+    Returns
+    -------
+    ndarray, shape (k, 3)
+        Corners; a face, an edge's two ends or one vertex where the plane only touches the hull;
+        empty, (0, 3), if the plane misses the hull.
     """
     way = np.asarray(normal, dtype=float) / PLANAR_SCALE
     slack = _slack(points)
@@ -138,11 +194,10 @@ def section(points: Array, normal: ArrayLike) -> Array:
 
 
 def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> Array:
-    """Return the largest s ≥ 0 with start + s · direction in a hull, shape (m,).
+    """Return the largest s ≥ 0 with start + s · direction in a hull, for each direction.
 
-    Not a number where the line misses the hull, or meets it only behind. A start on a face counts
-    as within it: along the face, rounding decides neither whether the line is in the hull nor where
-    it ends.
+    A start on a face counts as inside: along the face, rounding decides neither whether the line is
+    in the hull nor where the line ends.
 
     Parameters
     ----------
@@ -151,7 +206,12 @@ def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> 
     directions : ndarray, shape (m, 3)
         In the wrenches' units, of any length.
     start : array_like, shape (3,) or (m, 3), optional
-        The origin by default [N, N, N·m].
+        Wrench at which the line starts; zero by default [N, N, N·m].
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        NaN where the line misses the hull, or meets it only for s < 0.
     """
     normals, offsets = hull_facets(points * PLANAR_SCALE)
     slack = _slack(points)

@@ -1,4 +1,4 @@
-"""Find where on a scan a hand can hold, and how much: a hand is closed at each of many places."""
+"""Try holds on a scan: close a hand at each of many places, and compute the forces it can hold."""
 
 from __future__ import annotations
 
@@ -29,21 +29,25 @@ from hand_models.tile import Surface
 __all__ = ["AT_BORDER", "TRIAL_WAYS", "FoundHold", "HoldTrial", "grid_of_trials", "try_holds"]
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
-"""Why a hand is not asked for there."""
+"""Message for a place where a finger may reach the scan's border, so that no hand is tried."""
 
 TRIAL_WAYS: Final = {"-fz": 2, "-fx": 0, "+fx": 0, "-fy": 1, "+fy": 1}
-"""Wrenches on the rock, in H: the pull-off, and shear to all sides; and their axes."""
+"""Forces on the rock, in H, with their axes: the pull-off, and shear to all sides."""
 
 
 class HoldTrial(NamedTuple):
-    """A hand that may be at a point of a rock; all in the rock's frame.
+    """A place at which a hand is to be tried, in the rock's frame.
 
     Attributes
     ----------
-    point, approach : tuple of float
-        On the rock [m], and into it.
-    wrist_angle, outer_rotation : float
-        As of `approach_frame` and `Grasp` [rad].
+    point : tuple of float
+        Point on the rock [m].
+    approach : tuple of float
+        Direction of approach, into the rock.
+    wrist_angle : float
+        Turn of the hand about the approach (`approach_frame`) [rad].
+    outer_rotation : float
+        Rotation of the outer fingers (`Grasp`) [rad].
     """
 
     point: tuple[float, float, float]
@@ -53,21 +57,23 @@ class HoldTrial(NamedTuple):
 
 
 class FoundHold(NamedTuple):
-    """Seat of a hand at a place, and what it can hold there.
+    """Seat of a hand at a place, and the forces that it can hold there.
 
     Attributes
     ----------
     pose : Pose
-        H in the rock's frame.
+        The hand's frame H in the rock's frame.
     rule : str
+        Name of the rule by which the hand was seated.
     backed_off : float
-        Distance that its seating backed off [m].
+        Distance that the hand was moved back along −z of H by its seating [m].
     support : ndarray, shape (5,)
-        Reach in each of `TRIAL_WAYS`, with whatever else [N]; NaN if it holds nothing.
+        Largest force in each of `TRIAL_WAYS`, whatever the other components [N]; NaN if the wrench
+        space is empty.
     pure : float
-        Reach in pull-off with every other component zero [N]; NaN if nowhere.
+        Largest pull-off with every other component zero [N]; NaN if there is none.
     worst, tenth, hundredth : ndarray, shape (5,), or None
-        As of `Robustness`.
+        The same forces over a scatter of the place (`Robustness`) [N]; None if not asked for.
     """
 
     pose: Pose
@@ -91,30 +97,38 @@ def grid_of_trials(
     most: int | None = None,
     report: Progress | None = None,
 ) -> list[HoldTrial]:
-    """Return places on a grid across z of a rock's frame.
+    """Return places at which to try a hand, on a square grid across z of a rock's frame.
 
     Parameters
     ----------
     rock : Mesh
     spacing : float
-        Of the grid [m].
+        Distance of the grid's points, at least 0.001 [m].
     angles : int
-        Of the wrist, evenly over a whole turn.
+        Number of wrist angles at each point, evenly over a whole turn.
     rotations : sequence of float, optional
-        Of the outer fingers [rad].
+        Rotations of the outer fingers to try [rad].
     approach : tuple of float, optional
-        Of all hands; by default across the mean plane of the rock about the point.
+        Direction of approach of all hands; by default normal to the mean plane of the rock about
+        each point.
     radius : float
-        Half the side of the square about a point in which that is found [m].
+        Half the side of the square about a point in which that plane is fitted [m].
     most : int, optional
-        Places that there may be, before it is known which of them are on rock.
+        Largest number of places on the whole grid, on rock or not.
     report : callable, optional
         Called with (points done, points in all).
+
+    Returns
+    -------
+    list of HoldTrial
+        For each point on rock, every angle with every rotation.
 
     Raises
     ------
     InvalidInputError
-        If a number is impossible; a `LimitError` if there would be more than ``most``.
+        If a number is not possible.
+    LimitError
+        If the grid has more than ``most`` places; the field is ``spacing``.
     """
     if not 1e-3 <= spacing < math.inf:
         raise InvalidInputError(f"must be at least 0.001 m, got {spacing:g}", field="spacing")
@@ -186,7 +200,7 @@ def try_holds(
     *,
     robust: bool = False,
 ) -> list[FoundHold | InvalidInputError]:
-    """Close hands at places, all at once, and return what they hold.
+    """Close hands at places, all together, and return the forces that they can hold.
 
     Parameters
     ----------
@@ -195,14 +209,16 @@ def try_holds(
     surface : Surface
     trials : sequence of HoldTrial
     seat : {'rest', 'best'}, optional
+        Rule for the seat: 'rest' as the grasp seats the hand, 'best' by `best_seats`.
     robust : bool, optional
-        Whether also what is left of it over a scatter of each place.
+        True to compute the forces over a scatter of each place, too.
 
     Returns
     -------
     list of FoundHold or InvalidInputError
-        In order; why a hand cannot be there in place of one that cannot. Where the scan ends within
-        a finger's reach that is one, too: the finger would take the scan's border for an edge.
+        In the order of the trials; an error where a hand cannot be, with the reason. A place where
+        the scan ends within a finger's reach is an error, too: the finger would take the scan's
+        border for an edge.
     """
     placements = [
         Placement(

@@ -1,4 +1,4 @@
-"""Hands at points of a rock that stands still."""
+"""Place hands at points of a rock that does not move."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ ALONG_FINGERS: Final = (1.0, 0.0, 0.0)
 SeatRule = Literal["rest", "best"]
 
 SEAT_RULES: Final = get_args(SeatRule)
-"""How a hand is seated: as its grasp would have it, or near there where it holds most."""
+"""Rules for a hand's seat: 'rest' as its grasp seats it, 'best' near there where it holds most."""
 
 
 def approach_frame(
     point: ArrayLike, approach: ArrayLike, wrist_angle: float = 0.0, up: ArrayLike = ALONG_FINGERS
 ) -> Pose:
-    """Return the frame of a point that a hand approaches.
+    """Return the frame of a hand's approach to a point: z into the rock, x toward ``up``.
 
     Parameters
     ----------
     point : array_like, shape (3,)
-        On the rock [m].
+        Origin of the frame, on the rock [m].
     approach : array_like, shape (3,)
-        z of the frame, into the rock, of any length.
+        Direction of z, into the rock, of any length.
     wrist_angle : float, optional
-        By which the frame is turned about z from where its x is nearest to ``up`` [rad].
+        Turn of the frame about z; at 0, x is as near to ``up`` as can be [rad].
     up : array_like, shape (3,), optional
-        Of any length; all in one frame.
+        Direction of any length, in the same frame as point and approach.
 
     Raises
     ------
@@ -82,24 +82,30 @@ def place(
     direction: ArrayLike = PULL_OFF,
     hand: SpinyHand | None = None,
 ) -> SettledHand:
-    """Seat a hand at a point of a rock, and close it.
+    """Seat a hand at a point of a rock, and close its fingers.
 
-    The hand is seated as on a hold whose frame is that of `approach_frame`: the crest of a pinch,
-    and where the palm is looked for a place, are at the point; along the approach the palm rests
-    where the rock is.
+    The hand is seated as on a hold whose frame is `approach_frame` of the point: the crest of a
+    pinch is at the point, the search for a palm's place begins there, and along the approach the
+    palm rests on the rock.
 
     Parameters
     ----------
     rock : Hold
-    point, approach, wrist_angle, up
-        As of `approach_frame`, in the rock's frame.
+    point : array_like, shape (3,)
+        On the rock, in its frame [m].
+    approach : array_like, shape (3,)
+        Direction into the rock, of any length, in the rock's frame.
+    wrist_angle : float, optional
+        Turn of the hand about the approach; at 0, x is as near to ``up`` as can be [rad].
     grasp : Grasp, optional
     surface : Surface, optional
         The preset ``rock`` by default.
+    up : array_like, shape (3,), optional
+        Direction of any length, in the rock's frame.
     seat : {'rest', 'best'}, optional
-        As its grasp would have it, or near there where it holds most in a direction.
+        'rest' as the grasp seats the hand; 'best' near there where it holds most in a direction.
     direction : array_like, shape (6,), optional
-        As of `best_seats`.
+        Direction of the wrench on the rock, in H, for 'best'; the pull-off by default.
     hand : SpinyHand, optional
         The bundled one by default.
 
@@ -111,7 +117,7 @@ def place(
     Raises
     ------
     InvalidInputError
-        If a number is impossible, or the hand cannot be there.
+        If a number is not possible, or the hand cannot be there.
     """
     if seat not in SEAT_RULES:
         raise InvalidInputError(

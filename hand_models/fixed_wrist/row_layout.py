@@ -1,7 +1,8 @@
-"""Names of a hand's rows and columns, and whose they are: what its limits are, whatever loads it.
+"""Names of a hand's columns and rows (its loads and its limits), and the tile or finger of each.
 
-They only depend on which tiles touch, on how many half-planes limit a tile and on the joints'
-stops, so that hands share layouts; wrench spaces of fixed and of floating wrists have the same.
+A layout depends only on which tiles touch, on the names of the half-planes that limit a tile, on
+the joints' stops and on the palm, so that hands share layouts; wrench spaces of fixed and of
+floating wrists have the same rows.
 """
 
 from __future__ import annotations
@@ -48,33 +49,35 @@ _Name = tuple[str | None, str | None, str, str]
 
 @dataclass(frozen=True, eq=False)
 class RowLayout:
-    """Names, and which tile and column each row is about. Arrays are read-only.
+    """Names of columns and rows, and the tile and column that each row concerns.
+
+    Fingers are indices into `FINGERS`, tiles indices into the hand's tiles. Arrays are read-only.
 
     Attributes
     ----------
-    columns : tuple of str
-    limits, hard : tuple of Row
-    rows : tuple of Row
-        Both.
+    columns : tuple of str, length m
+        Names of the loads.
+    limits, hard, rows : tuple of Row
+        Limit rows, hard rows, and both one after the other.
     finger_of : ndarray of int, shape (n,)
-        Index of each tile's finger.
+        Finger of each of the n tiles.
     touching, bases, frames, tips, nails : ndarray of int
-        Tiles on rock; those of them on rotating bases; tiles whose phalanx rests beside them;
-        distal tiles whose phalanx presses on rock; nails that hook.
-    plane_tiles, plane_pieces, plane_signs : ndarray of int
-        Tile, half-plane, and sign of the lateral load (0 where there is none), of each limit row of
-        a tile.
+        Tiles on rock; those of them on rotating bases; tiles beside which the phalanx's frame rests
+        on rock; distal tiles whose phalanx presses on rock; nails that hook.
+    plane_tiles, plane_pieces, plane_signs : ndarray of int, shape (k,)
+        Tile, half-plane, and sign of the lateral load (0 where there is none), of each of the k
+        limit rows of tiles.
     engaged, reacting, drawing : tuple of int
-        Fingers with a tile on rock; those of them that resist sideways; the engaged ones and those
-        whose nail hooks.
+        Fingers with a tile on rock; those of them with a lateral reaction; the engaged ones and
+        those whose nail hooks.
     lateral_columns, nail_columns : tuple of int
-        Of the reactions of fingers that resist, of the loads along nails that hook.
+        Columns of the lateral reactions, and of the loads along nails that hook.
     stops : tuple of (int, int)
-        Finger and joint of those at a limit.
+        Finger and joint of each joint that is at its stop.
     palm : bool
-        Whether it is on rock: then its columns are the last two.
+        True if the palm is on rock: the last two columns are then its shear and its pressing.
     sticking : bool
-        Whether the tendons have friction, so that they must not be slackened.
+        True if the tendons have friction, so that they must not be slackened.
     """
 
     columns: tuple[str, ...]
@@ -100,10 +103,13 @@ class RowLayout:
     sticking: bool
 
     def planes(self, surfaces: Sequence[Surface]) -> Array:
-        """Return what each of the k limit rows of tiles says on some surfaces, shape (n, k, 4).
+        """Return the half-plane of each of the k limit rows of tiles, on each of n surfaces.
 
-        Its coefficients of shear, normal and lateral load, the last with its sign, and the capacity
-        of a whole tile [N].
+        Returns
+        -------
+        ndarray, shape (n, k, 4)
+            Coefficients of a tile's shear, normal and lateral load, the last with the row's sign,
+            and the capacity of a whole tile [N].
         """
         signs = np.ones((len(self.plane_signs), 4))
         signs[:, 2] = self.plane_signs
@@ -114,7 +120,14 @@ class RowLayout:
 
 
 def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
-    """Return the rows of a settled hand; ``sticking`` as of `RowLayout`."""
+    """Return the row layout of a settled hand.
+
+    Parameters
+    ----------
+    settled : SettledHand
+    sticking : bool
+        True if the tendons have friction, so that they must not be slackened.
+    """
     # nothing depends on what of a tile touches, and of a surface only the names
     alike = [
         tile if tile.contact != "edge" else tile._replace(contact="face") for tile in settled.tiles
@@ -138,21 +151,21 @@ def row_layout(
     palm: bool,
     sticking: bool,
 ) -> RowLayout:
-    """Return the rows of hands that touch alike.
+    """Return the row layout that hands of the same contacts share; an LRU cache keeps 512 of them.
 
     Parameters
     ----------
     tiles : tuple of SettledTile
     lateral : bool
-        Whether fingers with a tile on rock resist sideways.
+        True if fingers with a tile on rock have a lateral reaction.
     pieces : tuple of str
         Names of the half-planes that limit each tile.
     stops : tuple of (int, int)
-        Finger and joint of those at a limit.
+        Finger and joint of each joint that is at its stop.
     palm : bool
-        Whether it is on rock.
+        True if the palm is on rock.
     sticking : bool
-        Whether tendons must not be slackened.
+        True if the tendons have friction, so that they must not be slackened.
     """
     finger_of = [FINGERS.index(tile.finger) for tile in tiles]
     touching = [i for i, tile in enumerate(tiles) if tile.contact in ("face", "edge")]
@@ -244,6 +257,17 @@ def named_row(
     kind: Literal["limit", "hard"],
     more: str = "",
 ) -> Row:
-    """Return a row, labelled by its names and what distinguishes it from others of these."""
+    """Return a row whose label is its names joined by ``/``, then ``more``.
+
+    Parameters
+    ----------
+    finger, phalanx : str or None
+        Names of the finger and the phalanx that the row concerns; None is left out of the label.
+    limit : str
+        Name of the limit.
+    kind : {'limit', 'hard'}
+    more : str, optional
+        Suffix that distinguishes rows of the same names, such as ``+``, ``-`` or ``/3``.
+    """
     label = "/".join(part for part in (finger, phalanx, limit) if part is not None)
     return Row(finger, phalanx, limit, kind, label + more)

@@ -1,8 +1,8 @@
-"""Hands that are not quite where they were put, and what one can carry there.
+"""Monte Carlo samples of a hand's place: forces that a hand can hold if not exactly placed.
 
 Places are a scrambled Sobol sequence, which covers the six dimensions of a place more evenly than
-random numbers. What scrambles it is the hand's name and a seed: a hand's places do not hang on what
-other hands there are, nor on their order, nor on the machine.
+random numbers. The hand's name and a seed scramble it: a hand's places depend neither on other
+hands, nor on their order, nor on the machine.
 """
 
 from __future__ import annotations
@@ -31,38 +31,38 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class ScatterSettings:
-    """Numbers of a scatter of places."""
+    """Settings of the scatter of a hand's place: number of places, percentiles of results."""
 
     places: int = 128
-    """Of a hand, unless another number is asked for: a power of two, as Sobol sequences want it.
-    With 64 the tenth of a slab's load factors changes by 7 % (rms) with the seed, with 128 by
-    2 %."""
+    """Number of places of a hand by default: a power of two, as Sobol sequences need. With 64 the
+    tenth of a slab's load factors changes by 7 % (rms) with the seed, with 128 by 2 %.
+    """
     tenth: float = 10.0
     """Percentile that is exceeded at nine in ten places."""
     hundredth: float = 1.0
-    """Percentile that stands for the worst, which itself would hang on the number of places."""
+    """Percentile that stands for the worst place, which would depend on the number of places."""
 
 
 SCATTER_SETTINGS = ScatterSettings()
 
 
 class Robustness(NamedTuple):
-    """Reach of a hand in some directions over a scatter of its place.
+    """Largest force or moment of a hand in k directions over a scatter of its place.
 
-    A place where the hand cannot be, or holds nothing, counts as a reach of zero.
+    A place where the hand cannot be, or where its wrench space is empty, counts as zero.
 
     Attributes
     ----------
     draws, without : int
-        Places, and those of them where the hand cannot be or holds nothing.
+        Number of places, and of those where the hand cannot be or its wrench space is empty.
     position, angle : float
-        The scatter: to either side along each axis of H [m], and about each [rad].
+        Half width of the scatter along each axis of H [m], and about each axis [rad].
     seed : int
         Seed of the places.
     worst : ndarray, shape (k,)
         Deprecated: the same as ``hundredth``. It was the least of the places.
     tenth, hundredth : ndarray, shape (k,)
-        Reach that it exceeds at nine in ten places, and at 99 in a hundred.
+        Value that is exceeded at nine in ten places, and at 99 in a hundred.
     """
 
     draws: int
@@ -83,19 +83,21 @@ def robustness(
     seed: int = 0,
     scatter: tuple[float, float] | None = None,
 ) -> Robustness:
-    """Close a hand anew at places about its own, and return how far it still reaches.
+    """Close a hand again at places near its place, and return quantiles of its support function.
 
     Parameters
     ----------
     hand : SpinyHand
-        Which it is.
+        Model of the settled hand.
     settled : SettledHand
     directions : array_like, shape (k, 6)
-        Of wrenches on the rock, in H.
-    draws, seed : int, optional
+        Directions of wrenches on the rock, in H.
+    draws : int, optional
+        Number of places.
+    seed : int, optional
     scatter : tuple of float, optional
-        To either side along each axis of H [m], and about each [rad], about the middle of the palm;
-        evenly distributed. As in the hand's parameters by default.
+        Half width of a uniform scatter along each axis of H [m], and about each axis through the
+        middle of the palm [rad]. As in the hand's parameters by default.
 
     Raises
     ------
@@ -130,13 +132,19 @@ def robustness(
 
 
 def scattered_places(name: str, count: int, seed: int) -> Array:
-    """Return the places of a hand, shape (count, 6), from -1 to 1 along and about each axis of H.
+    """Return a hand's places, from −1 to 1 along and about each axis of H (scrambled Sobol).
 
     Parameters
     ----------
     name : str
-        The hand's.
-    count, seed : int
+        Name of the hand.
+    count : int
+        Number of places.
+    seed : int
+
+    Returns
+    -------
+    ndarray, shape (count, 6)
     """
     from scipy.stats import qmc
 
@@ -148,21 +156,22 @@ def scattered_places(name: str, count: int, seed: int) -> Array:
 def closed_about(
     hand: SpinyHand, settled: SettledHand, places: Array, scatter: tuple[float, float]
 ) -> Iterator[Sequence[SettledHand | InvalidInputError]]:
-    """Close a hand anew at places about its own.
+    """Close a hand again at places near its place, 64 at a time.
 
     Parameters
     ----------
     hand : SpinyHand
-        Which it is.
+        Model of the settled hand.
     settled : SettledHand
     places : ndarray, shape (n, 6)
+        Along and about each axis of H, in units of ``scatter``.
     scatter : tuple of float
-        How much one is, along an axis [m] and about it [rad].
+        Unit along an axis [m], and about an axis [rad].
 
     Yields
     ------
     sequence of SettledHand or InvalidInputError
-        Of some places after the other; an error in place of a hand that cannot be there.
+        The next 64 places, in order; an error in place of a hand that cannot be there.
     """
     position, angle = scatter
     at_once = 64  # hands that are closed together

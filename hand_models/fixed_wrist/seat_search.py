@@ -1,12 +1,12 @@
-"""Seats that hold: of many places near the seat that a hand would take, the one that holds most.
+"""Search for the best seat: of many places near the seat of a hand, the one where it holds most.
 
-A hand that is seated (`hand_models.hand.seating`) backs off along −z of its frame H there, turns
-about that axis and tilts about x and y, all about the middle of its palm, within the bounds of the
-hand's parameters. Its best seat is where it can carry most of a wrench with every other component
-zero; where it can nowhere do that, where it carries most of it with whatever else.
+From the seat (`hand_models.hand.seating`) the hand is backed off along −z of its frame H, turned
+about that axis and tilted about x and y, all about the middle of its palm, within the bounds of the
+hand's parameters. Its best seat is where the largest wrench in a given direction, with every other
+component zero, is greatest; where no place allows that, the largest support function decides.
 
 The search has two stages, each of them one batch: stand-offs and turns on a grid, then tilts and
-smaller steps about the best of these. So it is deterministic, and what it finds holds no less than
+smaller steps about the best of these. So it is deterministic, and the best seat holds no less than
 the seat that it began with.
 """
 
@@ -37,7 +37,7 @@ from hand_models.wrench_spaces import WrenchSpace
 __all__ = ["PULL_OFF", "best_seats"]
 
 PULL_OFF: Final = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
-"""The wrench on the rock of a hand that is pulled off it, in H."""
+"""Direction of the wrench on the rock, in H, of a hand that is pulled off the rock."""
 
 
 class _Move(NamedTuple):
@@ -66,27 +66,29 @@ def _about(move: _Move) -> list[_Move]:
 def best_seats(
     hand: SpinyHand, placements: Sequence[Placement], direction: ArrayLike = PULL_OFF
 ) -> list[SettledHand | InvalidInputError]:
-    """Seat hands where they hold most.
+    """Seat hands near their places where they can hold the largest wrench in a direction.
+
+    A cache of the hand's model keeps seats that were found before.
 
     Parameters
     ----------
     hand : SpinyHand
-        Which all of them are.
+        Model of all hands.
     placements : sequence of Placement
-        None of them with a pose.
+        Without poses.
     direction : array_like, shape (6,), optional
-        In which the hands are to reach far: of a wrench on the rock, in H; the pull-off by default.
+        Direction of the wrench on the rock, in H; the pull-off by default.
 
     Returns
     -------
     list of SettledHand or InvalidInputError
-        In order, their seatings with the rule ``best``; an error in place of a hand that can be at
-        none of the places, why it cannot be where it was seated.
+        In order, with the seating rule ``best``; where a hand can be at none of the places, the
+        error of the first.
 
     Raises
     ------
     InvalidInputError
-        If the direction is not six finite numbers, or a placement has a pose.
+        If the direction is not six finite numbers or is zero, or a placement has a pose.
     """
     d = finite_vector(direction, 6, "direction")
     if not d.any():

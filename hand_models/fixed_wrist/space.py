@@ -1,18 +1,17 @@
-"""A hand whose wrist stays where it is: from settled fingers to a WrenchSpace (Eqs. 9, 14–16).
+"""Wrench spaces of hands with a fixed wrist: from settled fingers to `WrenchSpace` (Eqs. 9, 14–16).
 
 The loads y are the tendon tensions, a passive lateral reaction for each finger that touches rock,
-and the palm's shear and pressing. Everything is affine in them:
+the load along each nail that hooks, and the palm's shear and pressing. All quantities are affine in
+the loads:
 
     w = Σ_tiles W_t (c_sys + f c_act) + lateral and palm loads = o + V y,
 
-and so are the loads of the motors and of the structure. All hands of a stance are worked out
-together, those with the same rows and columns in arrays of all of them: sums over the tiles of each
-finger, of their places p and forces F,
+and so are the loads of the motors and of the structure. Hands of equal `RowLayout` are computed
+together in arrays. Sums over the tiles of each finger, of their places p and forces F,
 
     Σ (1, p) ⊗ F,    F at zero tension, per newton of tension and per newton of lateral reaction,
 
-hold the wrenches of all columns, which are, one after another, tensions, lateral reactions, nails
-that hook, the palm.
+give the wrenches of all columns.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ TENDON_COUNT: Final = len(FINGERS)
 EACH_TENDON: Final = np.eye(TENDON_COUNT)
 
 HELD_ROWS: Final = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
-"""D of every hand: the rows of `HELD_DIRECTIONS` of a wrench."""
+"""D of every hand, shape (17, 6): takes a wrench to its force along the `HELD_DIRECTIONS`."""
 
 HELD_ROWS.setflags(write=False)
 
@@ -59,14 +58,24 @@ def _moments() -> Array:
 
 
 MOMENT_MAP: Final = _moments()
-"""Map from (1, p) ⊗ F to a wrench and what of it is held along `HELD_DIRECTIONS`."""
+"""Map (23, 12) from (1, p) ⊗ F to a wrench and its force along the `HELD_DIRECTIONS`."""
 
 
 def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:
-    """Return wrenches at zero tension (h, p), and those of the m columns (h, p, m), of h hands.
+    """Return the wrench of each hand at zero load, and the wrench per unit of each load.
 
-    Below the six parts of each what of its force is held, along `HELD_DIRECTIONS`: the last limit
-    rows.
+    Parameters
+    ----------
+    layout : RowLayout
+        Layout that all hands have, with m columns.
+    hands : sequence of SettledHand, length h
+
+    Returns
+    -------
+    at_zero : ndarray, shape (h, 23)
+        Force and moment in H [N, N·m], then the force along the 17 `HELD_DIRECTIONS` [N].
+    per_load : ndarray, shape (h, 23, m)
+        The same per newton of each column's load.
     """
     axes, places, shares = (_of_tiles(hands, n) for n in ("axes", "positions", "lateral_shares"))
     # F three times, first in the tile's axes, then in H
@@ -105,9 +114,23 @@ def limit_rows(
     most: Array,
     wrenches: tuple[Array, Array],
 ) -> tuple[Array, Array, Array]:
-    """Return L (h, nl, m), l0 and s (h, nl): tiles, tendons, fingers, nails, palm, the hand.
+    """Return the limits of hands: loads L y + l0 against capacities s.
 
-    ``most``: the largest tension of each hand (h,) [N]; ``wrenches``: their `wrench_columns`.
+    Parameters
+    ----------
+    layout : RowLayout
+        Layout that all hands have, with m columns and nl limits.
+    model : HandModel
+    hands : sequence of SettledHand, length h
+    most : ndarray, shape (h,)
+        Largest tendon tension of each hand [N].
+    wrenches : tuple of ndarray
+        Result of `wrench_columns` for these hands.
+
+    Returns
+    -------
+    L, l0, s : ndarray, shapes (h, nl, m), (h, nl), (h, nl)
+        In the order of ``layout.limits``: tiles, tendons and motors, fingers, nails, palm, hand.
     """
     (at_zero, V), finger_of = wrenches, layout.finger_of
     loads, structure = _of_tiles(hands, "loads"), model.structure
@@ -163,7 +186,19 @@ def limit_rows(
 
 
 def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:
-    """Return H (h, nh, m) and h (h, nh): tensions, tiles, stops, nails, friction, the palm."""
+    """Return the conditions H y ≤ h of hands that no strength can change.
+
+    Parameters
+    ----------
+    layout : RowLayout
+        Layout that all hands have, with m columns and nh hard rows.
+    hands : sequence of SettledHand, length n
+
+    Returns
+    -------
+    H, h : ndarray, shapes (n, nh, m), (n, nh)
+        In the order of ``layout.hard``: tensions, tiles, joint stops, nails, tendon friction, palm.
+    """
     loads, shape = _of_tiles(hands, "loads"), (len(hands), len(layout.hard))
     friction = np.array([hand.surface.friction for hand in hands])[:, None, None]
     pressed, base = loads[:, :, 1].copy(), layout.bases
@@ -218,30 +253,31 @@ def _of_fingers(layout: RowLayout, tiles: Array) -> Array:
 
 
 def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> WrenchSpace:
-    """Return the wrenches on the rock, in H, that a settled hand carries with its wrist fixed.
+    """Return all wrenches on the rock, in H, that a settled hand can exert with its wrist fixed.
 
     Parameters
     ----------
     settled : SettledHand
     tension_limit : float, optional
-        A caller's cap on every tendon [N]; the hand's own maximum if that is less.
+        Cap on every tendon's tension; the hand's maximum applies where that is less [N].
 
     Returns
     -------
     WrenchSpace
-        Columns: four tensions, the lateral reactions, palm shear and palm pressing [N]. Limit rows:
-        each tile's half-planes (with both signs of its lateral load); each tendon's tension, motor
-        torque [N·m] and motor current [A]; the shear of a finger's tiles together, the pressing of
-        its tip; the palm; and, as wrench rows, what the hand holds in the `HELD_DIRECTIONS`. Hard
-        rows: tension, palm loads not negative; no tile dragged backwards; a joint's stop and a
-        frame beside its tile only push; a nail that clings neither lifts nor slips nor closes its
-        finger; with friction in the tendons, no tension below closing, where they would stick. A
-        nail has a column for the load along it, and two limit rows. Arrays are read-only.
+        Columns: four tensions, the lateral reactions, the load along each nail that hooks, palm
+        shear and palm pressing [N]. Limit rows: each tile's half-planes (with both signs of its
+        lateral load); each tendon's tension, motor torque [N·m] and motor current [A]; the shear of
+        a finger's tiles together, a finger's lateral load, the pressing of its tip; two for each
+        nail; the palm; and, as wrench rows, the hand's force along the `HELD_DIRECTIONS`. Hard
+        rows: no negative tension or palm load; no tile dragged backwards; a joint's stop and a
+        frame beside its tile only push; a nail that hooks neither lifts nor slips nor closes its
+        finger; with friction in the tendons, no tension below closing, where they would stick.
+        Arrays are read-only.
 
     Raises
     ------
     InvalidInputError
-        If the cap is not above zero.
+        If ``tension_limit`` is not above zero.
     """
     # a set of its own: the vertices and half-spaces that it keeps go when the caller is done
     return replace(wrench_spaces([settled], tension_limit)[0])
@@ -250,9 +286,25 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
 def wrench_spaces(
     settled: Sequence[SettledHand], tension_limit: float | None = None
 ) -> list[WrenchSpace]:
-    """Return the set of each hand, as `wrench_space` does, all worked out together.
+    """Return the wrench space of each of several hands, as `wrench_space` does, computed together.
 
-    A hand's last sets are kept as long as the hand is: asked again, the answer is the same set.
+    Each hand has a cache of its last wrench spaces: a second call returns the same objects.
+
+    Parameters
+    ----------
+    settled : sequence of SettledHand
+    tension_limit : float, optional
+        Cap on every tendon's tension; each hand's maximum applies where that is less [N].
+
+    Returns
+    -------
+    list of WrenchSpace
+        In the order of the hands.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``tension_limit`` is not above zero.
     """
     if tension_limit is not None:
         check_positive(tension_limit, "N", "tension_limit", most=math.inf)

@@ -1,6 +1,7 @@
-"""The paper's own wrench space of a fixed wrist: tensions alone, each up to f_t(max) (Eqs. 14–16).
+"""The paper's wrench space of a fixed wrist: tensions alone, each up to f_t(max) (Eqs. 14–16).
 
-With the curve of Eq. 21 itself in place of half-planes, and neither palm nor lateral reactions.
+Tiles are limited by the curve of Eq. 21 itself, not by half-planes; the wrench space has neither
+palm nor lateral reactions.
 """
 
 from __future__ import annotations
@@ -20,15 +21,15 @@ __all__ = ["TensionLimit", "parallelepiped", "tension_limits"]
 
 
 class TensionLimit(NamedTuple):
-    """Tension of a tendon at which a tile of its finger first lets go.
+    """Tension of a finger's tendon at which the first of its tiles exceeds its limit.
 
     Attributes
     ----------
     finger : str
     tension : float
-        f_t(max) of Eq. 15 [N]; infinite where no tile ever lets go.
+        f_t(max) of Eq. 15 [N]; infinite where no tile exceeds its limit at any tension.
     phalanx : str or None
-        The one that lets go first.
+        Phalanx of the tile that first exceeds its limit.
     """
 
     finger: str
@@ -37,13 +38,21 @@ class TensionLimit(NamedTuple):
 
 
 def tension_limits(settled: SettledHand) -> tuple[TensionLimit, ...]:
-    """Return f_t(max) of each finger and the phalanx that lets go first (Eqs. 14–15).
+    """Return the tension f_t(max) of each finger at which its first tile fails (Eqs. 14–15).
 
-    With the linear law itself, not its half-planes, and no lateral load. Eq. 15 is a fixed point
-    ``f ← f · f_s(φ(f)) / |f_c(f)|``; here it is found by bracketing upward from the closing
-    tension, which does not depend on the loading angle staying nearly constant. A tile that is
-    beyond its limit by closing alone gives the largest tension below that is safe, zero if there is
-    none.
+    Tiles have the linear law itself, not its half-planes, and no lateral load. Eq. 15 is a fixed
+    point ``f ← f · f_s(φ(f)) / |f_c(f)|``; here it is found by bracketing upward from the closing
+    tension, which does not depend on the loading angle staying nearly constant.
+
+    Parameters
+    ----------
+    settled : SettledHand
+
+    Returns
+    -------
+    tuple of TensionLimit
+        One for each finger, in the order of `FINGERS`. A tile that exceeds its limit by closing
+        alone gives the largest safe tension below that, zero if there is none.
     """
     limits = []
     for i, finger in enumerate(FINGERS):
@@ -57,11 +66,11 @@ def tension_limits(settled: SettledHand) -> tuple[TensionLimit, ...]:
 
 
 def parallelepiped(settled: SettledHand) -> WrenchSpace:
-    """Return the paper's own fixed-wrist wrench space (Eq. 16): tensions alone, up to f_t(max).
+    """Return the paper's fixed-wrist wrench space (Eq. 16): tensions alone, up to f_t(max).
 
-    No palm, no lateral reactions, and one limit for each finger, from the curve of Eq. 21 itself.
-    Tensions begin where no tile is dragged backwards, not at zero as in Eq. 16: a tile that has
-    caught the rock cannot push it.
+    It has no palm, no lateral reactions, and one limit for each finger, from the curve of Eq. 21
+    itself. Tensions begin where no tile is dragged backwards, not at zero as in Eq. 16: a tile
+    whose spines have engaged cannot push.
 
     Parameters
     ----------
@@ -71,12 +80,12 @@ def parallelepiped(settled: SettledHand) -> WrenchSpace:
     -------
     WrenchSpace
         Columns: four tensions [N]; limit rows: f_t(max) of each finger, named after the phalanx
-        that lets go first, or the tendon's maximum if that is less.
+        that fails first, or the tendon's maximum if that is less.
 
     Raises
     ------
     EmptySetError
-        If a finger's tiles are beyond their limits at every tension.
+        If a finger's tile exceeds its limit at every tension.
     """
     space = wrench_space(settled)
     fingers = len(FINGERS)

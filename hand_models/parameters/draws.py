@@ -1,14 +1,14 @@
-"""Draws: sets of the hand's and the surfaces' numbers that all meet what is published.
+"""Samples: sets of the hand's and the surfaces' parameters that all meet the published data.
 
-What the published data leave open is in ``draws.toml``: of each quantity that was fitted a list
-over the sets, and the ranges of what no fit can find. One set makes one draw. Of everything that
-has a range (the strength of a tile on each surface but the fitted sandpaper, and the seat) the
-draws have evenly spaced quantiles, u = (r + ½) / n with r = 0 … n − 1 the rank of the draw's term
-in an additive recurrence of low discrepancy,
+The published data leave parameters uncertain; ``draws.toml`` has, of each quantity that was fitted,
+a list over the sets, and the ranges of quantities that no fit can find. One set makes one Monte
+Carlo sample. Of everything that has a range (the strength of a tile on each surface but the fitted
+sandpaper, and the seat) the samples have evenly spaced quantiles, u = (r + ½) / n with
+r = 0 … n − 1 the rank of the sample's term in an additive recurrence of low discrepancy,
 
-    x_kj = k φ⁻ʲ mod 1,    φ^(d+1) = φ + 1,    k = 1 … n draws,  j = 1 … d ranges,
+    x_kj = k φ⁻ʲ mod 1,    φ^(d+1) = φ + 1,    k = 1 … n samples,  j = 1 … d ranges,
 
-so that the same sets make the same draws everywhere. A caller's own draws are entries in the form
+so that the same sets make the same samples everywhere. A caller's samples are entries in the form
 of ``hand.toml`` and ``surfaces.toml`` (`own_draw`).
 """
 
@@ -35,21 +35,22 @@ from hand_models.parameters.tables import (
 __all__ = ["ParameterSample", "bundled_draws", "draws_of", "even_quantiles", "own_draw"]
 
 FITTED_SURFACE: Final = "sandpaper-36"
-"""The surface on which a set's tile was fitted; the strength on it is the set's own."""
+"""The surface on which a set's tile was fitted; the set has the strength on this surface."""
 
 ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
-"""An entry, or one number of an entry that is a list."""
+"""Pattern of an entry's name, or of one number of an entry that is a list, such as ``radii[1]``."""
 
 
 class ParameterSample(NamedTuple):
-    """One set of numbers that hand and rock may have: the entries that it changes.
+    """One Monte Carlo sample of uncertain parameters: changed entries of hand and surfaces.
 
     Attributes
     ----------
     hand : ParameterTable
-        In the form of ``hand.toml``.
+        Changed entries of the hand, in the form of ``hand.toml``.
     surfaces : ParameterTable
-        In the form of ``surfaces.toml``; of presets, since a caller's own surface is known.
+        Changed entries of preset surfaces, in the form of ``surfaces.toml``. A caller's surface is
+        known, so no sample changes it.
     """
 
     hand: ParameterTable
@@ -57,7 +58,7 @@ class ParameterSample(NamedTuple):
 
 
 def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
-    """Return a draw of the caller's own.
+    """Convert a caller's sample from JSON, and check its entries.
 
     Parameters
     ----------
@@ -68,7 +69,8 @@ def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
     Raises
     ------
     InvalidInputError
-        If it is none; the field is the entry's path.
+        If a key or an entry is unknown, a value is not possible, or no entry is given; the field is
+        the entry's path.
     """
     unknown = sorted(set(raw) - set(ParameterSample._fields))
     if unknown:
@@ -98,13 +100,13 @@ def _check(draw: ParameterSample, hand: ParameterTable | None) -> None:
 
 @stored("draws", 8)
 def bundled_draws(hand: ParameterTable | None = None) -> tuple[ParameterSample, ...]:
-    """Return the draws of ``draws.toml``, one for each of its sets.
+    """Return the bundled samples, one for each set of ``draws.toml``; a cache keeps 8 results.
 
     Parameters
     ----------
     hand : ParameterTable, optional
-        All numbers of the hand; the bundled ones by default. Entries in which it is not the bundled
-        hand are known to the caller: no draw changes them.
+        All parameters of the hand; the bundled ones by default. Entries that differ from the
+        bundled hand are taken as known: no sample changes them.
     """
     return draws_of(draw_table(), hand)
 
@@ -112,20 +114,26 @@ def bundled_draws(hand: ParameterTable | None = None) -> tuple[ParameterSample, 
 def draws_of(
     sets: ParameterTable, hand: ParameterTable | None = None
 ) -> tuple[ParameterSample, ...]:
-    """Return the draws that a table of sets and ranges makes.
+    """Make the samples of a table of fitted sets and ranges.
 
     Parameters
     ----------
     sets : ParameterTable
         In the form of ``draws.toml``.
     hand : ParameterTable, optional
-        As of `bundled_draws`.
+        All parameters of the hand; the bundled ones by default. Entries that differ from the
+        bundled hand are taken as known: no sample changes them.
+
+    Returns
+    -------
+    tuple of ParameterSample
+        One for each set.
 
     Raises
     ------
     InvalidInputError
-        If an entry is unknown or missing, in another unit, of another length than the others, or of
-        a number that it cannot have.
+        If an entry is unknown or missing, in another unit, of another length than the others, or
+        has a value that is not possible.
     """
     hand = hand or hand_table()
     count = _checked_count(sets)
@@ -142,9 +150,19 @@ def draws_of(
 
 
 def even_quantiles(count: int, ranges: int) -> Array:
-    """Return the quantiles of ranges in so many draws, shape (count, ranges), in (0, 1).
+    """Return evenly spaced quantiles for Monte Carlo samples of several ranges.
 
-    Each range has every (r + ½) / count once; see the module for the order.
+    Each range has every (r + ½) / count once; the module's text says in which order.
+
+    Parameters
+    ----------
+    count, ranges : int
+        Numbers of samples and of ranges.
+
+    Returns
+    -------
+    ndarray, shape (count, ranges)
+        In (0, 1).
     """
     ratio = 1.0
     for _ in range(64):

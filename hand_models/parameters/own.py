@@ -1,7 +1,7 @@
-"""A hand, or surfaces, of the caller's own: some entries in place of the bundled ones.
+"""Parameters of a caller's hand or surfaces: check entries that replace some of the bundled ones.
 
-An entry must be one that the bundled table has, in its unit and of its shape, and of a sign that it
-can have. What only several numbers together make impossible, the models that read them refuse.
+The bundled table must have the entry, in the same unit and shape, and with a sign and size that are
+possible. Combinations of numbers are checked by the models that read them.
 """
 
 from __future__ import annotations
@@ -28,27 +28,28 @@ from hand_models.parameters.tables import (
 __all__ = ["load_own_hand", "own_hand", "own_surfaces"]
 
 LARGEST_BY_UNIT: Final = {"m": 1.0, "rad": 2.0 * math.pi}
-"""Largest number of a hand, by unit; larger ones are in millimetres or degrees."""
+"""Largest magnitude of a hand's parameter, by unit; a larger one is in millimetres or degrees."""
 
 
 def load_own_hand(path: Path) -> ParameterTable:
-    """Read a hand's own entries from a file, and check them.
+    """Read the parameters of a caller's hand from a file, and check them.
 
     Parameters
     ----------
     path : Path
-        TOML in the form of ``hand.toml``, with none but the entries that differ. Bare numbers are
-        in the units of ``hand.toml``, and `assumed`.
+        TOML in the form of ``hand.toml``, with only those entries that differ. A bare number is in
+        the unit that ``hand.toml`` has for the entry, and has the source ``assumed``.
 
     Returns
     -------
     ParameterTable
-        The file's entries alone; `own_hand` makes a hand of them.
+        The file's entries alone; `own_hand` completes them to a hand.
 
     Raises
     ------
     InvalidInputError
-        In one line that names file, entry and value.
+        If the file cannot be read or an entry is not possible; the message is one line that names
+        file, entry and value.
     """
     own = ParameterTable.load(path, hand_table().units)
     with in_file(str(path)):
@@ -57,38 +58,48 @@ def load_own_hand(path: Path) -> ParameterTable:
 
 
 def own_hand(own: ParameterTable, base: ParameterTable | None = None) -> ParameterTable:
-    """Return all numbers of a hand, some of them the caller's own.
+    """Complete some parameters of a caller's hand to the table of a whole hand, and check them.
 
     Parameters
     ----------
     own : ParameterTable
-        Entries that differ.
+        Entries of the caller's hand.
     base : ParameterTable, optional
-        All others; the bundled hand's by default.
+        Table from which all other entries are taken; the bundled hand by default.
+
+    Returns
+    -------
+    ParameterTable
+        All entries of the hand.
 
     Raises
     ------
     InvalidInputError
-        If an entry is unknown, in another unit, of another shape, or of a sign or size that it
-        cannot have; the field is its section and name.
+        If an entry of ``own`` is unknown, or its unit, shape, sign or size is not possible; the
+        field is its section and name.
     """
     bundled = hand_table()
     return (base or bundled).replaced(_checked(own, bundled.sections))
 
 
 def own_surfaces(own: ParameterTable) -> ParameterTable:
-    """Return all numbers of the surfaces, some of them the caller's own.
+    """Complete some parameters of a caller's surfaces to the table of all surfaces, and check them.
 
     Parameters
     ----------
     own : ParameterTable
-        Entries that differ: of a preset, or of the ``defaults`` that hold for all presets which
-        have no such entry.
+        Entries of a preset, or of ``defaults``, which apply to every preset that lacks the entry.
+
+    Returns
+    -------
+    ParameterTable
+        All entries of the bundled surfaces, with those of ``own`` in their place.
 
     Raises
     ------
     InvalidInputError
-        As `own_hand`.
+        If an entry of ``own`` is unknown, or its unit, shape, sign or size is not possible; the
+        field is its section and name.
     """
     bundled = surface_table()
     shared = bundled.sections["defaults"]

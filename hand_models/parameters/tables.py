@@ -1,10 +1,10 @@
 """Parameter files: every physical number with its unit and its source.
 
-The hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, those of a tile's
-spines in ``spines.toml``, those of reading scanned rock in ``scan.toml``, those of the paper's
-experiments in ``experiments.toml``, sets of numbers that meet the published data in ``draws.toml``,
-beside this file. A caller's own file in the form of ``hand.toml`` may replace some or all of the
-hand's (`hand_models.parameters.own`).
+Beside this file, the hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, those
+of a tile's spines in ``spines.toml``, those for reading scanned rock in ``scan.toml``, those of the
+paper's experiments in ``experiments.toml``, and sets of parameter values that meet the published
+data in ``draws.toml``. A caller's file in the form of ``hand.toml`` may replace some or all of the
+hand's numbers (`hand_models.parameters.own`).
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ __all__ = [
 Source = Literal["paper", "measured", "calibrated", "assumed"]
 
 Units = Mapping[str, Mapping[str, str]]
-"""Units by section and name."""
+"""SI units by section and name of a parameter."""
 
 LONGEST_QUOTE: Final = 200
-"""Characters of a complaint about an entry: it may quote it."""
+"""Largest number of characters that an error message quotes of a parameter's entry."""
 
 
 class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A number, or a list of numbers, with where it comes from.
+    """A number, or a list of numbers, with its unit and its source.
 
     Attributes
     ----------
@@ -52,9 +52,9 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit : str
         The SI unit, ``1`` for a ratio.
     source : {'paper', 'measured', 'calibrated', 'assumed'}
-        How far to trust it.
+        Origin of the value, which says how far to trust it.
     note : str
-        Where exactly, or why.
+        Place in the source, or reason for the value.
     """
 
     value: float | list[float]
@@ -63,7 +63,15 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     note: str = ""
 
     def changed(self, value: float, place: int | None = None) -> Quantity:
-        """Return it with another number, of a list that at a place, the first by default."""
+        """Return a copy of the quantity with one number replaced.
+
+        Parameters
+        ----------
+        value : float
+            The new number, in the quantity's unit.
+        place : int, optional
+            Index of the number in a list; the first by default. A single number has no place.
+        """
         if not isinstance(self.value, list):
             return msgspec.structs.replace(self, value=value)
         numbers = list(self.value)
@@ -72,12 +80,12 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ParameterTable:
-    """Quantities by section and name. Tables of the same content are equal.
+    """Quantities by section and name; tables of the same names and values are equal.
 
     Parameters
     ----------
     sections : mapping of str to mapping of str to Quantity
-        Not to be changed any more.
+        Not to be changed afterwards.
     """
 
     def __init__(self, sections: Mapping[str, Mapping[str, Quantity]]) -> None:
@@ -85,7 +93,15 @@ class ParameterTable:
 
     @classmethod
     def read(cls, text: str, origin: str, units: Units | None = None) -> ParameterTable:
-        """Parse a parameter file, with bare numbers as in `of`.
+        """Parse the text of a parameter file (TOML).
+
+        Parameters
+        ----------
+        text : str
+        origin : str
+            Name of the file, for error messages.
+        units : mapping of str to mapping of str to str, optional
+            Units of bare numbers, as in `of`.
 
         Raises
         ------
@@ -97,14 +113,16 @@ class ParameterTable:
 
     @classmethod
     def of(cls, raw: Mapping[str, Any], units: Units | None = None) -> ParameterTable:
-        """Take quantities as TOML or JSON has them.
+        """Convert nested dictionaries, parsed from TOML or JSON, to a table.
 
         Parameters
         ----------
         raw : mapping of str to object
+            By section, then by name: dictionaries with the fields of `Quantity`.
         units : mapping of str to mapping of str to str, optional
-            By section and name. Entries may then be bare numbers, or lists of numbers: in this
-            unit (1 for an entry that has none here), and `assumed`.
+            Units by section and name. With units given, an entry may be a bare number, or a list of
+            numbers: in the entry's unit (``1`` where the mapping has none), with the source
+            ``assumed``.
 
         Raises
         ------
@@ -123,26 +141,39 @@ class ParameterTable:
 
     @classmethod
     def load(cls, path: Path, units: Units | None = None) -> ParameterTable:
-        """Read a parameter file from disk; raises what `read` raises, also if there is none."""
+        """Read a parameter file (TOML) from disk.
+
+        Parameters
+        ----------
+        path : Path
+        units : mapping of str to mapping of str to str, optional
+            Units of bare numbers, as in `of`.
+
+        Raises
+        ------
+        InvalidInputError
+            If the file cannot be read, is not TOML, or an entry is not a quantity of finite
+            numbers.
+        """
         with in_file(str(path)):
             text = path.read_text(encoding="utf-8")
         return cls.read(text, str(path), units)
 
     @property
     def units(self) -> dict[str, dict[str, str]]:
-        """Units by section and name."""
+        """Unit of every entry, as dictionaries by section and then by name."""
         return {
             section: {name: quantity.unit for name, quantity in quantities.items()}
             for section, quantities in self.sections.items()
         }
 
     def quantity(self, section: str, name: str) -> Quantity:
-        """Return one quantity.
+        """Return the number, unit and source of an entry, by its section and name.
 
         Raises
         ------
         InvalidInputError
-            If there is none of that name.
+            If the table has no such entry; the field is its section and name.
         """
         try:
             return self.sections[section][name]
@@ -150,21 +181,54 @@ class ParameterTable:
             raise InvalidInputError("missing parameter", field=f"{section}.{name}") from None
 
     def scalar(self, section: str, name: str) -> float:
-        """Return a single number in SI units."""
+        """Return the value of an entry that is a single number, in SI units.
+
+        Parameters
+        ----------
+        section, name : str
+            Section and name of the entry.
+
+        Raises
+        ------
+        InvalidInputError
+            If the table has no such entry, or the entry is a list.
+        """
         value = self.quantity(section, name).value
         if isinstance(value, list):
             raise InvalidInputError("one number is needed, not a list", field=f"{section}.{name}")
         return float(value)
 
     def positive(self, section: str, name: str) -> float:
-        """Return a single number in SI units; refuse one that is not above 0."""
+        """Return the value of an entry that is a single number above 0, in SI units.
+
+        Parameters
+        ----------
+        section, name : str
+            Section and name of the entry.
+
+        Raises
+        ------
+        InvalidInputError
+            If the table has no such entry, or the entry is a list or not above 0.
+        """
         value = self.scalar(section, name)
         if not value > 0.0:
             raise InvalidInputError(f"must be above 0, got {value:g}", field=f"{section}.{name}")
         return value
 
     def vector(self, section: str, name: str) -> tuple[float, ...]:
-        """Return a list of numbers in SI units."""
+        """Return the values of an entry that is a list of numbers, in SI units.
+
+        Parameters
+        ----------
+        section, name : str
+            Section and name of the entry.
+
+        Raises
+        ------
+        InvalidInputError
+            If the table has no such entry, or the entry is a single number.
+        """
         value = self.quantity(section, name).value
         if not isinstance(value, list):
             raise InvalidInputError("a list of numbers is needed", field=f"{section}.{name}")
@@ -176,14 +240,14 @@ class ParameterTable:
                 yield section, name, quantity
 
     def replaced(self, other: ParameterTable) -> ParameterTable:
-        """Return this table with the entries of ``other`` in place of its own."""
+        """Return a copy of this table with the entries of ``other`` added or put in place."""
         sections = {name: dict(section) for name, section in self.sections.items()}
         for section, name, quantity in other:
             sections.setdefault(section, {})[name] = quantity
         return ParameterTable(sections)
 
     def difference(self, other: ParameterTable) -> ParameterTable:
-        """Return the entries whose values are not those of ``other``."""
+        """Return the entries of this table that ``other`` lacks or has another value for."""
         sections: dict[str, dict[str, Quantity]] = {}
         for section, name, quantity in self:
             theirs = other.sections.get(section, {}).get(name)
@@ -252,30 +316,30 @@ def _bundled(name: str) -> ParameterTable:
 
 
 def hand_table() -> ParameterTable:
-    """Return the numbers of the SpinyHand, ``hand.toml``."""
+    """Return the bundled parameters of the SpinyHand, from ``hand.toml``."""
     return _bundled("hand.toml")
 
 
 def surface_table() -> ParameterTable:
-    """Return the numbers of the surfaces, ``surfaces.toml``."""
+    """Return the bundled parameters of the surfaces, from ``surfaces.toml``."""
     return _bundled("surfaces.toml")
 
 
 def experiment_table() -> ParameterTable:
-    """Return the numbers of the paper's experiments, ``experiments.toml``."""
+    """Return the parameters of the paper's experiments, from ``experiments.toml``."""
     return _bundled("experiments.toml")
 
 
 def scan_table() -> ParameterTable:
-    """Return the numbers of scanned rock, ``scan.toml``."""
+    """Return the parameters for reading scanned rock, from ``scan.toml``."""
     return _bundled("scan.toml")
 
 
 def spine_table() -> ParameterTable:
-    """Return the numbers of a tile's spines and of the rock's asperities, ``spines.toml``."""
+    """Return the parameters of a tile's spines and the rock's asperities, from ``spines.toml``."""
     return _bundled("spines.toml")
 
 
 def draw_table() -> ParameterTable:
-    """Return sets of numbers that meet the published data, ``draws.toml``."""
+    """Return the fitted sets and the ranges from which samples are made, from ``draws.toml``."""
     return _bundled("draws.toml")

@@ -1,7 +1,7 @@
-"""Find cells without a height that a grid has filled with one number, by their cliffs.
+"""Find cells without a height that a grid has filled with one number, by the cliffs around them.
 
-Where a grid has no height, some write a zero. As triangles that is a floor at exactly one value of
-one coordinate, seen from the side from which the rock is, and joined to it by cliffs alone.
+Some programs write zero where a grid has no height. In a mesh such cells form a floor at exactly
+one value of one coordinate, seen from the same side as the rock, and joined to it only by cliffs.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ __all__ = ["FilledCells", "filled_cells"]
 
 
 class FilledCells(NamedTuple):
-    """Vertices that are taken for cells without a height.
+    """Vertices that seem to be cells of a grid without a height, filled with one number.
 
     Attributes
     ----------
     axis : int
-        Of the coordinate that is the same.
+        Axis, 0 to 2, of the coordinate that all of them share.
     value : float
-        Of it [m].
+        Value of that coordinate [m].
     cells : int
-        How many.
+        Number of the vertices.
     """
 
     axis: int
@@ -38,9 +38,14 @@ class FilledCells(NamedTuple):
 
 
 def filled_cells(triangles: Triangles) -> list[FilledCells]:
-    """Return what looks like cells without a height in triangles, those of each value together.
+    """Find vertices of a mesh that seem to be cells of a grid without a height.
 
     Thresholds are in ``scan.toml``.
+
+    Returns
+    -------
+    list of FilledCells
+        One entry for each value of a coordinate that many vertices share.
     """
     table = scan_table()
     least, steep, share = (table.scalar("filled", name) for name in ("least", "steep", "share"))

@@ -1,7 +1,7 @@
-"""Hold geometry: pieces of rock that a hand may take.
+"""Shapes of holds: a wall, a log, an edge, a ball, a boulder, and the base class of all holds.
 
 A hold has its own frame: origin on the rock at the crest (the point nearest the palm), z into the
-rock, y along the axis of a cylinder or an edge. A finger plane cuts it in a section.
+rock, y along the axis of a cylinder or an edge. The rock in a finger's plane is a `Section`.
 """
 
 from __future__ import annotations
@@ -28,66 +28,92 @@ CURVE_PIECES: Final = 28
 
 
 class Hold(ABC):
-    """A piece of rock that a hand may take."""
+    """A piece of rock that a hand may grip: base class of the shapes, of meshes and of profiles."""
 
     shape: str
 
     scanned = False
-    """Whether it is known by much data, rather than by a few numbers."""
+    """True if the hold consists of measured data, False if a few numbers describe its shape."""
 
     nbytes = 0
-    """Of that data, if it may be large."""
+    """Memory that the hold's data takes [bytes]; 0 for a shape of a few numbers."""
 
     @property
     def border(self) -> Array:
-        """Edges where what is known of the rock ends, shape (n, 2, 3), in the hold's frame [m]."""
+        """Edges where the known rock ends, as pairs of end points, in the hold's frame [m].
+
+        Returns
+        -------
+        ndarray, shape (n, 2, 3)
+            Empty, (0, 2, 3), for a shape without border.
+        """
         return np.zeros((0, 2, 3))
 
     @property
     def oddities(self) -> tuple[str, ...]:
-        """Oddities of that data, which is used all the same; each begins with its field."""
+        """Warnings about the hold's data, which is used nevertheless; each begins with a field."""
         return ()
 
     @property
     def swept(self) -> Swept | None:
-        """The hold as a ball that is swept along faces, if it is one."""
+        """A smooth hold as a ball that is swept along two faces; None for other holds."""
         return None
 
     @abstractmethod
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
-        """Return the rock in a plane, or None where the plane misses it.
+        """Cut the hold with a finger's plane and return the rock in the plane.
 
         Parameters
         ----------
         origin : array_like, shape (3,)
-            Of the plane's coordinates, in the hold's frame [m].
+            Origin of the plane's coordinates (s, t), in the hold's frame [m].
         s_axis, t_axis : array_like, shape (3,)
-            Orthonormal axes of the plane, in the hold's frame.
+            Orthonormal axes of the plane, in the hold's frame; t into the rock.
+
+        Returns
+        -------
+        Section or None
+            None where the plane misses the rock.
         """
 
     def raw_section(
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
-        """Return the same with the steps and edges that are smaller than a finger's tile."""
+        """Cut the hold as `section` does, but keep steps and edges smaller than a finger's tile.
+
+        Returns
+        -------
+        Section or None
+            None where the plane misses the rock. For a smooth shape the same as `section`.
+        """
         return self.section(origin, s_axis, t_axis)
 
     @abstractmethod
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
-        """Return how far from a point, along a unit direction, the rock begins [m].
+        """Cast a ray: return the distance from a point, along a direction, at which rock begins.
 
-        Negative where the point is inside; infinite where the line misses the rock.
+        Parameters
+        ----------
+        point, direction : array_like, shape (3,)
+            In the hold's frame [m]; the direction has length one.
+
+        Returns
+        -------
+        float
+            Negative where the point is inside the rock; infinite where the ray's line misses the
+            rock [m].
         """
 
     def surface(self, low: Array, high: Array) -> Triangles:
-        """Return the rock's surface in the hold's frame, at least within a region.
+        """Return the rock's surface as triangles in the hold's frame, at least within a region.
 
-        It is what pictures show and what limbs are kept away from. Unless a hold knows better, it
-        is where rays along z enter the rock, without what hangs over.
+        Pictures show this surface, and limbs are kept clear of it. In this base class the surface
+        is where a grid of 41 × 41 rays along z enters the rock, without overhangs.
 
         Parameters
         ----------
         low, high : ndarray, shape (3,)
-            Corners of the region [m].
+            Opposite corners of the region [m].
 
         Returns
         -------
@@ -104,17 +130,20 @@ class Hold(ABC):
         )
 
     def check_place(self, at: Pose | None = None) -> None:
-        """Refuse a frame that a palm is to be at, unless there is rock that faces it.
+        """Check that rock lies at the origin of the frame that a palm is to take.
+
+        Nothing is checked where no frame is given.
 
         Parameters
         ----------
         at : Pose, optional
-            In the hold's frame, z into the rock; by default the hold's frame itself.
+            The palm's frame in the hold's frame, z into the rock.
 
         Raises
         ------
         InvalidInputError
-            If no rock is near its origin, or what is there faces away.
+            If no rock begins near the frame's origin along its z axis; the field is
+            ``place.point``.
         """
         if at is None:
             return
@@ -129,22 +158,37 @@ class Hold(ABC):
             )
 
     def crest_circle(self, offset: float) -> tuple[float, float] | None:
-        """Return depth of the centre [m] and radius [m] of the crest's circle at y = ``offset``.
+        """Return the circle that the rock's outline has at its crest in the plane y = ``offset``.
 
-        None where the plane at that offset meets nothing round.
+        Returns
+        -------
+        tuple of (float, float) or None
+            Depth of the centre and radius [m]; None if the outline is not round there.
         """
         return None
 
     def tangent_point(self, offset: float, angle: Angle) -> tuple[Angle, Angle] | None:
-        """Return the point (x, z) at y = ``offset`` where rock runs at an angle from x toward z.
+        """Return the point of the outline in the plane y = ``offset`` where it has a given slope.
 
-        Or points at angles. Only of a hold that is smooth but not round there; None elsewhere.
+        Only an ellipsoid answers; every other hold returns None.
+
+        Parameters
+        ----------
+        offset : float
+            y of the plane, in the hold's frame [m].
+        angle : float or ndarray
+            Angle of the outline's tangent from x toward z [rad].
+
+        Returns
+        -------
+        tuple of (x, z) or None
+            Coordinates [m], each of the shape of ``angle``; None where the plane misses the hold.
         """
         return None
 
 
 class SweptHold(Hold):
-    """A smooth hold: a ball that is swept along faces."""
+    """A smooth hold: base class of shapes described as a ball that is swept along two faces."""
 
     @property
     @abstractmethod
@@ -229,7 +273,7 @@ class Cylinder(SweptHold):
     Attributes
     ----------
     diameter : float
-        [m]
+        Diameter of the log, above 0 [m].
     """
 
     diameter: float
@@ -249,14 +293,14 @@ class Cylinder(SweptHold):
 
 @dataclass(frozen=True)
 class Edge(SweptHold):
-    """Two flat faces that meet in a fillet, symmetric about z, drawn out along y.
+    """Two flat faces that meet in a fillet, symmetric about z and endless along y.
 
     Attributes
     ----------
     fillet_radius : float
-        [m]
+        Radius of the rounded edge between the faces, above 0 [m].
     angle : float
-        Of the rock between the faces, in (0, π): π/2 for a square edge [rad].
+        Angle of the rock between the faces, in (0, π): π/2 for a square edge [rad].
     """
 
     fillet_radius: float
@@ -284,7 +328,7 @@ class Sphere(SweptHold):
     Attributes
     ----------
     diameter : float
-        [m]
+        Diameter of the ball, above 0 [m].
     """
 
     diameter: float
@@ -305,12 +349,13 @@ class Sphere(SweptHold):
 
 @dataclass(frozen=True)
 class Ellipsoid(SweptHold):
-    """A rounded boulder.
+    """A rounded boulder: an ellipsoid.
 
     Attributes
     ----------
     semi_axes : tuple of float
-        Along x, y and z of the hold's frame; the crest is an end of the last [m].
+        Semi-axes along x, y and z of the hold's frame, each above 0; the crest is an end of the
+        third [m].
     """
 
     semi_axes: tuple[float, float, float]

@@ -1,11 +1,11 @@
 """A hold made of triangles: a scanned boulder, or any shape that has no formula.
 
-Triangles are counterclockwise seen from outside the rock. They need not close: rock is behind the
-side that they show. On loading they are welded, triangles without area are left out, spikes taken
-back and turned ones wound alike (`hand_models.rock.triangles`). A finger's plane cuts them, gaps of
+Triangles are counterclockwise seen from outside the rock. They need not close: rock is behind their
+front side. On loading they are welded, triangles without area are dropped, spikes are removed and
+turned triangles wound alike (`hand_models.rock.triangles`). A finger's plane cuts the mesh; gaps of
 the cut up to a few millimetres are bridged, wider ones end the rock there, and the cut is smoothed
-to the scale of a tile (`hand_models.rock.smoothing`). The palm's and the base tiles' spines and the
-nails meet the raw triangles.
+to the scale of a tile (`hand_models.rock.smoothing`). The spines of the palm and of the base tiles
+and the nails meet the raw triangles.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ __all__ = ["Mesh"]
 
 
 class Mesh(OutlinedHold):
-    """Triangles of rock.
+    """A hold given as a triangle mesh.
 
     Parameters
     ----------
@@ -44,27 +44,27 @@ class Mesh(OutlinedHold):
     faces : array_like of int, shape (m, 3)
         Vertices of each triangle, counterclockwise from outside the rock.
     hand : ParameterTable, optional
-        As of `OutlinedHold`.
+        All parameters of the hand that is to grip the hold, for the scale of smoothing.
     anywhere : bool, optional
-        Whether its frame may begin anywhere, and not on the rock under a palm; see `check_place`.
+        True if the origin of the hold's frame need not be on rock under a palm (`check_place`).
 
     Attributes
     ----------
     triangles : Triangles
-        As they are used.
+        The repaired mesh.
     nbytes : int
-        Of these.
+        Memory of the repaired mesh [bytes].
     border : ndarray, shape (n, 2, 3)
-        Edges of only one triangle, but for holes that are bridged [m].
+        End points of edges of only one triangle, without holes that are bridged [m].
     oddities : tuple of str
-        Vertices without numbers that no triangle names, and what looks like cells of a grid that
-        had no height (`filled_cells`).
+        Warnings: vertices that are not finite and in no triangle, and vertices that look like a
+        grid's cells without height (`filled_cells`).
 
     Raises
     ------
     InvalidInputError
-        If numbers of triangles are not finite, faces name no vertices, nothing is left, the size is
-        that of another unit, or no palm can be at the frame's origin.
+        If a triangle has numbers that are not finite, faces name no vertices, no triangle has an
+        area, the size is that of another unit, or no palm can be at the frame's origin.
     """
 
     shape = "mesh"
@@ -110,10 +110,24 @@ class Mesh(OutlinedHold):
         return tuple(found)
 
     def surface(self, low: Array, high: Array) -> Triangles:
-        """Return all triangles."""
+        """Return the whole repaired mesh, in the hold's frame, whatever the region."""
         return self.triangles
 
     def check_place(self, at: Pose | None = None) -> None:
+        """Check that rock lies at the origin of the frame that a palm is to take, and faces it.
+
+        Parameters
+        ----------
+        at : Pose, optional
+            The palm's frame in the hold's frame, z into the rock; by default the hold's frame.
+
+        Raises
+        ------
+        InvalidInputError
+            If no rock is near the frame's origin, or the triangles there face away from a palm; the
+            field is ``vertices`` or ``faces`` for the hold's frame, else ``place.point`` or
+            ``place.approach``.
+        """
         there, table = at or Pose.identity(), scan_table()
         near, view = table.scalar("scan", "near"), table.vector("scan", "view")
         box = there.position - near, there.position + near
@@ -156,7 +170,14 @@ class Mesh(OutlinedHold):
         return TriangleCells(self.triangles)
 
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:
-        """Return how far from a point the rock begins: behind it if it is inside."""
+        """Cast a ray: return the distance from a point, along a direction, at which rock begins.
+
+        Returns
+        -------
+        float
+            Negative where the point is inside the rock; infinite where the ray meets no front side
+            of a triangle [m].
+        """
         where, entering = self._hits(point, direction)
         behind = np.flatnonzero(where <= 0.0)
         if len(behind) and entering[behind[-1]]:

@@ -1,8 +1,8 @@
-"""Mesh files: STL, PLY, OBJ and OFF, each read alone and no longer than it is.
+"""Mesh files: read STL, PLY, OBJ and OFF safely.
 
-Nothing that a file names beside itself (an OBJ's ``mtllib``, a PLY's texture) is opened, and a
-PLY's counts are compared with its size before anything is made of them; the other formats have none
-that a reader would believe.
+No other file that a mesh file names (an OBJ's ``mtllib``, a PLY's texture) is opened, and a PLY's
+counts are compared with its size before memory is allocated; in the other formats no count decides
+how much is read.
 """
 
 from __future__ import annotations
@@ -22,12 +22,18 @@ MESH_ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
 
 
 def read_mesh(path: Path) -> tuple[Array, Indices]:
-    """Return vertices [m] and faces of an STL, PLY, OBJ or OFF file.
+    """Read vertices and triangles of an STL, PLY, OBJ or OFF file, whose unit is to be metres.
+
+    Returns
+    -------
+    vertices : ndarray, shape (n, 3)
+        [m]
+    faces : ndarray of int, shape (m, 3)
 
     Raises
     ------
     InvalidInputError
-        If it cannot be read, or has no triangles; the field is ``file``.
+        If the file cannot be read, or has no triangles; the field is ``file``.
     """
     vertices, faces = read_vertices(path)
     if not len(faces):
@@ -36,18 +42,19 @@ def read_mesh(path: Path) -> tuple[Array, Indices]:
 
 
 def read_vertices(path: Path) -> tuple[Array, Indices]:
-    """Return vertices of an STL, PLY, OBJ or OFF file, and faces, which a point cloud has not.
+    """Read vertices of an STL, PLY, OBJ or OFF file, and its triangles if it has any.
 
     Returns
     -------
     vertices : ndarray, shape (n, 3)
         In the file's unit.
     faces : ndarray of int, shape (m, 3)
+        Empty, (0, 3), for a point cloud.
 
     Raises
     ------
     InvalidInputError
-        If it cannot be read; the field is ``file``.
+        If the file cannot be read; the field is ``file``.
     """
     import trimesh
 

@@ -1,11 +1,11 @@
 """A hold drawn as outlines: one for all fingers, or one for the strip of rock under each finger.
 
-An outline is a polyline of points (x, z) in the hold's frame, z into the rock, and is drawn out
-along y. With one for each finger the rock has four strips: from y = 0 to half-way between an inner
-and an outer finger's plane goes that of an inner finger, and beyond that of an outer one (left is
-+y, as in H). A finger is on the strip over which its base is. What a caller draws is raw rock: as
-the cut through a mesh it is smoothed to the scale of a tile (`hand_models.rock.smoothing`), but not
-under fingers that cling with their nails.
+An outline is a polyline of points (x, z) in the hold's frame, z into the rock, and is extruded
+along y. With one outline for each finger the rock has four strips: an inner finger's from y = 0 to
+half-way between the planes of an inner and an outer finger, and an outer finger's beyond (left is
++y, as in H). A finger is on the strip over which its base is. A drawn outline is raw rock: like the
+cut through a mesh it is smoothed to the scale of a tile (`hand_models.rock.smoothing`), but not
+under fingers that hook with their nails.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from hand_models.sections import SECTION_SETTINGS
 __all__ = ["STRIP_NAMES", "Profile"]
 
 STRIP_NAMES: Final = ("outer_left", "inner_left", "inner_right", "outer_right")
-"""Names of the strips from +y to −y: those of the fingers over them."""
+"""Names of the four strips from +y to −y, after the fingers over them."""
 
 
 class Profile(OutlinedHold):
-    """Rock drawn out along y.
+    """A hold given as outlines that are extruded along y.
 
     Parameters
     ----------
@@ -39,7 +39,8 @@ class Profile(OutlinedHold):
         The outline (x, z) of all rock, or one for each of `STRIP_NAMES`. Rock is on the side of
         larger z: on the left going from the end with smaller x to that with larger x [m].
     hand : ParameterTable, optional
-        As of `OutlinedHold`; the strips lie under its fingers.
+        All parameters of the hand that is to grip the hold, the bundled ones by default, for the
+        scale of smoothing; the strips lie under its fingers.
 
     Raises
     ------
@@ -75,7 +76,7 @@ class Profile(OutlinedHold):
         self._half_way = 0.5 * (inner + hand.vector("fingers", "outer_axis")[1])
 
     def surface(self, low: Array, high: Array) -> Triangles:
-        """Return the outlines drawn out along y, each over its strip, as far as a region goes."""
+        """Return the outlines as triangles, extruded along y over their strips within a region."""
         from trimesh.util import append_faces
 
         ends = float(low[1]), float(high[1])

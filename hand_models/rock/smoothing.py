@@ -1,14 +1,14 @@
-"""A cut through scanned or drawn rock, smoothed to what a finger's tile can feel.
+"""Smooth a cut through scanned or drawn rock to the scale of a finger's tile.
 
 A tile of length w bridges whatever is smaller than itself: it rests on the highest points under it.
 So a raw polyline is
 
-1. sampled at equal steps of its length from where it begins,
+1. sampled at equal steps of its length, from its first point,
 2. fitted with a parabola over every stretch of length w, and once more over w/2, so that no kink
    of the first fit is left (Savitzky–Golay). That leaves circles as they are: their radius R
    changes by 0.0038 (w/2)⁴/R³, 3 µm at R = 30 mm,
-3. raised along its normal, by what the raw points stand out of it at most within w/2, itself
-   smoothed over w/2 on both sides, so that no raw point stands out any more.
+3. raised along its normal by the largest height, within w/2, of the raw points above it. That
+   height is itself smoothed over w/2 on both sides, so that no raw point stands out any more.
 
 What is sharper than a tile, such as the corner of an edge, becomes a rounding of about its length,
 at most a few millimetres off the rock.
@@ -37,20 +37,20 @@ __all__ = ["OutlinedHold", "Scale", "smooth"]
 
 @dataclass(frozen=True)
 class Scale:
-    """Lengths of smoothing [m].
+    """Lengths to which a hold's cuts are smoothed and limited for a hand [m].
 
     Attributes
     ----------
     tile : float
         w, a tile's length.
     spacing : float
-        Of the points of a smoothed curve.
+        Distance of neighbouring points of a smoothed curve.
     bridged_gap : float
-        Open ends so near each other are joined; shorter pieces are left out.
+        Open ends no farther apart than this are joined; shorter pieces are dropped.
     reach : float
-        How far from a finger's base rock is of interest.
+        Half the side of the square about a finger's base outside which rock is left out.
     longest : float
-        Length of the rock that may be there.
+        Largest length of the rock's outline within that square.
     """
 
     tile: float
@@ -61,10 +61,15 @@ class Scale:
 
     @classmethod
     def of(cls, hand: ParameterTable | None = None) -> Scale:
-        """Return the scale of a hand that grips, of the bundled one by default.
+        """Return the lengths of smoothing for the hand that is to grip a hold.
 
-        A hand whose finger, nail and half a palm reach farther than ``scan.toml`` says has rock
-        that is as much larger.
+        The reach is that of ``scan.toml`` or, if larger, of the hand's finger, nail and half its
+        palm; ``longest`` grows in proportion.
+
+        Parameters
+        ----------
+        hand : ParameterTable, optional
+            All parameters of the hand; the bundled ones by default.
         """
         hand, table = hand or hand_table(), scan_table()
         usual = table.scalar("cut", "reach")
@@ -85,18 +90,18 @@ class Scale:
 
 
 def smooth(points: Array, scale: Scale) -> Array | None:
-    """Return a polyline, smoothed to a tile's scale and raised over its raw points.
+    """Smooth a polyline to a tile's scale, and raise it over its raw points.
 
     Parameters
     ----------
     points : ndarray, shape (n, 2)
-        With the rock on the left; closed if it ends where it begins [m].
+        Raw polyline with the rock on its left; closed if it ends where it begins [m].
     scale : Scale
 
     Returns
     -------
     ndarray, shape (m, 2), or None
-        None if the polyline is debris.
+        Smoothed polyline [m]; None if the raw one is a single point or shorter than a bridged gap.
     """
     points = _distinct(points)
     if len(points) < 2:
@@ -241,13 +246,13 @@ def _runs(piece: Array, reach: float) -> list[Array]:
 
 
 class OutlinedHold(Hold):
-    """Rock that is known by raw polylines in each plane; raw for nails, smoothed for fingers.
+    """A hold whose cut in each plane is a set of polylines: smoothed for fingers, raw for nails.
 
     Parameters
     ----------
     hand : ParameterTable, optional
-        All numbers of the hand that is to grip it, the bundled ones by default: its tiles' length
-        is the scale to which the rock is smoothed for its fingers.
+        All parameters of the hand that is to grip the hold, the bundled ones by default: the length
+        of its tiles is the scale to which the rock is smoothed for its fingers.
     """
 
     scanned = True
@@ -260,12 +265,17 @@ class OutlinedHold(Hold):
         """Return the raw outlines in a plane, rock on their left; arguments as of `section`."""
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
-        """Return the rock in a plane, as far as a finger reaches, smoothed.
+        """Cut the hold with a finger's plane, and smooth the cut to the scale of a tile.
+
+        Returns
+        -------
+        Section or None
+            Only rock within a finger's reach of the plane's origin; None if there is none.
 
         Raises
         ------
         InvalidInputError
-            If it is too long to be a surface of rock; the field is ``hold``.
+            If the outline is too long to be a surface of rock; the field is ``hold``.
         """
         runs = _reached(self._pieces(origin, s_axis, t_axis), self._scale)
         curves = [smooth(run, self._scale) for run in runs]
@@ -275,7 +285,19 @@ class OutlinedHold(Hold):
     def raw_section(
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
-        """Return the same, debris left out but not smoothed: a nail feels it."""
+        """Cut the hold with a finger's plane without smoothing, for a nail.
+
+        Returns
+        -------
+        Section or None
+            Only rock within a finger's reach, without pieces shorter than ``Scale.bridged_gap``;
+            None if there is none.
+
+        Raises
+        ------
+        InvalidInputError
+            If the outline is too long to be a surface of rock; the field is ``hold``.
+        """
         runs = map(_distinct, _reached(self._pieces(origin, s_axis, t_axis), self._scale))
         least = self._scale.bridged_gap
         reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= least]

@@ -1,4 +1,4 @@
-"""Surfaces as triangles: between points of a grid, and of outlines that are drawn out."""
+"""Triangle meshes of grids of points, and of outlines extruded along y."""
 
 from __future__ import annotations
 
@@ -12,14 +12,33 @@ __all__ = ["Triangles", "drawn_out", "grid"]
 
 
 class Triangles(NamedTuple):
-    """Vertices, shape (n, 3) [m], and faces, shape (m, 3), counterclockwise from outside."""
+    """A triangle mesh.
+
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, 3)
+        Corners [m].
+    faces : ndarray of int, shape (m, 3)
+        Indices of each triangle's corners, counterclockwise seen from outside.
+    """
 
     vertices: Array
     faces: Indices
 
 
 def grid(points: Array) -> Triangles:
-    """Return the triangles between points (n, m, 3), two for each cell."""
+    """Return a grid of points as a triangle mesh, two triangles for each cell of the grid.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, m, 3)
+        Points of the grid by row and column [m].
+
+    Returns
+    -------
+    Triangles
+        n m vertices in the order of the points, row by row, and 2 (n − 1) (m − 1) faces.
+    """
     rows, columns, _ = points.shape
     place = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (
@@ -30,8 +49,13 @@ def grid(points: Array) -> Triangles:
 
 
 def drawn_out(outline: Array, low: float, high: float) -> Triangles:
-    """Return the surface of an outline (x, z), shape (n, 2), drawn out from y = low to high.
+    """Extrude an outline along y into a triangle mesh.
 
-    The rock is on its left, seen along y.
+    Parameters
+    ----------
+    outline : ndarray, shape (n, 2)
+        Points (x, z) in order, with the rock on their left seen along y [m].
+    low, high : float
+        Ends of the extrusion along y [m].
     """
     return grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)]))

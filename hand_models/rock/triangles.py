@@ -1,9 +1,9 @@
-"""Triangles of rock: made whole, and cut by planes.
+"""Triangles of rock: repair a scan's mesh, and cut it with planes.
 
-Scans come open, with holes, spikes and double vertices, and now and then with some triangles turned
-over. Here they are welded, freed of what is no surface, and wound alike; then every edge that a
-plane crosses is a point of the cut, and every triangle that it crosses leads from one such edge to
-another, so that the chains of a cut follow from the edges' names, without comparing coordinates.
+Scans come open, with holes, spikes and double vertices, and some triangles turned over. They are
+welded, freed of degenerate triangles and wound alike. In a cut, every edge that the plane crosses
+gives a point, and every crossed triangle links two such edges: the cut's polylines follow from the
+edges' names, without comparing coordinates.
 """
 
 from __future__ import annotations
@@ -30,24 +30,40 @@ __all__ = [
 
 
 def edges_of(faces: Indices) -> Indices:
-    """Return the edges of triangles in their own direction, shape (3 m, 2), first sides first."""
+    """Return the three directed edges of each triangle (m, 3), as pairs of vertex indices.
+
+    Returns
+    -------
+    ndarray of int, shape (3 m, 2)
+        The first edges of all triangles, then the second, then the third.
+    """
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
 def connected(pairs: Indices, count: int) -> Indices:
-    """Return to which connected part each of ``count`` things belongs, by pairs (n, 2) of them."""
+    """Return the connected component of each of ``count`` nodes of a graph, numbered from 0.
+
+    The graph's edges are ``pairs`` of nodes, shape (n, 2); the result has shape (count,).
+    """
     graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
     return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
 
 
 def grouped(some: Indices, parts: Indices) -> list[Indices]:
-    """Return things (n,) of one part together, part by part, each in the order given."""
+    """Return items grouped by the part that each belongs to, parts ascending, as a list of arrays.
+
+    Items ``some`` (n,) index ``parts``, which has each one's part as `connected` returns it; the
+    items of a part stay in the order given.
+    """
     order = some[np.argsort(parts[some], kind="stable")]
     return np.split(order, np.flatnonzero(np.diff(parts[order])) + 1) if len(order) else []
 
 
 def weld(triangles: Triangles) -> Triangles:
-    """Return triangles that share vertices where these coincide, without those of no area."""
+    """Merge coinciding vertices of a mesh, and drop triangles without area and duplicates.
+
+    Vertices coincide if their coordinates are equal when rounded to 1e-8 m.
+    """
     import trimesh
 
     mesh = trimesh.Trimesh(*_merged(triangles), process=False)
@@ -94,15 +110,15 @@ def _merged(triangles: Triangles) -> Triangles:
 
 
 def wound_alike(triangles: Triangles) -> Triangles:
-    """Return triangles of which no two neighbours run along their edge in the same direction.
+    """Return a mesh of consistent winding: neighbours run along their edge in opposite directions.
 
-    In every connected part the fewer triangles are turned over. Edges of more than two triangles
-    part the surface.
+    In each connected part the minority of triangles is turned over. Three or more triangles at an
+    edge are not neighbours.
 
     Raises
     ------
     InvalidInputError
-        If a part has only one side, as a Möbius strip does; the field is ``faces``.
+        If a part is not orientable, as a Möbius strip; the field is ``faces``.
     """
     faces = triangles.faces
     count = len(faces)
@@ -148,12 +164,11 @@ def _edge_names(a: Indices, b: Indices, count: int) -> Indices:
 
 
 def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
-    """Return triangles whose spikes have been taken back.
+    """Return a mesh in which each vertex that is a spike is moved to the mean of its neighbours.
 
-    A spike is a vertex, not on the border of a hole, that stands off the mean of its neighbours by
-    more than ``ratio`` times their root mean square distance from that mean: a needle too steep to
-    be rock at the scan's resolution. It is put back at the mean. What more than one vertex holds
-    up is rock.
+    A spike is a single vertex, not on a border, that is farther from the mean of its neighbours
+    than ``ratio`` times their root mean square distance from that mean: a needle too steep to be
+    rock at the scan's resolution. A peak of several vertices is rock.
     """
     vertices, faces = triangles
     count = len(vertices)
@@ -172,9 +187,18 @@ def without_spikes(triangles: Triangles, ratio: float) -> Triangles:
 
 
 def border_edges(triangles: Triangles, gap: float) -> Array:
-    """Return the ends of every edge that only one triangle has, shape (n, 2, 3) [m].
+    """Return the border edges of a mesh: those that only one triangle has.
 
-    Left out are borders of holes that are no wider than ``gap`` along any axis [m].
+    Parameters
+    ----------
+    triangles : Triangles
+    gap : float
+        Borders of holes no wider than this along every axis are left out [m].
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 3)
+        End points of each edge [m].
     """
     vertices, faces = triangles
     ends, count = edges_of(faces), len(vertices)
@@ -191,22 +215,22 @@ def border_edges(triangles: Triangles, gap: float) -> Array:
 def cut(
     triangles: Triangles, origin: Array, s_axis: Array, t_axis: Array, reach: float
 ) -> list[Array]:
-    """Return the polylines in which a plane cuts triangles, with the rock on their left.
+    """Cut a mesh with a plane and return the polylines of the cut, with the rock on their left.
 
-    A vertex on the plane counts as beyond it, so that no triangle is met in a point.
+    A vertex on the plane counts as beyond the plane, so that no triangle is met in a single point.
 
     Parameters
     ----------
     triangles : Triangles
     origin, s_axis, t_axis : ndarray, shape (3,)
-        Of the plane's coordinates.
+        Origin [m] and orthonormal axes of the plane's coordinates (s, t).
     reach : float
-        Triangles outside the square |s|, |t| ≤ reach are left out [m].
+        Triangles outside the square −reach ≤ s, t ≤ reach are left out [m].
 
     Returns
     -------
     list of ndarray, shape (n, 2)
-        In the plane's coordinates; closed ones end where they begin [m].
+        Points (s, t) of each polyline; a closed one ends where it begins [m].
     """
     vertices, faces = triangles
     normal = np.cross(s_axis, t_axis)
@@ -279,9 +303,21 @@ def _points(chain: list[int], begin: Array, end: Array) -> Array:
 
 
 def bridge(pieces: list[Array], gap: float) -> list[Array]:
-    """Return polylines joined where an end is within ``gap`` of a beginning, the nearest first.
+    """Join polylines where an end is within ``gap`` of a beginning, nearest pairs first.
 
-    A piece may be closed so, if it is longer than twice the gap.
+    A single polyline is closed in the same way if it is longer than twice the gap.
+
+    Parameters
+    ----------
+    pieces : list of ndarray, shape (n, 2)
+        Polylines, open or closed [m].
+    gap : float
+        Largest distance that is bridged [m].
+
+    Returns
+    -------
+    list of ndarray, shape (n, 2)
+        The closed polylines as given, then the joined ones.
     """
     closed = [p for p in pieces if np.array_equal(p[0], p[-1])]
     pieces = [p for p in pieces if not np.array_equal(p[0], p[-1])]
@@ -307,7 +343,7 @@ def bridge(pieces: list[Array], gap: float) -> list[Array]:
 
 
 class TriangleCells:
-    """Triangles, found again by where they are.
+    """Spatial index of a mesh: finds the triangles in a box through a grid of cells.
 
     Parameters
     ----------
@@ -329,14 +365,19 @@ class TriangleCells:
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
 
     def within(self, axes: Array, low: Array, high: Array) -> Indices:
-        """Return, in order, triangles among which are all that reach into a box.
+        """Return candidates for the triangles that reach into a box: all that do, and some more.
 
         Parameters
         ----------
         axes : ndarray, shape (k, 3)
-            Unit vectors.
+            Unit vectors of the box; the box has no end in other directions.
         low, high : ndarray, shape (k,)
-            Of the box along these; without end in other directions [m].
+            Bounds of the box along the axes [m].
+
+        Returns
+        -------
+        ndarray of int
+            Indices of the triangles, ascending.
         """
         middle, half = self._middle @ axes.T, self._half @ np.abs(axes).T
         # rounding must not leave one out

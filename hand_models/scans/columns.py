@@ -1,4 +1,4 @@
-"""Tables in text: a point a line, as programs and people write them."""
+"""Read tables in text: one point per line, as programs and people write them."""
 
 from __future__ import annotations
 
@@ -25,11 +25,16 @@ class _Style(NamedTuple):
 
 
 def read_columns(path: Path) -> RawScan:
-    """Return points of a text with a point a line, parted by commas, semicolons or blanks.
+    """Read points from a text file: one per line, separated by commas, semicolons or blanks.
 
-    A first line that is no numbers names the columns; without names the first three are meant. A
-    first line with the count of the others is left out. Decimals may follow a comma, unless commas
-    part the columns, too. What is empty is not finite.
+    A first line without numbers names the columns; without names the first three columns are read.
+    A first line with the number of the other lines is left out. Commas may mark decimals, unless
+    commas separate the columns, too. An empty cell is not finite (NaN).
+
+    Raises
+    ------
+    InvalidInputError
+        If the file is not a text, columns are missing or ambiguous, or a line is not a point.
     """
     whole = _text(path).splitlines()
     places = [i for i, line in enumerate(whole) if line.strip() and line.strip()[0] != "#"]

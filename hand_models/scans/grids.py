@@ -1,6 +1,6 @@
-"""Grids of heights in files: NumPy arrays, GeoTIFF, ESRI ASCII.
+"""Read grids of heights from files: NumPy arrays, GeoTIFF, ESRI ASCII.
 
-Columns go along x, rows against y: the first row is the farthest up the map, as in pictures.
+Columns go along x, rows against y: the first row has the largest y, as in pictures of maps.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from hand_models.scans.scan import RawScan
 __all__ = ["is_esri", "read_esri", "read_geotiff", "read_numpy"]
 
 Cell = tuple[float, float]
-"""Width along x and height along y of a cell of a grid, in the file's unit."""
+"""Size of a grid's cell along x and along y, in the file's unit."""
 
 
 class GeoTag(IntEnum):
-    """Tags of a GeoTIFF."""
+    """Numbers of the GeoTIFF tags that are read."""
 
     PIXEL_SCALE = 33550
     TRANSFORMATION = 34264
@@ -35,7 +35,19 @@ class GeoTag(IntEnum):
 
 
 def read_numpy(path: Path, cell: float | None) -> RawScan:
-    """Return the heights of an ``.npy``, or of an ``.npz`` with its cells ``dx`` and ``dy``."""
+    """Read a grid of heights from an ``.npy`` or ``.npz`` file; the latter may give ``dx``, ``dy``.
+
+    Parameters
+    ----------
+    path : Path
+    cell : float or None
+        Size of a cell, in place of the file's, in the file's unit.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file is not a grid of heights or is broken, or the cell's size is not known.
+    """
     with path.open("rb") as file:
         # an .npy begins with the first, an .npz with the second
         if not file.read(6).startswith((b"\x93NUMPY", b"PK")):
@@ -92,7 +104,20 @@ def _numpy_cell(arrays: Mapping[str, NDArray[Any]]) -> Cell | None:
 
 
 def read_geotiff(path: Path, cell: float | None) -> RawScan:
-    """Return the heights of a GeoTIFF of one band, with whatever compression libtiff knows."""
+    """Read the heights of a GeoTIFF of one band, in any compression that libtiff supports.
+
+    Parameters
+    ----------
+    path : Path
+    cell : float or None
+        Size of a cell, in place of the file's, in the file's unit.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file is not a grid of heights or is cut short, pillow is missing, or the cell's size
+        is not known, as with degrees.
+    """
     try:
         from PIL import Image, UnidentifiedImageError
     except ImportError:
@@ -136,13 +161,25 @@ def _geo_cell(tags: Mapping[GeoTag, Any]) -> Cell | None:
 
 
 def is_esri(path: Path) -> bool:
-    """Return whether a text is an ESRI ASCII grid, not columns."""
+    """Return True if a text file is an ESRI ASCII grid, False if it may be columns of points."""
     with path.open("rb") as file:
         return file.read(5).lower() == b"ncols"
 
 
 def read_esri(path: Path, cell: float | None) -> RawScan:
-    """Return the heights of an ESRI ASCII grid."""
+    """Read the heights of an ESRI ASCII grid.
+
+    Parameters
+    ----------
+    path : Path
+    cell : float or None
+        Size of a cell, in place of the file's, in the file's unit.
+
+    Raises
+    ------
+    InvalidInputError
+        If rows and columns do not fit the heights, or the cell's size is not known.
+    """
     header: dict[str, float] = {}
     # some programs write a comma before decimals, none between heights
     lines = iter(path.read_text(encoding="utf-8").replace(",", ".").splitlines())

@@ -1,8 +1,9 @@
-"""Gaps between points that were triangulated: which triangles bridge too much, and what is left.
+"""Gaps between triangulated points: triangles that bridge too much, and the holes that they leave.
 
-A triangle bridges its circle, in which no point lies, and the distance between its corners in
-space. A hole is as wide as the largest circle without points whose middle is in it. Triangles on
-the outline have circles that reach beyond it, however short their edges: those are no holes.
+A triangle bridges its circumscribed circle, in which no point lies, and the distance between its
+corners in space. A hole is as wide as the largest circle without points whose centre is in the
+hole. Triangles on the outline have circles that reach beyond it, however short their edges: those
+are no holes.
 """
 
 from __future__ import annotations
@@ -21,18 +22,18 @@ __all__ = ["Gaps", "empty_circles"]
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Triangles between points, seen along z.
+    """Triangles of a Delaunay triangulation across z, with the width that each bridges.
 
     Attributes
     ----------
     triangles : ndarray, shape (m, 3, 3)
-        Corners [m].
+        Corners of each triangle [m].
     beside : ndarray of int, shape (m, 3)
-        Neighbours, −1 for none.
+        Neighbour opposite to each corner, −1 for none.
     bridged : ndarray, shape (m,)
-        Width of what each triangle bridges [m]; infinite for slivers of the outline.
+        Width that each triangle bridges [m]; infinite for slivers of the outline.
     area : ndarray, shape (m,)
-        Across z [m²].
+        Area across z [m²].
     """
 
     triangles: Array
@@ -42,7 +43,15 @@ class Gaps:
 
     @classmethod
     def between(cls, triangles: Array, beside: NDArray[np.int32]) -> Gaps:
-        """Return the gaps that triangles (m, 3, 3) with these neighbours (m, 3) bridge."""
+        """Compute the width that each triangle bridges, and its area.
+
+        Parameters
+        ----------
+        triangles : ndarray, shape (m, 3, 3)
+            Corners of each triangle [m].
+        beside : ndarray of int, shape (m, 3)
+            Neighbour opposite to each corner, −1 for none.
+        """
         edges = _edges(triangles)
         across, area = np.hypot(edges[..., 0], edges[..., 1]), _areas(edges)
         # hardly any area, as a part of the longest edge's square
@@ -53,20 +62,28 @@ class Gaps:
         return cls(triangles, beside, width, area)
 
     def open_(self, hole: float) -> NDArray[np.bool_]:
-        """Return which triangles bridge more than a length [m], shape (m,)."""
+        """Return True for each triangle that bridges more than ``hole`` [m], shape (m,)."""
         return np.asarray(self.bridged > hole)
 
     def covered(self, hole: float) -> float:
-        """Return the part of the area across z that is left if wider gaps stay open."""
+        """Return the share of the area across z that closed triangles cover.
+
+        Closed are the triangles that bridge no more than ``hole`` [m].
+        """
         return float(self.area[~self.open_(hole)].sum() / self.area.sum())
 
     def left(self, hole: float) -> tuple[tuple[Hole, ...], tuple[Step, ...]]:
-        """Return holes and steps that the outline does not reach, the widest and highest first.
+        """Return the open holes and steps that are not connected to the outline.
 
         Parameters
         ----------
         hole : float
-            The widest, and the highest, that is bridged [m].
+            Largest width, and largest height, that is bridged [m].
+
+        Returns
+        -------
+        tuple of (tuple of Hole, tuple of Step)
+            The widest hole and the highest step first.
         """
         open_, beside, count = self.open_(hole), self.beside, len(self.triangles)
         rows, side = np.nonzero(open_[:, None] & (beside >= 0) & open_[beside])
@@ -93,15 +110,20 @@ class Gaps:
 
 
 def empty_circles(triangles: Array) -> Array:
-    """Return the diameter of the largest circle without corners whose middle is in each triangle.
+    """Return the diameter of the largest empty circle with its centre in each triangle.
 
-    That is the circumscribed one's unless the triangle is obtuse; then its middle is on the longest
-    edge, where two corners are as near.
+    An empty circle has no corner inside. It is the circumscribed circle, unless the triangle is
+    obtuse; then its centre is on the longest edge, equally far from two corners.
 
     Parameters
     ----------
     triangles : ndarray, shape (m, 3, 3)
-        Of a Delaunay triangulation across z.
+        Triangles of a Delaunay triangulation across z [m].
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        [m]
     """
     edges = _edges(triangles[:, :, :2])
     a, b, c = np.sort(np.linalg.norm(edges, axis=2), axis=1).T

@@ -1,4 +1,4 @@
-"""Triangles of a file, kept as they are and put into a frame on the rock."""
+"""Keep the triangles of a scan file as they are, in a frame on the rock."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["keep_triangles"]
 
 
 def keep_triangles(scan: Scan, hole: float) -> ScannedRock:
-    """Return the triangles of a scan as rock, welded where their corners coincide.
+    """Convert a scan with triangles to rock: weld its vertices, and choose a frame on the rock.
 
-    Their winding says on which side the rock is. If it contradicts the view that was given, they
-    are turned over.
+    The triangles' winding says on which side the rock is. If it contradicts the given view, all
+    triangles are turned over.
 
     Parameters
     ----------
@@ -26,6 +26,11 @@ def keep_triangles(scan: Scan, hole: float) -> ScannedRock:
         With triangles.
     hole : float
         Width above which a hole is reported [m].
+
+    Raises
+    ------
+    InvalidInputError
+        If no triangle has an area, the view is ambiguous, or the wanted origin is not on the rock.
     """
     assert scan.faces is not None
     view = scan.direction()

@@ -1,9 +1,9 @@
-"""Points to triangles: projected along the view, thinned, and joined where they are near.
+"""Mesh a scan: points are projected along the view, thinned, and joined where they are near.
 
-Rock that was seen from one side is a height over the plane across the view. There the points are
-triangulated (Delaunay), and triangles that would bridge more than a finger does not care for are
-left out: those whose circle, in which no point lies, is wider than a hole may be, and those with an
-edge longer than that, which are steps that hide rock.
+Rock seen from one side is a height over the plane across the view. There the points are
+triangulated (Delaunay), and triangles that bridge too much are left out: those whose circumscribed
+circle, in which no point lies, is wider than a hole may be, and those with an edge longer than
+that, which are steps that hide rock.
 """
 
 from __future__ import annotations
@@ -40,26 +40,30 @@ def mesh_scan(
     hole: float | None = None,
     report: Progress = lambda done, total: None,
 ) -> ScannedRock:
-    """Return a scan as triangles, seen from where it was scanned; its own are kept, if it has any.
+    """Convert a scan to triangles in a frame on the rock; a file's triangles are kept.
 
     Parameters
     ----------
     scan : Scan
     spacing : float, optional
-        Side of the squares across the view of which each keeps one point, that of median depth. By
-        default half the median distance between neighbours, or as much more as leaves no more
-        points than ``scan.toml`` says [m].
+        Side of the squares across the view each of which keeps one point, that of median depth. By
+        default half the median distance between neighbours, or more where ``scan.toml`` allows
+        fewer points [m].
     hole : float, optional
-        The widest hole that is bridged, by default as ``scan.toml`` says [m]. Of triangles that are
-        kept none is bridged, and wider ones are reported.
+        Width of the widest hole that is bridged, by default as in ``scan.toml`` [m]. In a file's
+        triangles no hole is bridged, and wider ones are reported.
     report : callable, optional
-        Called with the steps done and their number.
+        Called with (steps done, steps in all).
+
+    Returns
+    -------
+    ScannedRock
 
     Raises
     ------
     InvalidInputError
-        If a length is not above zero, points are on a line, nothing is left, the frame's origin is
-        not on the rock, or a spacing is given for triangles that are kept.
+        If a length is not above zero, points are on a line, no triangle is left, the frame's
+        origin is not on the rock, or a spacing is given for triangles that are kept.
     """
     table, steps = scan_table(), SCAN_SETTINGS.mesh_steps
     hole = _length(table.scalar("mesh", "hole") if hole is None else hole, "hole")
@@ -101,18 +105,20 @@ def mesh_scan(
 
 
 class Triangulated(NamedTuple):
-    """Points of a scan, one a square, and the triangles between them.
+    """Thinned points of a scan, and the triangles between them.
 
     Attributes
     ----------
     points : ndarray, shape (n, 3)
-        From ``middle`` along ``axes`` [m].
+        Coordinates from ``middle`` along ``axes`` [m].
     corners : ndarray of int, shape (m, 3)
+        Points of each triangle.
     gaps : Gaps
+        The width that each triangle bridges.
     middle : ndarray, shape (3,)
         In the scan's axes [m].
     axes : ndarray, shape (3, 3)
-        Columns, in the scan's axes.
+        Columns, in the scan's axes; z along the view.
     """
 
     points: Array
@@ -125,7 +131,22 @@ class Triangulated(NamedTuple):
 def triangulated(
     scan: Scan, spacing: float | None, *, report: Progress = lambda done, total: None
 ) -> Triangulated:
-    """Return a scan thinned and triangulated across the view; parameters as of `mesh_scan`."""
+    """Thin a scan's points and triangulate them across the view (Delaunay).
+
+    Parameters
+    ----------
+    scan : Scan
+    spacing : float or None
+        Side of the squares across the view each of which keeps one point; None for the default of
+        `mesh_scan` [m].
+    report : callable, optional
+        Called with (steps done, steps of `mesh_scan`).
+
+    Raises
+    ------
+    InvalidInputError
+        If the spacing is not above zero, or points are on a line.
+    """
     axes = axes_along(scan.direction())
     middle = 0.5 * (scan.points.min(axis=0) + scan.points.max(axis=0))
     points = (scan.points - middle) @ axes
@@ -178,12 +199,12 @@ def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputEr
 
 
 def too_large(extent: float) -> str:
-    """Return what may be wrong with rock that is larger than a hold may be, in words.
+    """Return a warning, in words, about rock larger than a hold may be, with its probable cause.
 
     Parameters
     ----------
     extent : float
-        Of its longest side [m].
+        Length of the rock's longest side [m].
     """
     largest = scan_table().scalar("scan", "largest")
     unit = _fitting(extent)
@@ -194,14 +215,14 @@ def too_large(extent: float) -> str:
 
 
 def too_small(extent: float, unit: Unit) -> str:
-    """Return what may be wrong with rock that is smaller than a palm, in words; else nothing.
+    """Return a warning about rock smaller than a palm, with its probable cause; else an empty text.
 
     Parameters
     ----------
     extent : float
-        Of its longest side [m].
+        Length of the longest side [m].
     unit : {'m', 'cm', 'mm'}
-        In which the file was read.
+        Unit in which the file was read.
     """
     if extent >= SCAN_SETTINGS.smallest_rock:
         return ""
@@ -217,7 +238,10 @@ def _fitting(number: float) -> str:
 
 
 def wider_holes(hole: float) -> list[float]:
-    """Return widths above one that may be tried instead, up to the widest that is sensible [m]."""
+    """Return the hole widths above ``hole`` that are worth a trial, ascending [m].
+
+    Each is a fifth more than the one before, up to ``widest_bridge`` of ``scan.toml``.
+    """
     widest = scan_table().scalar("mesh", "widest_bridge")
     found, wider = [], hole
     # by a fifth each, up to the next millimetre

@@ -1,4 +1,4 @@
-"""PCD files: their header compared with their size, then their points and the scanner's pose."""
+"""Read PCD files: check the header against the file's size, then read points and scanner's pose."""
 
 from __future__ import annotations
 
@@ -16,14 +16,19 @@ from hand_models.scans.scan import AXIS_NAMES, RawScan
 __all__ = ["read_pcd"]
 
 UNKNOWN_VIEWPOINT: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-"""The VIEWPOINT that programs write which know none."""
+"""The VIEWPOINT that programs write if they know none: zero position, no rotation."""
 
 
 def read_pcd(path: Path) -> RawScan:
-    """Return the points of a PCD file (ascii, binary or binary_compressed), and its viewpoint.
+    """Read the points and the viewpoint of a PCD file (ascii, binary or binary_compressed).
 
-    A VIEWPOINT with a rotation is the pose of the scanner in whose frame the points are: they are
-    placed by it. Without one it says where the scanner was in the points' own axes.
+    A VIEWPOINT with a rotation is the pose of the scanner in whose frame the points are. Without a
+    rotation it is the scanner's position in the points' axes.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file is broken or cut short, has no x, y or z, or the package pypcd4 is missing.
     """
     with path.open("rb") as file:
         # a PCD file has its header in the first 64 KiB

@@ -1,4 +1,4 @@
-"""Scanned rock as a picture: seen from outside, coloured by height, lit from the upper left."""
+"""Pictures of scanned rock: seen from outside, coloured by height, lit from the upper left."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ __all__ = ["plot_holds", "plot_rock"]
 
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
-    """Draw rock as the scanner saw it, holes left white, and write the picture.
+    """Draw rock as the scanner saw it, holes left white, and write the picture to a file.
 
     Parameters
     ----------
     rock : ScannedRock
     path : Path
-        Of the picture; its ending says of what kind.
+        File of the picture; its ending chooses the format.
     title : str
     """
     axes, colours = _paint(rock.vertices, rock.faces, "viridis", title)
@@ -70,20 +70,22 @@ def plot_holds(
     path: Path,
     title: str,
 ) -> None:
-    """Draw rock, and on it how much a hand holds at points, and which way the best hands point.
+    """Draw rock, the pull-off that a hand holds at points, and the directions of the best hands.
 
     Parameters
     ----------
     rock : Triangles
-    points : ndarray, shape (n, 3)
         In the rock's frame [m].
+    points : ndarray, shape (n, 3)
+        Points with a hand, in the rock's frame [m].
     values : ndarray, shape (n,)
-        [N]
+        Largest pull-off at each point [N].
     refused : ndarray, shape (m, 3)
-        Points where no hand can be, or where it holds nothing [m].
+        Points where no hand can be, or where its wrench space is empty [m].
     best : sequence of Pose
         H of the best hands in the rock's frame, the best first.
     path : Path
+        File of the picture; its ending chooses the format.
     title : str
     """
     axes, _ = _paint(*rock, "gray", title)

@@ -1,4 +1,4 @@
-"""Scans from files, in metres and with z up."""
+"""Read scans from files, in metres and with z up."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SCAN_ENDINGS: Final = (
     *(".xyz", ".txt", ".csv", ".pts", ".asc"),
     *(".npy", ".npz", ".tif", ".tiff"),
 )
-"""Endings of point clouds, of triangles, of tables in text, and of grids of heights."""
+"""Endings of files that can be read: point clouds, triangles, tables in text, grids of heights."""
 
 ADVICE_BY_ENDING: Final = {
     **dict.fromkeys(
@@ -42,7 +42,7 @@ ADVICE_BY_ENDING: Final = {
         "make it GeoTIFF by `gdal_translate -of GTiff`",
     ),
 }
-"""Advice for files of other kinds, by their suffix."""
+"""Advice on how to convert files of other kinds, by their ending."""
 
 
 def read_scan(
@@ -56,30 +56,30 @@ def read_scan(
     cell: float | None = None,
     width: float | None = None,
 ) -> Scan:
-    """Return the points of a file, those that are not finite left out.
+    """Read a scan from a file; points that are not finite are left out.
 
     Parameters
     ----------
     path : Path
-        Of a point cloud (PCD, PLY, OBJ, XYZ, CSV), of triangles (PLY, OBJ, STL, OFF), or of a grid
-        of heights (``.npy``, ``.npz``, GeoTIFF, ESRI ASCII): columns along x, rows against y,
-        heights along z.
+        A point cloud (PCD, PLY, OBJ, XYZ, CSV), triangles (PLY, OBJ, STL, OFF), or a grid of
+        heights (``.npy``, ``.npz``, GeoTIFF, ESRI ASCII): columns along x, rows against y, heights
+        along z.
     unit : {'m', 'cm', 'mm'}
-        Of the file's numbers.
+        Unit of the file's numbers.
     up : {'x', 'y', 'z', '-x', '-y', '-z'}
         The file's axis that points up.
     view : array_like, shape (3,), optional
-        In which direction the scanner looked, in the file's axes. By default from the viewpoint, if
-        that is given, to the points' middle; down a grid's heights; else what `Scan.direction`
-        finds.
+        Direction in which the scanner looked, in the file's axes. By default from the viewpoint, if
+        that is given, to the points' middle; down a grid's heights; else the result of
+        `Scan.direction`.
     viewpoint : array_like, shape (3,), optional
-        Where the scanner was, in the file's axes and unit; by default what a PCD file says, else
+        Position of the scanner, in the file's axes and unit; by default that of a PCD file, else
         the file's origin. With a view or a viewpoint, a PCD's VIEWPOINT is not used; without,
-        its rotation, if it has one, places the points, which are in the scanner's frame then.
+        its rotation, if it has one, takes the points from the scanner's frame to the world.
     origin : array_like, shape (3,), optional
-        Where the rock's frame is to begin, in the file's axes and unit; by default in the middle.
+        Wanted origin of the rock's frame, in the file's axes and unit; by default the middle.
     cell : float, optional
-        Distance between neighbours of a grid, in the file's unit, in place of the file's own.
+        Distance between neighbours of a grid, in the file's unit, in place of the file's.
     width : float, optional
         In place of a unit: all lengths are scaled so that this is the longest side [m].
 

@@ -1,4 +1,4 @@
-"""Remedies for a scan that is left full of holes: each is tried before it is advised.
+"""Find options that leave a scan with fewer holes: each is tried before it is advised.
 
 One remedy drops points that stand alone: the statistical outlier removal of Open3D and PCL.
 """
@@ -24,17 +24,17 @@ __all__ = ["Remedy", "drop_outliers", "remedy"]
 
 
 class Remedy(NamedTuple):
-    """Options that leave few of the holes and steps of a scan, as they were tried.
+    """An option of meshing that leaves few holes and steps in a scan, with the result of its trial.
 
     Attributes
     ----------
     option : {'std_ratio', 'hole'}
     value : float
-        Of it: standard deviations, or [m].
+        Value of the option: standard deviations, or a width [m].
     left : int
-        Holes and steps that are left.
+        Number of holes and steps that are left.
     std_ratio : float, optional
-        Standard deviations beyond which points are dropped too, where a wider hole needs that.
+        Standard deviations beyond which points are dropped in addition to a wider hole.
     """
 
     option: str
@@ -46,23 +46,25 @@ class Remedy(NamedTuple):
 def remedy(
     scan: Scan, rock: ScannedRock, hole: float, *, spacing: float | None = None
 ) -> Remedy | None:
-    """Return what would leave a scan in one piece with few holes and steps, None if nothing does.
+    """Return an option that meshes a scan with few holes and steps; None if no option does.
 
-    Few are a tenth of those that it has or of those that are many, else half of them; they are
-    never many, and it has to cover half of its outline, and as much as it did. Tried are dropping
-    points that stand alone (`drop_outliers`), unless some were dropped, bridging holes up to the
-    palm's width, and both together.
+    Tried in turn are dropping points that stand alone (`drop_outliers`), unless some were dropped,
+    bridging holes up to the palm's width, and both together. An option is taken at once if it
+    leaves at most the share ``left_holes`` of the present holes and steps (or of ``many_holes`` if
+    that is more), never more than ``many_holes``; else the best option that leaves at most half of
+    them is taken. It has to cover ``least_covered`` of the outline, and 95 % of the area covered
+    before.
 
     Parameters
     ----------
     scan : Scan
-        Of points.
+        Points without triangles.
     rock : ScannedRock
-        That was made of it.
+        Result of `mesh_scan` for the scan.
     hole : float
-        That was bridged [m].
+        Width up to which holes were bridged [m].
     spacing : float, optional
-        As of `mesh_scan`.
+        Side of the squares that keep one point each, as in `mesh_scan` [m].
     """
     table = scan_table()
     many, open_ = table.scalar("mesh", "many_holes"), len(rock.holes) + len(rock.steps)
@@ -100,10 +102,10 @@ def _trials(
 
 
 def drop_outliers(scan: Scan, std_ratio: float, *, neighbours: int | None = None) -> Scan:
-    """Return a scan without the points that are farther from their neighbours than is usual.
+    """Return a scan without points that stand alone (statistical outlier removal).
 
-    A point is left out if its mean distance to its nearest neighbours is above the mean of that
-    over all points by more than so many standard deviations.
+    A point is left out if its mean distance to its nearest neighbours exceeds the mean of this
+    distance over all points by more than ``std_ratio`` standard deviations.
 
     Parameters
     ----------
@@ -111,7 +113,7 @@ def drop_outliers(scan: Scan, std_ratio: float, *, neighbours: int | None = None
     std_ratio : float
         Standard deviations, above zero; 1 to 3 are usual.
     neighbours : int, optional
-        Nearest other points of each; by default as ``scan.toml`` says.
+        Number of nearest neighbours of each point; by default as in ``scan.toml``.
 
     Raises
     ------

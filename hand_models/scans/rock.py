@@ -17,14 +17,15 @@ __all__ = ["Hole", "ScannedRock", "Step", "write_rock"]
 
 
 class Hole(NamedTuple):
-    """Part of the rock where no point was seen.
+    """Part of the rock without points, seen along the view.
 
     Attributes
     ----------
     width : float
-        Diameter of the widest circle without points whose middle is in it, across the view [m].
+        Diameter of the widest circle without points whose centre is in the hole, across the
+        view [m].
     place : ndarray, shape (3,)
-        The middle of its corners, in the rock's frame [m].
+        Mean of the hole's corners, in the rock's frame [m].
     """
 
     width: float
@@ -32,14 +33,14 @@ class Hole(NamedTuple):
 
 
 class Step(NamedTuple):
-    """Jump between neighbouring points along the view, so large that rock may hide between them.
+    """Jump along the view between neighbouring points, so large that it may hide rock.
 
     Attributes
     ----------
     height : float
         Height of the jump along the view [m].
     place : ndarray, shape (3,)
-        The middle of its corners, in the rock's frame [m].
+        Mean of the step's corners, in the rock's frame [m].
     """
 
     height: float
@@ -48,9 +49,10 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ScannedRock:
-    """Triangles of scanned rock, as a mesh hold has them.
+    """Triangles of scanned rock, ready for a `Mesh` hold.
 
-    Its frame begins on the rock; z goes into it along the view, x is up as far as it can be.
+    The origin of the rock's frame is on the rock; z goes into the rock along the view, x is as
+    upward as can be.
 
     Attributes
     ----------
@@ -61,23 +63,23 @@ class ScannedRock:
     pose : Pose
         The rock's frame in the scan's, which has z up.
     holes : tuple of Hole
-        That were left open, the widest first; the outline is not one of them.
+        Holes that were left open, the widest first; the outline is not one of them.
     read, dropped : int
-        Points of the file, and how many of them are not finite.
+        Number of points in the file, and of those that are not finite.
     spacing : float
-        Median distance between neighbours, of triangles that were kept the median edge [m].
+        Median distance of neighbouring points; of a file's triangles the median edge [m].
     filled : tuple of FilledCells
-        Points that look like cells of a grid that had no height, in the scan's axes.
+        Points that seem to be cells of a grid without height, in the scan's axes.
     steps : tuple of Step
-        That were left open, the highest first.
+        Steps that were left open, the highest first.
     covered : float
-        Part of the area within the points' convex outline that has triangles, seen along the view;
-        one of triangles that were kept.
+        Share of the area within the points' convex outline, seen along the view, that has
+        triangles; 1 for a file's triangles.
     outliers : int
-        Points that were left out because they stand alone.
+        Number of points that were left out because they stand alone.
     kept, turned : bool
-        Whether the triangles are the file's, and whether they were turned over, since they showed
-        their backs to the view that was given.
+        True if the triangles are the file's; True if these were turned over because they faced
+        away from the given view.
     """
 
     vertices: Array
@@ -96,12 +98,12 @@ class ScannedRock:
 
     @property
     def extent(self) -> Array:
-        """Size along the axes of the rock's frame, shape (3,) [m]."""
+        """Size of the rock along each axis of its frame, shape (3,) [m]."""
         return np.asarray(np.ptp(self.vertices, axis=0))
 
 
 def write_rock(rock: ScannedRock, path: Path) -> None:
-    """Write rock as a PLY file with normals [m], which a mesh hold may name."""
+    """Write scanned rock to a PLY file with normals [m], which `read_mesh` can read for a hold."""
     mesh = trimesh.Trimesh(rock.vertices, rock.faces, process=False)
     with whole_file(path) as part:
         part.write_bytes(export_ply(mesh, vertex_normal=True))

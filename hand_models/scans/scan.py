@@ -1,4 +1,4 @@
-"""A scan: points in metres with z up, from where they were seen, and the frame of its rock."""
+"""A scan: points in metres with z up, the place from which they were seen, and the rock's frame."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Unit = Literal["m", "cm", "mm"]
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 UNIT_METRES: Final[Mapping[Unit, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-"""Metres in a unit."""
+"""Length of each unit [m]."""
 
 UP_ROTATIONS: Final[Mapping[Up, Array]] = {
     "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
@@ -41,17 +41,17 @@ UP_ROTATIONS: Final[Mapping[Up, Array]] = {
     "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
     "-z": np.diag([1.0, -1.0, -1.0]),
 }
-"""Rotation that turns the axis of a file that points up to z, by that axis."""
+"""Rotation matrix (3, 3) that turns a file's axes so that z is up, by the axis that points up."""
 
 
 @dataclass(frozen=True, slots=True)
 class ScanSettings:
-    """Numbers that several functions of the scans have in common."""
+    """Settings that functions for scans share: steps of progress, size of the smallest rock."""
 
     mesh_steps: int = 3
-    """Steps that are reported: thinned, triangulated, parted from holes."""
+    """Steps of meshing that are reported to a progress callback: thin, triangulate, find holes."""
     smallest_rock: float = 0.1
-    """Size of the smallest rock that is scanned to be held, about a palm's length [m]."""
+    """Size of the smallest rock that a hand is to grip, about a palm's length [m]."""
 
 
 SCAN_SETTINGS: Final = ScanSettings()
@@ -60,7 +60,20 @@ AXIS_NAMES: Final = ("x", "y", "z")
 
 
 def areas_of(points: Array, faces: Indices) -> Array:
-    """Return the areas of triangles along their outward normals, shape (m, 3) [m²]."""
+    """Return the area vectors of triangles: outward normals as long as the triangle's area.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        [m]
+    faces : ndarray of int, shape (m, 3)
+        Counterclockwise seen from outside.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+        [m²]
+    """
     a, b, c = (points[faces[:, i]] for i in range(3))
     return np.asarray(0.5 * np.cross(b - a, c - a))
 
@@ -73,9 +86,10 @@ class RawScan(NamedTuple):
     points : ndarray, shape (n, 3)
         In the file's axes and unit; not finite where nothing was measured.
     scanner : Pose or None
-        Where the scanner was, if the file says; if it was turned, the points are in its frame.
+        Pose of the scanner, if the file has one; if the pose is turned, the points are in the
+        scanner's frame.
     heights : bool
-        Whether z is a height over a grid, seen from above.
+        True if z is a height over a grid, seen from above.
     faces : ndarray of int, shape (m, 3), or None
         Triangles of the points, if the file has any.
     """
@@ -88,28 +102,28 @@ class RawScan(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Points of rock as they were seen.
+    """Points of rock as a scanner saw them.
 
     Attributes
     ----------
     points : ndarray, shape (n, 3)
         Finite, z up [m].
     read : int
-        Points of the file, those that are left out, too.
+        Number of points in the file, including those that were left out.
     view : ndarray, shape (3,), or None
-        In which direction it was looked at, of length one; None if that follows from the points.
+        Unit vector in which the scanner looked; None to find the direction from the points.
     viewpoint : ndarray, shape (3,)
-        Where the scanner was [m].
+        Position of the scanner [m].
     origin : ndarray, shape (3,), or None
-        Where the rock's frame is to begin; None for the middle [m].
+        Wanted origin of the rock's frame; None for the middle of the points [m].
     assumed : bool
-        Whether the viewpoint is the file's origin because nothing says where the scanner was.
+        True if the viewpoint is the file's origin because the scanner's position is unknown.
     heights : bool
-        Whether the points are a grid of heights.
+        True if the points are a grid of heights.
     faces : ndarray of int, shape (m, 3), or None
         Triangles of the points, counterclockwise seen from outside, if the file has any.
     outliers : int
-        Points that were left out because they stand alone (`drop_outliers`).
+        Number of points that were left out because they stand alone (`drop_outliers`).
     """
 
     points: Array
@@ -124,21 +138,22 @@ class Scan:
 
     @property
     def dropped(self) -> int:
-        """Points of the file that are not finite."""
+        """Number of points in the file that were left out because they are not finite."""
         return self.read - len(self.points) - self.outliers
 
     def direction(self) -> Array:
-        """Return in which direction the rock was looked at, shape (3,), of length one.
+        """Return the unit vector in which the scanner looked at the rock, shape (3,).
 
-        That is `view`; else that against which its triangles face, or downward if these close; else
-        the direction in which the points vary least, away from the viewpoint, or downward where the
-        viewpoint is among the points and the rock is ground.
+        The vector is `view` if given. With triangles it is opposite to the side that they face
+        together, or downward if they form a closed surface. Else it is the direction in which the
+        points vary least, away from the viewpoint, or downward where the viewpoint is among the
+        points and the rock is ground.
 
         Raises
         ------
         InvalidInputError
-            If it is unknown from which side, or the viewpoint is assumed and so far away that
-            no scanner can have been there; the field is ``view``.
+            If the side is ambiguous, or the viewpoint is assumed and too far away for a scanner;
+            the field is ``view``.
         """
         if self.view is not None:
             return self.view
@@ -165,7 +180,13 @@ class Scan:
         )
 
     def shown(self) -> Array | None:
-        """Return toward which side triangles face together, of length one, None if they close."""
+        """Return the unit vector toward the side that most of the triangles' area faces.
+
+        Returns
+        -------
+        ndarray, shape (3,), or None
+            None if the triangles form a closed surface.
+        """
         assert self.faces is not None
         areas = areas_of(self.points, self.faces)
         total = areas.sum(axis=0)
@@ -189,9 +210,19 @@ class Scan:
 
 
 def axes_along(view: Array) -> Array:
-    """Return the axes of scanned rock as columns: z along the view, x up as far as it can be.
+    """Return the axes of a frame for scanned rock: z along the view, x as upward as can be.
 
-    Where the view is up or down, x is along y.
+    Where the view is up or down, x is as nearly along y as can be.
+
+    Parameters
+    ----------
+    view : ndarray, shape (3,)
+        Unit vector in which the scanner looked, z up.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Unit vectors x, y and z as columns, in the scan's axes.
     """
     for upward in (np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])):
         x = upward - (upward @ view) * view
@@ -203,24 +234,51 @@ def axes_along(view: Array) -> Array:
 
 
 def in_scan(cells: FilledCells, middle: Array, axes: Array) -> FilledCells:
-    """Return cells in the scan's axes: where any are found, the rock's axes are along them."""
+    """Convert filled cells from the rock's axes to the scan's axes.
+
+    Parameters
+    ----------
+    cells : FilledCells
+        In coordinates from ``middle`` along ``axes``.
+    middle : ndarray, shape (3,)
+        In the scan's axes [m].
+    axes : ndarray, shape (3, 3)
+        Columns, in the scan's axes.
+
+    Returns
+    -------
+    FilledCells
+        With the scan's axis that is nearest to theirs.
+    """
     axis = int(np.abs(axes[:, cells.axis]).argmax())
     value = float(middle[axis] + axes[axis, cells.axis] * cells.value)
     return FilledCells(axis, value, cells.cells)
 
 
 def start_on(points: Array, scan: Scan, middle: Array, axes: Array) -> Array:
-    """Return the point where the frame begins: the nearest, across the view, to what is wanted.
+    """Return the origin of the rock's frame: the point nearest, across the view, to a target.
+
+    The target is the scan's wanted origin, or the middle of the points.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        From ``middle`` along ``axes`` [m].
+        Coordinates from ``middle`` along ``axes`` [m].
     scan : Scan
-        That may say where it is to begin.
     middle : ndarray, shape (3,)
+        In the scan's axes [m].
     axes : ndarray, shape (3, 3)
-        Columns, in the scan's axes.
+        Columns, in the scan's axes; z along the view.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        One of the points [m].
+
+    Raises
+    ------
+    InvalidInputError
+        If no point is near the wanted origin; the field is ``origin``.
     """
     wanted = None if scan.origin is None else (scan.origin - middle) @ axes
     target = 0.5 * (points.min(axis=0) + points.max(axis=0)) if wanted is None else wanted

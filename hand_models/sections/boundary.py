@@ -1,7 +1,7 @@
-"""The boundary of rock in a finger's plane as chains of short straight segments: places near it.
+"""Polylines that bound the rock in a finger's plane: nearest segments, distances, windows.
 
-It is one or more polylines, open or closed, that have the rock on their left (turning from s toward
-t), convex or not. Places are complex numbers s + i t.
+A boundary is one or more polylines, open or closed, that have the rock on their left (turning from
+s toward t), convex or not. Places are complex numbers s + i t [m].
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ __all__ = ["Boundary", "Window", "stretch_minima"]
 
 
 class Window(NamedTuple):
-    """The part of a boundary that is near some places, as runs of vertices that follow each other.
+    """The part of a boundary near some places, as runs of consecutive vertices.
 
     Attributes
     ----------
     vertices : ndarray of complex, shape (v,)
+        Places of the vertices, run by run [m].
     first, last : ndarray of int, shape (v,)
-        Of each one's run.
+        Indices of the first and the last vertex of each vertex's run.
     goes_on : ndarray of bool, shape (v,)
-        Whether a segment goes from it to the next one.
+        True where a segment leads from the vertex to the next one.
     longest : float
-        At least as long as any segment [m].
+        Upper bound of the segments' lengths [m].
     """
 
     vertices: Complexes
@@ -40,13 +41,13 @@ class Window(NamedTuple):
 
 
 class Boundary:
-    """Polylines with rock on their left.
+    """Polylines with rock on their left, prepared for searches.
 
     Parameters
     ----------
     pieces : sequence of ndarray, shape (n, 2)
-        Points (s, t) in order, each unlike the one before it; a closed piece ends where it begins.
-        Where an open one ends, rock ends [m].
+        Points (s, t) in order, each different from the one before it; a closed piece ends where it
+        begins. Rock ends where an open piece ends [m].
     """
 
     def __init__(self, pieces: Sequence[Array]) -> None:
@@ -80,7 +81,15 @@ class Boundary:
         return np.stack([first, middle, last])
 
     def window(self, places: Complexes, reach: float) -> Window:
-        """Return the part within ``reach`` of any of some places, and what else is near them."""
+        """Return the part of the boundary near places, to search less of it.
+
+        Parameters
+        ----------
+        places : ndarray of complex
+            s + i t [m].
+        reach : float
+            All of the boundary within this distance of a place is in the window, and some more [m].
+        """
         centre, spread = _middle(places)
         near = np.abs(self._middle - centre) <= reach + spread + self._half
         kept = np.zeros(len(self._vertices), dtype=bool)
@@ -98,7 +107,16 @@ class Boundary:
         return Window(self._vertices[vertices], first, last, ~broken, longest)
 
     def nearest(self, points: Complexes) -> tuple[Indices, Array, Complexes]:
-        """Return the nearest segment to each point, where on it in [0, 1], and the way from it."""
+        """Return the nearest segment to each of n points.
+
+        Returns
+        -------
+        segment : ndarray of int, shape (n,)
+        part : ndarray, shape (n,)
+            Place nearest to the point as a share of the segment's length, in [0, 1].
+        away : ndarray of complex, shape (n,)
+            Vector from that place to the point [m].
+        """
         points = points.ravel()
         # a segment is at least as far as its middle, less half its length
         centre, spread = _middle(points)
@@ -120,7 +138,10 @@ class Boundary:
         return segment[at], part[at], away[at]
 
     def clearances(self, points: Complexes) -> Array:
-        """Return the distances of points (...) from the rock, negative inside [m]."""
+        """Return the signed distance of each point s + i t from the rock [m].
+
+        Negative inside the rock; of the same shape as the points.
+        """
         segment, part, away = self.nearest(points)
         normal = self._outward[np.where(part <= 0.0, 0, np.where(part >= 1.0, 2, 1)), segment]
         distance = np.abs(away)
@@ -128,7 +149,7 @@ class Boundary:
         return np.where(inside, -distance, distance).reshape(points.shape)
 
     def normal(self, point: complex) -> complex:
-        """Return the unit normal out of the rock of the segment nearest a point."""
+        """Return the unit normal, out of the rock, of the segment nearest a point."""
         segment, _, _ = self.nearest(np.array([point]))
         return complex(self._outward[1, segment[0]])
 
@@ -140,7 +161,18 @@ def _middle(places: Complexes) -> tuple[complex, float]:
 
 
 def stretch_minima(values: Array, first: Indices) -> Indices:
-    """Return where each stretch of values, that begins at ``first``, is least."""
+    """Return the index of the least value in each of several stretches of an array.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    first : ndarray of int, shape (k,)
+        Index at which each stretch begins; the first is 0.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+    """
     least = np.minimum.reduceat(values, first)
     lengths = np.diff(first, append=len(values))
     at = (values == np.repeat(least, lengths)).nonzero()[0]

@@ -1,13 +1,13 @@
-"""Rock in a finger's plane that is an ellipse: the oblique cut of a log, or that of a boulder.
+"""Sections that are ellipses: oblique cuts of a log, and cuts of a boulder.
 
-About a centre c it is the image of a disc,
+About a centre c an ellipse is the preimage of a disc,
 
-    |A v + B v̄| ≤ ρ,   v = q − c,
+    abs(A v + B v̄) ≤ ρ,   v = q − c,
 
-whose square is G(v) = m |v|² + Re(κ v²), with m = |A|² + |B|² and κ = 2 A B̄. What laying asks of
-it follows from the circle that fits it best where the last one led: at its point foremost in the
-direction n, with the support h = √(n·En) and E = ρ² G⁻¹, it bends with the radius det E / h³. From
-one circle to the next the mistake is squared.
+whose square is ``G(v) = m |v|² + Re(κ v²)``, with ``m = |A|² + |B|²`` and κ = 2 A B̄. Contacts are
+found by iteration over circles fitted to the ellipse: at the point foremost in the direction n,
+with the support h = √(n·En) and E = ρ² G⁻¹, the ellipse has the radius of curvature det E / h³.
+From one circle to the next the error is squared.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class _Nearest(NamedTuple):
 
 
 class Ellipse(SmoothSection):
-    """An ellipse of rock.
+    """An ellipse of rock, ``|A v + B v̄| ≤ ρ`` with v = q − c for points q.
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ class Ellipse(SmoothSection):
     linear : tuple of complex
         A and B.
     rho : float
-        ρ.
+        ρ, radius of the disc that A and B map the ellipse to.
     size : float
-        What distances from the disc are multiplied by.
+        Factor from distances to that disc to approximate distances to the ellipse [m].
     """
 
     def __init__(
@@ -214,7 +214,7 @@ class Ellipse(SmoothSection):
 def arc(
     centre: complex, axes: tuple[complex, complex], most: float, reach: float, spacing: float
 ) -> Complexes:
-    """Return places centre + e₁ sin φ − e₂ cos φ, dense where they are within reach, |φ| ≤ most.
+    """Return points centre + e₁ sin φ − e₂ cos φ of an ellipse, dense where they are within reach.
 
     Parameters
     ----------
@@ -223,9 +223,11 @@ def arc(
     axes : tuple of complex
         e₁ and e₂ [m].
     most : float
-        [rad]
-    reach, spacing : float
-        As of `Section.outline` [m].
+        φ goes from −most to most [rad].
+    reach : float
+        Distance from the origin within which points are dense [m].
+    spacing : float
+        Approximate distance of neighbouring points there [m].
     """
 
     def places(turns: Array) -> Complexes:
@@ -242,14 +244,35 @@ def arc(
 
 
 def radii(linear: tuple[complex, complex], rho: float) -> tuple[complex, complex]:
-    """Return what A v + B v̄ = ρ and iρ are v of [m]."""
+    """Return two conjugate half-diameters of the ellipse ``|A v + B v̄| = ρ``, as complex numbers.
+
+    Parameters
+    ----------
+    linear : tuple of complex
+        A and B.
+    rho : float
+        ρ.
+
+    Returns
+    -------
+    tuple of complex
+        The vectors v for which A v + B v̄ is ρ and iρ [m].
+    """
     A, B = linear
     part = rho / (abs(A) ** 2 - abs(B) ** 2)
     return part * (A.conjugate() - B), 1j * part * (A.conjugate() + B)
 
 
 def rock_left(places: Complexes, axes: tuple[complex, complex]) -> Complexes:
-    """Return places of `arc` in the order in which they have the rock on their left."""
+    """Return points of an ellipse in the order in which the ellipse is on their left.
+
+    Parameters
+    ----------
+    places : ndarray of complex
+        Result of `arc`.
+    axes : tuple of complex
+        Half-diameters e₁ and e₂ of the arc.
+    """
     return places if (axes[0].conjugate() * axes[1]).imag > 0.0 else places[::-1]
 
 

@@ -1,14 +1,14 @@
-"""Find where turning faces first meet a boundary of short segments, many at once.
+"""First contact of turning faces with a boundary of short segments, for many faces at once.
 
 A face that turns about a joint at the distance h above it meets such rock first either
 
 (a) at a vertex of the boundary: a vertex at the distance ρ and bearing β from the joint is on the
-    face at ``a = √(ρ² − h²)`` along it, when the phalanx stands at ``θ = β − atan2(h, a)``; or
-(b) with one of its ends, whose circle about the joint cuts a segment of the boundary.
+    face at ``a = √(ρ² − h²)`` along it, when the phalanx is at the angle ``θ = β − atan2(h, a)``;
+(b) or with one of its ends, whose circle about the joint cuts a segment of the boundary.
 
-The first of all these angles is where the face comes to rest. It touches at the lowest point of a
-parabola fitted to the rock near the place that it meets (the place itself, of facets), or in the
-middle of the stretch that touches if that is longer.
+The face comes to rest at the first of all these angles. It touches at the lowest point of a
+parabola fitted to the rock near that contact (at the contact itself, of facets), or in the middle
+of the stretch that touches if that is longer.
 """
 
 from __future__ import annotations
@@ -27,25 +27,27 @@ from hand_models.sections.settings import SECTION_SETTINGS
 __all__ = ["TurningFaces"]
 
 FACE_PARTS: Final = np.linspace(0.0, 1.0, 17)[:, None]
-"""Where along a face that cuts a boundary its distance from the rock is taken."""
+"""Places along a face, as shares of its length, at which its distance from the rock is computed."""
 
 
 Meetings = tuple[Array, Indices]
-"""Where faces, or their ends, first meet a boundary, shape (n,) each: how far the phalanx turns
-till then, infinite if they do not [rad]; and the vertex, or the one after the place of an end."""
+"""First contact of n faces, or of their ends, with a boundary, shape (n,) each: the angle by
+which the phalanx turns until then, infinite without contact [rad]; and the index of the vertex, or
+of the vertex after an end's contact.
+"""
 
 
 class TurningFaces:
-    """Faces that turn over a boundary from an angle on.
+    """Faces that turn over a boundary about n joints, starting at one angle.
 
     Parameters
     ----------
     boundary : Boundary
     joint : ndarray of complex, shape (n,)
-        About which they turn [m].
+        Joints about which the faces turn [m].
     face : Face
     low : float
-        From where on [rad].
+        Angle of the phalanges at the start [rad].
     """
 
     def __init__(self, boundary: Boundary, joint: Complexes, face: Face, low: float) -> None:
@@ -59,9 +61,9 @@ class TurningFaces:
         self._along, self._above = _turned(self._s, self._t, np.array([low]))
 
     def clearances(self) -> Array:
-        """Return how far faces are from the rock where they begin, negative if they cut it [m].
+        """Return the distance of each face from the rock at the start, shape (n,) [m].
 
-        Of those that do not cut it, how far their ends are.
+        Negative where a face cuts the rock; for other faces the distance of the nearer end.
         """
         start, end = self._face[:2]
         along, gap = self._along, self._above - self._face.height
@@ -82,16 +84,22 @@ class TurningFaces:
         return np.asarray(clear)
 
     def contacts(self, high: float, faceted: bool) -> tuple[Array, Array, Flags]:
-        """Return angles and distances at which faces first rest on rock; NaN where they do not.
-
-        And whether they lie flat there.
+        """Return the first contact of each face with the rock.
 
         Parameters
         ----------
         high : float
-            Up to where they turn [rad].
+            Angle up to which the phalanges turn [rad].
         faceted : bool
-            Whether vertices are corners of the rock, not places on a smooth curve.
+            True if vertices are corners of the rock, False if they are places on a smooth curve.
+
+        Returns
+        -------
+        angle, distance : ndarray, shape (n,)
+            Angle of the phalanx [rad], and distance of the contact along it [m]; NaN without
+            contact.
+        flat : ndarray of bool, shape (n,)
+            True where the face lies flat.
         """
         count = len(self._joint)
         angle, distance = np.full((2, count), np.nan)

@@ -1,4 +1,4 @@
-"""Rock in the planes of many fingers as points along its boundary, each with its share of it."""
+"""Rock in the planes of many fingers as points, each of which represents a length of boundary."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ __all__ = ["Outlines"]
 
 
 class Outlines(NamedTuple):
-    """Rock in the planes of n fingers.
+    """Points on the rock in the planes of n fingers: p for each, in blocks of 16.
 
     Attributes
     ----------
     points : ndarray of complex, shape (n, p)
-        s + i t of places on the rock, chain by chain [m].
+        s + i t of places on the rock, chain by chain; a filler is 1 km away [m].
     lengths : ndarray, shape (n, p)
-        Of the rock's boundary that each stands for [m].
+        Length of the rock's boundary that each point represents [m].
     centres : ndarray of complex, shape (n, p / 16)
+        Centre of a bounding circle of each block [m].
     radii : ndarray, shape (n, p / 16)
-        Circles around each 16 points in order (`points_per_circle`) [m].
+        Radius of that circle [m].
     longest : ndarray, shape (n, p / 16)
-        The largest of their lengths [m].
+        Largest of the lengths in each block [m].
     """
 
     points: Complexes
@@ -39,15 +40,16 @@ class Outlines(NamedTuple):
 
     @classmethod
     def of(cls, sections: Sequence[Section | None], reach: float, spacing: float) -> Outlines:
-        """Gather sections, one for each finger; None where there is no rock.
+        """Sample the boundaries of sections, one for each finger.
 
         Parameters
         ----------
         sections : sequence of Section or None, length n
+            None for a finger without rock.
         reach : float
-            How far from the origin rock counts [m].
+            Distance from the origin beyond which rock is left out [m].
         spacing : float
-            Of the points, at most [m].
+            Largest distance between neighbouring points [m].
         """
         block = SECTION_SETTINGS.points_per_circle
         taken = [_points(section, reach, spacing) for section in sections]

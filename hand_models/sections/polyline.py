@@ -1,8 +1,8 @@
-"""Rock in a finger's plane whose surface is a chain of short straight pieces.
+"""Sections bounded by polylines: rock in a finger's plane whose surface is many straight pieces.
 
-Its boundary is one or more polylines, open or closed, that have the rock on their left (turning
-from s toward t), convex or not. How far places are from it `hand_models.sections.boundary` finds,
-and where a face that turns first meets it `hand_models.sections.first_contact`.
+The boundary is one or more polylines, open or closed, that have the rock on their left (turning
+from s toward t), convex or not. `hand_models.sections.boundary` finds distances from it, and
+`hand_models.sections.first_contact` finds where a turning face first meets it.
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ __all__ = ["PolylineSection"]
 
 
 class Rests(NamedTuple):
-    """Faces that turn until they rest on the rock, shape (n,) each.
+    """Contacts of n faces that turn until they rest on the rock, shape (n,) each.
 
     Attributes
     ----------
     angle, distance : ndarray
-        As of `Rest`; NaN where a face meets no rock [rad, m].
+        Angle of the phalanx from s toward t [rad], and distance of the contact from the joint,
+        along the phalanx [m]; NaN where a face meets no rock.
     flat : ndarray of bool
-        Whether it lies flat.
+        True where the face lies flat.
     blocked : ndarray of bool
-        Whether there is rock in its way from the first; the others mean nothing then.
+        True where the face cuts rock before it turns; the other arrays mean nothing there.
     """
 
     angle: Array
@@ -48,11 +49,11 @@ class PolylineSection(Section):
     Parameters
     ----------
     pieces : sequence of ndarray, shape (n, 2)
-        Points (s, t) in order, each unlike the one before it; a closed piece ends where it begins.
-        Where an open one ends, rock ends: nothing is touched beyond [m].
+        Points (s, t) in order, each different from the one before it; a closed piece ends where it
+        begins. Rock ends where an open piece ends: nothing is touched beyond [m].
     faceted : bool, optional
-        Whether the points are corners of the rock, not places on a smooth curve, so that what rests
-        on a corner touches there and not at the lowest place of a fit.
+        True if the points are corners of the rock: a contact is then at the corner itself. False if
+        they are places on a smooth curve: a contact is at the lowest place of a fitted parabola.
     """
 
     def __init__(self, pieces: Sequence[Array], *, faceted: bool = False) -> None:
@@ -61,7 +62,7 @@ class PolylineSection(Section):
 
     @cached_property
     def boundary(self) -> Boundary:
-        """Boundary of the line, made when first used; `highest` alone does not need it."""
+        """Search structure of the polylines, made when first used; `highest` does not need it."""
         return Boundary(self.pieces)
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:
@@ -71,7 +72,16 @@ class PolylineSection(Section):
         return Rest(float(found.angle[0]), float(found.distance[0]), bool(found.flat[0]))
 
     def rests(self, joints: Complexes, face: Face, low: float, high: float) -> Rests:
-        """Return what `rest` does for joints (n,)."""
+        """Return the first contacts of faces that turn about n joints; see `rest`.
+
+        Parameters
+        ----------
+        joints : ndarray of complex, shape (n,)
+            [m]
+        face : Face
+        low, high : float
+            Angle of the phalanges from which they turn, and up to which [rad].
+        """
         with np.errstate(invalid="ignore", divide="ignore"):
             faces = TurningFaces(self.boundary, joints, face, low)
             angle, distance, flat = faces.contacts(high, self.faceted)
@@ -97,7 +107,18 @@ class PolylineSection(Section):
         return out.real, out.imag
 
     def highest(self, low: Array, high: Array) -> Array:
-        """Return the least t of the rock between values of s, (n,); infinite if there is none."""
+        """Return the least t of the rock in each of n windows of s.
+
+        Parameters
+        ----------
+        low, high : ndarray, shape (n,)
+            Bounds of the windows, low ≤ s ≤ high [m].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Infinite for a window without rock [m].
+        """
         least = np.full(len(low), math.inf)
         # what all windows hold is looked at once, and what none does not at all
         inner, outer = (low.max(), high.min()), (low.min(), high.max())

@@ -1,12 +1,12 @@
-"""Rock in a finger's plane: what settling asks of it.
+"""The rock in a finger's plane: base class of sections, and the contact of a turning phalanx.
 
-A section has coordinates (s, t), t growing into the rock; places in it are complex numbers s + i t
-[m], and directions complex numbers of length one. Its rock is the cut of a smooth hold, a
-half-plane, a disc, an ellipse or one of these swept along two faces
-(`hand_models.sections.smooth`), or it is known by polylines (`hand_models.sections.polyline`).
+A section has coordinates (s, t), t growing into the rock; places are complex numbers s + i t [m],
+directions complex numbers of length one, and angles grow from s toward t [rad]. The rock is the cut
+of a smooth hold (a half-plane, a disc, an ellipse or one of these swept along two faces,
+`hand_models.sections.smooth`), or is bounded by polylines (`hand_models.sections.polyline`).
 
-Settling asks one question: at which angle does the face of a phalanx that turns about its joint
-first meet the rock (`Section.rest`).
+`Section.rest` finds the angle at which the face of a phalanx that turns about its joint first meets
+the rock.
 """
 
 from __future__ import annotations
@@ -32,16 +32,17 @@ Flags = NDArray[np.bool_]
 
 
 class Face(NamedTuple):
-    """The face of a phalanx, on the side of the rock.
+    """The face of a phalanx, on the side of the rock: a straight line parallel to the phalanx.
 
     Attributes
     ----------
     start, end : float
-        Where along the phalanx it begins and ends [m].
+        Distances along the phalanx, from its joint, at which the face begins and ends [m].
     height : float
-        Of it above the phalanx [m].
+        Distance of the face from the phalanx's axis [m].
     level : float
-        How near the rock both ends are for it to lie flat [m].
+        Distance from the rock up to which both ends count as touching, so that the face lies flat
+        [m].
     """
 
     start: float
@@ -51,16 +52,17 @@ class Face(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """A face at rest on the rock.
+    """Contact of a face that has turned until it rests on the rock.
 
     Attributes
     ----------
     angle : float
-        Of the phalanx, from the section's first axis toward its second [rad].
+        Angle of the phalanx from the section's s axis toward t [rad].
     distance : float
-        Of the contact from the joint, along the phalanx; the face's middle if it lies flat [m].
+        Distance of the contact from the joint, along the phalanx; the face's middle if it lies
+        flat [m].
     flat : bool
-        Whether the face lies flat, so that it touches all along.
+        True if the face lies flat, so that its whole length touches.
     """
 
     angle: float
@@ -69,63 +71,83 @@ class Rest(NamedTuple):
 
 
 class Section(ABC):
-    """Rock in a plane with coordinates (s, t); t grows into the rock."""
+    """The rock in a plane with coordinates (s, t); t grows into the rock."""
 
     @abstractmethod
     def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
-        """Return the boundary of the rock as chains of points s + i t, rock on their left [m].
+        """Return the boundary of the rock as chains of points s + i t, with rock on their left [m].
 
         Parameters
         ----------
         reach : float
-            From the origin; what is farther off may be missing [m].
+            Distance from the origin beyond which rock may be left out [m].
         spacing : float
-            Of points along curved rock, about [m].
+            Approximate distance of neighbouring points on curved rock [m].
         """
 
     @abstractmethod
     def distance(self, point: complex) -> float:
-        """Return about how far a point is from the rock, negative inside [m].
+        """Return the approximate signed distance of a point s + i t from the rock [m].
 
-        Exact on flat and round sections, and everywhere its sign is.
+        Negative inside. The distance is exact on flat and round sections, its sign on all.
         """
 
     @abstractmethod
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:
-        """Return where a face first meets the rock as its phalanx turns.
+        """Return the contact at which a face first meets the rock as its phalanx turns.
 
         Parameters
         ----------
         joint : complex
-            About which the phalanx turns [m].
+            Joint about which the phalanx turns [m].
         face : Face
         low, high : float
-            The angle grows from one to the other; at ``low`` the face is free [rad].
+            Angle of the phalanx from which it turns, and up to which; at ``low`` the face is clear
+            of the rock [rad].
 
         Returns
         -------
         Rest or None
-            None if it meets no rock on its way.
+            None if the face meets no rock up to ``high``.
         """
 
     def clearance(self, point: Vector2) -> float:
-        """Return `distance` of a point (s, t) [m]."""
+        """Return the approximate signed distance of a point (s, t) from the rock [m]."""
         return self.distance(complex(*point))
 
     def clearances(self, places: Complexes) -> Array:
-        """Return the distances of places (...) from the rock [m]."""
+        """Return the signed distance of each of several places from the rock, negative inside.
+
+        Parameters
+        ----------
+        places : ndarray of complex
+            s + i t [m].
+
+        Returns
+        -------
+        ndarray
+            Of the places' shape; approximate, as `distance` [m].
+        """
         return np.array(list(map(self.distance, places.ravel().tolist()))).reshape(places.shape)
 
     def face_clearance(self, joint: complex, u: complex, face: Face) -> float:
-        """Return about how far the face of a phalanx along u is from the rock [m].
+        """Return the approximate distance between the rock and the face of a phalanx [m].
 
-        Negative where it cuts into it.
+        Negative where the face cuts into the rock.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint of the phalanx, s + i t [m].
+        u : complex
+            Unit direction of the phalanx.
+        face : Face
         """
         along = np.linspace(face.start, face.end, 9).tolist()
         return min(self.distance(joint + complex(a, face.height) * u) for a in along)
 
     def normal(self, point: Vector2) -> Vector2:
-        """Return the unit vector out of the rock at the place nearest a point."""
+        """Return the unit vector (s, t) out of the rock at the place nearest a point (s, t)."""
         s, t = point
         step = 1e-7  # [m] of the gradient's differences
         ds = self.clearance((s + step, t)) - self.clearance((s - step, t))

@@ -1,15 +1,15 @@
-"""Rock in a finger's plane, where it cuts a smooth hold: convex, and bounded by a curve.
+"""Sections of smooth holds: convex rock in a finger's plane, bounded by a curve.
 
-Hands that close ask some hundred times how a phalanx comes to it (`SmoothSection.turned`), so it is
-put to plain numbers. That is answered from two simpler questions,
+Closing a hand asks some hundred times where a phalanx meets such rock (`SmoothSection.turned`), so
+the code uses plain numbers. Two simpler functions answer,
 
 ``tangent``
-    in which direction of a phalanx the whole line of its face touches the curved part of the rock,
+    the direction of a phalanx in which the line of its face touches the curved part of the rock,
 ``entries``
-    in which directions a given point that turns about the joint enters the rock.
+    the directions in which a given point that turns about the joint enters the rock.
 
-Here are the kinds that need no more than a circle or a line; the others are in
-`hand_models.sections.ellipses` and `hand_models.sections.swept_cuts`.
+Here are the discs and the half-planes; the other sections are in `hand_models.sections.ellipses`
+and `hand_models.sections.swept_cuts`.
 """
 
 from __future__ import annotations
@@ -26,10 +26,14 @@ from hand_models.sections.section import Complexes, Face, Rest, Section
 __all__ = ["Disc", "SmoothSection", "Wall", "into_circle", "past_circle", "to_face"]
 
 Tangent = tuple[complex, float]
-"""Direction of a phalanx whose face's line touches the rock, and how far along it that is [m]."""
+"""Direction of a phalanx whose face's line touches the rock, and the contact's distance along the
+phalanx [m].
+"""
 
 Turned = tuple[float, complex, float, bool]
-"""How far a phalanx turns till it rests [rad], its direction and its contact, and if it is flat."""
+"""Angle by which a phalanx turns until its face rests [rad], the phalanx's direction, the contact's
+distance along it [m], and True if the face lies flat.
+"""
 
 
 class SmoothSection(Section):
@@ -38,9 +42,9 @@ class SmoothSection(Section):
     Attributes
     ----------
     faced : bool
-        Whether it has flat faces.
+        True if the rock has flat faces.
     skew : bool
-        Whether the plane runs nearly along the axis of what it cuts.
+        True if the plane is nearly parallel to the axis of the shape that it cuts.
     """
 
     faced = False
@@ -48,27 +52,75 @@ class SmoothSection(Section):
 
     @abstractmethod
     def tangent(self, joint: complex, height: float) -> Tangent | None:
-        """Return where a turning phalanx first touches the curved rock with its face's line."""
+        """Return the tangent to the curved rock of the face's line as the phalanx turns.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint about which the phalanx turns [m].
+        height : float
+            Distance of the face from the phalanx's axis [m].
+
+        Returns
+        -------
+        tuple of (complex, float), or None
+            Direction of the phalanx, and the contact's distance along it [m]; None without tangent.
+        """
 
     @abstractmethod
     def entries(self, joint: complex, arm: float) -> list[complex]:
-        """Return the directions in which a point that turns about a joint enters the rock."""
+        """Return the directions in which a point that turns about a joint enters the rock.
+
+        Parameters
+        ----------
+        joint : complex
+            s + i t [m].
+        arm : float
+            Distance of the point from the joint [m].
+
+        Returns
+        -------
+        list of complex
+            Unit vectors from the joint to the places of entry; empty if the point meets no rock.
+        """
 
     def partings(self, joint: complex, u: complex, face: Face) -> Iterator[complex]:
-        """Yield normals, into the rock, of lines that part it from the face of a phalanx along u.
+        """Yield separating lines between the rock and the face of a phalanx, by their normals.
 
-        As far as is known without search.
+        Only lines that are known without search are tried.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint of the phalanx, s + i t [m].
+        u : complex
+            Unit direction of the phalanx.
+        face : Face
+
+        Yields
+        ------
+        complex
+            Unit normal of a line, into the rock.
         """
         return iter(())
 
     def clear(self, joint: complex, u: complex, face: Face) -> bool:
-        """Return True if the face of a phalanx along u is clear of the rock."""
+        """Return True if the face of a phalanx does not touch the rock.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint of the phalanx, s + i t [m].
+        u : complex
+            Unit direction of the phalanx.
+        face : Face
+        """
         for _ in self.partings(joint, u, face):
             return True
         return self.face_clearance(joint, u, face) > 0.0
 
     def straight(self, point: complex) -> bool:
-        """Return True if the rock beside a point is straight: a face may lie flat on it."""
+        """Return True if the rock beside a point s + i t is flat: a face may lie flat there."""
         return False
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:
@@ -76,7 +128,24 @@ class SmoothSection(Section):
         return None if found is None else Rest(low + found[0], found[2], found[3])
 
     def turned(self, joint: complex, face: Face, low: complex, span: float) -> Turned | None:
-        """Return where a phalanx that turns by up to ``span`` from ``low`` rests, if it does."""
+        """Return the first contact of a face as its phalanx turns from ``low`` by up to ``span``.
+
+        Parameters
+        ----------
+        joint : complex
+            Joint about which the phalanx turns [m].
+        face : Face
+        low : complex
+            Direction of the phalanx at the start, of length one.
+        span : float
+            Largest angle of turning [rad].
+
+        Returns
+        -------
+        tuple of (float, complex, float, bool), or None
+            Angle turned [rad], the phalanx's direction, the contact's distance along it [m], and
+            True if the face lies flat; None if the face meets no rock.
+        """
         tangent = self.tangent(joint, face.height)
         if tangent is not None:
             u, along = tangent
@@ -118,7 +187,15 @@ class SmoothSection(Section):
 
 
 class Disc(SmoothSection):
-    """A disc of rock."""
+    """A disc of rock.
+
+    Parameters
+    ----------
+    centre : complex
+        [m]
+    radius : float
+        [m]
+    """
 
     def __init__(self, centre: complex, radius: float) -> None:
         self.centre, self.radius = centre, radius
@@ -163,9 +240,9 @@ class Wall(SmoothSection):
     Parameters
     ----------
     into : complex
-        Direction into the rock.
+        Unit direction into the rock.
     offset : float
-        How far the origin is from it [m].
+        Distance of the origin from the rock [m].
     """
 
     faced = True
@@ -203,7 +280,21 @@ class Wall(SmoothSection):
 
 
 def past_circle(away: complex, offset: float) -> Tangent | None:
-    """Return the direction, and how far, to where a line passes a centre at an offset."""
+    """Return the direction of a line from a joint that passes a circle's centre at an offset.
+
+    Parameters
+    ----------
+    away : complex
+        Vector from the joint to the centre [m].
+    offset : float
+        Distance of the line from the centre, which is on its left (s toward t) [m].
+
+    Returns
+    -------
+    tuple of (complex, float), or None
+        Unit direction, and the distance along the line to the place nearest the centre [m]; None
+        if the centre is not farther than the offset.
+    """
     distance = abs(away)
     if distance <= offset:
         return None
@@ -212,7 +303,20 @@ def past_circle(away: complex, offset: float) -> Tangent | None:
 
 
 def into_circle(away: complex, radius: float, arm: float) -> complex | None:
-    """Return the direction in which a point that turns enters a circle about a centre."""
+    """Return the direction in which a point that turns about a joint enters a circle.
+
+    Parameters
+    ----------
+    away : complex
+        Vector from the joint to the circle's centre [m].
+    radius, arm : float
+        Radius of the circle, and distance of the point from the joint [m].
+
+    Returns
+    -------
+    complex or None
+        Unit direction from the joint; None if the point's path does not meet the circle.
+    """
     distance = abs(away)
     if arm * distance == 0.0:
         return None
@@ -223,7 +327,21 @@ def into_circle(away: complex, radius: float, arm: float) -> complex | None:
 
 
 def to_face(away: complex, u: complex, face: Face) -> complex:
-    """Return the way to a centre from the place of a face nearest it, in the phalanx's axes."""
+    """Return the vector to a centre from the place of a face nearest to it.
+
+    Parameters
+    ----------
+    away : complex
+        Vector from the joint to the centre [m].
+    u : complex
+        Unit direction of the phalanx.
+    face : Face
+
+    Returns
+    -------
+    complex
+        In the phalanx's axes: along it, and i times the component across it [m].
+    """
     place = u.conjugate() * away
     along = place.real
     nearest = face.start if along < face.start else face.end if along > face.end else along

@@ -1,7 +1,7 @@
 """Smooth holds in one form: a ball, stretched along the axes, that is swept along two faces.
 
 With x from the hold's frame, its centre c at (0, 0, depth) and the scales S on the diagonal, the
-rock is every point y that a point of the ball ``|S (x − c)| ≤ radius`` gets to along the directions
+rock is every point that a point of the ball ``|S (x − c)| ≤ radius`` reaches along the directions
 of the faces, (± sine, 0, cosine):
 
 - a ball and a boulder have no faces;
@@ -9,8 +9,7 @@ of the faces, (± sine, 0, cosine):
 - an edge is a log swept along its two faces;
 - a wall is an edge of half a turn whose log has no size, and of which only z counts.
 
-So what many holds ask is the same arithmetic, whatever their kinds: where a line enters them, and
-which rock they have in a finger's plane.
+So the same arithmetic casts rays into all these holds, and cuts them with a finger's plane.
 """
 
 from __future__ import annotations
@@ -33,23 +32,24 @@ Vector3 = Sequence[float]
 """Three numbers."""
 
 FingerPlane = tuple[float, float, float, float, float, float, float, float, float]
-"""Axes of a finger's plane, along the finger and into the rock, and its origin from the centre of
-the hold's ball, all scaled."""
+"""Nine numbers: axes of a finger's plane, along the finger and into the rock, and its origin from
+the centre of the hold's ball, all multiplied by the scales.
+"""
 
 
 class Swept(NamedTuple):
-    """A smooth hold.
+    """Numbers of a smooth hold: a ball, scaled along the axes, that is swept along two faces.
 
     Attributes
     ----------
     scale_x, scale_y, scale_z : float
-        S; of an ellipsoid in 1/m, of others 1, or 0 for what does not count.
+        Scales S: 1/m for an ellipsoid; for other holds 1, or 0 for a coordinate without effect.
     depth : float
-        Of the ball's centre [m].
+        z of the ball's centre in the hold's frame [m].
     radius : float
-        Of the scaled ball; of an ellipsoid 1, of others in m, of a wall 0.
+        Radius of the scaled ball: 1 for an ellipsoid, in m for other holds, 0 for a wall.
     sine, cosine : float
-        Of half the angle between the faces; both 0 where there are none.
+        Sine and cosine of half the angle between the faces; both 0 for a hold without faces.
     grazing : float
         Slope up to which a line counts as parallel to a face.
     """
@@ -65,15 +65,15 @@ class Swept(NamedTuple):
 
 
 def entry_distances(shape: Swept, points: Sequence[Vector3], direction: Vector3) -> list[float]:
-    """Return how far from points, along a unit direction, the rock of a hold begins.
+    """Cast rays: return the distance from each point, along one direction, at which rock begins.
 
     Parameters
     ----------
     shape : Swept
     points : sequence of (float, float, float)
-        From the centre of the hold's ball, scaled.
+        From the centre of the hold's ball, multiplied by the scales.
     direction : (float, float, float)
-        Scaled.
+        A unit vector, multiplied by the scales.
 
     Returns
     -------
@@ -114,7 +114,19 @@ def _entries_of_face(
 
 
 def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
-    """Return the rock in a plane; None if the plane misses it."""
+    """Cut a smooth hold with a finger's plane, and return the rock in the plane.
+
+    Parameters
+    ----------
+    shape : Swept
+    plane : tuple of float, length 9
+        See `FingerPlane`.
+
+    Returns
+    -------
+    SmoothSection or None
+        None if the plane misses the rock.
+    """
     a, b, c, d, e, f, x, y, z = plane
     if not shape.radius:
         steep = math.hypot(c, f)

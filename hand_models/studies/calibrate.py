@@ -1,18 +1,18 @@
-"""One set of the gripper's numbers for Figs. 12 to 14, found globally, and what else they allow.
+"""Calibration: fit the gripper's parameters to Figs. 12 to 14, and find what else the data allow.
 
-What of the gripper is not published is searched, each number within what is plausible, by CMA-ES
-(Hansen, *The CMA evolution strategy: a tutorial*, 2016) from several starts: the recorded set, and
-sets at random. It makes least
+Parameters of the gripper that are not published are searched, each within its plausible range, by
+CMA-ES (Hansen, *The CMA evolution strategy: a tutorial*, 2016) from several starts: the recorded
+set, and sets at random. The objective to minimise is
 
     (Σ r_i⁸)^(1/8) + 0.2 √(mean r_i²),
 
-with r the residuals of `GripperFit` in tolerances, so that the worst count most. All sets that are
-met on the way and whose misfit is at most one meet the data as well as can be known. Of them
-those are kept that are farthest apart: what they leave of a number's plausible range is what the
-data leave of it, and what a plan does over all of them is how sure it is (``draws.toml``).
+with r the residuals of `GripperFit` in tolerances, so that the worst count most. Every set met on
+the way whose misfit is at most one meets the data as well as can be known. Of these sets those
+farthest apart are kept as samples (``draws.toml``): their range of a parameter is what the data
+leave of its plausible range, and a plan's spread over them shows how sure the plan is.
 
-Then the search begins again at the set that was found, with a number held or a datum asked for more
-closely: what each of these costs.
+Then the search begins again at the best set, with a parameter held fixed or a datum required more
+closely, to find what each of these costs.
 """
 
 from __future__ import annotations
@@ -40,19 +40,21 @@ SEARCH_VARIANTS: Final = (
     ("no friction of pressed tiles, T ≥ 0", "friction", 0.0),
     ("side view of Fig. 13 within 2 N", "pull-off at F_x = 40 N", 0.3),
 )
-"""Number that is held and its value, or datum that is asked for within a share of its tolerance."""
+"""Text of each variant of the search; the parameter held and its value, or the datum required more
+closely and the share of its tolerance.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """Sets that a search has met.
+    """Sets of parameters that a search has met, each as shares of plausible ranges.
 
     Attributes
     ----------
     best : ndarray, shape (n,)
-        Where the objective is least.
+        The set with the least objective.
     sets : ndarray, shape (k, n)
-        Those that meet the data.
+        All sets that meet the data: misfit at most one.
     """
 
     best: Array
@@ -69,25 +71,25 @@ def global_search(
     closer: Array | None = None,
     held: dict[int, float] | None = None,
 ) -> Met:
-    """Search the numbers of a gripper by CMA-ES.
+    """Search the parameters of a gripper that fit the data best, by CMA-ES.
 
     Parameters
     ----------
     fit : GripperFit
     start : ndarray, shape (n,)
-        In plausible ranges from 0 to 1.
+        First set, as shares 0 to 1 of plausible ranges.
     spread : float
-        First standard deviation, in the same.
+        First standard deviation, as a share of plausible ranges.
     evaluations : int
-        Sets tried, about.
+        Approximate number of sets to try.
     seed : int
-        Of the random numbers, above 0.
+        Seed of the random numbers, above 0.
     tick : callable
         Called for each set tried.
-    closer : ndarray, optional
-        Of each datum, the share of its tolerance within which it is asked for; 1 by default.
+    closer : ndarray, shape (k,), optional
+        For each of the k data, the share of its tolerance that counts as one; 1 by default.
     held : dict, optional
-        Numbers that are held, by their index, at a value in plausible ranges.
+        Shares of parameters that are held fixed, by their index.
     """
     # a second's work to load, which only this study needs
     import cma
@@ -131,7 +133,15 @@ def global_search(
 
 
 def farthest_apart(sets: Array, count: int) -> list[int]:
-    """Return the indices of sets, each as far as can be from those before it."""
+    """Return indices of sets far apart: the first set, then each farthest from those before.
+
+    Parameters
+    ----------
+    sets : ndarray, shape (k, n)
+        Sets as shares of plausible ranges.
+    count : int
+        Largest number of indices.
+    """
     chosen = [0]
     gaps = np.linalg.norm(sets - sets[0], axis=1)
     while len(chosen) < min(count, len(sets)):
@@ -141,7 +151,11 @@ def farthest_apart(sets: Array, count: int) -> list[int]:
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the gripper's numbers, keep what meets the data, and return what each aim costs."""
+    """Fit the gripper's parameters to Figs. 12 to 14, and keep sets that meet the data.
+
+    The data of the result are the best set's residuals, the kept sets, and the variants of the
+    search with a parameter held or a datum required more closely.
+    """
     fit = GripperFit(gripper_table(hand))
     n, effort = len(fit.numbers), STUDY_SETTINGS
     searched = effort.calibrate_starts * effort.calibrate_evaluations
@@ -282,9 +296,14 @@ def _numbers(fit: GripperFit, x: Array, kept: Array) -> list[dict[str, Any]]:
 
 
 def as_draws(data: Mapping[str, Any]) -> str:
-    """Return the sets of a study's data as what ``draws.toml`` has of them.
+    """Return the kept sets of a study's data as text in the form of ``draws.toml``.
 
-    ``python -m hand_models.studies.calibrate DIR/result.json`` prints it.
+    ``python -m hand_models.studies.calibrate DIR/result.json`` prints the text.
+
+    Parameters
+    ----------
+    data : mapping
+        ``data`` of the study's result, read from ``result.json``.
     """
     sets = data["sets"]
     columns = dict(zip((n["name"] for n in data["numbers"]), _columns(sets), strict=True))
@@ -331,7 +350,7 @@ def _columns(sets: Sequence[Mapping[str, Any]]) -> list[list[float]]:
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw residuals, what the data leave of each number, and what else was asked for."""
+    """Draw the residuals, each parameter's range over the kept sets, and the variants' misfits."""
     figure, (left, middle, right) = panels(
         1, 3, (17.0, 7.0), grid="x", width_ratios=(1.1, 1.2, 0.8)
     )

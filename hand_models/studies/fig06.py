@@ -1,4 +1,4 @@
-"""Fig. 6: two tiles on one tendon; what friction does to the palm's maximum load (Eqs. 1–3)."""
+"""Fig. 6: the effect of friction on the palm's maximum load, two tiles on one tendon (Eqs. 1–3)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,11 @@ Pair = tuple[int, int]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Load every pair of springs with and without friction."""
+    """Compute the palm's maximum load for every pair of springs, with and without friction.
+
+    The gain by friction is also computed over the friction coefficient and over the preload
+    stiffness.
+    """
     experiment = PalmExperiment.from_tables(hand)
     numbers = range(1, len(experiment.springs) + 1)
     pairs = list(itertools.combinations(numbers, 2))
@@ -132,7 +136,7 @@ def _against_equations(experiment: PalmExperiment, pair: Pair) -> tuple[float, f
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the paper's bars, and what the gain depends on."""
+    """Draw the maximum loads as bars, and the gain over friction and preload stiffness."""
     data, text = result.data, StudyText("fig06")
     figure, (bars, over_friction, over_springs) = panels(
         1, 3, (14.0, 4.6), grid="y", width_ratios=(1.2, 1.0, 1.0)

@@ -1,4 +1,4 @@
-"""Fig. 7: four tiles on one tendon, every sequence of springs; where friction helps, where not."""
+"""Fig. 7: the effect of friction with four tiles on one tendon, for every sequence of springs."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ from hand_models.studies.settings import STUDY_SETTINGS
 __all__ = ["plot", "run"]
 
 ROD_VARIANTS: Final = {"tiles": False, "tiles and palm": True}
-"""Where the pulleys are fixed rods, and whether that is the palm's own too."""
+"""Which pulleys are fixed rods; the value is True if the palm's pulleys are rods, too."""
 
 ROD_COLOURS: Final = {"tiles": "tab:blue", "tiles and palm": "tab:orange"}
 
 Loaded = list[dict[str, Any]]
-"""Configurations of springs, with their loads and gains."""
+"""Configurations of springs, each a dictionary with its loads and gains."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Load every sequence (mirror images once) with and without friction, for several k_p."""
+    """Compute the palm's maximum load for every sequence of springs, with and without friction.
+
+    A sequence and its mirror image count once. The gains are also computed for other preload
+    stiffnesses k_p.
+    """
     experiment = PalmExperiment.from_tables(hand)
     numbers = range(1, len(experiment.springs) + 1)
     tried = experiment_table().vector("load_sharing", "springs_tried")
@@ -138,7 +142,7 @@ def _discrepancy_correlations(
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw loads and gains of all sequences, and what the gains depend on."""
+    """Draw the maximum loads and gains of all sequences, and the gains over springs and k_p."""
     return {
         "fig07": _draw_sequences(result.data),
         "fig07-dependence": _draw_dependence(result.data),

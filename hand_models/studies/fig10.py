@@ -1,10 +1,10 @@
 """Fig. 10: the limit curve of one tile on 36-grit sandpaper, simulated, and the laws fitted to it.
 
-Seventy tiles of the spine array are pulled until they let go, five in each of fourteen directions
+Seventy tiles of the spine array are pulled until they fail, five in each of fourteen directions
 of the finger plane, as in Section 6.1. The straight lines of the paper, in φ (Eq. 21) and in
-Cartesian coordinates, are fitted to them and to the array's mean, and held against the planner's
-own law. Also here: the measured strengths from which the array's asperities come, and the surface
-out of the finger plane.
+Cartesian coordinates, are fitted to them and to the array's mean, and compared with the planner's
+law. The study also has the measured strengths from which the array's asperities come, and the
+surface out of the finger plane.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ __all__ = ["plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Simulate the trials, the table of strengths and the surface.
+    """Simulate pulls of tiles on sandpaper, fit the limit curve to them, and check the claims.
 
-    They are of one tile's spines and of the rock, so no number of the hand's matters.
+    All of this concerns one tile's spines and the rock, so no parameter of ``hand`` has an effect.
     """
     surface, array = Surface.named("sandpaper-36"), SpineArray.named("sandpaper-36")
     progress(0, 1)
@@ -143,7 +143,9 @@ def _gaps(surface: Surface) -> list[dict[str, float]]:
 
 
 def hull_over_surface(surface: Surface) -> float:
-    """Return the volume of a surface's convex hull over its own, for T ≥ 0 and N ≤ 0.
+    """Return the ratio of the volume of a limit surface's convex hull to the surface's volume.
+
+    Both volumes are of the part with shear T ≥ 0 and normal load N ≤ 0 (pull-off).
 
     Parameters
     ----------
@@ -200,7 +202,7 @@ def _check(text: StudyText, surface: Surface, array: SpineArray, data: dict[str,
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the limit curve, the table of strengths, and the surface seen from the pull."""
+    """Draw the limit curve of a tile, the table of strengths, and the limit surface."""
     return {
         "fig10": _draw_curve(result.data),
         "fig10_tile_shear": _draw_table(result.data),

@@ -1,9 +1,9 @@
 """Fig. 12: forces on the phalanges while the gripper is pulled straight off, and A of Eq. 7.
 
-Two fingers on a round surface are loaded along −z in small increments until a tile lets go, as in
-Section 6.2. The lines of shear and normal force over the pull are held against values read off the
-paper's figure, to which the gripper was calibrated; how they run, which tile lets go and how far
-the base moves is then a test.
+Two fingers on a round surface are loaded along −z in small increments until a tile exceeds a limit,
+as in Section 6.2. The lines of shear and normal force over the pull are compared with values read
+off the paper's figure, to which the gripper was calibrated; the shape of the lines, the tile that
+fails and the shift of the base are then a test.
 """
 
 from __future__ import annotations
@@ -35,7 +35,10 @@ __all__ = ["balance_matrix", "plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Pull the gripper straight off, and in other directions of (F_x, F_z)."""
+    """Pull the gripper straight off until a tile slips, and record the forces on the phalanges.
+
+    The gripper is also pulled along other directions of (F_x, F_z), for the shift of its base.
+    """
     progress(0, 1)
     table = experiment_table()
     conditions = Conditions.of_figure("fig12")
@@ -102,17 +105,17 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
 def balance_matrix(gripper: Gripper, poses: Array, loads: FingerLoads) -> Array:
     """Return A of Eq. 7 for one finger, A f_c = b, in SI units, shape (m, 6, 6).
 
-    f_c is the force of each of three contacts on the rock, (x, z) in F, proximal first. A takes it
-    to the torques of three joints (Jᵀ; from x toward z) [m], and to the three components along the
-    phalanges (P_x) [1]. Rows of two units: its condition depends on them.
+    f_c is the force of each of three contacts on the rock, (x, z) in the finger's frame F, proximal
+    first. A takes f_c to the torques of three joints (Jᵀ; from x toward z) [m], and to the three
+    components along the phalanges (P_x) [1]. The condition number depends on these two units.
 
     Parameters
     ----------
     gripper : Gripper
     poses : ndarray, shape (m, 3)
-        Without turn or shift along x.
+        Poses (x, z, ω_y) of the wrist, with x = ω_y = 0 [m, m, rad].
     loads : FingerLoads
-        There.
+        Loads of the finger at these poses.
     """
     count = len(PHALANGES)
     spacing = gripper.finger.model.joint_spacing
@@ -182,7 +185,7 @@ def _listed(values: Array) -> str:
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw shear and normal forces over the pull, and the condition of A."""
+    """Draw the phalanges' shear and normal forces over the pull, and the condition number of A."""
     data, slip, text = result.data, result.data["slip"], StudyText("fig12")
     figure, (shear, normal, condition) = panels(1, 3, (14.0, 4.4))
     for axes, kind in ((shear, "shear"), (normal, "normal")):

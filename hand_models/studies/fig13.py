@@ -1,8 +1,9 @@
 """Fig. 13: the wrench space of the gripper on 300 mm, by the procedure of Fig. 9.
 
-The hull of the wrenches of all poses of the wrist that hold, and its part F_z ≤ 0, which the paper
-shows; how well the set linearised at rest stands for it; and how much of the hull a load along a
-straight direction reaches before a tile lets go, since the set itself is not convex.
+The study computes the hull of the wrenches at all poses of the wrist that hold, and its part
+F_z ≤ 0, which the paper shows; how well the set linearised at rest represents the hull; and, since
+the set itself is not convex, the share of the hull that a load along a straight direction reaches
+before a tile exceeds a limit.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ __all__ = ["plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the poses of the wrist, and pull along directions."""
+    """Compute the hull of the gripper's wrenches over poses of the wrist, and pulls to failure."""
     table = experiment_table()
     conditions, numbers = Conditions.of_figure("fig13"), gripper_table(hand)
     gripper = conditions.gripper(numbers)
@@ -226,7 +227,7 @@ def _check(text: StudyText, data: dict[str, Any], table: ParameterTable) -> None
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the hull from aside, from above and along F_x, and the map of pull-off strengths."""
+    """Draw the hull of wrenches from the side, from above and along F_x, and the pull-off map."""
     data, text = result.data, StudyText("fig13")
     figure = Figure(figsize=(14.0, 10.0), layout="constrained")
     points, pulled = data["hull_vertices"], data["pulls"]["wrenches"]

@@ -1,10 +1,10 @@
-"""Fig. 14: which phalanx fails first over the wrench space, and the best planes of loading.
+"""Fig. 14: the phalanx that fails first over the wrench space, and the best planes of loading.
 
 The gripper on surfaces of two diameters is loaded along evenly spread directions with F_z ≤ 0 until
-a tile lets go: each shows which phalanx fails first there. A plane F_x : M_y = const. cuts the hull
-of Fig. 9's procedure in a slice; the best planes are those whose slices hold the greatest force,
-√(F_x² + F_z²), and the greatest moment. A cable anchored a behind the palm loads the plane
-M_y = a F_x.
+a tile fails: each direction shows which phalanx fails first. A plane F_x : M_y = const. cuts the
+hull of Fig. 9's procedure in a slice; the best planes are those whose slices have the greatest
+force, √(F_x² + F_z²), and the greatest moment. A cable anchored at a distance a behind the palm
+loads the plane M_y = a F_x.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = ["loading_planes", "plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Search the wrench spaces, and pull along directions."""
+    """Compute failing phalanges and best planes of loading for each diameter and tension."""
     table = experiment_table()
     diameters, tension = table.vector("fig14", "diameters"), table.scalar("fig14", "tension")
     larger = max(diameters)
@@ -95,14 +95,22 @@ def _surface(conditions: Conditions, hand: ParameterTable, progress: Progress) -
 
 
 def loading_planes(points: Array) -> dict[str, Any]:
-    """Return what a hull holds in planes M_y = a F_x, and the best of them.
+    """Return the greatest force and moment of a hull in planes M_y = a F_x, and the best planes.
 
-    Both √(F_x² + F_z²) and |M_y| are convex, so that the best are at vertices of the hull.
+    Both √(F_x² + F_z²) and the magnitude of M_y are convex, so that the best are at vertices of the
+    hull.
 
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        Of the part F_z ≤ 0.
+        Wrenches of the part F_z ≤ 0 [N, N, N·m].
+
+    Returns
+    -------
+    dict
+        ``arm``: values of a [m]; ``force`` [N] and ``moment`` [N·m]: the greatest in each plane;
+        ``best_for_force`` and ``best_for_moment``: the best over all planes, with
+        ``arms_as_good``, the range of arms within 1 % of the best.
     """
     size = np.abs(points).max(axis=0)
     turns = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)[1:-1]
@@ -212,7 +220,7 @@ def _check_sizes(text: StudyText, near: dict[str, Any], *others: dict[str, Any])
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the failures over the wrench spaces, and what planes of loading hold."""
+    """Draw the failing phalanges over the wrench spaces, and the force and moment in each plane."""
     surfaces = result.data["surfaces"]
     of_diameters = surfaces[:2]
     return {"fig14": _draw_failures(of_diameters), "fig14_planes": _draw_planes(surfaces)}

@@ -1,9 +1,9 @@
 """Fig. 15: force limits over the tension of the tendons, on 300 and 700 mm of fine concrete.
 
 The shear limit is the largest F_x of the wrench hull with F_z ≤ 0 in the loading plane
-F_x = 50 M_y; beside it stands that of pure shear, F_z = 0, on the same line. The normal limit is
-the largest −F_z of the hull. It lies in that plane, too: the hull is skew symmetric, so beside any
-wrench it has one without F_x and M_y that pulls as hard.
+F_x = 50 M_y; the pure shear limit, beside it, has F_z = 0 on the same line. The normal limit is the
+largest −F_z of the hull. It lies in that plane, too: the hull is skew symmetric, so for every
+wrench it has one without F_x and M_y of the same F_z.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ __all__ = ["plot", "run"]
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Compute the limits at evenly spaced tensions.
+    """Compute the gripper's shear and normal limits at evenly spaced tensions, on both diameters.
 
     Raises
     ------
     InvalidInputError
-        If the gripper does not lie on both surfaces, or holds at no tension.
+        If the gripper's fingers do not lie on both surfaces, or it holds at no tension.
     """
     table = gripper_table(hand)
     settings = experiment_table()
@@ -203,7 +203,7 @@ class _Curve:
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the limits over the tension, dotted where closing alone fails."""
+    """Draw the shear and normal limits over the tension, dotted where closing alone fails."""
     data, tension, text = result.data, result.data["tension"], StudyText("fig15")
     figure, both = panels(1, 2, (12.0, 4.8))
     for axes, force in zip(both, ("shear", "normal"), strict=True):

@@ -1,7 +1,8 @@
 """Fig. 16: force limits over the pulley radii of the middle and the distal joint.
 
 The gripper closes with 46 N on fine concrete, on 300 mm (A) and on 700 mm (B); the proximal radius
-stays. Blue cells fail by closing alone, dark blue ones push themselves off the rock.
+is fixed. In blue cells closing alone overloads a tile; in dark blue cells the gripper ejects
+itself.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ MEASURES_SHOWN: Final[tuple[Measure, ...]] = ("shear", "normal")
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
-    """Compute the maps of both surfaces, and coarser ones at a lower tension."""
+    """Compute maps of the force limits over the pulley radii, on two surfaces at two tensions."""
     table = gripper_table(hand)
     usual = dict(zip(("A", "B"), Conditions.of_fig16(), strict=True))
     tension = experiment_table().scalar("fig16", "lower_tension")
@@ -132,7 +133,7 @@ def _check(text: StudyText, data: dict[str, Any]) -> None:
 
 
 def plot(result: StudyResult) -> dict[str, Figure]:
-    """Draw the maps at the printed tension, and at the lower one."""
+    """Draw the maps of force limits at the printed tension, and at the lower one."""
     return {
         "fig16": _draw(result.data["maps"]),
         "fig16_lower_tension": _draw(result.data["maps_at_lower_tension"]),

@@ -1,8 +1,8 @@
-"""The paper's experiments, run again: figures, data, and every claim of the text held against them.
+"""The paper's experiments, repeated with the model: figures, data, and a test of every claim.
 
 A study is a module of this package with ``run(progress, hand) -> StudyResult`` and
-``plot(result) -> dict[str, Figure]``; ``hand`` is the whole table of the hand, the bundled one or
-one with entries of the caller's. What the model misses stays among the claims as missed.
+``plot(result) -> dict[str, Figure]``; ``hand`` is the table of all parameters of the bundled hand
+or of the caller's. Claims that the model does not confirm stay in the result.
 """
 
 from __future__ import annotations
@@ -42,26 +42,32 @@ STUDY_MODULES: Final[Mapping[str, str]] = {
     },
     "sweep": "hand_models.experiments.sweep",
 }
-"""Modules of the studies by the name of their figure; loaded when asked for."""
+"""Module of each study by the study's name; modules are loaded when needed."""
 
 
 class Study(Protocol):
-    """The functions of a study's module."""
+    """Interface of a study's module."""
 
     def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
-        """Compute everything, for a hand."""
+        """Compute the study's data and check its claims, for a hand's table."""
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
-        """Draw the pictures, by their files' names."""
+        """Draw the study's pictures from its result.
+
+        Returns
+        -------
+        dict of str to Figure
+            By the names of the files, without ending.
+        """
 
 
 def load_study(name: str) -> Study:
-    """Return a study by the name of its figure.
+    """Import and return a study by its name, such as ``fig06``.
 
     Raises
     ------
     InvalidInputError
-        If there is none of that name.
+        If there is no study of that name; the field is ``NAME``.
     """
     if name not in STUDY_MODULES:
         raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDY_MODULES)}", field="NAME")
@@ -69,7 +75,7 @@ def load_study(name: str) -> Study:
 
 
 def as_json(result: StudyResult) -> dict[str, Any]:
-    """Return the content of ``result.json``: lists for arrays, null for what is no number there."""
+    """Return the content of ``result.json``: arrays as lists, NaN as null."""
     return {"v": 1, **msgspec.to_builtins(result, enc_hook=_plain)}
 
 
@@ -86,24 +92,25 @@ def run_study(
     Parameters
     ----------
     name : str or Study
-        One of `STUDY_MODULES`, or a study of the caller's own.
+        A key of `STUDY_MODULES`, or a caller's study.
     folder : Path
         Made if it does not exist.
     progress : Progress
+        Called with (steps done, steps in all).
     hand : ParameterTable, optional
-        All numbers of the hand; the bundled ones by default.
+        All parameters of the hand; the bundled ones by default.
 
     Returns
     -------
     result : StudyResult
-        Its data as in ``result.json``.
+        With the data as ``result.json`` has them.
     files : list of Path
-        ``result.json`` first.
+        Files written, ``result.json`` first.
 
     Raises
     ------
     InvalidInputError
-        If there is no study of that name, or the hand cannot be what the study needs.
+        If there is no study of that name, or the hand does not suit the study.
     OSError
         If the folder cannot be made or written to.
     """

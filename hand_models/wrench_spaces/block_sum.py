@@ -1,4 +1,4 @@
-"""The sum of a wrench space's blocks: its facets and vertices, wrench rows left aside."""
+"""The Minkowski sum of a wrench space's blocks: its facets and vertices, without wrench rows."""
 
 from __future__ import annotations
 
@@ -28,14 +28,15 @@ __all__ = ["Block", "BlockSum", "Sizes", "coupled_columns"]
 
 
 class Block(NamedTuple):
-    """The polytope of a few coupled columns.
+    """The polytope { y : A y ≤ b } of a few coupled columns.
 
     Attributes
     ----------
     columns : ndarray of int, shape (d,)
+        Indices of the columns in the wrench space.
     vertices : ndarray, shape (n, d)
     A, b : ndarray, shapes (k, d), (k,)
-        Rows that are enough for it; in more than two columns those of its facets.
+        Rows that are enough to describe the polytope; in more than two columns its facets.
     """
 
     columns: Indices
@@ -45,7 +46,18 @@ class Block(NamedTuple):
 
 
 def coupled_columns(used: NDArray[np.bool_]) -> list[Indices]:
-    """Return the columns in groups that rows couple, from which row (k, m) uses which column."""
+    """Group columns that rows couple, directly or through others (connected components).
+
+    Parameters
+    ----------
+    used : ndarray of bool, shape (k, m)
+        True where a row has a coefficient for a column.
+
+    Returns
+    -------
+    list of ndarray of int
+        Column indices of each group.
+    """
     if not used.shape[1]:
         return []
     incidence = scipy.sparse.csr_array((used.T.astype(int) @ used.astype(int)) > 0)
@@ -54,14 +66,15 @@ def coupled_columns(used: NDArray[np.bool_]) -> list[Indices]:
 
 
 class Sizes(NamedTuple):
-    """Numbers of candidate vertices and half-spaces of a set, known beforehand.
+    """Numbers of candidate vertices and half-spaces of a set, known before they are computed.
 
     Attributes
     ----------
     vertices : int
-        Candidates, of which some are vertices.
+        Number of candidates; some of them are vertices.
     half_spaces : int
-        About so many half-spaces, or candidates for vertices where these are needed, too.
+        Approximate number of half-spaces; where wrench rows clip the set, the number of
+        candidate vertices if that is larger.
     """
 
     vertices: int
@@ -69,15 +82,16 @@ class Sizes(NamedTuple):
 
 
 class BlockSum:
-    """Minkowski sum of the images of blocks of coupled columns.
+    """Minkowski sum of the polytopes of blocks, each mapped to wrenches by V.
 
     Parameters
     ----------
     origin : ndarray, shape (6,)
-        o [N, N·m].
+        o, the wrench at zero load [N, N·m].
     generators : ndarray, shape (6, m)
-        V.
+        V, the wrench per unit of each load.
     blocks : sequence of Block
+        Blocks of the wrench space; each column is in one block at most.
     """
 
     def __init__(self, origin: Array, generators: Array, blocks: Sequence[Block]) -> None:
@@ -94,22 +108,29 @@ class BlockSum:
 
     @property
     def base(self) -> Array:
-        """A scaled wrench of the set."""
+        """A scaled wrench of the set, shape (6,) [N]: the origin of coordinates along `axes`."""
         start = self.origin * WRENCH_SCALE
         return np.asarray(sum((summand.points[0] for summand in self._summands), start=start))
 
     @cached_property
     def axes(self) -> tuple[Array, Array]:
-        """Directions (r, 6) of the affine hull, orthonormal, and the edges' reach along each, (r,).
+        """Axes of the coordinates in which facets and vertices are found (by singular values).
 
-        Facets and vertices are found in coordinates along these, divided by the reach.
+        A coordinate is the product with a direction, divided by the reach.
+
+        Returns
+        -------
+        directions : ndarray, shape (r, 6)
+            Orthonormal directions of the affine hull, in scaled wrenches.
+        reach : ndarray, shape (r,)
+            Size of the blocks' edges along each direction [N].
         """
         edges = [s.points[1:] - s.points[0] for s in self._summands if s.dimension]
         return affine_hull(np.vstack([np.zeros((0, 6)), *edges]))
 
     @property
     def sizes(self) -> Sizes:
-        """Numbers of candidate vertices and half-spaces of the sum."""
+        """Numbers of candidate vertices and half-spaces of the sum, from the blocks alone."""
         parts, r = [s for s in self._summands if s.dimension], len(self.axes[1])
         candidates = math.prod(len(part.points) for part in parts)
         if self._whole is not None:
@@ -147,12 +168,26 @@ class BlockSum:
 
     @property
     def rounding(self) -> float:
-        """Distance that rounding may move points in coordinates of `axes`: more in a thin set."""
+        """Largest distance by which rounding may move a point, in coordinates along `axes`.
+
+        The distance is larger for a thin set.
+        """
         reach = self.axes[1]
         return max(SETTINGS.tolerance, 16.0 * np.finfo(float).eps * float(reach[0] / reach[-1]))
 
     def extreme(self, slopes: Array) -> Array:
-        """Return the loads y, shape (m,), with the largest slopes · y in the sum."""
+        """Return the loads with the largest product slopes · y over the sum (support mapping).
+
+        Parameters
+        ----------
+        slopes : ndarray, shape (m,)
+            Value of a unit of each load.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            Loads y.
+        """
         y = np.zeros(self.generators.shape[1])
         for columns, vertices, *_ in self.blocks:
             y[columns] = vertices[(vertices @ slopes[columns]).argmax()]
@@ -160,7 +195,13 @@ class BlockSum:
 
     @cached_property
     def facets(self) -> Facets:
-        """Facets of the sum of the blocks, without wrench rows."""
+        """Facets of the sum, in coordinates along `axes` about `base`.
+
+        Raises
+        ------
+        LimitError
+            If the sum has too many candidate vertices.
+        """
         parts, r = self._parts(), len(self.axes[1])
         if r == 0:
             return Facets(np.zeros((0, 0)), np.zeros(0))
@@ -177,7 +218,13 @@ class BlockSum:
 
     @cached_property
     def vertices(self) -> Array:
-        """Vertices of the sum of the blocks, without wrench rows."""
+        """Vertices of the sum, shape (n, r), in coordinates along `axes` about `base`.
+
+        Raises
+        ------
+        LimitError
+            If the sum has too many candidate vertices.
+        """
         parts = self._parts()
         if not parts:
             return np.zeros((1, 0))

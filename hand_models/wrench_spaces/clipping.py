@@ -1,4 +1,4 @@
-"""Polytopes cut with half-spaces, vertex by vertex and edge by edge."""
+"""Clip polytopes with half-spaces, given their vertices and facets."""
 
 from __future__ import annotations
 
@@ -16,25 +16,26 @@ __all__ = ["clipped"]
 def clipped(
     vertices: Array, faces: Facets, cuts: Facets, rounding: float
 ) -> tuple[Array, Facets] | None:
-    """Return the vertices (n, r) and facets of a polytope that is cut with half-spaces.
+    """Clip a polytope with half-spaces, and return its vertices and facets.
 
-    One after another: vertices beyond a cut go, and every edge that crosses it gets a new one. Two
-    vertices are the ends of an edge where the normals of the facets that both lie on span all
-    directions but one.
+    Half-spaces are taken one after another: vertices beyond one are dropped, and every edge that
+    crosses its plane gets a new vertex. Two vertices are the ends of an edge where the normals of
+    the facets that both lie on span all directions but one.
 
     Parameters
     ----------
     vertices : ndarray, shape (n, r)
-    faces : Faces
+    faces : Facets
         All facets of the polytope.
-    cuts : Faces
+    cuts : Facets
+        Half-spaces, normals · x ≤ offsets, that clip the polytope.
     rounding : float
-        How far rounding may move points.
+        Distance that rounding may move points, in units of the vertices.
 
     Returns
     -------
-    tuple or None
-        None if nothing, or nothing with an interior, is left.
+    tuple of (ndarray, Facets), or None
+        Vertices (k, r) and facets; None if no interior is left.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Convex sets as half-spaces: facets in a set's own coordinates, and back from these.
+"""Convex sets as half-spaces: facets in coordinates of the set's affine hull, and back to wrenches.
 
-A set may be thin, or flat. Its facets are found in coordinates along its affine hull in which it is
-round, and lifted from there.
+A set may be thin, or flat. Its facets are found in scaled coordinates of its affine hull, in which
+it is about as wide in every direction, and mapped back from there.
 """
 
 from __future__ import annotations
@@ -15,11 +15,18 @@ from hand_models.wrench_spaces.settings import SETTINGS
 
 __all__ = ["WRENCH_SCALE", "Facets", "HalfSpaces", "affine_hull", "lifted"]
 WRENCH_SCALE: Final = np.array([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
-"""Factors of a scaled wrench [N]: moments over 0.1 m, about the size of a hand."""
+"""Factors from a wrench to a scaled wrench [N]: moments over 0.1 m, about the size of a hand."""
 
 
 class Facets(NamedTuple):
-    """Facets of a polytope: unit outward normals (k, r), and offsets (k,)."""
+    """Facets of a polytope { x : normals @ x ≤ offsets } in r dimensions.
+
+    Attributes
+    ----------
+    normals : ndarray, shape (k, r)
+        Unit outward normals.
+    offsets : ndarray, shape (k,)
+    """
 
     normals: Array
     offsets: Array
@@ -28,8 +35,14 @@ class Facets(NamedTuple):
 class HalfSpaces(NamedTuple):
     """``normals @ w ≤ offsets`` and, for a flat set, ``equation_normals @ w = equation_offsets``.
 
-    Normals have unit length (those of a `WrenchSpace` as functions of the scaled wrench, so that a
-    violation is a distance [N]).
+    Normals of a `WrenchSpace` have unit length as functions of the scaled wrench, so that a
+    violation is a distance [N].
+
+    Attributes
+    ----------
+    normals, offsets : ndarray, shapes (k, d), (k,)
+    equation_normals, equation_offsets : ndarray, shapes (e, d), (e,)
+        e = 0 for a set that is not flat.
     """
 
     normals: Array
@@ -39,10 +52,20 @@ class HalfSpaces(NamedTuple):
 
 
 def affine_hull(edges: Array) -> tuple[Array, Array]:
-    """Return orthonormal directions (r, d) that edges (n, d) span, and their reach (r,) along each.
+    """Return orthonormal directions that edges span, by singular value decomposition.
 
-    In coordinates along these, divided by the reach, a thin set is as round as any other and the
-    normals of its facets are well apart.
+    In coordinates along these directions, divided by the reach, a thin set is about as wide in
+    every direction, and the normals of its facets are well apart.
+
+    Parameters
+    ----------
+    edges : ndarray, shape (n, d)
+
+    Returns
+    -------
+    directions : ndarray, shape (r, d)
+    reach : ndarray, shape (r,)
+        Singular value along each direction, descending.
     """
     if not len(edges):
         return np.zeros((0, edges.shape[1])), np.zeros(0)
@@ -53,14 +76,21 @@ def affine_hull(edges: Array) -> tuple[Array, Array]:
 
 
 def lifted(faces: Facets, directions: Array, reach: Array, base: Array) -> HalfSpaces:
-    """Return half-spaces of facets known in the coordinates of `affine_hull` about a point.
+    """Map facets from coordinates of `affine_hull` back to the full space.
 
     Parameters
     ----------
-    faces : Faces
-        In r dimensions.
+    faces : Facets
+        In r dimensions, in coordinates divided by the reach, about ``base``.
     directions, reach : ndarray, shapes (r, d), (r,)
+        Result of `affine_hull`.
     base : ndarray, shape (d,)
+        Origin of the coordinates.
+
+    Returns
+    -------
+    HalfSpaces
+        In d dimensions, with d − r equations.
     """
     normals = (faces.normals / reach) @ directions
     lengths = np.linalg.norm(normals, axis=1)

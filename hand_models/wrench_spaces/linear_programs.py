@@ -1,7 +1,4 @@
-"""Linear programs, asked again where a solver's presolve leaves them undecided.
-
-Among them: how far { o + V y : A y ≤ b } reaches.
-"""
+"""Linear programs, solved a second time where the solver's presolve leaves them undecided."""
 
 from __future__ import annotations
 
@@ -18,25 +15,31 @@ __all__ = ["ends_along", "linear_program"]
 def linear_program(
     cost: Array, A: Array, b: Array, what: str, *, tolerance: float | None = None, **more: Any
 ) -> Array | None:
-    """Return the x of min cost · x, A x ≤ b; None where none is possible.
+    """Return the x that minimises cost · x subject to A x ≤ b; None if no x is feasible.
+
+    A program that the solver leaves undecided is retried without presolve.
 
     Parameters
     ----------
     cost : ndarray, shape (n,)
     A, b : ndarray, shapes (k, n), (k,)
     what : str
-        What it is of, for errors.
+        Name of the program, for error messages.
     tolerance : float, optional
-        Of feasibility; the solver's own by default.
+        Feasibility tolerance; the solver's default otherwise.
     **more
-        Of `scipy.optimize.linprog`; x is free where no bounds are given.
+        Keyword arguments of `scipy.optimize.linprog`; x is free where no bounds are given.
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
 
     Raises
     ------
     UnsupportedError
-        If it has no bound.
+        If the objective is unbounded.
     SolverError
-        If it is not decided.
+        If the solver does not decide the program.
     """
     options: Any = {}
     if tolerance is not None:
@@ -64,7 +67,7 @@ def linear_program(
 def ends_along(
     direction: Array, origin: Array, generators: Array, A: Array, b: Array
 ) -> tuple[float, float] | None:
-    """Return the least and the largest t for which t d = o + V y, A y ≤ b has a y; None if none.
+    """Return the least and the largest t for which t d = o + V y has a y with A y ≤ b.
 
     Parameters
     ----------
@@ -74,10 +77,17 @@ def ends_along(
         V.
     A, b : ndarray, shapes (k, m), (k,)
 
+    Returns
+    -------
+    tuple of (float, float), or None
+        None if no t is feasible.
+
     Raises
     ------
+    UnsupportedError
+        If t is unbounded.
     SolverError
-        If a program fails.
+        If the solver does not decide a program.
     """
     m = generators.shape[1]
     equations = np.hstack([generators, -direction[:, None]])

@@ -24,18 +24,30 @@ __all__ = ["Summand", "about_facets", "extreme_points", "facets", "sum_vertices"
 
 
 class Summand(NamedTuple):
-    """Extreme points (n, 6) of one block's image in scaled wrenches; polygons are in order."""
+    """Extreme points of one block's image in wrenches.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, d)
+        Extreme points; those of a polygon in order around it.
+    dimension : int
+        Dimension of their affine hull: 0 for a point, 1 for a segment, 2 for a polygon, …
+    """
 
     points: Array
     dimension: int
 
 
 def extreme_points(image: Array, columns: int) -> Summand:
-    """Return the extreme points of a few points (n, 6), in order around a polygon.
+    """Return the extreme points of the image of a block's vertices under a linear map.
 
-    They are the image of a block's vertices under a linear map of so many columns. Where that is
-    one to one they are all extreme: of many in a space of many dimensions a hull may lose some, as
-    it merges facets that are wide by rounding.
+    Parameters
+    ----------
+    image : ndarray, shape (n, 6)
+        Images of the vertices.
+    columns : int
+        Number of the block's columns. Where the map is one to one on more than two columns, all
+        images are extreme, and no hull is computed: it might merge facets and lose some of them.
     """
     centred = image - image.mean(axis=0)
     size = 1.0 + float(np.abs(image).max())
@@ -55,10 +67,17 @@ def extreme_points(image: Array, columns: int) -> Summand:
 
 
 def about_facets(parts: Sequence[Summand], r: int) -> int:
-    """Return about how many facets a sum of segments and polygons has, from their sizes alone.
+    """Estimate how many facets a Minkowski sum of segments and polygons has, from sizes alone.
 
-    A choice of r − 1 edges spans two facets; an edge of a polygon is extreme along one normal in
-    two. So it is in general position; parallel edges make it fewer.
+    The estimate is for parts in general position: a choice of r − 1 edges spans two facets, and an
+    edge of a polygon is extreme along one normal in two. Parallel edges make fewer facets.
+
+    Parameters
+    ----------
+    parts : sequence of Summand
+        Segments and polygons.
+    r : int
+        Dimension of the sum.
     """
     choices = np.ones(1)
     for part in parts:
@@ -68,20 +87,20 @@ def about_facets(parts: Sequence[Summand], r: int) -> int:
 
 
 def facets(parts: Sequence[Summand], r: int, rounding: float) -> Facets:
-    """Return the facets of a sum of segments and polygons that spans R^r, r ≥ 1.
+    """Return the facets of a Minkowski sum of segments and polygons that spans R^r, r ≥ 1.
 
     A facet is spanned by r − 1 independent edges: one of a segment or polygon, or two (its whole
     plane) of a polygon; an edge counts only where the normal makes it extreme in its polygon. The
-    offset is the support function along the normal, so that no half-space cuts the set, however
-    little its edges differ from dependent ones.
+    offset is the support function along the normal, so that no half-space cuts the set, even
+    where its edges are nearly dependent.
 
     Parameters
     ----------
     parts : sequence of Summand
-        Their points in r dimensions.
+        Segments and polygons with points in r dimensions.
     r : int
     rounding : float
-        How far rounding may move points.
+        Distance that rounding may move points, in units of the points.
     """
     shapes = tuple([(len(part.points), part.dimension) for part in parts])
     ends, whole, choices = _choices(shapes, r)
@@ -177,7 +196,18 @@ def _choices(
 
 
 def sums(parts: list[Summand]) -> Array:
-    """Return every sum of one point of each part, shape (n, r)."""
+    """Return all sums of one point from each part: candidates for the vertices of a Minkowski sum.
+
+    Parameters
+    ----------
+    parts : list of Summand
+        Points in r dimensions.
+
+    Returns
+    -------
+    ndarray, shape (n, r)
+        n is the product of the parts' numbers of points.
+    """
     total = np.zeros((1, parts[0].points.shape[1]))
     for part in parts:
         total = (total[:, None, :] + part.points[None, :, :]).reshape(-1, total.shape[1])
@@ -185,10 +215,19 @@ def sums(parts: list[Summand]) -> Array:
 
 
 def sum_vertices(parts: list[Summand], normals: Array, offsets: Array, rounding: float) -> Array:
-    """Return the vertices (n, r) of a sum, given its facets.
+    """Return the vertices (n, r) of a Minkowski sum, given its facets.
 
-    A sum of points is a vertex if the mean normal of the facets it lies on makes each of them the
-    only highest point of its part.
+    A sum of points is a vertex if the mean normal of the facets it lies on makes each of the
+    points the only highest one of its part.
+
+    Parameters
+    ----------
+    parts : list of Summand
+        Points in r dimensions.
+    normals, offsets : ndarray, shapes (k, r), (k,)
+        Facets of the sum.
+    rounding : float
+        Distance that rounding may move points, in units of the points.
     """
     candidates = sums(parts)
     choice = np.indices([len(part.points) for part in parts]).reshape(len(parts), -1)

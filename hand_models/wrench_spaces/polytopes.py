@@ -1,4 +1,4 @@
-"""Small polytopes: their vertices from their rows, and hulls of points."""
+"""Small polytopes: their vertices from their inequalities, and convex hulls of points."""
 
 from __future__ import annotations
 
@@ -16,10 +16,15 @@ __all__ = ["Polytope", "distinct", "hull", "hull_facets", "polytope"]
 
 
 class Polytope(NamedTuple):
-    """A bounded set { y : A y ≤ b }: its vertices (n, d), none if it is empty, and its facets.
+    """A bounded set { y : A y ≤ b } by its vertices and its facets.
 
-    ``facets``: which rows are enough for it; in more than two dimensions none that could go, in one
-    or two all that touch it.
+    Attributes
+    ----------
+    vertices : ndarray, shape (n, d)
+        None, n = 0, if the set is empty.
+    facets : ndarray of int
+        Rows of A that are enough to describe the set: in more than two dimensions no redundant
+        row, in one or two every row that touches the set.
     """
 
     vertices: Array
@@ -27,7 +32,17 @@ class Polytope(NamedTuple):
 
 
 def polytope(A: Array, b: Array) -> Polytope:
-    """Return { y : A y ≤ b }, bounded, by its vertices and facets."""
+    """Return the vertices and facets of the bounded polytope { y : A y ≤ b } (vertex enumeration).
+
+    Parameters
+    ----------
+    A, b : ndarray, shapes (k, d), (k,)
+
+    Raises
+    ------
+    SolverError
+        If the set is unbounded or, in more than two dimensions, has no interior.
+    """
     d = A.shape[1]
     everything = np.arange(len(b))
     norms = np.linalg.norm(A, axis=1)
@@ -161,7 +176,10 @@ def _irredundant(A: Array, b: Array) -> Indices:
 
 
 def distinct(points: Array, slack: float) -> Array:
-    """Return the points that differ by more than ``slack`` in some coordinate."""
+    """Return points (n, d) without near duplicates.
+
+    Points are duplicates if all their coordinates differ by no more than about 10 ``slack``.
+    """
     if len(points) < 2:
         return points
     # of very many alike the tree would list all pairs
@@ -175,12 +193,18 @@ def distinct(points: Array, slack: float) -> Array:
 
 
 def hull(points: Array, options: str | None = None) -> scipy.spatial.ConvexHull:
-    """Return the convex hull of points (n, r), joggled where it cannot be found exactly.
+    """Return the convex hull of points (n, r); points are joggled where no exact hull is found.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, r)
+    options : str, optional
+        Qhull's options for the first attempt.
 
     Raises
     ------
     SolverError
-        If that fails as well.
+        If the hull of the joggled points fails as well.
     """
     failed = ""
     # not merged where they are wide (Q12), which costs vertices and makes facets that are none
@@ -194,7 +218,13 @@ def hull(points: Array, options: str | None = None) -> scipy.spatial.ConvexHull:
 
 
 def hull_facets(points: Array) -> tuple[Array, Array]:
-    """Return unit normals and offsets of the hull of points (n, r)."""
+    """Return the facets of the convex hull of points (n, r): normals · x ≤ offsets.
+
+    Returns
+    -------
+    normals, offsets : ndarray, shapes (k, r), (k,)
+        Unit outward normals, and their product with the facet's points.
+    """
     if points.shape[1] == 1:
         return np.array([[1.0], [-1.0]]), np.array([points.max(), -points.min()])
     try:

@@ -1,4 +1,4 @@
-"""Numbers of the room of wrench spaces: how much it works through before it gives up."""
+"""Settings of wrench spaces: sizes up to which vertices are listed, and tolerances."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ __all__ = ["SETTINGS"]
 
 @dataclass(frozen=True, slots=True)
 class WrenchSpaceSettings:
-    """Sizes up to which sets are listed, and tolerances that are the room's own."""
+    """Sizes up to which a set's vertices and facets are listed, and tolerances of polytopes."""
 
     tolerance: float = BASE_TOLERANCES.relative
-    """Relative tolerance of the geometry of polytopes, and of what is flat."""
+    """Relative tolerance of the geometry of polytopes; a set thinner than this share is flat."""
     most_rows: int = 250
-    """Coupled rows whose polytope is listed: each takes a linear program."""
+    """Largest number of coupled rows whose polytope is listed: each row takes a linear program."""
     most_pairs: int = 100_000
-    """Pairs of vertices that a cut looks through for edges: 20,000 vertices have some 60,000."""
+    """Largest number of pairs of vertices searched for edges in a cut; see ``pairs_per_vertex``."""
     pairs_per_vertex: int = 5
-    """The same for each vertex, if that is more."""
+    """The largest number of pairs is this many per vertex where that exceeds ``most_pairs``."""
     numbers_at_once: int = 2_000_000
-    """Numbers of a table that is worked through part by part: 16 MB."""
+    """Numbers in one part of a table that is computed part by part: 16 MB."""
     row_clearance: float = 1e-6
-    """Distance by which a row must clear a bounding box to be left out at once."""
+    """Distance by which a redundant row must clear a bounding box to be left out at once."""
 
 
 SETTINGS = WrenchSpaceSettings()

@@ -1,15 +1,14 @@
-"""WrenchSpace: everything that one hand on one hold can exert, as one object with named rows.
+"""WrenchSpace: all wrenches that one hand on one hold can exert, as inequalities with named rows.
 
     { o + V y : L y + l0 ≤ u s,  H y ≤ h }      at utilisation u;   A y ≤ b at u = 1
 
-Its views (vertices, half-spaces, support function, …) are of the set at u = 1. The inequalities of
-a fixed-wrist hand couple no finger to another, so the set is a Minkowski sum of small polytopes,
-one for each block of coupled columns; the views use that, and need no double description. Only
-*wrench rows*, D w ≤ u s, couple all: they are half-spaces of the wrench itself, with which the
-views clip that sum where it reaches beyond them.
+y are the hand's loads. The views (vertices, half-spaces, support function, …) are of the set at
+u = 1. The inequalities of a hand with a fixed wrist couple no finger to another, so the set is a
+Minkowski sum of small polytopes, one for each block of coupled columns; the views use that, and
+need no double description. Only *wrench rows*, D w ≤ u s, couple all columns: they clip that sum.
 
 Directions and distances that mix forces and moments are taken in *scaled* wrenches, whose moments
-are divided by `MOMENT_ARM`, so that all six components are newtons.
+are divided by 0.1 m (`WRENCH_SCALE`), so that all six components are newtons.
 """
 
 from __future__ import annotations
@@ -47,14 +46,14 @@ class Row(NamedTuple):
     Attributes
     ----------
     finger, phalanx : str or None
-        Whose it is; None where it is the palm's, or a whole finger's.
+        Part that the row concerns; None for the palm, the hand, or a whole finger.
     limit : str
-        What it limits.
+        Name of the limited load.
     kind : {'limit', 'hard'}
     label : str
-        Unique in its set.
+        Name that is unique in a wrench space.
     joint : str or None
-        Of the limb that carries the hand, where the limit is that joint's.
+        Joint of the limb that carries the hand, for a limit of that joint.
     """
 
     finger: str | None
@@ -67,25 +66,24 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WrenchSpace:
-    """Wrenches on the rock, in H, that a hand can carry.
+    """All wrenches on the rock, in the hand's frame H, that a hand can exert.
 
     Attributes
     ----------
     origin : ndarray, shape (6,)
-        o [N, N·m].
+        o, the wrench at zero load: force and moment [N, N·m].
     generators : ndarray, shape (6, m)
-        V, a column for each of `columns`.
+        V, the wrench per unit of each load.
     columns : tuple of str, length m
-        Names of the entries of y.
+        Names of the loads y.
     rows : tuple of Row
-        Limit rows, then hard rows.
+        Names of the limit rows, then of the hard rows.
     L, l0, s : ndarray, shapes (nl, m), (nl,), (nl,)
         Limit rows: the load ``L y + l0`` against the capacity ``s`` > 0.
     H, h : ndarray, shapes (nh, m), (nh,)
         Hard rows ``H y ≤ h``, whatever the utilisation.
     D : ndarray, shape (nd, 6), optional
-        Wrench rows: the last nd limit rows have the load D w, so that their L is D V and their l0
-        is D o. None by default.
+        Wrench rows: the last nd limit rows have the load D w (L = D V, l0 = D o). None by default.
     """
 
     origin: Array
@@ -123,20 +121,20 @@ class WrenchSpace:
 
     @property
     def A(self) -> Array:
-        """All rows at u = 1, shape (nl + nh, m)."""
+        """Coefficients A of all rows in A y ≤ b at u = 1, limit rows first, shape (nl + nh, m)."""
         return np.vstack([self.L, self.H])
 
     @property
     def b(self) -> Array:
-        """Right-hand sides at u = 1, shape (nl + nh,)."""
+        """Right-hand sides b of all rows in A y ≤ b at u = 1, limit rows first (nl + nh,)."""
         return np.concatenate([self.s - self.l0, self.h])
 
     def wrench(self, y: ArrayLike) -> Array:
-        """Return o + V y, shape (6,)."""
+        """Return the wrench o + V y, shape (6,) [N, N·m], that loads y, shape (m,), exert."""
         return np.asarray(self.origin + self.generators @ np.asarray(y, dtype=float))
 
     def utilisations(self, y: ArrayLike) -> Array:
-        """Return load over capacity of each limit row, shape (nl,)."""
+        """Return the utilisation (load / capacity) of each limit row (nl,), for loads y (m,)."""
         return np.asarray((self.L @ np.asarray(y, dtype=float) + self.l0) / self.s)
 
     # Views at u = 1 -----------------------------------------------------------------------------
@@ -184,7 +182,7 @@ class WrenchSpace:
 
     @property
     def listed(self) -> bool:
-        """True if rows couple few enough others for their loads' polytopes to be listed."""
+        """True if the blocks of coupled columns have few enough rows to list their vertices."""
         return self._most_rows <= SETTINGS.most_rows
 
     @property
@@ -214,7 +212,7 @@ class WrenchSpace:
 
     @property
     def dimension(self) -> int:
-        """Dimension of the set's affine hull, from 0 to 6."""
+        """Dimension of the set's affine hull at u = 1, from 0 to 6; raises `EmptySetError`."""
         _ = self._cuts  # an empty set has none
         return len(self._sum.axes[1])
 
@@ -272,16 +270,14 @@ class WrenchSpace:
         return self._clipped[1] if len(self._cuts) else self._sum.facets
 
     def sizes(self) -> Sizes:
-        """Return how many vertices and half-spaces `vertices` and `half_spaces` go through.
-
-        This comes before the set is computed, at far less cost.
+        """Return how many candidates `vertices` and `half_spaces` examine, at far less cost.
 
         Raises
         ------
         EmptySetError
-            If nothing is left at u = 1.
+            If the set at u = 1 is empty.
         LimitError
-            If even this is too dear to know.
+            If the blocks have too many rows to list their vertices.
         """
         if not self.listed:
             raise LimitError(
@@ -291,14 +287,14 @@ class WrenchSpace:
         return sizes._replace(half_spaces=max(sizes)) if len(self._cuts) else sizes
 
     def half_spaces(self) -> HalfSpaces:
-        """Return the set at u = 1 as inequalities and, where it is flat, equations.
+        """Return the set at u = 1 as inequalities of the wrench and, where it is flat, equations.
 
         Raises
         ------
         EmptySetError
-            If nothing is left at u = 1.
+            If the set at u = 1 is empty.
         LimitError
-            If the vertices to go through are too many, as `sizes`, or cannot be distinguished.
+            If there are too many candidate vertices (see `sizes`), or rounding hides their edges.
         """
         scaled = lifted(self._facets, *self._sum.axes, self._sum.base)
         return scaled._replace(
@@ -307,7 +303,7 @@ class WrenchSpace:
         )
 
     def vertices(self) -> Array:
-        """Return the extreme wrenches of the set at u = 1 (n, 6); raises as `half_spaces`."""
+        """Return the vertices (n, 6) of the set at u = 1 [N, N·m]; raises as `half_spaces`."""
         directions, reach = self._sum.axes
         return np.asarray(((self._vertices * reach) @ directions + self._sum.base) / WRENCH_SCALE)
 
@@ -317,16 +313,16 @@ class WrenchSpace:
         return self._clipped[0] if len(self._cuts) else self._sum.vertices
 
     def support(self, direction: ArrayLike) -> float:
-        """Return max { d · w : w in the set at u = 1 }, d of shape (6,); raises as `extreme`."""
+        """Return the support function max { d · w } at u = 1, d (6,); raises as `extreme`."""
         return float(finite_vector(direction, 6, "direction") @ self.extreme(direction))
 
     def extreme(self, direction: ArrayLike) -> Array:
-        """Return a wrench w of the set at u = 1 with the largest d · w, for d of shape (6,).
+        """Return the wrench w (6,) in the set at u = 1 with the largest d · w, for d of shape (6,).
 
         Raises
         ------
         EmptySetError
-            If nothing is left at u = 1.
+            If the set at u = 1 is empty.
         SolverError
             If a linear program fails.
         """
@@ -341,7 +337,7 @@ class WrenchSpace:
         return found
 
     def contains(self, wrench: ArrayLike, tolerance: float = 1e-6) -> bool:
-        """Return True if a wrench is in the set at u = 1, or within ``tolerance`` of each face.
+        """Return True if a wrench is in the set at u = 1, within ``tolerance`` of each face.
 
         Parameters
         ----------
@@ -357,7 +353,7 @@ class WrenchSpace:
         return bool(max(beyond, off) <= tolerance)
 
     def capability(self, direction: ArrayLike) -> tuple[float, float] | None:
-        """Return the least and the largest t for which t·d is in the set at u = 1.
+        """Return the least and the largest t for which the wrench t·d is in the set at u = 1.
 
         None where the line through zero along d, of shape (6,), misses the set.
 
@@ -378,15 +374,15 @@ class WrenchSpace:
     def volume(self) -> tuple[float, int]:
         """Return the volume of the set at u = 1 in its affine hull, and that hull's dimension r.
 
-        Measured in scaled wrenches, so its unit is N^r, to about 1e-4 of it. Thousands of vertices
-        take seconds.
+        The volume is of scaled wrenches [N^r], accurate to about 1e-4 of its value. Sets of
+        thousands of vertices take seconds.
 
         Raises
         ------
         EmptySetError
-            If nothing is left at u = 1.
+            If the set at u = 1 is empty.
         SolverError
-            If the hull of the vertices cannot be found.
+            If the convex hull of the vertices cannot be found.
         """
         r = self.dimension
         stretch = float(np.prod(self._sum.axes[1]))
