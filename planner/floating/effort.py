@@ -36,14 +36,15 @@ __all__ = ["LeastEffort", "best_within", "with_room"]
 
 
 class LeastEffort(Goal):
-    """Goal of least effort at a utilisation within a cap, with bounds on the wrists' twists.
+    """Goal of least effort at a utilisation within a cap, with bounds on the wrists' poses.
 
     Parameters
     ----------
     cap : float
         Largest utilisation.
-    farthest : sequence of ndarray, shape (6,)
-        Largest twist of each hand's wrist from its rest pose [m, rad].
+    farthest : sequence of ndarray, shape (m,)
+        Bound on the size of each component of each wrist's pose y: twist from rest [m, rad], of a
+        compliant hand also tensions [N].
     """
 
     least_penalty = 0.05
@@ -159,14 +160,14 @@ def best_within(
     cap : float
         Largest utilisation.
     goal : callable
-        Function (cap, largest twist of each wrist from rest [m, rad]) → Goal.
+        Function (cap, bounds on each wrist's pose y, as `Goal.farthest`) → Goal.
     budget : Budget
         Largest number of conic programs.
 
     Returns
     -------
     WristSolution
-        Plan whose goal's value is no larger than that of the start plan.
+        Plan whose value of the goal is no larger than that of the start plan.
     """
     # in `TWIST_UNIT`: farther, where loads of one step from rest are no longer sure, less
     # would be no gain

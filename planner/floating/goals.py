@@ -65,9 +65,9 @@ class Goal(ABC):
     promised : float or None
         Share of the predicted decrease that a corrected step must achieve for the trust region to
         grow; None: the trust region does not grow after a corrected step.
-    farthest : sequence of ndarray, shape (6,), or None
-        Largest twist of each hand's wrist from its rest pose [m, rad]; None: no bound but that of
-        small twists.
+    farthest : sequence of ndarray, shape (m,), or None
+        Bound on the size of each component of each wrist's pose y: twist from rest [m, rad], of a
+        compliant hand also tensions [N]. None: no bound but that of small twists.
     """
 
     least_penalty: float

@@ -144,7 +144,7 @@ class Best(StanceProgram):
         return ConicProgram(P, q, A, b, size + len(self.G), size)
 
     def solve(self) -> Outcome:
-        """Solve the program; ``value`` is the utilisation u, or with a given cap the objective."""
+        """Solve the program; ``value`` is u, or with a cap or residuals the objective."""
         outcome, u = self.run()
         return outcome if u is None or not self.wanted else replace(outcome, value=float(u[0]))
 
