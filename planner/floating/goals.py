@@ -76,10 +76,16 @@ class Goal(ABC):
 
     @abstractmethod
     def value(self, measure: ExactMeasure) -> float:
-        """Return the objective of a point: the quantity that the search minimises."""
+        """Return the objective of a point: the quantity that the search minimises.
+
+        Parameters
+        ----------
+        measure : ExactMeasure
+            Exact utilisation, violations and effort at the point.
+        """
 
     def excess(self, measure: ExactMeasure) -> float:
-        """Return by how much a point exceeds a bound of the goal; 0 by default."""
+        """Return by how much a point exceeds a bound of the goal, such as a cap; 0 by default."""
         return 0.0
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
@@ -87,11 +93,19 @@ class Goal(ABC):
         return measure.exact(hands)
 
     def wrong(self, measure: ExactMeasure) -> float:
-        """Return the sum of violations at a point: missing wrench, broken hard row, excess."""
+        """Return the sum of all violations at a point: missing wrench, hard row, excess."""
         return measure.missing + measure.broken + self.excess(measure)
 
     def merit(self, measure: ExactMeasure, penalty: float) -> float:
-        """Return the merit of a point: the objective plus the penalty times the violations."""
+        """Return the merit function at a point: objective plus penalty times violations.
+
+        Parameters
+        ----------
+        measure : ExactMeasure
+            Exact utilisation, violations and effort at the point.
+        penalty : float
+            Penalty ρ per unit of violation.
+        """
         return self.value(measure) + penalty * self.wrong(measure)
 
     def constraints(self, data: StanceData) -> StanceData:
@@ -100,11 +114,22 @@ class Goal(ABC):
 
     @abstractmethod
     def solve(self, data: StanceData) -> Outcome:
-        """Minimise the objective on linearised sets; return loads and dual values."""
+        """Minimise the objective on sets linearised at a point.
+
+        Parameters
+        ----------
+        data : StanceData
+            The linearised sets' scaled rows.
+
+        Returns
+        -------
+        Outcome
+            Loads and the dual values that prove them optimal.
+        """
 
     @abstractmethod
     def dearest(self, outcome: Outcome) -> float:
-        """Return the largest dual value of an outcome, which the penalty must exceed."""
+        """Return the largest dual value of an outcome; the penalty must exceed it to be exact."""
 
     @abstractmethod
     def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
@@ -165,7 +190,7 @@ class Goal(ABC):
 
     @abstractmethod
     def restore(self, data: StanceData) -> Outcome:
-        """Solve for a step toward feasibility, where the linearised sets have no plan."""
+        """Solve for a step toward feasibility, where the linearised sets contain no plan."""
 
 
 class LeastUse(Goal):

@@ -251,6 +251,17 @@ def made_exact(
 ) -> WristSolution:
     """Remove the violations at a point where a search ended without proof, by repeated corrections.
 
+    Parameters
+    ----------
+    hands : HandSets
+    goal : Goal
+    start : WristSolution
+        Point at which the search ended.
+    rounds : int
+        Number of linearisations until then.
+    budget : Budget
+        Largest number of conic programs.
+
     Returns
     -------
     WristSolution
@@ -277,7 +288,21 @@ def made_exact(
 
 
 def gap(goal: Goal, state: WristSolution, outcome: Outcome) -> float:
-    """Return how far a point's value is above the optimum on its linearised sets, relative."""
+    """Return the relative difference between a point's value and the optimum on its sets.
+
+    Parameters
+    ----------
+    goal : Goal
+    state : WristSolution
+        The point, with its exact measure.
+    outcome : Outcome
+        Solution of the goal's program on the sets linearised at the point.
+
+    Returns
+    -------
+    float
+        (value of the point − optimum) / max(1, value of the point).
+    """
     value = goal.value(state.measure)
     return (value - outcome.value) / max(1.0, value)
 

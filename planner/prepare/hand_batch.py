@@ -96,7 +96,13 @@ TILE_PARTS: Final = {nails: _parts_of_hand(nails=nails) for nails in (False, Tru
 
 
 def tile_index_of(counts: Sequence[int]) -> TileIndex:
-    """Return the index arrays for hands with the given numbers of tiles."""
+    """Return the index arrays of all tiles.
+
+    Parameters
+    ----------
+    counts : sequence of int, length H
+        Number of tiles (and nails) of each hand.
+    """
     hand = np.arange(len(counts)).repeat(counts)
     of_each = np.concatenate([TILE_PARTS[count > len(TILE_PARTS[False])] for count in counts])
     finger, part = len(FINGERS) * hand + of_each[:, 0], of_each[:, 1]
@@ -146,7 +152,13 @@ class ContactPattern(NamedTuple):
 
 
 def contact_pattern_of(hands: tuple[tuple[SettledTile, ...], ...]) -> ContactPattern:
-    """Return the contact states of hands, given the tiles of each hand."""
+    """Return the contact states of all tiles.
+
+    Parameters
+    ----------
+    hands : tuple of tuple of SettledTile
+        Tiles of each hand, with their contact states.
+    """
     places = tile_index_of(tuple(map(len, hands)))
     contacts = np.array([CONTACT_CODES[tile.contact] for hand in hands for tile in hand])
     away = contacts != CONTACT_CODES["face"]
@@ -201,7 +213,7 @@ class HandBatch:
 
     @classmethod
     def of(cls, hands: Sequence[SettledHand]) -> HandBatch:
-        """Return the arrays of settled hands."""
+        """Collect the arrays of settled hands, one hand after another."""
         tiles = tuple([hand.tiles for hand in hands])
         positions = [hand.positions for hand in hands]
         angles = concatenated([hand.postures.angles for hand in hands])

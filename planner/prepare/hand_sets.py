@@ -95,7 +95,7 @@ class ExactMeasure(NamedTuple):
     excess: float
 
     def exact(self, hands: HandSets) -> bool:
-        """Return whether the body wrench is balanced and no hard row is violated."""
+        """Return whether the body is balanced and no hard row violated, to about 1e-8."""
         size = max(1.0, float(np.linalg.norm(hands.wrench)))
         # what is missing is relative, in `WRENCH_UNIT`; hard rows are in `LOAD_UNIT`
         return self.missing <= 2e-8 * size and self.broken <= 1e-8
@@ -179,7 +179,7 @@ class HandSets:
         added: tuple[StanceConstraints, ...],
         known: tuple[ScaledRows, ...] | None = None,
     ) -> HandSets:
-        """Return the hands of a stance; ``known`` is ``scaled`` if already computed."""
+        """Build the hands of a stance; ``known`` are their scaled rows, if already computed."""
         scaled = tuple(map(ScaledRows.of, spaces)) if known is None else known
         data = StanceData.of(hands_data(scaled, transports, held), wrench)
         floating = any(wrist is not None for wrist in wrists)
@@ -193,7 +193,7 @@ class HandSets:
         spaces: Sequence[WrenchSpace],
         wrists: tuple[FloatingWrist | None, ...] | None = None,
     ) -> HandSets:
-        """Return the same stance with other sets of its hands, and if given other wrists."""
+        """Return the same stance with other sets of its hands and, if given, other wrists."""
         own = self.wrists if wrists is None else wrists
         return HandSets.of(spaces, own, self.transports, self.wrench, self.held, self.added)
 
@@ -285,9 +285,10 @@ class HandSets:
     ) -> list[Array]:
         """Return the curvature of each hand's rows, weighted by dual values, shape (m, m) each.
 
-        ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by finite differences of slopes; zero for fixed wrists. λ, μ,
-        ν are the dual values of limits, hard rows and balance; ε are weights of the efforts, by
-        default 0.
+        ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by finite differences of slopes at a point; zero for fixed
+        wrists. λ, μ, ν are the dual values (``duals``) of limits, hard rows and balance; ε are
+        weights of the efforts (``efforts``), by default 0. ``within`` is the trust region in
+        `TWIST_UNIT`.
         """
         difference = 1e-3  # of slopes, in the units of poses
         balance, bent = duals.balance_dual, []
@@ -374,7 +375,10 @@ def _room(space: WrenchSpace) -> float:
 def wrist_at(
     stance: Stance, index: int, settled: SettledHand, tension_limit: float | None = None
 ) -> FloatingWrist | None:
-    """Return the model of a hand's compliant or floating wrist; None if the wrist is fixed."""
+    """Return the wrist model of a stance's hand, by index; None if the wrist is fixed.
+
+    ``settled`` is the closed hand; ``tension_limit`` caps its tensions [N].
+    """
     hand = stance.hands[index]
     if hand.wrist == "fixed":
         return None

@@ -108,12 +108,12 @@ class PreparedStance:
 
 
 def checked_question(question: Question) -> Question:
-    """Return the argument if it is a `Question`.
+    """Return a question unchanged, after a check of its type.
 
     Raises
     ------
     InvalidInputError
-        If it is not.
+        If the argument is no `Question`.
     """
     if not isinstance(question, Question):
         raise InvalidInputError(f"a Question is needed, got a {type(question).__name__}")

@@ -103,7 +103,13 @@ def settle_each(
 def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
     """Close one hand of a stance on its hold; return the closed hand and its wrench space.
 
-    See `resting_hand` for the set of a floating hand, and for errors.
+    The wrench space is that of `resting_hand`, which also says when an error is raised.
+
+    Parameters
+    ----------
+    stance : Stance
+    limb : str
+        Limb of the hand.
     """
     hand = resting_hand(stance, limb)
     return hand.settled, hand.space
@@ -161,7 +167,13 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
 
 
 def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
-    """Return the model of a floating hand's wrist, by limb.
+    """Close a floating hand of a stance on its hold, and return the model of its wrist.
+
+    Parameters
+    ----------
+    stance : Stance
+    limb : str
+        Limb of the hand.
 
     Raises
     ------

@@ -61,7 +61,7 @@ TIE_WEIGHT: Final = 8e-6
 
 
 class Residuals(NamedTuple):
-    """Linear functions R z − c of all loads, whose squares are added up k times."""
+    """Term k ‖R z − c‖² of an objective, in the scaled loads z of all hands, shape (M,)."""
 
     R: Array
     c: Array
@@ -163,7 +163,13 @@ class Best(StanceProgram):
 
 
 def tie_weight(hands: int) -> float:
-    """Return the weight of a squared relative tension in `unique`, for this many hands."""
+    """Return the weight of a squared relative tension in `unique`.
+
+    Parameters
+    ----------
+    hands : int
+        Number of hands of the stance.
+    """
     return TIE_WEIGHT / (len(FINGERS) * hands)
 
 
@@ -208,7 +214,8 @@ class Reach(StanceProgram):
     def load_factor(cls, data: StanceData) -> Reach:
         """Return the program for the load factor: largest multiple of the body wrench, at cap 1.
 
-        The body wrench must not be zero. ``value`` of the solved outcome is the load factor.
+        The body wrench of ``data`` must not be zero. ``value`` of the solved outcome is the load
+        factor.
         """
         body, held = data.wrench.copy(), data.wrench.copy()
         body[6:], held[:6] = 0.0, 0.0

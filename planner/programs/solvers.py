@@ -80,7 +80,7 @@ class TensionTrade(NamedTuple):
 
 
 def tension_trade(least: float, cap: float) -> TensionTrade:
-    """Return how much utilisation a plan may spend for less tension: weight and bounds.
+    """Return how much utilisation a plan may spend for less tendon tension.
 
     Parameters
     ----------
@@ -88,6 +88,11 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
         Least utilisation u* of the question.
     cap : float
         Largest utilisation that the question allows.
+
+    Returns
+    -------
+    TensionTrade
+        Weight of the tensions, and bounds of the utilisation.
     """
     given_away, weight = _tension_numbers()
     whole = given_away * abs(least)
@@ -103,32 +108,59 @@ def _tension_numbers() -> tuple[float, float]:
 
 
 def margin(data: StanceData) -> Outcome:
-    """Solve for the least utilisation, which is ``value`` of the outcome."""
+    """Solve for the least utilisation (largest load over capacity) at which the body is balanced.
+
+    Parameters
+    ----------
+    data : StanceData
+
+    Returns
+    -------
+    Outcome
+        ``value`` is the least utilisation; the dual values of the limits give their shadow prices.
+    """
     return Best(data).solve()
 
 
 def vertex(data: StanceData) -> Outcome:
-    """Solve for the least utilisation by the simplex method (see `Best.vertex`)."""
+    """Solve for the least utilisation by the simplex method; see `Best.vertex`."""
     return Best(data).vertex()
 
 
 def unique(data: StanceData, share: float = 1.0) -> Outcome:
     """Solve for the least utilisation, made unique by a small weight on tensions, in one solve.
 
-    A tension is at most u times its maximum, so the returned utilisation u, which is ``value`` of
-    the outcome, exceeds the least by less than TIE_WEIGHT u².
+    A tension is at most u times its maximum, so the returned utilisation u exceeds the least by
+    less than TIE_WEIGHT u².
 
     Parameters
     ----------
     data : StanceData
     share : float, optional
         Factor on the weight of the tensions.
+
+    Returns
+    -------
+    Outcome
+        ``value`` is the utilisation u, without the weighted tensions.
     """
     return Best(data, weights=tie_weight(len(data.hands)) * share * data.rows.tie).solve()
 
 
 def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
-    """Solve for the plan that trades utilisation for less tension; ``value`` is its utilisation."""
+    """Solve for the plan that trades utilisation for less tendon tension; see `TensionTrade`.
+
+    Parameters
+    ----------
+    data : StanceData
+    trade : TensionTrade
+        Weight of the tensions, and largest utilisation of the plan.
+
+    Returns
+    -------
+    Outcome
+        ``value`` is the utilisation of the plan.
+    """
     return Best(data, weights=trade.weight * data.rows.tie, most=trade.most).solve()
 
 
@@ -150,7 +182,16 @@ def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
 
 
 def tie_break(data: StanceData, cap: float) -> Outcome:
-    """Solve for the least sum of squared relative tensions under a cap on the utilisation."""
+    """Solve for the least sum of squared relative tensions under a cap on the utilisation.
+
+    It selects one of the plans that have equal utilisation.
+
+    Parameters
+    ----------
+    data : StanceData
+    cap : float
+        Largest utilisation.
+    """
     # weights relative to the largest: the minimiser does not change
     return Best(data, cap=cap, weights=data.rows.tie / data.rows.tie.max()).solve()
 
@@ -158,8 +199,17 @@ def tie_break(data: StanceData, cap: float) -> Outcome:
 def least_tensions(data: StanceData, utilisation: float) -> Outcome:
     """Solve `tie_break` at a given utilisation; retry with more slack if the first solve fails.
 
-    The cap is the utilisation plus 1e-9, relative to at least 1; in the second try plus
-    `CAP_SLACK`.
+    Parameters
+    ----------
+    data : StanceData
+    utilisation : float
+        Least utilisation. The cap is larger by 1e-9 (absolute below 1, relative above), in the
+        second try by `CAP_SLACK`.
+
+    Returns
+    -------
+    Outcome
+        Of the last try; status `OUT_OF_TIME` or unsolved if both fail.
     """
     outcome = Outcome(False, OUT_OF_TIME, 0, math.nan)
     for slack in (1e-9, CAP_SLACK):  # where the least has all its digits, or else near it
@@ -170,10 +220,15 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
 
 
 def effort(data: StanceData, cap: float) -> Outcome:
-    """Solve for the least sum of squared relative tensions and joint torques, under a cap.
+    """Solve for the least effort: the sum of squared relative tensions and joint torques.
 
-    Small weights make the other loads unique (palms, lateral reactions, wrists). The cap is the
-    largest utilisation.
+    Small weights make the other loads unique (palms, lateral reactions, wrists).
+
+    Parameters
+    ----------
+    data : StanceData
+    cap : float
+        Largest utilisation.
     """
     E = scipy.linalg.block_diag(*(hand.E for hand in data.hands))
     e0 = np.concatenate([hand.e0 for hand in data.hands])
@@ -205,7 +260,10 @@ def elastic(
 
 
 def load_factor(data: StanceData) -> Outcome:
-    """Solve for the load factor: largest multiple of a body wrench, not 0, at utilisation 1."""
+    """Solve for the load factor: largest multiple of a body wrench, not 0, at utilisation 1.
+
+    ``value`` of the outcome is the load factor.
+    """
     return Reach.load_factor(data).solve()
 
 
@@ -230,12 +288,16 @@ def reach(
 
 
 def nearest(data: StanceData) -> Outcome:
-    """Solve `Nearest`: smallest misfit of the body wrench and of prescribed hand wrenches."""
+    """Solve for loads whose body wrench is nearest to the one asked for; limits do not count.
+
+    Prescribed components of hand wrenches count like the body wrench. ``value`` of the outcome is
+    the distance, in `WRENCH_UNIT`. See `Nearest`.
+    """
     return Nearest(data).solve()
 
 
 def nearest_body(data: StanceData) -> Outcome:
-    """Solve `Nearest` for the body wrench, with all prescribed components of hand wrenches met."""
+    """Solve `nearest` with all prescribed components of hand wrenches met exactly."""
     return Nearest(data, len(data.wrench) - 6).solve()
 
 
@@ -300,13 +362,28 @@ def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
 
 
 def used(data: StanceData, loads: Sequence[Array]) -> Array:
-    """Return the utilisation of every limit row at loads y, hand by hand, shape (Σ nl,)."""
+    """Return the utilisation (load over capacity) of every limit row at given loads.
+
+    Parameters
+    ----------
+    data : StanceData
+    loads : sequence of ndarray, shape (m,)
+        Loads y of each hand [N], or wrist pose [m, rad].
+
+    Returns
+    -------
+    ndarray, shape (Σ nl,)
+        Utilisations, hand by hand.
+    """
     parts = zip(data.hands, loads, strict=True)
     return np.concatenate([hand.L @ (y / hand.unit) + hand.l0 for hand, y in parts])
 
 
 def used_effort(data: StanceData, loads: Sequence[Array]) -> float:
-    """Return the effort of loads y: Σ ‖E z + e₀‖², squared relative tensions and torques."""
+    """Return the effort of loads y: Σ ‖E z + e₀‖², squared relative tensions and torques.
+
+    z are the loads over their units.
+    """
     return sum(
         float(np.sum((hand.E @ (y / hand.unit) + hand.e0) ** 2))
         for hand, y in zip(data.hands, loads, strict=True)

@@ -186,7 +186,10 @@ def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Role
 
 
 def is_effort(row: Row) -> bool:
-    """Return whether a limit row counts as effort: a tendon's tension, or a joint's + torque."""
+    """Return whether a limit row counts as effort: a tendon's tension, or a joint's torque.
+
+    Of a joint's two rows, one for each sign of the torque, the + row counts.
+    """
     of_joint = row.limit in (JOINT_TORQUE, JOINT_FORCE)
     return row.limit == TENDON_TENSION or (of_joint and row.label.endswith("+"))
 
@@ -244,7 +247,7 @@ class HandData(NamedTuple):
         return hands_data([ScaledRows.of(space)], transport[None], [given])[0]
 
     def capped(self, utilisation: float) -> HandData:
-        """Return the hand with its limits at a utilisation turned into hard rows."""
+        """Return the hand with its limits, at a given utilisation, turned into hard rows."""
         return self._replace(
             L=self.L[:0],
             l0=self.l0[:0],
@@ -253,7 +256,10 @@ class HandData(NamedTuple):
         )
 
     def about(self, centre: Array, stiffness: float) -> HandData:
-        """Return the hand in loads z − centre, with its tie-break weights times a stiffness."""
+        """Return the hand with loads relative to a centre, shape (m,) in units of z.
+
+        ``stiffness`` multiplies the weights of the tie-break.
+        """
         return self._replace(
             g=self.g + self.G @ centre,
             l0=self.l0 + self.L @ centre,
@@ -263,7 +269,7 @@ class HandData(NamedTuple):
         )
 
     def held(self, y: Array) -> HandData:
-        """Return the hand with fixed loads y, shape (m,): without variables and hard rows."""
+        """Return the hand with all loads fixed at y, shape (m,): no variables, no hard rows."""
         fixed, none = self.about(y / self.unit, 1.0), np.zeros(0)
         fixed = fixed._replace(H=np.zeros((0, 0)), h=none, tie=none, rest=none, unit=none)
         return fixed._replace(G=self.G[:, :0], L=self.L[:, :0], E=self.E[:, :0])
@@ -361,25 +367,28 @@ class StanceData:
 
     @property
     def offset(self) -> Array:
-        """Right-hand side of G z in the balance, W − Σ g, shape (nb,)."""
+        """Right-hand side of the balance G z = W − Σ g, shape (nb,), in `WRENCH_UNIT`."""
         return np.asarray(self.wrench - sum(hand.g for hand in self.hands))
 
     def capped(self, utilisation: float) -> StanceData:
-        """Return the stance with its limits at a utilisation turned into hard rows."""
+        """Return the stance with its limits, at a given utilisation, turned into hard rows."""
         hands = tuple(hand.capped(utilisation) for hand in self.hands)
         return StanceData.of(hands, self.wrench)
 
     def by_rows(
         self, values: Array, *, limits: bool = True
     ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
-        """Split values of all rows: balance; each hand's limits, if ``limits``; its hard rows."""
+        """Split an array over all rows into (balance, limits of each hand, hard rows of each hand).
+
+        Without ``limits`` the array has no limit rows.
+        """
         of_limits = [len(hand.l0) for hand in self.hands] if limits else []
         sizes = [len(self.wrench), *of_limits, *(len(hand.h) for hand in self.hands)]
         balance, *others = parted(values, sizes)
         return balance, tuple(others[: len(of_limits)]), tuple(others[len(of_limits) :])
 
     def turned(self, wrench: Array) -> StanceData:
-        """Return the stance with another right-hand side of the balance, shape (nb,), scaled."""
+        """Return the stance for another right-hand side of the balance, shape (nb,), scaled."""
         return replace(self, wrench=wrench)
 
 

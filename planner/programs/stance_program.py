@@ -187,7 +187,7 @@ class StanceProgram(ABC):
 
     @property
     def of_limits(self) -> slice:
-        """Indices of the limit rows in the solver's form, if no rows come before the balance."""
+        """Indices of the limit rows in the solver's form, if the balance comes first."""
         return slice(len(self.G), len(self.G) + len(self.L))
 
     def solve(self) -> Outcome:

@@ -33,7 +33,7 @@ EARTH_GRAVITY: Final = (0.0, 0.0, -9.81)
 
 
 def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
-    """Raise an error if a name is not a limb of the robot.
+    """Check that all keys of a mapping are limbs of the robot.
 
     Parameters
     ----------
@@ -56,7 +56,21 @@ def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
 
 
 def known_choice(value: str, known: Sequence[str], field: str) -> None:
-    """Raise an `InvalidInputError` if a value of a field is not one of the known ones."""
+    """Check that the value of a field is one of the known choices.
+
+    Parameters
+    ----------
+    value : str
+    known : sequence of str
+        Valid values.
+    field : str
+        Field that the error names.
+
+    Raises
+    ------
+    InvalidInputError
+        If the value is not one of them.
+    """
     if value not in known:
         raise InvalidInputError(
             f"unknown {field} {value!r}; known are {', '.join(known)}", field=field
@@ -64,12 +78,18 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
 
 
 def checked_body_wrench(wrench: Array, field: str | None) -> Array:
-    """Return a body wrench, shape (6,) [N, N·m], after a check of its size.
+    """Return a wrench unchanged, shape (6,) [N, N·m], after a check of its size.
+
+    Parameters
+    ----------
+    wrench : ndarray, shape (6,)
+    field : str or None
+        Field that the error names.
 
     Raises
     ------
     InvalidInputError
-        If a component exceeds 1e12 or is not a number.
+        If a component exceeds 1e12 N or N·m, or is NaN.
     """
     most = 1e12  # [N, N·m] larger, the unit is wrong
     if not np.abs(wrench).max() <= most:
@@ -276,7 +296,7 @@ class Stance:
 
     @property
     def given_joints(self) -> dict[str, Array]:
-        """Joint angles that the stance gives, by limb [rad]."""
+        """Joint angles that the stance gives, by limb, shape (n,) [rad]; prismatic joints [m]."""
         joints = {} if self.joints is None or isinstance(self.joints, str) else self.joints
         return {limb: each for limb, each in joints.items() if not isinstance(each, str)}
 

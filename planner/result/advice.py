@@ -1,4 +1,4 @@
-"""Changes of a question that would make its stance feasible or lower its utilisation, planned and verified."""
+"""Changes of a question that make its stance feasible or lower its utilisation, all verified."""
 
 from __future__ import annotations
 

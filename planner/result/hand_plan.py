@@ -173,7 +173,13 @@ class HandPlan:
         return tuple(p._replace(capacity=share * p.capacity) for p in self.half_planes)
 
     def tile(self, finger: str | None, phalanx: str | None) -> int:
-        """Return the index of the tile on a finger's phalanx, in the arrays of the hand."""
+        """Return the index of a tile in the arrays of the hand.
+
+        Parameters
+        ----------
+        finger, phalanx : str or None
+            Names of the tile's finger and phalanx.
+        """
         return next(i for i, tile in enumerate(self.tiles) if tile[:2] == (finger, phalanx))
 
 

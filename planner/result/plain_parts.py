@@ -76,7 +76,7 @@ class Price(LimitName, frozen=True, kw_only=True):
 
     @classmethod
     def of(cls, name: LimitName, price: float, unit: str) -> Price:
-        """Return the shadow price of a limit."""
+        """Return the shadow price of a limit, given the decrease of the utilisation per unit."""
         return cls(*astuple(name), price=price, unit=unit)
 
     @property

@@ -108,7 +108,7 @@ class Plan:
     clearance : Clearance or None
         Least distances between hands, links, body and rock, if asked for.
     advice : tuple of Advice or None
-        Changes that would make the stance feasible or raise its load factor, if asked for. First
+        Changes that would make the stance feasible or lower its utilisation, if asked for. First
         the changes that make it feasible, the smallest first; then those with most gain for their
         size.
     """
@@ -158,7 +158,7 @@ class Plan:
 
     @property
     def joint_utilisation(self) -> float | None:
-        """Largest torque over torque limit of a joint; None if torques are not known."""
+        """Largest ratio of torque to torque limit over all joints; None if no torques are known."""
         shares = self.joint_shares
         return None if shares is None else max(float(np.max(each)) for each in shares.values())
 
