@@ -123,7 +123,7 @@ class LeastEffort(Goal):
 
 
 def with_room(cap: float, used: float) -> float:
-    """Return a cap slightly above a plan's utilisation, as room for rounding.
+    """Return a cap that leaves a plan at the cap some room for rounding.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def with_room(cap: float, used: float) -> float:
     Returns
     -------
     float
-        At least ``cap``, and above it by at most `CAP_SLACK`.
+        At least ``cap``, and above ``cap`` by less than `CAP_SLACK`.
     """
     return max(cap, min(used + 0.5 * CAP_SLACK, cap + CAP_SLACK - SETTINGS.cap_excess))
 

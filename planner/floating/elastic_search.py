@@ -5,7 +5,7 @@ a linearised set is good for one. So the balance and the hard rows are relaxed a
 each round solves `programs.elastic` on the sets of its point, within a trust region. A step must
 lower the merit
 
-    u + ρ (|missing body wrench| + violations of all hard rows)
+    u + ρ (‖missing body wrench‖₁ + violations of all hard rows)
 
 of the model itself, u the utilisation. If the step lowers it by less than predicted, a few Newton
 steps first correct the error of the linearisation (Fletcher, Practical Methods of Optimization,

@@ -261,13 +261,13 @@ def bent_root(curvature: Array, rows: Array, near: float) -> Array:
     rows : ndarray, shape (k, m)
         Gradients of the binding rows.
     near : float
-        Weight that is added in every direction.
+        Root of a small curvature that is added in every direction.
 
     Returns
     -------
     ndarray, shape (m, m)
-        R. In the free directions RᵀR is the positive part of the curvature, plus ``near``²; in all
-        others ``near``². Negative curvature is dropped, so that the program stays convex.
+        R. In the free directions RᵀR is the positive part of the curvature, plus near²; in all
+        other directions near². Negative curvature is dropped, so that the program stays convex.
     """
     _, sizes, axes = np.linalg.svd(rows)
     rank = int((sizes > SETTINGS.dependent_rows * sizes.max(initial=0.0)).sum())

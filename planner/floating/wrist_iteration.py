@@ -11,7 +11,7 @@ A set is exact where it is linearised, so balance, limits and hard rows *at the 
 the model itself, and so is the plan. A `Goal` says what is minimised: the utilisation u, or the
 effort under a cap on u. A step must lower the merit function
 
-    value + ρ (|missing body wrench| + largest violation of a hard row + excess over the cap),
+    value + ρ (‖missing body wrench‖₁ + largest violation of a hard row + excess over the cap),
 
 if need be after a second-order correction; else it is tried again in a smaller trust region
 (exact penalty function; Fletcher, Practical Methods of Optimization, ch. 14).

@@ -121,7 +121,7 @@ class Sets(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """True if every phalanx touches rock at the point, so that all rows are finite."""
+        """True if all rows are finite: no phalanx in contact loses its rock at the point."""
         return all(
             np.isfinite(hand.L).all() and np.isfinite(hand.G).all() for hand in self.data.hands
         )
@@ -129,7 +129,7 @@ class Sets(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HandSets:
-    """The hands of a stance, from which their sets at any point are computed.
+    """The hands of a stance, from which their wrench spaces at any point are computed.
 
     Attributes
     ----------
@@ -339,7 +339,7 @@ def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
     """Return the widest set at rest over the palm modes, and its largest linearisation error [N].
 
     The widest set contains the largest ball of twists, in `TWIST_UNIT`. The error is measured where
-    the set reaches farthest along ± each axis, if every phalanx touches rock there.
+    the set reaches farthest along ± each axis, if no phalanx in contact loses its rock there.
     """
     palms = wrist.palm_modes()
     spaces = [wrist.linearised(palm=palm) for palm in palms]

@@ -69,7 +69,7 @@ class PrepareTolerances:
     hand_offset: float = 0.01  # [m] of a hand's pose from where its joints put it
     hand_turn: float = 0.05  # [rad] of its axes from those that its joints give
     body_wrench: float = 1e-9
-    """Smallest body wrench, in `WRENCH_UNIT`, for which a load factor is defined."""
+    """Largest body wrench, in `WRENCH_UNIT`, that counts as zero: it has no load factor."""
 
 
 TOLERANCES: Final = PrepareTolerances()

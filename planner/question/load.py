@@ -154,7 +154,7 @@ class Load(Strict, frozen=True):
         return into_body @ (acceleration - stance.gravity), into_body @ angular
 
     def payload_places(self, stance: Stance) -> Array:
-        """Return the positions of payloads without known joints, in B, shape (p, 3) [m].
+        """Return the positions of payloads if joints are not known, in B, shape (p, 3) [m].
 
         Raises
         ------

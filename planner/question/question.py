@@ -166,12 +166,19 @@ class Question:
         return replace(self, want=frozenset(), draws=None, deadline=None, objective=least)
 
     def needed_wrench(self, weights: Weights | None = None) -> Array:
-        """Return the body wrench that is planned for, in B, shape (6,) [N, N·m].
+        """Return the body wrench: what the rock must exert on the robot, in B, shape (6,) [N, N·m].
+
+        It is the question's ``body_wrench`` if given, else computed from its ``load``.
 
         Parameters
         ----------
         weights : Weights, optional
             Weight of the robot, if its joints are known.
+
+        Raises
+        ------
+        InvalidInputError
+            If the load is not valid; the field is relative to the load.
         """
         if self.body_wrench is not None:
             return self.body_wrench

@@ -131,7 +131,7 @@ class Solver(Struct, frozen=True):
     name, status : str
         Name of the solver, and its status as CVXPY names it.
     iterations : int
-        Zero if the plan was computed without the solver, from the active limits of an earlier plan.
+        Zero if the plan follows from the active limits of an earlier plan, without the solver.
     """
 
     name: str
@@ -140,7 +140,7 @@ class Solver(Struct, frozen=True):
 
 
 class Time(Struct, frozen=True):
-    """Computing time of each part [s]."""
+    """Computing time [s]: preparing the model, solving the program, and the total."""
 
     model: float
     solve: float
