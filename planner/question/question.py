@@ -24,7 +24,7 @@ __all__ = ["MOST_DRAWS", "OwnObjective", "Question"]
 
 
 class OwnObjective(Protocol):
-    """Objective of the caller's, given as an object: a `planner.solving.Objective`."""
+    """Objective that the caller defines: an object as `planner.solving.Objective`."""
 
     name: ClassVar[str]
 

@@ -346,8 +346,9 @@ class Tile(Struct, frozen=True):
     load_per_newton : list of float, length 2
         Increase of shear and normal load per newton of tension.
     half_planes : list of list of float, length 4
-        [a_shear, a_normal, a_lateral, capacity] of each limit of the tile's spines on the rock; for
-        a tile that is not on rock, of a whole tile.
+        [a_shear, a_normal, a_lateral, capacity] of each limit a_shear·shear + a_normal·normal +
+        a_lateral·lateral ≤ capacity [N] of the tile's spines on the rock; for a tile that is not
+        on rock, of a whole tile.
     """
 
     phalanx: str
