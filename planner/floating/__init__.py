@@ -1,4 +1,4 @@
-"""Search for the poses of floating hands' wrists."""
+"""Search for plans of floating and compliant hands, over the poses of their wrists."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,9 +1,9 @@
-"""The plan of floating hands, and the largest load that they can carry: along the body wrench.
+"""Least utilisation and load factor of floating hands, by continuation along the body wrench.
 
-What floating hands use is not convex in the body wrench, and a search from rest may end at a poor
-point, or at none. Where it does, smaller body wrenches are planned first and each plan is where the
-next search begins, up to the largest factor of the body wrench that can be held, and on to the
-whole (continuation; Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2).
+The utilisation of floating hands is not convex in the body wrench: a search from rest may end at a
+poor plan, or at none. Then smaller multiples of the body wrench are planned first, and each plan is
+the start of the next search, up to the largest multiple that can be held, and on to the whole
+(Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2).
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ __all__ = ["LargestFactor", "least_use", "most_load"]
 
 
 class LargestFactor(NamedTuple):
-    """The largest factor of the body wrench that was found.
+    """Largest multiple of the body wrench for which a plan was found.
 
     Attributes
     ----------
     factor : float
+        The multiple.
     sure : bool
-        Whether utilisation 1 ends it; otherwise a search that found no plan beyond it, so that it
-        is a lower bound.
+        True if utilisation 1 is reached there. False if a search beyond it found no plan: then the
+        multiple is a lower bound.
     """
 
     factor: float
@@ -53,25 +54,27 @@ class _Way(NamedTuple):
 def least_use(
     hands: HandSets, budget: Budget, near: WristSolution | None = None
 ) -> tuple[WristSolution, LargestFactor | None]:
-    """Find the point of least utilisation over the modes of the hands' palms.
+    """Search for the plan of least utilisation, over wrist poses and palm modes.
 
-    Where that is beyond 1, or there is none, the search is continued from smaller body wrenches, up
-    to the largest that can be held and on to the whole: a better point may lie there.
+    If the utilisation exceeds 1, or no plan is found, the search continues from smaller multiples
+    of the body wrench up to the largest that can be held, and on to the whole.
 
     Parameters
     ----------
     hands : HandSets
     budget : Budget
+        Largest number of conic programs.
     near : WristSolution, optional
-        A plan of hands that are much the same, from which the search begins; where it leads to a
-        plan, beyond 1 from there to the largest that can be held.
+        Plan of similar hands, from which the search starts. If that leads to a plan beyond
+        utilisation 1, the search continues from that plan to the largest multiple that can be held.
 
     Returns
     -------
     WristSolution
-        If there is no plan, that of the search with the least missing.
+        The best plan found; if there is none, the search that ended with the least missing wrench.
     LargestFactor or None
-        Of the body wrench, as far as it has been sought: None for a plan within its limits.
+        Largest multiple of the body wrench found on the way; None if none was sought, as for a plan
+        within its limits.
     """
     choices = starts(hands, 1.0, budget)
     first = SETTINGS.first_programs
@@ -103,17 +106,22 @@ def least_use(
 def most_load(
     hands: HandSets, plan: WristSolution, known: LargestFactor | None, budget: Budget
 ) -> LargestFactor | None:
-    """Return the largest factor of the body wrench that has a plan of utilisation 1.
-
-    None if it is not found.
+    """Return the largest multiple of the body wrench that has a plan of utilisation 1.
 
     Parameters
     ----------
     hands : HandSets
     plan : WristSolution
-        For the whole body wrench, or what a search for it has come to.
+        Result of `least_use` for the whole body wrench.
     known : LargestFactor or None
-        What that search has found of it.
+        Multiple that `least_use` found.
+    budget : Budget
+        Largest number of conic programs.
+
+    Returns
+    -------
+    LargestFactor or None
+        None if no multiple was found.
     """
     if (known is not None and known.sure) or not _held(plan):
         return known

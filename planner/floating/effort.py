@@ -1,15 +1,16 @@
-"""The plan of least effort of floating hands, down from the one of least utilisation.
+"""The plan of least effort of floating hands, found from the plan of least utilisation.
 
-Effort is Σ ‖E z + e₀‖² over relative tensions and joint torques. Both are curved in a floating
-wrist's twist, so the search is that of `planner.floating.wrist_iteration` with another goal: on the
-sets about a point `programs.effort` is solved, and steps near the end have the curvature of the
-Lagrangian,
+Effort is Σ ‖E z + e₀‖² over relative tensions and joint torques, in a hand's variables z. E z + e₀
+is nonlinear in a floating wrist's twist, so the search is that of
+`planner.floating.wrist_iteration` with another goal: on the sets linearised at a point it solves
+`programs.effort`. Steps near the optimum have the curvature of the Lagrangian,
 
     Σ 2 (E z + e₀) ∂²E/∂z² + λ ∂²L/∂z² + μ ∂²H/∂z² + ν ∂²G/∂z²,
 
-as further rows of E (Gauss–Newton is the rest). It starts from a plan within the cap and ends at
-one with no more effort: exact, and by no more than 4e-6 above the least effort
-of the sets about it, or else unproven.
+as further rows of E (the rest of the curvature is Gauss–Newton); λ, μ, ν are the dual values of
+limits, hard rows and balance. The search starts from a plan within the cap and ends with a plan of
+no more effort. That plan is exact; its effort is at most 4e-6 above the least effort of the sets
+linearised there, or else the plan is marked unproven.
 """
 
 from __future__ import annotations
@@ -35,7 +36,16 @@ __all__ = ["LeastEffort", "best_within", "with_room"]
 
 
 class LeastEffort(Goal):
-    """Least effort at a utilisation within a cap, with wrists so far from rest at most."""
+    """Goal of least effort at a utilisation within a cap, with bounds on the wrists' poses.
+
+    Parameters
+    ----------
+    cap : float
+        Largest utilisation.
+    farthest : sequence of ndarray, shape (m,)
+        Bound on the size of each component of each wrist's pose y: twist from rest [m, rad], of a
+        compliant hand also tensions [N].
+    """
 
     least_penalty = 0.05
     promised = 0.7
@@ -45,9 +55,11 @@ class LeastEffort(Goal):
         self.farthest = farthest
 
     def value(self, measure: ExactMeasure) -> float:
+        """Return the effort of a point."""
         return measure.effort
 
     def excess(self, measure: ExactMeasure) -> float:
+        """Return by how much the utilisation of a point exceeds the cap; at least 0."""
         return max(measure.utilisation - self.cap, 0.0)
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
@@ -111,7 +123,20 @@ class LeastEffort(Goal):
 
 
 def with_room(cap: float, used: float) -> float:
-    """Return a cap at which a plan that uses just as much leaves room for rounding."""
+    """Return a cap that leaves a plan at the cap some room for rounding.
+
+    Parameters
+    ----------
+    cap : float
+        Largest utilisation that the question allows.
+    used : float
+        Utilisation of the plan.
+
+    Returns
+    -------
+    float
+        At least ``cap``, and above ``cap`` by less than `CAP_SLACK`.
+    """
     return max(cap, min(used + 0.5 * CAP_SLACK, cap + CAP_SLACK - SETTINGS.cap_excess))
 
 
@@ -122,21 +147,27 @@ def best_within(
     goal: Callable[[float, Sequence[Array]], Goal],
     budget: Budget,
 ) -> WristSolution:
-    """Return the best plan for a goal that is found down from a plan within a cap.
+    """Search for a better plan for a goal, starting from a plan within a cap on the utilisation.
 
-    Wrists stay within 4 `TWIST_UNIT` of rest, or where the plan has them. If nothing is better, the
-    plan itself is returned, without proof.
+    Wrists stay within 4 `TWIST_UNIT` of rest, or of the plan's twist if that is larger. If the
+    search finds nothing better, the start plan is returned and marked unproven.
 
     Parameters
     ----------
     hands : HandSets
     plan : WristSolution
-        Within the cap.
+        Start plan, within the cap.
     cap : float
-        On the utilisation.
+        Largest utilisation.
     goal : callable
-        Returns the goal at a cap, with how far from rest each wrist may be.
+        Function (cap, bounds on each wrist's pose y, as `Goal.farthest`) → Goal.
     budget : Budget
+        Largest number of conic programs.
+
+    Returns
+    -------
+    WristSolution
+        Plan whose value of the goal is no larger than that of the start plan.
     """
     # in `TWIST_UNIT`: farther, where loads of one step from rest are no longer sure, less
     # would be no gain

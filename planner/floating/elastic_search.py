@@ -1,16 +1,16 @@
-"""Find tensions and wrists of compliant hands by linearising sets whose rows give at a price.
+"""Find tensions and wrist poses of compliant hands by sequential ℓ₁ linear programming.
 
-From rest the sets about a point have no plan as a rule: a wrist gives by millimetres, and a
-linearised set is good for one. So the balance and the hard rows may be missed, at a price ρ, and
-each round solves `programs.elastic` on the sets about its point, within a range about it. A step
-must lower the merit
+From rest, the sets linearised at a point usually contain no plan: a wrist moves by millimetres, and
+a linearised set is good for one. So the balance and the hard rows are relaxed at a price ρ, and
+each round solves `programs.elastic` on the sets of its point, within a trust region. A step must
+lower the merit
 
-    u + ρ (|missing body wrench| + excesses of all hard rows)
+    u + ρ (‖missing body wrench‖₁ + violations of all hard rows)
 
-of the model itself; where it does by less than promised, a few of Newton's steps first restore
-what the curvature of the sets has cost. This is sequential ℓ₁ linear programming with a trust
-range (Fletcher, Practical Methods of Optimization, ch. 12 and 14). At the end the point is made
-exact, and the sets about it prove the utilisation the least of these sets, or do not.
+of the model itself, u the utilisation. If the step lowers it by less than predicted, a few Newton
+steps first correct the error of the linearisation (Fletcher, Practical Methods of Optimization,
+ch. 12 and 14). At the end the violations at the point are removed; the sets linearised there prove
+that its utilisation is the least, or the result is marked unproven.
 """
 
 from __future__ import annotations
@@ -47,16 +47,24 @@ def find_wrists(
     most: int = SETTINGS.rounds,
     goal: Goal = LEAST_USE,
 ) -> WristSolution:
-    """Find the best point for a goal from a start: `solve_wrists`, or as here where hands comply.
+    """Search for the best wrist poses for a goal: relaxed for compliant hands, else `solve_wrists`.
+
+    The relaxed search is used where a hand is compliant and the goal is the least utilisation.
 
     Parameters
     ----------
     hands : HandSets
     start : LinearisationPoint
     budget : Budget
+        Largest number of conic programs.
     most : int, optional
-        Rounds.
+        Largest number of rounds (linearisations).
     goal : Goal, optional
+        Objective; the least utilisation by default.
+
+    Returns
+    -------
+    WristSolution
     """
     if hands.together is None or goal is not LEAST_USE:
         return solve_wrists(hands, start, budget, most, goal)

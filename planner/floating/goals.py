@@ -1,8 +1,9 @@
-"""Goals that a search for the wrists of floating hands minimises.
+"""Objectives of the search for the wrist poses of floating and compliant hands.
 
-The search itself (`planner.floating.wrist_iteration`) knows sets, ranges and steps. A goal says
-which program is solved on the sets, whose multipliers prove the outcome; with which one it steps,
-at first and near the end; and which value the model gives a point.
+The search in `planner.floating.wrist_iteration` is sequential: it linearises the hands' sets at a
+point, solves a conic program on them, and steps within a trust region. A `Goal` supplies the
+program whose dual values prove the outcome, the programs of the steps (far from and near the
+optimum), and the merit function of a point.
 """
 
 from __future__ import annotations
@@ -25,11 +26,12 @@ __all__ = ["LEAST_USE", "SETTINGS", "FloatingSettings", "Goal", "LeastUse", "ben
 
 @dataclass(frozen=True, slots=True)
 class FloatingSettings:
-    """Sizes and tolerances of searches for wrists that give way."""
+    """Sizes and tolerances of the search for poses of floating and compliant wrists."""
 
     programs: int = 320
-    """For a question, at most, so that four floating hands take some ten seconds. Then the best
-    found so far is the answer."""
+    """Largest number of conic programs for one question.
+
+    Then the best plan found is returned. Four floating hands take some ten seconds."""
     first_programs: int = 70  # for a search for a first plan, at most
     effort_programs: int = 110  # for the search for least effort, at most
     rounds: int = 40  # for one choice of palm modes, at most
@@ -37,14 +39,15 @@ class FloatingSettings:
     first_range: float = 4.0  # about a point, in `TWIST_UNIT`
     closeness: float = 4e-6  # of a point to the best of the sets about it, relative
     price: float = 2.0
-    """Of a `WRENCH_UNIT` of missing force, and of `LOAD_UNIT` of a broken row, per utilisation."""
+    """Price, as utilisation, of a `WRENCH_UNIT` of missing wrench or a `LOAD_UNIT` of violation."""
     small_factors: tuple[float, ...] = (0.5, 0.1)
-    """Of the body wrench, from which the largest is sought where the whole has no plan."""
+    """Multiples of the body wrench to start the search from if the whole one has no plan."""
     binding_multiplier: float = 1e-6  # above this it binds
     dependent_rows: float = 1e-8  # relative size of binding rows that count as dependent
     effort_nearness: float = 2e-4
-    """Weight with which rounds stay near the point, for one unit of z: what an effort may be below
-    which is not worth a way of several units."""
+    """Weight that keeps an effort step near its point, for one unit of z.
+
+    Smaller gains of effort are not worth a step of several units."""
     cap_excess: float = 0.25 * CAP_SLACK  # of a plan's utilisation over the cap, at most
 
 
@@ -52,18 +55,19 @@ SETTINGS: Final = FloatingSettings()
 
 
 class Goal(ABC):
-    """Quantity that a search minimises.
+    """Objective of a search for wrist poses: what is minimised, and with which programs.
 
     Attributes
     ----------
     least_penalty : float
-        Least ρ: of the value for what is missing of the body wrench, per `WRENCH_UNIT`. Twice the
-        dearest multiplier if that is more.
+        Least penalty ρ of violations, per `WRENCH_UNIT` of missing body wrench. The search uses
+        twice the largest dual value if that is more.
     promised : float or None
-        What of a promised decrease a repaired step must keep for the range about it to widen;
-        None: it does not widen there.
-    farthest : sequence of ndarray, shape (6,), or None
-        How far from rest each hand's twist may be [m, rad]; None: as far as a twist is small.
+        Share of the predicted decrease that a corrected step must achieve for the trust region to
+        grow; None: the trust region does not grow after a corrected step.
+    farthest : sequence of ndarray, shape (m,), or None
+        Bound on the size of each component of each wrist's pose y: twist from rest [m, rad], of a
+        compliant hand also tensions [N]. None: no bound but that of small twists.
     """
 
     least_penalty: float
@@ -72,39 +76,74 @@ class Goal(ABC):
 
     @abstractmethod
     def value(self, measure: ExactMeasure) -> float:
-        """Return what is to be least, of a point."""
+        """Return the objective of a point: the quantity that the search minimises.
+
+        Parameters
+        ----------
+        measure : ExactMeasure
+            Exact utilisation, violations and effort at the point.
+        """
 
     def excess(self, measure: ExactMeasure) -> float:
-        """Return by how much a point is beyond what the goal allows; nothing by default."""
+        """Return by how much a point exceeds a bound of the goal, such as a cap; 0 by default."""
         return 0.0
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
-        """Return whether a point is a plan: nothing missing, nothing broken, nothing in excess."""
+        """Return whether a point is a plan: balanced, within hard rows and the goal's bounds."""
         return measure.exact(hands)
 
     def wrong(self, measure: ExactMeasure) -> float:
-        """Return what is missing, broken or in excess, together."""
+        """Return the sum of all violations at a point: missing wrench, hard row, excess."""
         return measure.missing + measure.broken + self.excess(measure)
 
     def merit(self, measure: ExactMeasure, penalty: float) -> float:
-        """Return the value, and ρ for what is wrong."""
+        """Return the merit function at a point: objective plus penalty times violations.
+
+        Parameters
+        ----------
+        measure : ExactMeasure
+            Exact utilisation, violations and effort at the point.
+        penalty : float
+            Penalty ρ per unit of violation.
+        """
         return self.value(measure) + penalty * self.wrong(measure)
 
     def constraints(self, data: StanceData) -> StanceData:
-        """Return the stance with all that must hold as hard rows; as it is by default."""
+        """Return the stance with the goal's constraints as hard rows; by default unchanged."""
         return data
 
     @abstractmethod
     def solve(self, data: StanceData) -> Outcome:
-        """Return what is least on sets, with the multipliers that prove it."""
+        """Minimise the objective on sets linearised at a point.
+
+        Parameters
+        ----------
+        data : StanceData
+            The linearised sets' scaled rows.
+
+        Returns
+        -------
+        Outcome
+            Loads and the dual values that prove them optimal.
+        """
 
     @abstractmethod
     def dearest(self, outcome: Outcome) -> float:
-        """Return the largest multiplier that the penalty must exceed."""
+        """Return the largest dual value of an outcome; the penalty must exceed it to be exact."""
 
     @abstractmethod
     def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
-        """Return where a round goes that is not yet near the end."""
+        """Solve for the next step while the search is still far from the optimum.
+
+        Parameters
+        ----------
+        data : StanceData
+            Sets linearised at the current point.
+        outcome : Outcome
+            Result of `solve` on the sets.
+        near : sequence of ndarray, shape (m,)
+            Loads of each hand [N], or wrist pose [m, rad], at the current point.
+        """
 
     @abstractmethod
     def root(
@@ -115,24 +154,53 @@ class Goal(ABC):
         within: float,
         weights: Outcome,
     ) -> Array:
-        """Return R (M, M) for `later_step`: RᵀR is the curvature that linear sets lack."""
+        """Return the curvature that linearised sets lack, as a root R with curvature RᵀR.
+
+        Parameters
+        ----------
+        hands : HandSets
+        point : LinearisationPoint
+            Current point.
+        sets : Sets
+            Sets linearised at the point.
+        within : float
+            Half width of the trust region, in `TWIST_UNIT`.
+        weights : Outcome
+            Dual values that weigh the rows' curvatures.
+
+        Returns
+        -------
+        ndarray, shape (M, M)
+            R in the scaled loads of all hands, for `later_step`.
+        """
 
     @abstractmethod
     def later_step(self, data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
-        """Return where a round goes that minds the sets' curvature, about loads."""
+        """Solve for the next step near the optimum, with the sets' curvature RᵀR.
+
+        Parameters
+        ----------
+        data : StanceData
+            Sets linearised at the current point.
+        root : ndarray, shape (M, M)
+            R, in the scaled loads of all hands.
+        near : sequence of ndarray, shape (m,)
+            Loads of each hand [N], or wrist pose [m, rad], at the current point.
+        """
 
     @abstractmethod
     def restore(self, data: StanceData) -> Outcome:
-        """Return where a round goes whose sets have no balance as the goal wants it."""
+        """Solve for a step toward feasibility, where the linearised sets contain no plan."""
 
 
 class LeastUse(Goal):
-    """Least utilisation; of several such points that of about least effort."""
+    """Goal of least utilisation; among points of equal utilisation, about least effort."""
 
     least_penalty = 10.0
     promised = None
 
     def value(self, measure: ExactMeasure) -> float:
+        """Return the utilisation of a point."""
         return measure.utilisation
 
     def solve(self, data: StanceData) -> Outcome:
@@ -180,13 +248,26 @@ class LeastUse(Goal):
 
 
 LEAST_USE: Final = LeastUse()
+"""The goal of least utilisation."""
 
 
 def bent_root(curvature: Array, rows: Array, near: float) -> Array:
-    """Return R, shape (m, m), of a curvature (m, m) where binding rows (k, m) leave room.
+    """Return a root R of a curvature, restricted to the directions that binding rows leave free.
 
-    RᵀR is the curvature there, as far as it bends toward more (the rest of it has no part in the
-    solution, and need not be convex), and ``near``² everywhere.
+    Parameters
+    ----------
+    curvature : ndarray, shape (m, m)
+        Symmetric second derivatives.
+    rows : ndarray, shape (k, m)
+        Gradients of the binding rows.
+    near : float
+        Root of a small curvature that is added in every direction.
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+        R. In the free directions RᵀR is the positive part of the curvature, plus near²; in all
+        other directions near². Negative curvature is dropped, so that the program stays convex.
     """
     _, sizes, axes = np.linalg.svd(rows)
     rank = int((sizes > SETTINGS.dependent_rows * sizes.max(initial=0.0)).sum())

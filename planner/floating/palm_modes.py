@@ -1,9 +1,9 @@
-"""Choose how the palms of floating hands carry load.
+"""Choose the palm modes of floating hands: whether a palm drags along the rock and presses on it.
 
-A palm drags the rock where it moves toward −x and presses where it moves into it, so that each of a
-hand's palm modes is a set of its own. They meet where the palm just does not move. A good choice
-of modes is sought at rest, hand by hand; where in the plan a palm is held back by nothing but its
-mode, it is tried the other way.
+A palm drags the rock if it moves toward −x, and presses if it moves into the rock. Each of a hand's
+palm modes has a set of its own; the sets meet where the palm just does not move. A good combination
+of modes is sought at rest, hand by hand. If in the plan only its mode holds a palm back, the plan
+is searched for again with that palm's mode switched.
 """
 
 from __future__ import annotations
@@ -32,7 +32,23 @@ Palms = tuple[PalmMode | None, ...]
 def first_plan(
     hands: HandSets, factor: float, choices: Iterator[Palms], budget: Budget
 ) -> WristSolution:
-    """Return the first plan that a choice of modes gives, or what comes nearest to one."""
+    """Return the first plan found over combinations of palm modes, or the nearest failure.
+
+    Parameters
+    ----------
+    hands : HandSets
+    factor : float
+        Multiple of the body wrench to be balanced.
+    choices : iterator of tuple of PalmMode or None
+        Palm modes of all hands to try, in order.
+    budget : Budget
+        Largest number of conic programs.
+
+    Returns
+    -------
+    WristSolution
+        A plan; if there is none, the failed search with the smallest missing wrench.
+    """
     failed: list[WristSolution] = []
     for palms in choices:
         most = SETTINGS.rounds_nearby if failed else SETTINGS.rounds
@@ -69,7 +85,16 @@ def _beginnings(
 
 
 def starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[Palms]:
-    """Yield choices of modes, the best at rest first."""
+    """Yield up to five combinations of palm modes, ranked by least utilisation at rest.
+
+    Parameters
+    ----------
+    hands : HandSets
+    factor : float
+        Multiple of the body wrench to be balanced.
+    budget : Budget
+        Largest number of conic programs.
+    """
     choices = [None if wrist is None else wrist.palm_modes() for wrist in hands.wrists]
     engaged = [i for i, modes in enumerate(choices) if modes is not None and len(modes) > 1]
     common: list[Palms] = [
@@ -106,7 +131,23 @@ def _with(palms: Palms, i: int, mode: PalmMode) -> Palms:
 def exchanged(
     hands: HandSets, found: WristSolution, budget: Budget, goal: Goal = LEAST_USE
 ) -> WristSolution:
-    """Return a better point that is had by turning palms that their mode holds back."""
+    """Improve a plan by switching palm modes that hold a palm back (positive dual value).
+
+    Parameters
+    ----------
+    hands : HandSets
+    found : WristSolution
+        Plan to be improved.
+    budget : Budget
+        Largest number of conic programs.
+    goal : Goal, optional
+        Objective; the least utilisation by default.
+
+    Returns
+    -------
+    WristSolution
+        A plan with a smaller value of the goal, or ``found``.
+    """
     tried: set[Palms] = {found.point.palms}
     for _ in range(6):
         new = next((p for p in _turned(found) if p not in tried), None)

@@ -1,20 +1,20 @@
-"""Find the poses of floating hands' wrists by linearising sets until they are exact.
+"""Find the wrist poses of floating hands: sequential convex programming with a trust region.
 
-What a floating hand holds is curved in its wrist's twist ξ, so a plan made on one linearised set is
-some per cent off. Here the hands' sets are linearised about a point (ξ of every floating hand, the
-loads of the others), the conic program is solved on them within a range about it, and the outcome
-is the next point:
+A floating hand's wrench is nonlinear in its wrist's twist ξ, so a plan on one linearised set is off
+by some per cent. Here the hands' sets are linearised at a point (ξ of every floating hand, the
+loads of the others), the conic program is solved on them within a range around the point, and the
+outcome is the next point:
 
     ξ_k → sets at ξ_k → loads → ξ_{k+1} → … until the sets at ξ_k have nothing better than ξ_k.
 
 A set is exact where it is linearised, so balance, limits and hard rows *at the point* are those of
-the model itself, and so is the plan. What is better is a goal's to say: less utilisation u, or less
-effort under a cap on it. Steps must lower the merit
+the model itself, and so is the plan. A `Goal` says what is minimised: the utilisation u, or the
+effort under a cap on u. A step must lower the merit function
 
-    value + ρ (|missing body wrench| + what hard rows are broken by + excess over the cap),
+    value + ρ (‖missing body wrench‖₁ + largest violation of a hard row + excess over the cap),
 
-once repaired, or are tried again in a narrower range: sequential programming with a trust region,
-an exact penalty and second-order corrections (Fletcher, Practical Methods of Optimization, ch. 14).
+if need be after a second-order correction; else it is tried again in a smaller trust region
+(exact penalty function; Fletcher, Practical Methods of Optimization, ch. 14).
 """
 
 from __future__ import annotations
@@ -46,31 +46,33 @@ __all__ = [
 ]
 
 NOT_SOLVED: Final = Outcome(False, "none", 0, math.nan)
-"""Before anything is solved."""
+"""Outcome before any program is solved."""
 
 
 @dataclass(frozen=True, eq=False)
 class WristSolution:
-    """Result of a search for a point.
+    """Result of a search for the wrist poses of floating and compliant hands.
 
     Attributes
     ----------
     found : {'least', 'unproven', 'nothing'}
-        ``least``: the point balances, keeps to hard rows, and nothing in the sets about it is
-        better. ``unproven``: it balances and keeps to them, but lies at a kink, where a tendon
-        begins to slip or a contact comes to its tile's edge, or the rounds ended: nothing better
-        was found, and the sets about it do not prove that there is none. ``nothing``: none of it.
+        ``least``: the point is a plan (balanced, within hard rows), and the sets linearised there
+        contain nothing better. ``unproven``: the point is a plan, but not proven to be the best: it
+        lies at a kink (a tendon begins to slip, a contact reaches its tile's edge), or the search
+        ran out of rounds. ``nothing``: the point is no plan.
     point : LinearisationPoint
+        Wrist poses and loads found.
     sets : Sets
-        About it.
+        Sets linearised at the point.
     outcome : Outcome
-        Of the goal's program on these sets; not solved where nothing was found.
+        Of the goal's program on these sets; not solved if ``nothing`` was found.
     rounds : int
+        Number of linearisations.
     error : float
-        Largest disagreement of a hand's wrench with the sets of the last step: forces, and moments
-        over 0.1 m [N].
+        Largest difference of a hand's wrench at the point from the sets of the last step: forces,
+        and moments over 0.1 m [N].
     measure : ExactMeasure
-        What the model says of the point.
+        Exact utilisation, violations and effort at the point.
     """
 
     found: Literal["least", "unproven", "nothing"]
@@ -86,7 +88,7 @@ class WristSolution:
 
     @property
     def exact(self) -> bool:
-        """True where the point is a plan."""
+        """True if the point is a plan."""
         return self.found != "nothing"
 
 
@@ -98,7 +100,20 @@ def searching(
     before: Sets | None = None,
     error: float = 0.0,
 ) -> WristSolution:
-    """Return a point with the sets about it, of which nothing is solved yet."""
+    """Return a point with the sets linearised there, and no program solved on them yet.
+
+    Parameters
+    ----------
+    hands : HandSets
+    goal : Goal
+    point : LinearisationPoint
+    within : float
+        Half width of the trust region, in `TWIST_UNIT`.
+    before : Sets, optional
+        Sets of the previous point, with which the wrenches at the new point are compared.
+    error : float, optional
+        Linearisation error to report if ``before`` is not given [N].
+    """
     sets = hands.sets(point, within, goal.farthest)
     if before is not None:
         error = max(disagreements(hands, before.spaces, sets.spaces, point.loads))
@@ -112,10 +127,25 @@ def solve_wrists(
     most: int = SETTINGS.rounds,
     goal: Goal = LEAST_USE,
 ) -> WristSolution:
-    """Find the best point for a goal, from a start and with the start's palm modes.
+    """Search for the best wrist poses for a goal, with the palm modes of the start point.
 
-    Where the search ends without proof, or its budget does, the point is made exact there. At a
-    deadline the best exact point on the way is what was found.
+    If the search ends without proof, or its budget is spent, violations at the last point are
+    corrected (`made_exact`). At a deadline the latest plan found on the way is returned.
+
+    Parameters
+    ----------
+    hands : HandSets
+    start : LinearisationPoint
+    budget : Budget
+        Largest number of conic programs.
+    most : int, optional
+        Largest number of rounds (linearisations).
+    goal : Goal, optional
+        Objective; the least utilisation by default.
+
+    Returns
+    -------
+    WristSolution
     """
     now = searching(hands, goal, start, SETTINGS.first_range)
     passed: WristSolution | None = None
@@ -176,11 +206,20 @@ def solve_wrists(
 
 
 def repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -> WristSolution:
-    """Return a point with less missing and broken, hardly moving: a second-order correction.
+    """Return a point with smaller violations, by the smallest step: a second-order correction.
 
-    The smallest step that balances, and puts hard rows that are broken on their limits; those that
-    just hold stay as they are. The same point where that step would go far from rest: rows that all
-    but contradict each other ask for kilometres, where the model has no answer.
+    The step is the least-squares solution that balances the body and puts violated hard rows on
+    their limits; active hard rows stay active. If rows nearly contradict each other, the step would
+    be kilometres long, where the model is not valid: then the point is returned unchanged.
+
+    Parameters
+    ----------
+    hands : HandSets
+    goal : Goal
+    state : WristSolution
+        Point to be corrected.
+    within : float
+        Half width of the trust region of the returned sets, in `TWIST_UNIT`.
     """
     data, loads = goal.constraints(state.sets.data), state.point.loads
     if not state.sets.finite:
@@ -210,7 +249,25 @@ def repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -
 def made_exact(
     hands: HandSets, goal: Goal, start: WristSolution, rounds: int, budget: Budget
 ) -> WristSolution:
-    """Make the point exact at which a search ended without proof."""
+    """Remove the violations at a point where a search ended without proof, by repeated corrections.
+
+    Parameters
+    ----------
+    hands : HandSets
+    goal : Goal
+    start : WristSolution
+        Point at which the search ended.
+    rounds : int
+        Number of linearisations until then.
+    budget : Budget
+        Largest number of conic programs.
+
+    Returns
+    -------
+    WristSolution
+        ``unproven`` with the corrected point if it is a plan whose value has hardly grown (by at
+        most a thousandth); else ``nothing``, with the point that the search ended at.
+    """
     now = start = searching(hands, goal, start.point, SETTINGS.first_range, error=start.error)
     for _ in range(12):
         if deadline.expired():
@@ -231,7 +288,21 @@ def made_exact(
 
 
 def gap(goal: Goal, state: WristSolution, outcome: Outcome) -> float:
-    """Return how far a point is above the best of its sets, relative."""
+    """Return the relative difference between a point's value and the optimum on its sets.
+
+    Parameters
+    ----------
+    goal : Goal
+    state : WristSolution
+        The point, with its exact measure.
+    outcome : Outcome
+        Solution of the goal's program on the sets linearised at the point.
+
+    Returns
+    -------
+    float
+        (value of the point − optimum) / max(1, value of the point).
+    """
     value = goal.value(state.measure)
     return (value - outcome.value) / max(1.0, value)
 
@@ -242,7 +313,24 @@ def disagreements(
     there: Sequence[WrenchSpace],
     loads: Sequence[Array],
 ) -> list[float]:
-    """Return how far sets of floating hands are off at loads where others are exact [N]."""
+    """Return the linearisation error of each compliant or floating hand's set at given loads.
+
+    Parameters
+    ----------
+    hands : HandSets
+    spaces : sequence of WrenchSpace
+        Sets whose error is wanted.
+    there : sequence of WrenchSpace
+        Sets linearised at the loads, which are exact there.
+    loads : sequence of ndarray, shape (m,)
+        Loads y of each hand.
+
+    Returns
+    -------
+    list of float
+        Largest difference of the wrench of each compliant or floating hand: forces, and moments
+        over 0.1 m [N].
+    """
     return [
         float(np.abs((a.wrench(y) - b.wrench(y)) * WRENCH_SCALE).max())
         for wrist, a, b, y in zip(hands.wrists, spaces, there, loads, strict=True)

@@ -1,4 +1,4 @@
-"""Prepare a question: all hands' sets and the programs' data."""
+"""Prepare a question for the solver: hands on holds, joint torques and wrench spaces."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,6 +1,6 @@
-"""The settled hands of a stance in arrays: one hand after another, each with its tiles in order.
+"""Arrays over all settled hands of a stance: one hand after another, each with its tiles in order.
 
-There are T tiles and nails, F = 4 H fingers, and H hands.
+Sizes: H hands, F = 4 H fingers, T tiles and nails.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ __all__ = [
 ]
 
 KEPT_NAMES: Final = 256
-"""Lists of names (of tiles, columns, rows) of which something is kept: some 5 kB each."""
+"""Bound of the caches of layouts, by lists of names (tiles, columns, rows): some 5 kB each."""
 
 Number = TypeVar("Number", bound=np.generic)
 
 CONTACT_CODES: Final = {"none": 0, "face": 1, "edge": 1, "frame": 2, NAIL: 3}
-"""Codes of the contact states of a tile: its face and its edge hold alike."""
+"""Code of each contact state; ``face`` and ``edge`` share a code, as they carry load alike."""
 
 
 class _Part(IntEnum):
@@ -47,24 +47,24 @@ class _Part(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class TileIndex:
-    """Index of the tiles of all hands, by how many each hand has.
+    """Index arrays of the tiles of all hands.
 
     Attributes
     ----------
     hand, finger : ndarray of int, shape (T,)
-        Hand and finger of each tile, the fingers counted through all hands.
+        Hand and finger of each tile; fingers are numbered through all hands.
     first : ndarray of int, shape (H,)
-        Each hand's first tile.
+        First tile of each hand.
     first_of_finger : ndarray of int, shape (F,)
-        Each finger's first tile.
+        First tile of each finger.
     phalanges : ndarray of int, shape (F, 3)
-        Tiles of each finger's phalanges.
+        Tiles on the phalanges of each finger.
     tips : ndarray of int, shape (F,)
-        The last of these.
+        Tile on the last phalanx of each finger.
     bases, base_fingers : ndarray of int, shape (2 H,)
-        The tiles on rotating bases, and their fingers.
+        Tiles on the rotating bases of outer fingers, and the fingers of these tiles.
     nails : ndarray of int
-        Nails, whether they hook or not.
+        Nails among the tiles, whether they hook or not.
     """
 
     hand: Indices
@@ -92,11 +92,17 @@ def _parts_of_hand(*, nails: bool) -> Indices:
 
 
 TILE_PARTS: Final = {nails: _parts_of_hand(nails=nails) for nails in (False, True)}
-"""Fingers and parts of the tiles of a hand, by whether it clings with its nails."""
+"""Finger and part of each tile of a hand, by whether the hand has nails."""
 
 
 def tile_index_of(counts: Sequence[int]) -> TileIndex:
-    """Return the places of hands that have so many tiles each."""
+    """Return the index arrays of all tiles.
+
+    Parameters
+    ----------
+    counts : sequence of int, length H
+        Number of tiles (and nails) of each hand.
+    """
     hand = np.arange(len(counts)).repeat(counts)
     of_each = np.concatenate([TILE_PARTS[count > len(TILE_PARTS[False])] for count in counts])
     finger, part = len(FINGERS) * hand + of_each[:, 0], of_each[:, 1]
@@ -123,15 +129,17 @@ class ContactPattern(NamedTuple):
     Attributes
     ----------
     contacts : ndarray of int, shape (T,)
-        Codes of `CONTACT_CODES`.
-    touches, framed : ndarray, shape (T,)
-        One for tiles on rock, zero for others; the same of those whose frame rests beside them.
+        Contact state of each tile, as code of `CONTACT_CODES`.
+    touches : ndarray, shape (T,)
+        1 for a tile on rock (face or edge), else 0.
+    framed : ndarray, shape (T,)
+        1 for a tile beside which the phalanx's frame presses on rock, else 0.
     away : ndarray of bool, shape (T,)
-        Tiles that are not on rock.
+        True for a tile that is not on rock.
     touching, idle : ndarray of int
-        Tiles on rock; tiles that touch nothing.
+        Indices of the tiles on rock, and of the tiles that touch nothing.
     holding : tuple of int, length F
-        How many tiles and nails of each finger are on rock that they hold.
+        Number of each finger's tiles and nails that are on rock.
     """
 
     contacts: Indices
@@ -144,7 +152,13 @@ class ContactPattern(NamedTuple):
 
 
 def contact_pattern_of(hands: tuple[tuple[SettledTile, ...], ...]) -> ContactPattern:
-    """Return the contact states of hands with these tiles."""
+    """Return the contact states of all tiles.
+
+    Parameters
+    ----------
+    hands : tuple of tuple of SettledTile
+        Tiles of each hand, with their contact states.
+    """
     places = tile_index_of(tuple(map(len, hands)))
     contacts = np.array([CONTACT_CODES[tile.contact] for hand in hands for tile in hand])
     away = contacts != CONTACT_CODES["face"]
@@ -163,7 +177,7 @@ def contact_pattern_of(hands: tuple[tuple[SettledTile, ...], ...]) -> ContactPat
 
 @dataclass(frozen=True, eq=False)
 class HandBatch:
-    """Settled hands of a stance, in arrays over all of them.
+    """Settled hands of a stance, as arrays over all of them. Vectors are in each hand's frame H.
 
     Attributes
     ----------
@@ -171,16 +185,19 @@ class HandBatch:
     places : TileIndex
     touch : ContactPattern
     points : ndarray, shape (T + H, 3)
-        Places of all tiles, then of all palms.
+        Positions of all tiles, then of all palms [m].
     axes : ndarray, shape (T, 3, 3)
-    engagement, lateral_shares : ndarray, shape (T,)
-        As of `SettledHand`.
+        Rows: unit forces of each tile's shear, normal and lateral load.
+    engagement : ndarray, shape (T,)
+        Share of each tile's spines that are on the rock.
+    lateral_shares : ndarray, shape (T,)
+        Share of the finger's lateral reaction that each tile carries, as in `SettledHand`.
     angles : ndarray, shape (F, 3)
         Angle of each phalanx [rad].
     bends : ndarray, shape (F, 3)
         Angle of each joint, relative to the phalanx before it [rad].
     palm_limits : ndarray, shape (H, 2)
-        Limits of each palm's shear and pressing; infinite where it touches nothing [N].
+        Limits of each palm's shear and pressing [N]; infinite for a palm that touches nothing.
     """
 
     hands: tuple[SettledHand, ...]
@@ -196,7 +213,7 @@ class HandBatch:
 
     @classmethod
     def of(cls, hands: Sequence[SettledHand]) -> HandBatch:
-        """Return the arrays of settled hands."""
+        """Collect the arrays of settled hands, one hand after another."""
         tiles = tuple([hand.tiles for hand in hands])
         positions = [hand.positions for hand in hands]
         angles = concatenated([hand.postures.angles for hand in hands])
@@ -240,10 +257,10 @@ class HandBatch:
 
     @property
     def stops(self) -> NDArray[np.int8]:
-        """Limit that each joint stands at, codes of `JOINT_STOPS`, shape (F, 3)."""
+        """Mechanical stop that each finger joint is at, as codes of `JOINT_STOPS`, shape (F, 3)."""
         return concatenated([hand.postures.stops for hand in self.hands])
 
 
 def concatenated(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
-    """Return the hands' arrays one after another."""
+    """Concatenate arrays of all hands along the first axis."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)

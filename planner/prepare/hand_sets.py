@@ -1,6 +1,7 @@
-"""The hands of a stance about a point: sets linearised there where wrists give way, or fixed.
+"""Wrench spaces of a stance's hands, linearised at a point where wrists are compliant or floating.
 
-A point is a pose of each wrist that gives way, and loads of each other hand; sets are exact there.
+A point is a pose of each compliant or floating wrist, and loads of each other hand. A hand's set is
+exact at that point. The set of a hand with a fixed wrist does not depend on the point.
 """
 
 from __future__ import annotations
@@ -51,16 +52,17 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class LinearisationPoint:
-    """Point about which the hands' sets are linearised.
+    """Point at which the hands' sets are linearised.
 
     Attributes
     ----------
-    loads : tuple of ndarray
-        y of each hand: loads [N], the twist of a floating wrist [m, rad], or tensions and twist.
+    loads : tuple of ndarray, shape (m,)
+        y of each hand. Fixed wrist: loads [N]; floating: twist of the wrist [m, rad]; compliant:
+        tensions [N] and twist [m, rad].
     palms : tuple of PalmMode or None
-        How each floating hand's palm carries; None for a hand with a fixed wrist.
+        Palm mode (which loads the palm carries) of each floating hand; None for a fixed wrist.
     factor : float
-        How many times the body wrench is to be balanced.
+        Multiple of the body wrench that is to be balanced.
     """
 
     loads: tuple[Array, ...]
@@ -69,21 +71,21 @@ class LinearisationPoint:
 
 
 class ExactMeasure(NamedTuple):
-    """Exact values of the model at a point, where the sets about it are exact.
+    """Exact values of the model at the point at which the sets are linearised.
 
     Attributes
     ----------
     utilisation : float
-        Largest utilisation.
+        Largest utilisation of all limits.
     missing : float
-        Sum of the components of the body wrench that are missing, scaled.
+        Sum of the absolute residuals of the balance, in `WRENCH_UNIT`.
     broken : float
-        Largest violation of a hard row, scaled; not below zero.
+        Largest violation of a hard row, in `LOAD_UNIT`; at least zero.
     effort : float
-        What `programs.effort` makes least: the sum of squared relative tensions and joint torques,
-        and of fixed hands a little of what makes their other loads unique.
+        Objective of `programs.effort`: sum of squared relative tensions and joint torques, plus,
+        for hands with fixed wrists, small weights that make their other loads unique.
     excess : float
-        Sum of the violations of all hard rows, scaled.
+        Sum of the violations of all hard rows, in `LOAD_UNIT`.
     """
 
     utilisation: float
@@ -93,20 +95,20 @@ class ExactMeasure(NamedTuple):
     excess: float
 
     def exact(self, hands: HandSets) -> bool:
-        """Return whether the body wrench is balanced and no hard row is broken."""
+        """Return whether the body is balanced and no hard row violated, to about 1e-8."""
         size = max(1.0, float(np.linalg.norm(hands.wrench)))
         # what is missing is relative, in `WRENCH_UNIT`; hard rows are in `LOAD_UNIT`
         return self.missing <= 2e-8 * size and self.broken <= 1e-8
 
 
 class Sets(NamedTuple):
-    """The hands' sets about a point, and the program's data of them."""
+    """Wrench spaces of all hands linearised at a point, and their scaled rows for the programs."""
 
     spaces: tuple[WrenchSpace, ...]
     data: StanceData
 
     def measure(self, loads: Sequence[Array]) -> ExactMeasure:
-        """Return what loads do, exact for those of the point."""
+        """Return utilisation, violations and effort of loads y; exact for the point's loads."""
         used, broken, excess, effort = -math.inf, 0.0, 0.0, 0.0
         for hand, y in zip(self.data.hands, loads, strict=True):
             z = y / hand.unit
@@ -119,7 +121,7 @@ class Sets(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """True if every phalanx still finds its rock."""
+        """True if all rows are finite: no phalanx in contact loses its rock at the point."""
         return all(
             np.isfinite(hand.L).all() and np.isfinite(hand.G).all() for hand in self.data.hands
         )
@@ -127,32 +129,32 @@ class Sets(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HandSets:
-    """The hands of a stance.
+    """The hands of a stance, from which their wrench spaces at any point are computed.
 
     Attributes
     ----------
     spaces : tuple of WrenchSpace
-        Of hands that give way, at rest with idle palms.
+        Set of each hand; of compliant or floating hands at rest, with idle palms.
     scaled : tuple of ScaledRows
-        Their rows.
+        Scaled rows of these sets.
     wrists : tuple of FloatingWrist or None
-        None for hands with a fixed wrist.
+        Model of each compliant or floating wrist; None for a fixed wrist.
     transports : ndarray, shape (hands, 6, 6)
-        Ad(B←H).
+        Ad(B←H): carries a wrench from the hand frame H to the body frame B.
     wrench : ndarray, shape (nb,)
-        What the balance is to give: the body wrench, in `WRENCH_UNIT`, and components of hands'
-        wrenches that are given.
+        Right-hand side of the balance: body wrench, then prescribed components of hands' wrenches,
+        in `WRENCH_UNIT`.
     held : tuple of ndarray, shape (nb − 6, 6)
-        Of `HandData.of`.
+        Selects each hand's prescribed wrench components, as in `HandData.of`.
     added : tuple of StanceConstraints
-        What the stance adds to each hand's set; `spaces` have it already. Joints are those at which
-        the hand rests: a wrist that gives way by millimetres hardly moves them.
+        Rows that the stance adds to each hand's set (included in `spaces`). Joint torques are those
+        at the rest pose: a wrist moves by millimetres, which hardly moves joints.
     data : StanceData
-        Of hands with a fixed wrist; of floating ones a place to fill.
+        Scaled rows of all hands; `sets` replaces those of compliant or floating hands.
     floating : bool
-        Whether any wrist gives way.
+        True if any wrist is compliant or floating.
     together : CompliantWrists or None
-        The compliant ones of them, if there are any.
+        All compliant wrists, computed in one call; None if there are none.
     """
 
     spaces: tuple[WrenchSpace, ...]
@@ -177,7 +179,7 @@ class HandSets:
         added: tuple[StanceConstraints, ...],
         known: tuple[ScaledRows, ...] | None = None,
     ) -> HandSets:
-        """Return the hands of a stance; parameters as the attributes, ``known`` as ``scaled``."""
+        """Build the hands of a stance; ``known`` are their scaled rows, if already computed."""
         scaled = tuple(map(ScaledRows.of, spaces)) if known is None else known
         data = StanceData.of(hands_data(scaled, transports, held), wrench)
         floating = any(wrist is not None for wrist in wrists)
@@ -191,7 +193,7 @@ class HandSets:
         spaces: Sequence[WrenchSpace],
         wrists: tuple[FloatingWrist | None, ...] | None = None,
     ) -> HandSets:
-        """Return the same stance with other sets of its hands, and other wrists."""
+        """Return the same stance with other sets of its hands and, if given, other wrists."""
         own = self.wrists if wrists is None else wrists
         return HandSets.of(spaces, own, self.transports, self.wrench, self.held, self.added)
 
@@ -202,21 +204,21 @@ class HandSets:
 
     @property
     def springy(self) -> bool:
-        """True if the palm of a compliant hand carries by its springs."""
+        """True if the palm of a compliant hand carries load by its springs."""
         return any(isinstance(w, CompliantWrist) and w.palm_carries for w in self.wrists)
 
     def without_palms(self) -> HandSets:
-        """Return the same hands, of whose compliant ones no palm carries."""
+        """Return the same hands, with palms of compliant hands that carry nothing."""
         wrists = [w.without_palm() if isinstance(w, CompliantWrist) else w for w in self.wrists]
         return replace(self, wrists=tuple(wrists))
 
     @property
     def idle(self) -> tuple[PalmMode | None, ...]:
-        """Modes in which no floating hand's palm carries."""
+        """Palm modes of all hands in which no palm carries load."""
         return tuple(None if wrist is None else "off" for wrist in self.wrists)
 
     def at_rest(self, palms: Sequence[PalmMode | None]) -> LinearisationPoint:
-        """Return the point at which wrists are at rest, and the other hands carry nothing."""
+        """Return the point with all wrists at rest, and no loads on hands with fixed wrists."""
         pairs = zip(self.wrists, self.spaces, strict=True)
         loads = [np.zeros(len(s.columns)) if w is None else w.at_rest for w, s in pairs]
         return LinearisationPoint(tuple(loads), tuple(palms))
@@ -227,15 +229,16 @@ class HandSets:
         within: float | None = None,
         farthest: Sequence[Array] | None = None,
     ) -> Sets:
-        """Return the sets about a point.
+        """Return the hands' sets linearised at a point.
 
         Parameters
         ----------
         point : LinearisationPoint
         within : float, optional
-            A range about it for wrists, in `TWIST_UNIT`; by default as far as the rows let.
-        farthest : sequence of ndarray, shape (6,), optional
-            With a range, how far from rest each wrist's twist may be [m, rad].
+            Half width of the trust region of wrists, in `TWIST_UNIT`; by default unbounded.
+        farthest : sequence of ndarray, shape (m,), optional
+            Bound on the size of each component of each wrist's pose y: twist from rest [m, rad], of
+            a compliant hand also tensions [N]. Requires ``within``.
         """
         if not self.floating:
             whole = point.factor == 1.0
@@ -280,10 +283,12 @@ class HandSets:
         duals: Outcome,
         efforts: Sequence[Array] | None = None,
     ) -> list[Array]:
-        """Return the curvature of each hand's rows, weighed by multipliers, shape (m, m).
+        """Return the curvature of each hand's rows, weighted by dual values, shape (m, m) each.
 
-        ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by differences of slopes; zero for fixed wrists. Weights ε
-        of the rows of effort are none by default.
+        ∂²(λ·L + μ·H + ν·G + ε·E)/∂z², by finite differences of slopes at a point; zero for fixed
+        wrists. λ, μ, ν are the dual values (``duals``) of limits, hard rows and balance; ε are
+        weights of the efforts (``efforts``), by default 0. ``within`` is the trust region in
+        `TWIST_UNIT`.
         """
         difference = 1e-3  # of slopes, in the units of poses
         balance, bent = duals.balance_dual, []
@@ -308,12 +313,12 @@ class HandSets:
         return [0.5 * (part + part.T) for part in map(np.nan_to_num, bent)]
 
     def near_rest(self, point: LinearisationPoint) -> bool:
-        """Return whether no wrist is farther from rest than a small twist."""
+        """Return whether every wrist's twist from rest is small (at most 50 `TWIST_UNIT`)."""
         # in `TWIST_UNIT`: beyond, no twist is small
         return self.step(self.at_rest(point.palms), point.loads) <= 50.0
 
     def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:
-        """Return how far the wrists move from a point to loads, in `TWIST_UNIT`."""
+        """Return the largest move of a wrist from a point to given loads, in `TWIST_UNIT`."""
         moved = [
             float(np.abs((y - at) / pose_units(wrist.columns)).max())
             for wrist, y, at in zip(self.wrists, loads, point.loads, strict=True)
@@ -331,10 +336,10 @@ def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:
 
 
 def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
-    """Return the widest set at rest over the palm's modes, and how far it is off at most [N].
+    """Return the widest set at rest over the palm modes, and its largest linearisation error [N].
 
-    The widest has room for the largest ball of twists, in `TWIST_UNIT`. It is held against the
-    model where it reaches farthest along ± each axis, if every phalanx finds its rock there.
+    The widest set contains the largest ball of twists, in `TWIST_UNIT`. The error is measured where
+    the set reaches farthest along ± each axis, if no phalanx in contact loses its rock there.
     """
     palms = wrist.palm_modes()
     spaces = [wrist.linearised(palm=palm) for palm in palms]
@@ -370,7 +375,10 @@ def _room(space: WrenchSpace) -> float:
 def wrist_at(
     stance: Stance, index: int, settled: SettledHand, tension_limit: float | None = None
 ) -> FloatingWrist | None:
-    """Return how the hand of that index gives way; None if its wrist is fixed."""
+    """Return the wrist model of a stance's hand, by index; None if the wrist is fixed.
+
+    ``settled`` is the closed hand; ``tension_limit`` caps its tensions [N].
+    """
     hand = stance.hands[index]
     if hand.wrist == "fixed":
         return None
@@ -387,5 +395,5 @@ def wrist_at(
 def wrists_at(
     stance: Stance, settled: Sequence[SettledHand], tension_limit: float | None = None
 ) -> tuple[FloatingWrist | None, ...]:
-    """Return how each hand gives way; see `wrist_at`."""
+    """Return the model of each hand's wrist; see `wrist_at`."""
     return tuple([wrist_at(stance, i, hand, tension_limit) for i, hand in enumerate(settled)])

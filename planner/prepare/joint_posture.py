@@ -1,9 +1,8 @@
-"""Find the joint angles of a stance, and the joint torques and the weight of the robot there.
+"""Joint angles of a stance (given, or by inverse kinematics), joint torques and the robot's weight.
 
-Angles are given, or found by inverse kinematics from the hands' poses; hands may be a little off
-these. Limbs without a hand or an angle are at zero, or the limit nearest to it. Torques and the
-weight are those of one Newton–Euler pass over the whole robot, its body accelerated and its joints
-at rest.
+A hand's pose may differ slightly from the one that its joint angles give. Limbs without a hand or
+an angle are at zero, or the limit nearest to zero. Torques and weight come from one Newton–Euler
+pass over the whole robot (inverse dynamics), with the body accelerated and the joints at rest.
 """
 
 from __future__ import annotations
@@ -24,19 +23,19 @@ __all__ = ["Posture", "posture"]
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """The joints of a stance.
+    """Joint angles of a stance, with the joint torques and the weight of the robot at these angles.
 
     Attributes
     ----------
     angles : mapping of str to ndarray, shape (n,)
-        Of every limb [rad].
+        Joint angles of every limb [rad]; of prismatic joints [m].
     joints : mapping of str to JointLoads
-        What every limb's joints bear.
+        Joint torques of every limb as a function of its hand's wrench, and their limits.
     weights : Weights
-        What the robot and its payloads weigh there.
+        Body wrench from the robot's weight, centre of mass, and positions of payloads.
     off : mapping of str to tuple of float, float
-        By limb, of those whose pose no joint angles were found for, only some near it: how far its
-        hand is off there [m], and by how much it is turned [rad].
+        Errors of inverse kinematics by limb, of hands whose pose is only nearly reached: distance
+        [m] and angle [rad].
     """
 
     angles: Mapping[str, Array]
@@ -45,22 +44,27 @@ class Posture:
     off: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def idle(self, stance: Stance) -> dict[str, JointLoads]:
-        """Return what the joints bear of limbs that have no hand in a stance."""
+        """Return the joint loads of the limbs that have no hand in a stance, by limb."""
         holding = {hand.limb for hand in stance.hands}
         return {limb: joints for limb, joints in self.joints.items() if limb not in holding}
 
 
 def posture(question: Question) -> Posture | None:
-    """Return where a question's joints are; None if nothing is said of them.
+    """Return the joint angles of a question, found by inverse kinematics where not given.
+
+    Returns
+    -------
+    Posture or None
+        With joint torques and weight; None if the question has no joints.
 
     Raises
     ------
     UnreachableError
         If a hand's pose is out of its limb's reach; the field is relative to the question.
     InvalidInputError
-        If given joints are impossible, or not where the hands' poses are.
+        If given angles are outside the joints' ranges, or do not fit the hands' poses.
     DeadlineError
-        If the time is over before they are found.
+        If the deadline expires before angles are found.
     """
     stance = question.stance
     if stance.joints is None:
@@ -79,10 +83,17 @@ def posture(question: Question) -> Posture | None:
 
 
 def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
-    """Return what the joints bear at these angles; limbs left out are at rest.
+    """Return joint torques and weight of the robot at given joint angles.
 
-    Hands act on the rock where the stance has them, also where the joints put them a little off:
-    what balances the body and what the joints bear are wrenches at one pose.
+    Hands act on the rock at the poses of the stance, even if the angles put them slightly off: the
+    balance of the body and the joint torques then refer to the same pose.
+
+    Parameters
+    ----------
+    question : Question
+    angles : mapping of str to ndarray, shape (n,)
+        Joint angles by limb [rad], of prismatic joints [m]; limbs left out are at their rest
+        angles.
     """
     stance, robot, load = question.stance, question.stance.robot, question.load
     whole = {
@@ -130,7 +141,10 @@ def _jacobians_at(stance: Stance, angles: Mapping[str, Array]) -> dict[str, Arra
 
 
 def torque_limits(question: Question) -> dict[str, Array]:
-    """Return what each joint can bear: the caller's figures, or else the robot's [N·m]."""
+    """Return the torque limits of each limb's joints, shape (n,) [N·m], by limb.
+
+    The question's limits come before the robot's. Of prismatic joints the limits are forces [N].
+    """
     robot, own = question.stance.robot, question.limits.joint_torque
     if own is None:
         return {limb: chain.torque_limits for limb, chain in robot.chains.items()}

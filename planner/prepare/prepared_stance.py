@@ -1,4 +1,4 @@
-"""A question's stance, prepared: its hands' sets, with all that the stance adds to them."""
+"""Prepare a question for the solver: hands on their holds, joint torques, all constraint rows."""
 
 from __future__ import annotations
 
@@ -27,27 +27,28 @@ __all__ = ["PreparedStance", "assemble", "checked_question", "prepare_stance"]
 KNOWN_HANDS: Final[
     BoundedStore[Hashable, tuple[HandBatch, list[WrenchSpace], tuple[ScaledRows, ...]]]
 ] = BoundedStore("hands in arrays", 64)
-"""Hands of stances in arrays, their sets, and these as programs need them, by the hands and the cap
-on tensions: those that were asked for last."""
+"""LRU cache of hands with fixed wrists: arrays, wrench spaces and scaled rows.
+
+The key is the settled hands and the cap on tensions."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedStance:
-    """All that is known of a question before a solver is asked; the owner of its arrays.
+    """A question, prepared for the solver: hands on their holds, their sets, and the body wrench.
 
     Attributes
     ----------
     question : Question
     where : Posture or None
-        The joints; None if the question says nothing of them.
+        Joint angles and torques; None if the question has no joints.
     batch : HandBatch
-        The hands on their holds.
+        The hands on their holds, as arrays.
     hands : HandSets
-        What the programs need of them.
+        Wrench spaces of the hands, as the programs need them.
     wrench : ndarray, shape (6,)
-        The body wrench that is planned for, in B [N, N·m].
+        Body wrench that is planned for, in the body frame B [N, N·m].
     limbs : tuple of str
-        Of the hands, in the order of all arrays.
+        Limb of each hand, in the order of all arrays.
     """
 
     question: Question
@@ -63,18 +64,18 @@ class PreparedStance:
 
     @property
     def floating(self) -> list[str]:
-        """Limbs whose hands' wrists float."""
+        """Limbs whose hands have a compliant or floating wrist."""
         pairs = zip(self.limbs, self.hands.wrists, strict=True)
         return [limb for limb, wrist in pairs if wrist is not None]
 
     @property
     def needs_hands(self) -> bool:
-        """True if the hands have a body wrench to give."""
+        """True if the body wrench is not zero, so that the hands must carry it."""
         return bool(np.abs(self.hands.wrench[:6]).max() > TOLERANCES.body_wrench)
 
     @property
     def at_rest(self) -> Sets:
-        """The hands' sets, of floating ones at rest with idle palms, and the programs' data."""
+        """Wrench spaces of all hands; of compliant or floating hands at rest with idle palms."""
         hands = self.hands
         if hands.floating:
             return hands.sets(hands.at_rest(hands.idle))
@@ -86,12 +87,17 @@ class PreparedStance:
         return replace(self, question=question, hands=self.hands.turned(wrench), wrench=wrench)
 
     def with_hands(self, settled: Sequence[SettledHand]) -> PreparedStance:
-        """Return the same stance, body, joints and all, with its hands closed otherwise.
+        """Return the same stance with other settled hands; body, joints and constraints stay.
+
+        Parameters
+        ----------
+        settled : sequence of SettledHand
+            One for each hand of the stance, in its order.
 
         Raises
         ------
         InvalidInputError
-            If a floating hand does not hold its preload there; the field begins with
+            If a floating hand cannot have its preload there; the field begins with
             ``stance.hands``.
         """
         stance, cap = self.question.stance, self.question.limits.tendon_tension
@@ -102,12 +108,12 @@ class PreparedStance:
 
 
 def checked_question(question: Question) -> Question:
-    """Return a question.
+    """Return a question unchanged, after a check of its type.
 
     Raises
     ------
     InvalidInputError
-        If it is none.
+        If the argument is no `Question`.
     """
     if not isinstance(question, Question):
         raise InvalidInputError(f"a Question is needed, got a {type(question).__name__}")
@@ -115,12 +121,17 @@ def checked_question(question: Question) -> Question:
 
 
 def prepare_stance(question: Question) -> PreparedStance:
-    """Return what is known of a question before a solver is asked.
+    """Prepare a question for the solver.
+
+    Returns
+    -------
+    PreparedStance
+        Hands closed on their holds, joint torques, wrench spaces and the body wrench.
 
     Raises
     ------
     InvalidInputError
-        If it cannot be understood; the field is relative to the question.
+        If the question is not valid; the field is relative to the question.
     """
     checked_question(question)
     where = posture(question)
@@ -132,14 +143,22 @@ def prepare_stance(question: Question) -> PreparedStance:
 def assemble(
     question: Question, where: Posture | None, wrench: Array
 ) -> tuple[HandBatch, HandSets]:
-    """Return the hands of a question on their holds, and what the programs need of them.
+    """Close the hands of a question on their holds, and compute their wrench spaces.
 
     Parameters
     ----------
     question : Question
     where : Posture or None
+        Joint angles and torques; None if joints are not known.
     wrench : ndarray, shape (6,)
-        The body wrench that is needed, in B [N, N·m].
+        Body wrench that is planned for, in B [N, N·m].
+
+    Returns
+    -------
+    batch : HandBatch
+        The settled hands, as arrays.
+    hands : HandSets
+        Their wrench spaces with all rows that the stance adds.
     """
     stance, cap = question.stance, question.limits.tendon_tension
     settled = tuple(settle_stance(stance))

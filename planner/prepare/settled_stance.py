@@ -1,4 +1,4 @@
-"""The hands of a stance on their holds, and what each can carry at rest."""
+"""Close the hands of a stance on their holds, and compute the wrench space of one hand at rest."""
 
 from __future__ import annotations
 
@@ -25,7 +25,13 @@ __all__ = [
 
 
 def settle_hand(hand: HandOnHold, stance: Stance) -> SettledHand:
-    """Close one hand of a stance on its hold."""
+    """Close one hand of a stance on its hold.
+
+    Raises
+    ------
+    InvalidInputError
+        If the hand cannot be closed on its hold there.
+    """
     (settled,) = settle_each(stance.robot.hand, [hand])
     if isinstance(settled, InvalidInputError):
         raise settled
@@ -33,12 +39,19 @@ def settle_hand(hand: HandOnHold, stance: Stance) -> SettledHand:
 
 
 def settle_stance(stance: Stance, which: Sequence[int] | None = None) -> list[SettledHand]:
-    """Close the hands of a stance on their holds, at once; of all by default, or of these indices.
+    """Close the hands of a stance on their holds, all in one call.
+
+    Parameters
+    ----------
+    stance : Stance
+    which : sequence of int, optional
+        Indices of the hands; all by default.
 
     Raises
     ------
     InvalidInputError
-        If a hand cannot be where it is; of the first one, its field relative to the question.
+        If a hand cannot be closed on its hold; of the first such hand, its field relative to the
+        question.
     """
     indices = range(len(stance.hands)) if which is None else which
     settled = []
@@ -53,7 +66,19 @@ def settle_stance(stance: Stance, which: Sequence[int] | None = None) -> list[Se
 def settle_each(
     kind: SpinyHand, hands: Sequence[HandOnHold]
 ) -> list[SettledHand | InvalidInputError]:
-    """Return hands of one kind closed on their holds; errors in place of those that cannot be."""
+    """Close hands of one kind on their holds; return an error in place of each that cannot close.
+
+    Parameters
+    ----------
+    kind : SpinyHand
+        Model of all the hands.
+    hands : sequence of HandOnHold
+
+    Returns
+    -------
+    list of SettledHand or InvalidInputError
+        In the order of ``hands``.
+    """
     placements = [
         Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold(), hand.at)
         for hand in hands
@@ -76,24 +101,34 @@ def settle_each(
 
 
 def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
-    """Return one hand of a stance on its hold, and what it can carry; see `resting_hand`."""
+    """Close one hand of a stance on its hold; return the closed hand and its wrench space.
+
+    The wrench space is that of `resting_hand`, which also says when an error is raised.
+
+    Parameters
+    ----------
+    stance : Stance
+    limb : str
+        Limb of the hand.
+    """
     hand = resting_hand(stance, limb)
     return hand.settled, hand.space
 
 
 class RestingHand(NamedTuple):
-    """One hand of a stance on its hold, and what it can carry.
+    """One hand of a stance closed on its hold, and its wrench space at rest.
 
     Attributes
     ----------
     settled : SettledHand
     space : WrenchSpace
-        Of a floating hand the widest of its sets linearised at rest, one for each palm mode.
+        All wrenches that the hand can exert on the rock. Of a floating hand, the set linearised at
+        rest for the palm mode in which it is widest.
     palm : PalmMode or None
-        The mode of that set; None for a fixed wrist.
+        That palm mode; None for a fixed wrist.
     error : float
-        How far it is off at most where it reaches farthest along ± each axis: forces, and moments
-        over 0.1 m [N].
+        Largest linearisation error where the set reaches farthest along ± each axis: forces, and
+        moments over 0.1 m [N]. Zero for a fixed wrist.
     """
 
     settled: SettledHand
@@ -103,14 +138,20 @@ class RestingHand(NamedTuple):
 
 
 def resting_hand(stance: Stance, limb: str) -> RestingHand:
-    """Return one hand of a stance on its hold, and what it can carry.
+    """Close one hand of a stance on its hold, and compute its wrench space at rest.
+
+    Parameters
+    ----------
+    stance : Stance
+    limb : str
+        Limb of the hand.
 
     Raises
     ------
     InvalidInputError
-        If the stance has no such hand, or the hold cannot be where it is.
+        If the stance has no such hand, or the hand cannot be closed on its hold.
     UnsupportedError
-        If its wrist is compliant: what tensions and poses give together is far from a polyhedron.
+        If the wrist is compliant: its wrench space is far from a polyhedron.
     """
     settled, wrist = _hand_at(stance, limb)
     if wrist is not None and wrist.driven:
@@ -126,12 +167,19 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
 
 
 def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
-    """Return how one hand of a stance gives way.
+    """Close a floating hand of a stance on its hold, and return the model of its wrist.
+
+    Parameters
+    ----------
+    stance : Stance
+    limb : str
+        Limb of the hand.
 
     Raises
     ------
     InvalidInputError
-        If the stance has no such hand, its wrist is fixed, or the hold cannot be where it is.
+        If the stance has no such hand, its wrist is not floating, or the hand cannot be closed on
+        its hold.
     """
     _, wrist = _hand_at(stance, limb)
     if wrist is None or wrist.driven:

@@ -1,14 +1,14 @@
-"""Rows that a hand's set gains in a stance: its limb's joints, a cap on its force, small changes.
+"""Rows that a stance adds to a hand's wrench space: joint torques, force caps, tension changes.
 
-All are rows of the hand's `WrenchSpace { o + V y }`, so programs, prices and proofs treat them like
-any other:
+Each is a row of the hand's `WrenchSpace { o + V y }` (wrench o + V y on the rock for loads y), so
+programs, shadow prices and certificates treat them like any other row. u is the utilisation:
 
-- a joint bears ``|τ_g + Jᵀ (o + V y)| ≤ u τ_max``, τ_g from gravity and acceleration, J of H; of
-  one without a motor it is zero (hard);
+- a joint's torque is within ``|τ_g + Jᵀ (o + V y)| ≤ u τ_max``, τ_g from gravity and acceleration,
+  J the limb's Jacobian in the hand frame H; a joint without a motor has torque zero (hard row);
 - a hand's force on the rock, in a named frame, is at most u times a cap;
-- a tendon's tension changes by no more than so much from what it is now (hard).
+- a tendon's tension differs from its present value by at most a given change (hard row).
 
-A margin on what holds at zero, and a least tension, tighten hard rows that the set has.
+A hold margin and a least tension tighten hard rows that the set already has.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 FORCE_CAP: Final = "force_cap"
-"""Name of the limit rows of a cap on a hand's force."""
+"""Name of the limit rows that cap a hand's force."""
 
 TENSION_CHANGE: Final = "tension_change"
 """Name of the hard rows that keep tensions near the present ones."""
@@ -48,46 +48,49 @@ PASSIVE_JOINT: Final = "passive_joint"
 """Name of the hard rows of a joint without a motor."""
 
 FORCE_DIRECTIONS: Final = np.vstack([HELD_DIRECTIONS, HELD_DIRECTIONS[8:] * [1.0, 1.0, -1.0]])
-"""Directions (26, 3) whose largest product with a force is at least its size: `HELD_DIRECTIONS`
-and, toward the rock, its mirror image: that of those after the first eight, which lie in the palm's
-plane."""
+"""Directions (26, 3), little longer than unit vectors, whose largest product with a force is at
+least the force's size.
+
+They are `HELD_DIRECTIONS` and their mirror images toward the rock, except for the first eight,
+which lie in the palm's plane."""
 
 CHANGE_ROWS: Final = tuple(
     Row(finger, None, TENSION_CHANGE, "hard", f"{finger}/{TENSION_CHANGE}/{way}")
     for finger in FINGERS
     for way in ("up", "down")
 )
-"""Names of the hard rows of a change of tensions."""
+"""Names of the hard rows that bound changes of tension, two for each finger."""
 
 
 @dataclass(frozen=True, slots=True)
 class PrepareTolerances:
-    """Least size of numbers of a stance that mean something."""
+    """Tolerances below which numbers of a stance count as zero."""
 
     hand_offset: float = 0.01  # [m] of a hand's pose from where its joints put it
     hand_turn: float = 0.05  # [rad] of its axes from those that its joints give
     body_wrench: float = 1e-9
-    """In `WRENCH_UNIT`; a smaller one is none, every multiple of it is the same."""
+    """Largest body wrench, in `WRENCH_UNIT`, that counts as zero: it has no load factor."""
 
 
 TOLERANCES: Final = PrepareTolerances()
 
 
 class JointLoads(NamedTuple):
-    """Loads of a limb's joints: ``gravity + Jᵀ w`` for the hand's wrench w on the rock, in H.
+    """Loads of a limb's joints as a function of the hand's wrench w: ``gravity + Jᵀ w``.
 
-    Torques [N·m] are forces [N] of joints that slide.
+    w is the wrench on the rock, in the hand frame H. Of prismatic joints, loads are forces [N].
 
     Attributes
     ----------
     names : tuple of str, length n
     sliding : ndarray of bool, shape (n,)
+        True for prismatic joints.
     gravity : ndarray, shape (n,)
-        Torque at no wrench, from gravity and the body's acceleration [N·m].
+        Torques for no wrench, from gravity and the body's acceleration [N·m].
     jacobian : ndarray, shape (6, n)
-        Jacobian of H, in H.
+        Jacobian J of the hand frame H, in H.
     limits : ndarray, shape (n,)
-        Torque limits [N·m]; zero of a joint without a motor.
+        Torque limits [N·m]; zero for a joint without a motor.
     """
 
     names: tuple[str, ...]
@@ -97,7 +100,7 @@ class JointLoads(NamedTuple):
     limits: Array
 
     def of(self, which: NDArray[np.bool_]) -> JointLoads:
-        """Return some of the joints."""
+        """Return the loads of the joints selected by a boolean mask, shape (n,)."""
         names = tuple(compress(self.names, which.tolist()))
         return JointLoads(
             names,
@@ -118,30 +121,32 @@ class JointLoads(NamedTuple):
         return self.of(self.limits == 0.0)
 
     def torques(self, wrench: Array) -> Array:
-        """Return the joints' torques for a hand's wrench on the rock, shape (n,) [N·m]."""
+        """Return the joint torques for a hand's wrench on the rock in H, shape (n,) [N·m]."""
         return np.asarray(self.gravity + self.jacobian.T @ wrench)
 
 
 @dataclass(frozen=True, eq=False)
 class StanceConstraints:
-    """Constraints that a stance adds to the set of one hand.
+    """Constraints that a stance adds to the wrench space of one hand.
 
     Attributes
     ----------
     joints : JointLoads or None
+        Loads and limits of the limb's joints; None if joints are not known.
     cap : tuple of (float, float) of length 3, or float, or None
-        Least and largest force along each axis of a frame, or the largest force whatever its
-        direction [N].
-    frame : ndarray, shape (3, 3)
-        Axes of that frame in H, as columns.
+        Least and largest force along each axis of ``frame``, or the largest force in any direction
+        [N]; None: no cap.
+    frame : ndarray, shape (3, 3), or None
+        Axes of the cap's frame, as columns in the hand frame H.
     present : ndarray, shape (4,), or None
-        Present tensions [N].
+        Present tensions of the tendons [N].
     change : float
-        Largest change from those [N].
+        Largest change from the present tensions [N].
     margin : float
-        Force by which tiles and bare frames are to hold [N].
+        Force by which each tile must stay short of being dragged backward, and each bare frame must
+        press on the rock [N].
     least : float
-        Tension of every tendon [N].
+        Least tension of every tendon [N].
     """
 
     joints: JointLoads | None = None
@@ -153,10 +158,10 @@ class StanceConstraints:
     least: float = 0.0
 
     def on(self, space: WrenchSpace) -> WrenchSpace:
-        """Return a hand's set with these rows.
+        """Return a hand's wrench space with the constraints added as rows.
 
-        Limit rows are ``D w + d0 ≤ u s`` of the hand's wrench w, hard rows ``C w ≤ 0`` or of its
-        tensions.
+        Limit rows are ``D w + d0 ≤ u s``, of the hand's wrench w, utilisation u and capacities s.
+        Hard rows bound w or the tensions.
         """
         if self.margin or self.least:
             space = self._tightened(space)
@@ -248,4 +253,4 @@ def _force_rows(kind: Literal["limit", "hard"], ways: Iterable[str]) -> list[Row
 
 
 NO_CONSTRAINTS: Final = StanceConstraints()
-"""No rows."""
+"""Constraints that add no rows."""

@@ -1,4 +1,4 @@
-"""The conic programs: the rows of a stance, CVXPY's definition, solvers kept ready."""
+"""Conic programs of a stance: scaled rows, definitions in CVXPY, and cached solvers."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

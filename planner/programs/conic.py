@@ -1,12 +1,11 @@
-"""Conic programs as their solver takes them, at the speed of the solver.
+"""Conic programs in the solver's form (Clarabel), with solvers that are set up once and reused.
 
-    min ½ xᵀ diag(P) x + qᵀ x   with   A x + s = b,  s ∈ K,
+    min ½ xᵀ diag(P) x + qᵀ x   with   A x + s = b,  s ∈ K.
 
-K being zeros, then nonnegative numbers, then one second-order cone. Of A only the entries count
-that are not zero: the rows of a stance are mostly zeros, and a solver that does not know costs
-three times as much. A solver is set up for a pattern of entries, is kept, and takes over the
-numbers of later programs of that pattern: an answer depends on its program alone, not on those
-before.
+The cone K is a product of zeros, then nonnegative numbers, then one second-order cone. A is passed
+sparse, because most entries of a stance's rows are zero: a dense A costs three times as much. A
+solver is set up for one sparsity pattern, is kept in `Solvers`, and takes over the numbers of later
+programs of that pattern. The solution of a program does not depend on the programs solved before.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ __all__ = [
 ]
 
 OUT_OF_TIME: Final = "out of time"
-"""Status of a solver that the deadline has ended."""
+"""Status of a solver that was stopped by the deadline."""
 
 CLARABEL_STATUSES: Final = {
     "Solved": "optimal",
@@ -51,27 +50,28 @@ CLARABEL_STATUSES: Final = {
     "MaxTime": "user_limit",
     "CallbackTerminated": OUT_OF_TIME,
 }
-"""CVXPY's word for each of Clarabel's; for all others it is `SOLVER_ERROR`."""
+"""CVXPY's name of each of Clarabel's statuses; any other status becomes `SOLVER_ERROR`."""
 
 SOLVER_ERROR: Final = "solver_error"
 
 SOLVED_STATUSES: Final = ("optimal", "optimal_inaccurate")
-"""Statuses with a solution."""
+"""Statuses of a program that has a solution."""
 
 INFEASIBLE_STATUSES: Final = ("infeasible", "infeasible_inaccurate")
-"""Statuses with multipliers that prove that there is no solution."""
+"""Statuses whose multipliers are an infeasibility (Farkas) certificate."""
 
 
 class Columns(NamedTuple):
-    """A matrix without its zeros, in compressed columns.
+    """Sparse matrix in compressed sparse column format (CSC).
 
     Attributes
     ----------
     values : ndarray, shape (n,)
+        Entries that are not zero, column by column.
     rows : ndarray of int, shape (n,)
-        Of the values, column by column.
+        Row index of each entry.
     starts : ndarray of int, shape (columns + 1,)
-        Where each column begins in them, and where the last one ends.
+        Index of each column's first entry in ``values``; last, the number of entries.
     """
 
     values: Array
@@ -80,7 +80,7 @@ class Columns(NamedTuple):
 
     @classmethod
     def of(cls, matrix: Array) -> Columns:
-        """Leave the zeros of a matrix out."""
+        """Convert a dense matrix, shape (rows, columns), to compressed sparse columns."""
         height, width = matrix.shape
         flat = matrix.T.ravel()
         # of truth values they are found six times as fast as of numbers
@@ -90,7 +90,7 @@ class Columns(NamedTuple):
 
     @classmethod
     def beside(cls, parts: Sequence[Columns]) -> Columns:
-        """Put some with the same rows beside each other."""
+        """Concatenate sparse matrices with equal numbers of rows from left to right."""
         ends = np.cumsum([0, *(part.starts[-1] for part in parts)])
         starts = [part.starts[:-1] + end for part, end in zip(parts, ends, strict=False)]
         return cls(
@@ -101,20 +101,23 @@ class Columns(NamedTuple):
 
 
 class ConicProgram(NamedTuple):
-    """A program's data; m rows, n columns.
+    """Data of one conic program with m rows and n columns: P, q, A, b and the sizes of the cones.
 
     Attributes
     ----------
     P, q : ndarray, shape (n,)
+        Diagonal of the quadratic cost, and linear cost.
     A : tuple of Columns
-        Beside each other, all with m rows.
+        Blocks of the constraint matrix from left to right, each with m rows.
     b : ndarray, shape (m,)
+        Right-hand side.
     zero : int
-        Rows of equations, the first ones.
+        Number of equations, which are the first rows.
     above : int
-        Of these, those above the balance.
+        Number of those equations that come before the balance of wrenches.
     second_order : int
-        Rows of the second-order cone, the last ones; all between are nonnegative.
+        Number of rows of the second-order cone, which are the last rows. All rows between the
+        equations and the second-order cone are inequalities.
     """
 
     P: Array
@@ -127,19 +130,21 @@ class ConicProgram(NamedTuple):
 
 
 class ConicSolution(NamedTuple):
-    """Solution of a conic program, or the proof that there is none.
+    """Solution of a conic program, or its infeasibility (Farkas) certificate.
 
     Attributes
     ----------
     status : str
-        CVXPY's word, or `OUT_OF_TIME`.
+        CVXPY's name of the solver's status, or `OUT_OF_TIME`.
     iterations : int
+        Iterations of the interior-point method.
     value : float
-        The objective; NaN without one.
-    x : ndarray or None
-        None where there is no solution.
-    multipliers : ndarray or None
-        Multipliers of the rows; where the program is infeasible, the proof of it. None without any.
+        Objective at the solution; NaN without a solution.
+    x : ndarray, shape (n,), or None
+        Variables; None without a solution.
+    multipliers : ndarray, shape (m,), or None
+        Dual values (Lagrange multipliers) of the rows. Of an infeasible program, its infeasibility
+        certificate. None for every other status without a solution.
     """
 
     status: str
@@ -150,13 +155,14 @@ class ConicSolution(NamedTuple):
 
 
 class ConicSolver:
-    """A solver set up for a pattern of data, with the numbers it was given last.
+    """A Clarabel solver set up for one sparsity pattern, with the numbers of its latest program.
 
     Parameters
     ----------
     program : ConicProgram
+        Program whose sparsity pattern the solver is set up for.
     settings : mapping of str to value
-        Of Clarabel. To be updated it may neither presolve nor decompose.
+        Options of Clarabel. Presolve and chordal decomposition must be off for `update`.
     """
 
     def __init__(self, program: ConicProgram, settings: Mapping[str, Any]) -> None:
@@ -183,7 +189,7 @@ class ConicSolver:
         )
 
     def update(self, program: ConicProgram) -> None:
-        """Take over a program of the pattern."""
+        """Replace the solver's numbers by those of a program with the same sparsity pattern."""
         numbers = _numbers(program)
         changed = {
             name: value
@@ -196,7 +202,10 @@ class ConicSolver:
             self._numbers = numbers
 
     def solve(self) -> ConicSolution:
-        """Solve the program taken last."""
+        """Solve the program passed last; stop at the deadline of `planner.deadline`, if one is set.
+
+        If the deadline expires, the solution's status is `OUT_OF_TIME`.
+        """
         if deadline.left() is None:
             return _read(self._solver.solve())
         caught: list[BaseException] = []
@@ -239,14 +248,14 @@ class _Matrix(NamedTuple):
 
 
 class Solvers:
-    """Solvers that wait for programs. Safe to use from several threads.
+    """Bounded cache (LRU) of idle solvers, reused for programs of the same pattern. Thread-safe.
 
-    Each serves one caller at a time, so that threads do not wait for each other.
+    A solver serves one caller at a time, so that threads do not wait for each other.
 
     Parameters
     ----------
     most : int
-        That are kept; those go first that were used longest ago.
+        Largest number of idle solvers; beyond it the least recently used solver is dropped.
     """
 
     name = "solvers"
@@ -259,18 +268,18 @@ class Solvers:
         enlist(self)
 
     def info(self) -> StoreInfo:
-        """Return how they have served."""
+        """Return the cache's hits and misses, its number of idle solvers, and its bound."""
         with self._lock:
             return StoreInfo(self._hits, self._misses, len(self._idle), self._most)
 
     def clear(self) -> None:
-        """Let all go that wait."""
+        """Drop all idle solvers, and set hits and misses to zero."""
         with self._lock:
             self._idle.clear()
             self._hits = self._misses = 0
 
     def solve(self, program: ConicProgram, settings: Mapping[str, Any]) -> ConicSolution:
-        """Solve a program; parameters as for `ConicSolver`."""
+        """Solve a program with an idle solver of its pattern and settings, or with a new one."""
         solver = self._take(Pattern.of(program), settings)
         if solver is None:
             solver = ConicSolver(program, settings)
@@ -296,19 +305,20 @@ class Solvers:
 
 
 WAITING_SOLVERS: Final = Solvers(64)
-"""Those of this process."""
+"""Solver cache of this process."""
 
 
 class Pattern(NamedTuple):
-    """Pattern of the programs that a solver is set up for.
+    """Sparsity pattern and cone sizes of a program: the key by which a solver is reused.
 
     Attributes
     ----------
     rows, columns, zero, second_order : int
+        Shape of A, and numbers of equations and of rows of the second-order cone.
     quadratic : bool
-        Whether P is not zero.
+        True if P has an entry that is not zero.
     places : tuple of bytes
-        Places where A is not zero.
+        Row indices and column starts of each block of A, as bytes.
     """
 
     rows: int
@@ -320,7 +330,7 @@ class Pattern(NamedTuple):
 
     @classmethod
     def of(cls, program: ConicProgram) -> Pattern:
-        """Return that of a program."""
+        """Return the sparsity pattern of a program."""
         return cls(
             len(program.b),
             len(program.q),
@@ -346,24 +356,26 @@ def _read(raw: Any) -> ConicSolution:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Outcome of a program of a stance: its loads, or the proof that there are none.
+    """Result of a stance's conic program: loads of all hands, or an infeasibility certificate.
 
     Attributes
     ----------
     solved : bool
-        Whether the solver says so; the plan is checked apart from it.
+        True if the solver returned loads. The planner checks the loads separately.
     status : str
-        CVXPY's word, or `OUT_OF_TIME`.
+        CVXPY's name of the solver's status, or `OUT_OF_TIME`.
     iterations : int
+        Iterations of the solver.
     value : float
-        Objective, NaN if not solved.
-    loads : tuple of ndarray
-        y of each hand [N], of a floating one [m, rad]; empty if not solved.
-    limit_duals, hard_duals : tuple of ndarray
-        Multipliers of each hand's rows; where there is no solution, the proof of that. Empty if
-        the solver has neither.
-    balance_dual : ndarray or None
-        Multipliers of the balance, shape (nb,).
+        Objective; NaN if not solved.
+    loads : tuple of ndarray, shape (m,)
+        Loads y of each hand [N], or pose of a compliant or floating wrist [m, rad]; empty if not
+        solved.
+    limit_duals, hard_duals : tuple of ndarray, shapes (nl,), (nh,)
+        Dual values of each hand's limit rows and hard rows. Of an infeasible program, its Farkas
+        certificate. Empty if the solver returned no dual values.
+    balance_dual : ndarray, shape (nb,), or None
+        Dual values of the balance of wrenches.
     """
 
     solved: bool
@@ -377,7 +389,7 @@ class Outcome:
 
 
 class Reached(NamedTuple):
-    """Outcome of `Reach`, and the t that it reached, shape (k,), NaN if it was not solved."""
+    """Result of `Reach`: solver's outcome, and the variables t, shape (k,), NaN if not solved."""
 
     outcome: Outcome
     t: Array

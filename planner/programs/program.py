@@ -1,32 +1,34 @@
-"""The conic programs of a stance, in CVXPY: their definition, readable as the mathematics.
+"""The conic programs of a stance in CVXPY: their definition, readable as the mathematics.
 
-Hand h has loads y_h with ``L_h y_h + l0_h ≤ u s_h`` (limits), ``H_h y_h ≤ h_h`` (hard rows) and the
-wrench o_h + V_h y_h on the rock. Carried to the body, the rock's reactions give the body wrench W:
+Hand h has loads y_h with ``L_h y_h + l0_h ≤ u s_h`` (limits, u the utilisation), ``H_h y_h ≤ h_h``
+(hard rows) and the wrench o_h + V_h y_h on the rock. Ad(B←H_h) (6, 6) carries a wrench from the
+hand's frame to the body's. The rock's reactions give the body wrench W:
 
     Σ_h −Ad(B←H_h) (o_h + V_h y_h) = W.                                              (balance)
 
-Below these six rows the balance has one for each component of a hand's wrench that is given
-(`held`). What joints, caps and largest changes of tension say are rows of the hands' sets.
+Below these six rows the balance has one row for each component of a hand's wrench that the
+question prescribes (`held`). Joints, force caps and largest changes of tension are further rows of
+the hands' sets.
 
-Four programs share these rows: `Best`, of least utilisation or least squares; `Reach`, of how far
-body wrenches go; `Nearest`, of how near; and `Elastic`, whose rows give at a price. With what is
-least they have names:
+Four classes share these rows: `Best` minimises the utilisation or a sum of squares; `Reach`
+maximises a body wrench; `Nearest` finds the nearest body wrench; `Elastic` relaxes the rows at a
+price (an exact ℓ₁ penalty). Each program has a function in `planner.programs.solvers`:
 
 ==============  =============================================================================
 `margin`        min u                              least utilisation; its duals are the prices
 `unique`        min u + `TIE_WEIGHT` · mean (tension / maximum)²   least use, made unique
-`less_tension`  min u + w Σ (tension / maximum)²  the plan that is meant: see `tension_trade`
+`less_tension`  min u + w Σ (tension / maximum)²  trades utilisation for tension: `tension_trade`
 `curved`        min u + ½ ‖R (z − z₀)‖²            with the curvature of floating hands
 `tie_break`     min Σ (tension / maximum)²         among plans of least utilisation
 `effort`        min Σ ‖E z + e₀‖²                  relative tensions and torques, under a cap
-`reach`         max c·t with W + B t for W         how far body wrenches go, under a cap
+`reach`         max c·t with W + B t for W         farthest body wrench, under a cap
 `load_factor`   max s with s W in place of W       at utilisation 1
 `nearest`       min ‖S (W − Σ …)‖                  hard rows alone, loads up to `LOAD_BOX`
 `elastic`       min u + ρ (‖W − Σ …‖₁ + 1ᵀv)       hard rows exceeded by v
 ==============  =============================================================================
 
-Everything is nondimensional: loads over `LOAD_UNIT` (a floating wrist's twist over `TWIST_UNIT`),
-body wrenches over `WRENCH_UNIT`, limit rows over their capacities.
+Everything is nondimensional: z are the loads y over `LOAD_UNIT` (a floating wrist's twist over
+`TWIST_UNIT`), body wrenches are over `WRENCH_UNIT`, limit rows over their capacities.
 """
 
 from __future__ import annotations
@@ -52,14 +54,14 @@ from planner.programs.stance_program import (
 __all__ = ["LOAD_BOX", "TIE_WEIGHT", "Best", "Elastic", "Nearest", "Reach", "tie_weight"]
 
 LOAD_BOX: Final = 1e4
-"""Box, in `LOAD_UNIT`, on loads at no matter what utilisation: far beyond any strength."""
+"""Bound on every load, in `LOAD_UNIT`, where no limit counts: far beyond any strength."""
 
 TIE_WEIGHT: Final = 8e-6
-"""Weight of the mean square of relative tensions beside the utilisation."""
+"""Weight of the mean square of relative tensions, beside the utilisation, in `unique`."""
 
 
 class Residuals(NamedTuple):
-    """Linear functions R z − c of all loads, whose squares are added up k times."""
+    """Term k ‖R z − c‖² of an objective, in the scaled loads z of all hands, shape (M,)."""
 
     R: Array
     c: Array
@@ -69,17 +71,20 @@ class Residuals(NamedTuple):
 class Best(StanceProgram):
     """min u + Σ w z² + k ‖R z − c‖²: least utilisation, or least squares under a cap on it.
 
+    Here z, shape (M,), are the scaled loads of all hands, and u is the utilisation.
+
     Parameters
     ----------
     data : StanceData
+        Balance, limits and hard rows of all hands.
     cap : float, optional
-        Instead of u, which has no part in it then.
+        Fixed largest utilisation; u is then no variable, and not in the objective.
     weights : ndarray, shape (M,), optional
-        w; without it there is no such term.
+        Weights w of the squared loads; without weights the term is left out.
     residuals : Residuals, optional
-        Without it there is no such term.
+        R, c and k; without residuals the term is left out.
     most : float, optional
-        Largest u.
+        Upper bound of the variable u.
     """
 
     def __init__(
@@ -98,6 +103,7 @@ class Best(StanceProgram):
             self.settings, self.wanted = (SHARP_SETTINGS, REFINED_SETTINGS), 1
 
     def define(self) -> Definition:
+        """Return the program written in CVXPY."""
         import cvxpy as cp
 
         z, u = self.loads(), cp.Variable() if self.cap is None else None
@@ -114,7 +120,11 @@ class Best(StanceProgram):
         return Definition(cp.Problem(cp.Minimize(sum(least)), constraints), variables, rows)
 
     def conic(self) -> ConicProgram:
-        """Columns u, R z − c and z, as far as there are such terms; rows R z, the others, u."""
+        """Return the program in the solver's form.
+
+        Columns: u, the residuals R z − c, and z, as far as the program has such terms. Rows: the
+        equations of the residuals, the rows of the stance, the bound of u.
+        """
         free, below = int(self.cap is None), int(self.most is not None)
         R, c, k = self.residuals or Residuals(np.zeros((0, self.size)), np.zeros(0), 0.0)
         size, above = len(c), None if self.residuals is None else R
@@ -134,14 +144,15 @@ class Best(StanceProgram):
         return ConicProgram(P, q, A, b, size + len(self.G), size)
 
     def solve(self) -> Outcome:
+        """Solve the program; ``value`` is u, or with a cap or residuals the objective."""
         outcome, u = self.run()
         return outcome if u is None or not self.wanted else replace(outcome, value=float(u[0]))
 
     def vertex(self) -> Outcome:
-        """Return a plan where as many rows meet as there are loads, by the simplex method.
+        """Solve the program by the simplex method, which returns a vertex of the feasible set.
 
-        Of linear programs alone. An interior point has as many digits of all loads as of the
-        largest; here each row has its own.
+        Only for linear programs (no weights, no residuals). At a vertex each load has all its
+        digits; an interior point has as many digits of every load as of the largest load.
         """
         options = {
             "method": "highs-ds",
@@ -152,27 +163,36 @@ class Best(StanceProgram):
 
 
 def tie_weight(hands: int) -> float:
-    """Return what `unique` weighs the sum of squares with: `TIE_WEIGHT` over all tendons."""
+    """Return the weight of a squared relative tension in `unique`.
+
+    Parameters
+    ----------
+    hands : int
+        Number of hands of the stance.
+    """
     return TIE_WEIGHT / (len(FINGERS) * hands)
 
 
 class Reach(StanceProgram):
-    """max c·t: how far along the columns of B the balance can go, under a cap.
+    """max c·t: how far the balance can go along the columns of B, within a cap on the utilisation.
 
-    The limit rows may change with t, too, as those of joints do with the body's acceleration:
-    L z + l0 + K t ≤ cap.
+    The balance is G z = offset + B t. The limit rows may depend on t, too, as those of joints
+    depend on the body's acceleration: L z + l0 + K t ≤ cap.
 
     Parameters
     ----------
     data : StanceData
+        Balance, limits and hard rows of all hands.
     goal : ndarray, shape (k,)
-        c.
+        Direction c in the space of t.
     B : ndarray, shape (nb, k)
+        Directions of the balance's right-hand side, scaled as `StanceData.wrench`.
     cap : float, optional
-    K : sequence of ndarray, optional
-        Of each hand, (nl, k); zero by default.
+        Largest utilisation.
+    K : sequence of ndarray, shape (nl, k), optional
+        Change of each hand's utilisations per unit of t; zero by default.
     forward : bool, optional
-        Whether t is zero or above.
+        Whether t ≥ 0 is required.
     """
 
     def __init__(
@@ -192,9 +212,10 @@ class Reach(StanceProgram):
 
     @classmethod
     def load_factor(cls, data: StanceData) -> Reach:
-        """Return that of how many times the body wrench, not zero, could be held at utilisation 1.
+        """Return the program for the load factor: largest multiple of the body wrench, at cap 1.
 
-        ``value`` is that load factor.
+        The body wrench of ``data`` must not be zero. ``value`` of the solved outcome is the load
+        factor.
         """
         body, held = data.wrench.copy(), data.wrench.copy()
         body[6:], held[:6] = 0.0, 0.0
@@ -205,6 +226,7 @@ class Reach(StanceProgram):
         return found
 
     def define(self) -> Definition:
+        """Return the program written in CVXPY."""
         import cvxpy as cp
 
         t, z = cp.Variable(len(self.goal)), self.loads()
@@ -215,6 +237,7 @@ class Reach(StanceProgram):
         return Definition(cp.Problem(cp.Maximize(self.goal @ t), [*rows, *further]), (t, z), rows)
 
     def conic(self) -> ConicProgram:
+        """Return the program in the solver's form: columns t and z."""
         ways = len(self.goal)
         t, loads, b = self.blocks(ways, below=ways if self.forward else 0)
         t[: len(self.G)], t[self.of_limits] = -self.B, self.K
@@ -226,27 +249,30 @@ class Reach(StanceProgram):
         return ConicProgram(P, q, (Columns.of(t), loads), b, len(self.G))
 
     def farthest(self) -> Reached:
-        """Return the farthest t."""
+        """Solve the program; return the outcome and the optimal t, shape (k,), NaN if unsolved."""
         outcome, t = self.run()
         if t is None:
             return Reached(outcome, np.full(self.wanted, np.nan))
         return Reached(replace(outcome, value=float(self.goal @ t) / self.unit), t)
 
     def solve(self) -> Outcome:
+        """Solve the program; ``value`` is c·t, or of a `load_factor` program the load factor."""
         return self.farthest().outcome
 
 
 class Nearest(StanceProgram):
-    """min ‖W − w‖ over all body wrenches w that loads up to `LOAD_BOX` can give.
+    """min ‖W − w‖ over all body wrenches w that the hands can give with loads up to `LOAD_BOX`.
 
-    ``value`` is the distance, in `WRENCH_UNIT`.
+    Only hard rows count, no limits. ``value`` of the solved outcome is the distance, in
+    `WRENCH_UNIT`.
 
     Parameters
     ----------
     data : StanceData
+        Balance and hard rows of all hands.
     kept : int, optional
-        The last so many rows of the balance, of wrenches that hands are given, are kept exactly;
-        the others count like the body's.
+        Number of last rows of the balance (prescribed components of hands' wrenches) that must be
+        met exactly. The misfit of the other rows is minimised with that of the body wrench.
     """
 
     def __init__(self, data: StanceData, kept: int = 0) -> None:
@@ -255,6 +281,7 @@ class Nearest(StanceProgram):
         self.L, self.l0 = self.L[:0], self.l0[:0]
 
     def define(self) -> Definition:
+        """Return the program written in CVXPY."""
         import cvxpy as cp
 
         missing, z = cp.Variable(len(self.G)), self.loads()
@@ -266,7 +293,7 @@ class Nearest(StanceProgram):
         return Definition(problem, (z,), (balance, limits, hard))
 
     def conic(self) -> ConicProgram:
-        """Columns ‖W − w‖, W − w and z."""
+        """Return the program in the solver's form: columns ‖W − w‖, W − w and z."""
         count, kept, size = len(self.G), self.kept, self.size
         zero, box = count + kept, count + kept + len(self.H)
         cone = box + 2 * size
@@ -284,21 +311,24 @@ class Nearest(StanceProgram):
 
 
 class Elastic(StanceProgram):
-    """min u + ρ (‖W − w‖₁ + 1ᵀv) + ½ ε ‖z − z₀‖²: hard rows give by v ≥ 0, unless they are firm.
+    """min u + ρ (‖W − w‖₁ + 1ᵀv) + ½ ε ‖z − z₀‖²: balance and hard rows relaxed at a price ρ.
 
-    It has a solution wherever the firm rows have. ``value`` is that of the first two terms.
+    W is the body wrench asked for, w the one that the loads z give, u the utilisation. Hard rows
+    may be exceeded by slacks v ≥ 0, except the firm rows. The program has a solution wherever the
+    firm rows have one. ``value`` of the outcome is the sum of the first two terms.
 
     Parameters
     ----------
     data : StanceData
+        Balance, limits and hard rows of all hands.
     penalty : float
-        ρ
+        Price ρ of violations.
     near : ndarray, shape (M,)
-        z₀
+        Scaled loads z₀ near which the solution is kept.
     firm : ndarray of bool, shape (Σ nh,)
-        Hard rows that do not give.
+        True for each hard row that must not be exceeded.
     nearness : float, optional
-        ε, which makes the solution unique.
+        Weight ε, which makes the solution unique.
     """
 
     def __init__(
@@ -315,6 +345,7 @@ class Elastic(StanceProgram):
         self.wanted = 1 + 2 * len(self.G) + self.gives.shape[1]
 
     def define(self) -> Definition:
+        """Return the program written in CVXPY."""
         import cvxpy as cp
 
         z, u, v = self.loads(), cp.Variable(), cp.Variable(self.gives.shape[1])
@@ -333,7 +364,10 @@ class Elastic(StanceProgram):
         return Definition(problem, (u, lacks, exceeds, v, z), (balance, limits, hard))
 
     def conic(self) -> ConicProgram:
-        """Columns u, what lacks, what exceeds, v, and z."""
+        """Return the program in the solver's form.
+
+        Columns: u, missing wrench, excess wrench, slacks v, and z.
+        """
         count, wanted = len(self.G), self.wanted
         front, loads, b = self.blocks(wanted, below=wanted - 1)
         front[:count, 1 : 1 + count] = np.eye(count)
@@ -347,6 +381,7 @@ class Elastic(StanceProgram):
         return ConicProgram(P, q, (Columns.of(front), loads), b, count)
 
     def solve(self) -> Outcome:
+        """Solve the program; ``value`` is the utilisation plus ρ times all violations."""
         outcome, found = self.run()
         if found is None:
             return outcome

@@ -1,4 +1,8 @@
-"""The programs, solved, and what loads do to their rows."""
+"""One function for each conic program of a stance, and evaluations of given loads.
+
+The programs are defined in `planner.programs.program`. All loads y are in newtons, or of a
+floating wrist its twist [m, rad]; ``data`` holds the scaled rows of all hands.
+"""
 
 from __future__ import annotations
 
@@ -44,30 +48,30 @@ __all__ = [
 ]
 
 CAP_SLACK: Final = 1e-6
-"""Utilisation that the tie-break may give away above the least; also its tolerance at a cap."""
+"""Utilisation by which the tie-break may exceed the least; also the tolerance at a cap."""
 
 
 class TensionTrade(NamedTuple):
-    """Utilisation above the least, u*, that a plan may give away for less tension.
+    """Utilisation above the least, u*, that a plan may spend in exchange for less tendon tension.
 
-    Least utilisation alone pulls a tendon to its strength for a ten-thousandth of it. So a plan is
-    meant that minimises
+    The plan of least utilisation alone would pull a tendon to its strength to gain a ten-thousandth
+    of utilisation. So the planner returns the plan that minimises
 
-        u + w Σ (tension / maximum)²   with   u ≤ u* + r,   r = min(`given_away` u*, cap − u*) ≥ 0:
+        u + w Σ (tension / maximum)²   with   u ≤ u* + r,   r = min(`given_away` u*, cap − u*) ≥ 0.
 
-    near the cap, and beyond, nothing is given away. The plan is unique, and changes continuously
-    with u* and the rows, as the objective is strictly convex and r continuous. Where no tendon
-    pulls for next to nothing it is the plan of least utilisation itself, of these the one of least
-    Σ (tension / maximum)². No plan within u* + r has a sum that is less by more than r/w.
+    At the cap and beyond, r is zero. The plan is unique, as the objective is strictly convex; it
+    changes continuously with u* and the rows, as r is continuous. If tension would be traded for
+    nothing, the plan is the one of least utilisation and, among those, of least Σ (tension /
+    maximum)². No plan within u* + r has a sum that is less by more than r/w.
 
     Attributes
     ----------
     weight : float
-        w of the sum of squared relative tensions.
+        Weight w of the sum of squared relative tensions.
     most : float
-        Largest utilisation of the plan.
+        Largest utilisation of the plan, u* + r.
     whole : float
-        Largest utilisation that is given away, far from the cap.
+        Utilisation that may be spent far from the cap, `given_away` u*.
     """
 
     weight: float
@@ -76,14 +80,19 @@ class TensionTrade(NamedTuple):
 
 
 def tension_trade(least: float, cap: float) -> TensionTrade:
-    """Return what a plan may give away.
+    """Return how much utilisation a plan may spend for less tendon tension.
 
     Parameters
     ----------
     least : float
-        The least utilisation.
+        Least utilisation u* of the question.
     cap : float
-        On the utilisation, that the question asks for.
+        Largest utilisation that the question allows.
+
+    Returns
+    -------
+    TensionTrade
+        Weight of the tensions, and bounds of the utilisation.
     """
     given_away, weight = _tension_numbers()
     whole = given_away * abs(least)
@@ -99,52 +108,109 @@ def _tension_numbers() -> tuple[float, float]:
 
 
 def margin(data: StanceData) -> Outcome:
-    """Solve for the least utilisation; ``value`` is that utilisation."""
+    """Solve for the least utilisation (largest load over capacity) at which the body is balanced.
+
+    Parameters
+    ----------
+    data : StanceData
+
+    Returns
+    -------
+    Outcome
+        ``value`` is the least utilisation; the dual values of the limits give their shadow prices.
+    """
     return Best(data).solve()
 
 
 def vertex(data: StanceData) -> Outcome:
-    """Solve `margin` by the simplex method."""
+    """Solve for the least utilisation by the simplex method; see `Best.vertex`."""
     return Best(data).vertex()
 
 
 def unique(data: StanceData, share: float = 1.0) -> Outcome:
-    """Solve for the least utilisation, made unique in one solve; ``value`` is that utilisation.
+    """Solve for the least utilisation, made unique by a small weight on tensions, in one solve.
 
-    A tension is at most u times its maximum, so the least u is exceeded by less than TIE_WEIGHT u².
-    ``share``: how much of its weight the second term is given.
+    A tension is at most u times its maximum, so the returned utilisation u exceeds the least by
+    less than TIE_WEIGHT u².
+
+    Parameters
+    ----------
+    data : StanceData
+    share : float, optional
+        Factor on the weight of the tensions.
+
+    Returns
+    -------
+    Outcome
+        ``value`` is the utilisation u, without the weighted tensions.
     """
     return Best(data, weights=tie_weight(len(data.hands)) * share * data.rows.tie).solve()
 
 
 def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
-    """Solve for the plan that is meant, u at most ``trade.most``; ``value`` is its utilisation."""
+    """Solve for the plan that trades utilisation for less tendon tension; see `TensionTrade`.
+
+    Parameters
+    ----------
+    data : StanceData
+    trade : TensionTrade
+        Weight of the tensions, and largest utilisation of the plan.
+
+    Returns
+    -------
+    Outcome
+        ``value`` is the utilisation of the plan.
+    """
     return Best(data, weights=trade.weight * data.rows.tie, most=trade.most).solve()
 
 
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
-    """Solve for the least utilisation where sets are curved, or near to loads.
+    """Solve for the least utilisation plus a quadratic term ½ ‖R (z − z₀)‖² around given loads.
+
+    The term stands for the curvature of the rows of floating hands, and keeps near the loads.
 
     Parameters
     ----------
     data : StanceData
     root : ndarray, shape (M, M)
-        R, a root of the curvature in all hands' z.
-    near : sequence of ndarray
-        Each hand's y₀.
+        Root R of the curvature RᵀR in the scaled loads z of all hands.
+    near : sequence of ndarray, shape (m,)
+        Loads y₀ of each hand [N], or wrist pose [m, rad]; z₀ is y₀ over its units.
     """
     centre = root @ (np.concatenate(near) / data.rows.unit)
     return Best(data, residuals=Residuals(root, centre, 0.5)).solve()
 
 
 def tie_break(data: StanceData, cap: float) -> Outcome:
-    """Solve for the least tensions under a cap: which plan is meant of those."""
+    """Solve for the least sum of squared relative tensions under a cap on the utilisation.
+
+    It selects one of the plans that have equal utilisation.
+
+    Parameters
+    ----------
+    data : StanceData
+    cap : float
+        Largest utilisation.
+    """
     # weights relative to the largest: the minimiser does not change
     return Best(data, cap=cap, weights=data.rows.tie / data.rows.tie.max()).solve()
 
 
 def least_tensions(data: StanceData, utilisation: float) -> Outcome:
-    """Solve `tie_break` at a utilisation that has all its digits, or where needed near it."""
+    """Solve `tie_break` at a given utilisation; retry with more slack if the first solve fails.
+
+    Parameters
+    ----------
+    data : StanceData
+    utilisation : float
+        Least utilisation. The cap is larger by 1e-9 (absolute below 1, relative above), in the
+        second try by `CAP_SLACK`.
+
+    Returns
+    -------
+    Outcome
+        Of the last try; status `OUT_OF_TIME` or unsolved if both fail.
+    """
     outcome = Outcome(False, OUT_OF_TIME, 0, math.nan)
     for slack in (1e-9, CAP_SLACK):  # where the least has all its digits, or else near it
         outcome = tie_break(data, utilisation + slack * max(1.0, abs(utilisation)))
@@ -154,9 +220,15 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
 
 
 def effort(data: StanceData, cap: float) -> Outcome:
-    """Solve for the least sum of squared relative tensions and torques under a cap.
+    """Solve for the least effort: the sum of squared relative tensions and joint torques.
 
-    Small weights make loads unique that are neither: palms, lateral reactions, wrists.
+    Small weights make the other loads unique (palms, lateral reactions, wrists).
+
+    Parameters
+    ----------
+    data : StanceData
+    cap : float
+        Largest utilisation.
     """
     E = scipy.linalg.block_diag(*(hand.E for hand in data.hands))
     e0 = np.concatenate([hand.e0 for hand in data.hands])
@@ -167,47 +239,120 @@ def effort(data: StanceData, cap: float) -> Outcome:
 def elastic(
     data: StanceData, penalty: float, near: Sequence[Array], firm: NDArray[np.bool_]
 ) -> Outcome:
-    """Solve `Elastic` about loads; ``value`` is the utilisation and what is wrong at its price."""
+    """Solve the relaxed program `Elastic` around given loads.
+
+    Parameters
+    ----------
+    data : StanceData
+    penalty : float
+        Price ρ of violations of the balance and of hard rows.
+    near : sequence of ndarray, shape (m,)
+        Loads of each hand [N], or wrist pose [m, rad], near which the solution is kept.
+    firm : ndarray of bool, shape (Σ nh,)
+        True for each hard row that must not be exceeded.
+
+    Returns
+    -------
+    Outcome
+        ``value`` is the utilisation plus ρ times all violations.
+    """
     return Elastic(data, penalty, np.concatenate(near) / data.rows.unit, firm).solve()
 
 
 def load_factor(data: StanceData) -> Outcome:
-    """Solve for how many times the body wrench, not zero, could be held at utilisation 1."""
+    """Solve for the load factor: largest multiple of a body wrench, not 0, at utilisation 1.
+
+    ``value`` of the outcome is the load factor.
+    """
     return Reach.load_factor(data).solve()
 
 
 def reach(
     data: StanceData, goal: Array, B: Array, cap: float = 1.0, K: Sequence[Array] | None = None
 ) -> Reached:
-    """Solve `Reach`."""
+    """Solve `Reach`: the farthest t along the columns of B, in direction ``goal``, within a cap.
+
+    Parameters
+    ----------
+    data : StanceData
+    goal : ndarray, shape (k,)
+        Direction in the space of t.
+    B : ndarray, shape (nb, k)
+        Directions of the balance's right-hand side, scaled as `StanceData.wrench`.
+    cap : float, optional
+        Largest utilisation.
+    K : sequence of ndarray, shape (nl, k), optional
+        Change of each hand's utilisations per unit of t; zero by default.
+    """
     return Reach(data, goal, B, cap, K).farthest()
 
 
 def nearest(data: StanceData) -> Outcome:
-    """Solve `Nearest`."""
+    """Solve for loads whose body wrench is nearest to the one asked for; limits do not count.
+
+    Prescribed components of hand wrenches count like the body wrench. ``value`` of the outcome is
+    the distance, in `WRENCH_UNIT`. See `Nearest`.
+    """
     return Nearest(data).solve()
 
 
 def nearest_body(data: StanceData) -> Outcome:
-    """Solve `Nearest` with all given wrenches of hands kept."""
+    """Solve `nearest` with all prescribed components of hand wrenches met exactly."""
     return Nearest(data, len(data.wrench) - 6).solve()
 
 
 def loads_are_feasible(data: StanceData, loads: Sequence[Array], cap: float) -> bool:
-    """Return whether loads y balance, and keep hard rows and limits at a cap, by `CAP_SLACK`."""
+    """Return whether loads balance the body, and meet hard rows and limits at a cap.
+
+    The tolerance is `CAP_SLACK`.
+
+    Parameters
+    ----------
+    data : StanceData
+    loads : sequence of ndarray, shape (m,)
+        Loads y of each hand [N], or wrist pose [m, rad].
+    cap : float
+        Largest utilisation.
+    """
     error = np.abs(body_wrench(data, loads) - data.wrench).max()
     balances = bool(error <= CAP_SLACK * max(1.0, float(np.abs(data.wrench).max())))
     return balances and beyond(data, loads, cap) <= CAP_SLACK
 
 
 def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
-    """Return the scaled balance that the hands' loads y give, shape (nb,)."""
+    """Return the left-hand side of the balance for given loads of all hands.
+
+    Parameters
+    ----------
+    data : StanceData
+    loads : sequence of ndarray, shape (m,)
+        Loads y of each hand [N], or wrist pose [m, rad].
+
+    Returns
+    -------
+    ndarray, shape (nb,)
+        Body wrench, then prescribed components of hands' wrenches, in `WRENCH_UNIT`.
+    """
     parts = [hand.G @ (y / hand.unit) + hand.g for hand, y in zip(data.hands, loads, strict=True)]
     return np.asarray(sum(parts, start=np.zeros_like(data.wrench)))
 
 
 def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
-    """Return by how much loads y exceed limits at a cap, or break hard rows, scaled; at least 0."""
+    """Return the largest violation of limits at a cap, or of hard rows, by given loads.
+
+    Parameters
+    ----------
+    data : StanceData
+    loads : sequence of ndarray, shape (m,)
+        Loads y of each hand [N], or wrist pose [m, rad].
+    cap : float
+        Largest utilisation.
+
+    Returns
+    -------
+    float
+        Violation of a limit as utilisation, of a hard row in `LOAD_UNIT`; at least 0.
+    """
     worst = 0.0
     for hand, y in zip(data.hands, loads, strict=True):
         z = y / hand.unit
@@ -217,13 +362,28 @@ def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
 
 
 def used(data: StanceData, loads: Sequence[Array]) -> Array:
-    """Return the utilisation of every limit row, hand by hand, shape (sum of nl,)."""
+    """Return the utilisation (load over capacity) of every limit row at given loads.
+
+    Parameters
+    ----------
+    data : StanceData
+    loads : sequence of ndarray, shape (m,)
+        Loads y of each hand [N], or wrist pose [m, rad].
+
+    Returns
+    -------
+    ndarray, shape (Σ nl,)
+        Utilisations, hand by hand.
+    """
     parts = zip(data.hands, loads, strict=True)
     return np.concatenate([hand.L @ (y / hand.unit) + hand.l0 for hand, y in parts])
 
 
 def used_effort(data: StanceData, loads: Sequence[Array]) -> float:
-    """Return Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques."""
+    """Return the effort of loads y: Σ ‖E z + e₀‖², squared relative tensions and torques.
+
+    z are the loads over their units.
+    """
     return sum(
         float(np.sum((hand.E @ (y / hand.unit) + hand.e0) ** 2))
         for hand, y in zip(data.hands, loads, strict=True)

@@ -1,10 +1,9 @@
-"""The rows of a stance's hands, nondimensional: what the conic programs are given.
+"""Scaled rows of all hands of a stance: the input data of the conic programs.
 
-Loads are over `LOAD_UNIT` (a wrist's twist over `TWIST_UNIT`), body wrenches over
-`WRENCH_UNIT`, limit rows over their capacities: one physical scaling for all programs.
+Loads are over `LOAD_UNIT` (a wrist's twist over `TWIST_UNIT`), body wrenches over `WRENCH_UNIT`,
+limit rows over their capacities: one physical scaling for all programs.
 
-`ScaledRows` are all of a hand's data but its part of the balance: the same wherever the hand is.
-What names alone decide is found once for each list of names.
+`ScaledRows` are the hand's data except its part of the balance: the same wherever the hand is.
 """
 
 from __future__ import annotations
@@ -44,30 +43,30 @@ LOAD_UNIT: Final = 100.0
 """Scale of a hand's loads y [N]."""
 
 TWIST_UNIT: Final = pose_units(WRIST_COLUMNS)
-"""Scale of a wrist's twist y [m, rad]: about what loads a hand by `LOAD_UNIT`."""
+"""Scale of a wrist's twist y [m, rad]: a twist that loads a hand by roughly `LOAD_UNIT`."""
 
 WRIST_RANGE: Final = "wrist_range"
-"""Name of the hard rows within which the set of a hand that gives way is linearised."""
+"""Name of the hard rows that bound the range in which a compliant hand's set is linearised."""
 
 WRIST_TRAVEL: Final = "wrist_travel"
 """Name of the hard rows that keep a compliant wrist within its travel."""
 
 JOINT_TORQUE: Final = "joint_torque"
-"""Name of the limit rows of a limb's joints that turn."""
+"""Name of the limit rows of a limb's revolute joints."""
 
 JOINT_FORCE: Final = "joint_force"
-"""Name of the limit rows of a limb's joints that slide."""
+"""Name of the limit rows of a limb's prismatic joints."""
 
 
 class ScaledRows(NamedTuple):
-    """Scaled rows of a hand's set, the same wherever the hand is. Arrays are read-only.
+    """Scaled rows of a hand's wrench space, the same wherever the hand is. Arrays are read-only.
 
     Attributes
     ----------
     generators, origin : ndarray, shapes (6, m), (6,)
-        Its wrench on the rock, in H, is generators z + origin [N, N·m].
+        The hand's wrench on the rock is generators z + origin, in the hand frame H [N, N·m].
     L, l0, H, h, E, e0, tie, rest, unit : ndarray
-        As of `HandData`.
+        Rows and weights with the meanings and shapes of the fields of `HandData`.
     """
 
     generators: Array
@@ -84,7 +83,7 @@ class ScaledRows(NamedTuple):
 
     @classmethod
     def of(cls, space: WrenchSpace) -> ScaledRows:
-        """Return what the set of a hand gives the programs."""
+        """Scale the rows of a hand's wrench space for the conic programs."""
         roles = _roles(space.columns, space.rows, len(space.s))
         scale, s = roles.scale, space.s
         L, l0 = space.L * (scale / s[:, None]), space.l0 / s
@@ -187,7 +186,10 @@ def _roles(columns: tuple[str, ...], rows: tuple[Row, ...], count: int) -> _Role
 
 
 def is_effort(row: Row) -> bool:
-    """Return whether a limit row counts as effort: a tension's, or a torque's of positive sign."""
+    """Return whether a limit row counts as effort: a tendon's tension, or a joint's torque.
+
+    Of a joint's two rows, one for each sign of the torque, the + row counts.
+    """
     of_joint = row.limit in (JOINT_TORQUE, JOINT_FORCE)
     return row.limit == TENDON_TENSION or (of_joint and row.label.endswith("+"))
 
@@ -197,24 +199,24 @@ WRENCH_UNIT: Final = np.array([300.0, 300.0, 300.0, 30.0, 30.0, 30.0])
 
 
 class HandData(NamedTuple):
-    """One hand's rows, nondimensional; nb rows of balance.
+    """Scaled rows of one hand, in its scaled loads z, shape (m,); nb rows of the balance.
 
     Attributes
     ----------
     G, g : ndarray, shapes (nb, m), (nb,)
-        Its part of the body wrench, and of what hands are to hold, G z + g.
+        The hand's part of the balance, G z + g: body wrench, then prescribed hand wrenches.
     L, l0 : ndarray, shapes (nl, m), (nl,)
-        Utilisations L z + l0.
+        Limits: utilisations L z + l0.
     H, h : ndarray, shapes (nh, m), (nh,)
-        Hard rows H z ≤ h.
+        Hard rows: H z ≤ h.
     E, e0 : ndarray, shapes (ne, m), (ne,)
         Efforts E z + e0: tensions and joint torques over their capacities.
     tie : ndarray, shape (m,)
         Weights of z² in the tie-break.
     rest : ndarray, shape (m,)
-        Weights of z², of loads that are no tensions, beside the effort; zero for tensions.
+        Weights of z² of loads other than tensions, beside the effort; zero for tensions.
     unit : ndarray, shape (m,)
-        Of z: the loads are ``y = unit z`` [N], of a floating wrist [m, rad].
+        Units of z: the loads are ``y = unit z`` [N], of a floating wrist its twist [m, rad].
     """
 
     G: Array
@@ -231,21 +233,21 @@ class HandData(NamedTuple):
 
     @classmethod
     def of(cls, space: WrenchSpace, transport: Array, held: Array | None = None) -> HandData:
-        """Scale a hand's set.
+        """Scale a hand's wrench space, and carry its wrench to the body.
 
         Parameters
         ----------
         space : WrenchSpace
         transport : ndarray, shape (6, 6)
-            Ad(B←H).
+            Ad(B←H), which carries a wrench from the hand frame H to the body frame B.
         held : ndarray, shape (nb − 6, 6), optional
-            What the further rows of the balance take of this hand's wrench in H.
+            Selects the hand's prescribed wrench components, in H, for the last rows of the balance.
         """
         given = np.zeros((0, 6)) if held is None else held
         return hands_data([ScaledRows.of(space)], transport[None], [given])[0]
 
     def capped(self, utilisation: float) -> HandData:
-        """Return the hand with its limits at a utilisation as hard rows, and no others."""
+        """Return the hand with its limits, at a given utilisation, turned into hard rows."""
         return self._replace(
             L=self.L[:0],
             l0=self.l0[:0],
@@ -254,7 +256,10 @@ class HandData(NamedTuple):
         )
 
     def about(self, centre: Array, stiffness: float) -> HandData:
-        """Return the hand with loads counted from a centre, shape (m,), and ties so much dearer."""
+        """Return the hand with loads relative to a centre, shape (m,) in units of z.
+
+        ``stiffness`` multiplies the weights of the tie-break.
+        """
         return self._replace(
             g=self.g + self.G @ centre,
             l0=self.l0 + self.L @ centre,
@@ -264,7 +269,7 @@ class HandData(NamedTuple):
         )
 
     def held(self, y: Array) -> HandData:
-        """Return the hand with its loads given, shape (m,): no column is left, nor hard rows."""
+        """Return the hand with all loads fixed at y, shape (m,): no variables, no hard rows."""
         fixed, none = self.about(y / self.unit, 1.0), np.zeros(0)
         fixed = fixed._replace(H=np.zeros((0, 0)), h=none, tie=none, rest=none, unit=none)
         return fixed._replace(G=self.G[:, :0], L=self.L[:, :0], E=self.E[:, :0])
@@ -273,16 +278,15 @@ class HandData(NamedTuple):
 def hands_data(
     scaled: Sequence[ScaledRows], transports: Array, held: Sequence[Array]
 ) -> tuple[HandData, ...]:
-    """Return the data of some hands.
+    """Return the scaled data of hands from their scaled rows and their poses.
 
     Parameters
     ----------
     scaled : sequence of ScaledRows
-        Their sets' rows, which are the same wherever the hands are.
     transports : ndarray, shape (hands, 6, 6)
-        Ad(B←H).
+        Ad(B←H) of each hand.
     held : sequence of ndarray, shape (nb − 6, 6)
-        What the further rows of the balance take of each hand's wrench in H.
+        Selects each hand's prescribed wrench components, in H, for the last rows of the balance.
     """
     found = []
     for rows, carried, given in zip(scaled, -transports / WRENCH_UNIT[:, None], held, strict=True):
@@ -297,20 +301,20 @@ def hands_data(
 
 
 class HandRows(NamedTuple):
-    """All hands' rows in all their loads z (M,): G z of the balance, limits L z, hard rows H z.
+    """Rows of all hands in all their scaled loads z (M,): balance G z, limits L z, hard rows H z.
 
     Attributes
     ----------
     whole : ndarray, shape (nb + Σ nl + Σ nh, M)
         G above L above H.
     columns : Columns
-        The same without its zeros.
+        ``whole`` as a sparse matrix.
     rest : ndarray, shape (Σ nl + Σ nh,)
         −l0 above h.
     limits : int
-        Σ nl.
+        Number of limit rows, Σ nl.
     unit, tie : ndarray, shape (M,)
-        Of `HandData`.
+        Units and tie-break weights, as in `HandData`.
     """
 
     whole: Array
@@ -322,7 +326,7 @@ class HandRows(NamedTuple):
 
     @classmethod
     def of(cls, hands: Sequence[HandData], balance: int) -> HandRows:
-        """Write the rows of hands below each other."""
+        """Stack the rows of hands; ``balance`` is the number of rows of the balance."""
         unit = np.concatenate([hand.unit for hand in hands])
         rest = np.concatenate([*(-hand.l0 for hand in hands), *(hand.h for hand in hands)])
         limits = sum(len(hand.l0) for hand in hands)
@@ -341,15 +345,15 @@ class HandRows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StanceData:
-    """All hands of a stance, and what their balance is to give, scaled.
+    """Scaled data of all hands of a stance, and the right-hand side of their balance.
 
     Attributes
     ----------
     hands : tuple of HandData
     wrench : ndarray, shape (nb,)
-        First the body wrench (6,), then the components of hands' wrenches that are given.
+        Body wrench (6,), then the prescribed components of hands' wrenches, in `WRENCH_UNIT`.
     rows : HandRows
-        All hands' rows below each other.
+        Rows of all hands below each other.
     """
 
     hands: tuple[HandData, ...]
@@ -358,34 +362,37 @@ class StanceData:
 
     @classmethod
     def of(cls, hands: tuple[HandData, ...], wrench: Array) -> StanceData:
-        """Return the data of hands and what they are to balance."""
+        """Return the data of hands and of the wrench, shape (nb,), that they are to balance."""
         return cls(hands, wrench, HandRows.of(hands, len(wrench)))
 
     @property
     def offset(self) -> Array:
-        """Right-hand side of the loads' part of the balance, W − Σ g, shape (nb,)."""
+        """Right-hand side of the balance G z = W − Σ g, shape (nb,), in `WRENCH_UNIT`."""
         return np.asarray(self.wrench - sum(hand.g for hand in self.hands))
 
     def capped(self, utilisation: float) -> StanceData:
-        """Return the stance with limits at a utilisation as hard rows, and no others."""
+        """Return the stance with its limits, at a given utilisation, turned into hard rows."""
         hands = tuple(hand.capped(utilisation) for hand in self.hands)
         return StanceData.of(hands, self.wrench)
 
     def by_rows(
         self, values: Array, *, limits: bool = True
     ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
-        """Return values of rows apart: balance, each hand's limits (with ``limits``), hard rows."""
+        """Split an array over all rows into (balance, limits of each hand, hard rows of each hand).
+
+        Without ``limits`` the array has no limit rows.
+        """
         of_limits = [len(hand.l0) for hand in self.hands] if limits else []
         sizes = [len(self.wrench), *of_limits, *(len(hand.h) for hand in self.hands)]
         balance, *others = parted(values, sizes)
         return balance, tuple(others[: len(of_limits)]), tuple(others[len(of_limits) :])
 
     def turned(self, wrench: Array) -> StanceData:
-        """Return the stance with another balance."""
+        """Return the stance for another right-hand side of the balance, shape (nb,), scaled."""
         return replace(self, wrench=wrench)
 
 
 def parted(whole: Array, sizes: Iterable[int]) -> tuple[Array, ...]:
-    """Return the parts of an array, one after another, of these sizes."""
+    """Split an array into consecutive parts of the given sizes."""
     ends = list(accumulate(sizes, initial=0))
     return tuple([whole[begin:end] for begin, end in pairwise(ends)])

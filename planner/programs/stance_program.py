@@ -1,8 +1,8 @@
-"""Base of all programs of a stance: its rows, in CVXPY and for the solver, and how it is solved.
+"""Base class of the conic programs of a stance: the constraints, and how the solver is called.
 
-`StanceProgram.define` is the program, as mathematics; `StanceProgram.conic` is the same for the
-solver, block by block, which takes a fraction of the time. Where the solver comes to no end with
-that, CVXPY solves the definition.
+`StanceProgram.define` writes the program in CVXPY, as readable mathematics. `StanceProgram.conic`
+writes the same program in the solver's form, which takes a fraction of the time. `run` solves the
+second; if the solver returns neither a solution nor a certificate, CVXPY solves the first.
 """
 
 from __future__ import annotations
@@ -46,32 +46,32 @@ CLARABEL_SETTINGS: Final[dict[str, Any]] = {
     "tol_gap_rel": 1e-9,
     "tol_feas": 1e-9,
 }
-"""One physical scaling instead of equilibration, and no refinement of solutions that are good."""
+"""Default options of Clarabel: no equilibration, as all data are scaled, and no refinement."""
 
 SHARP_SETTINGS: Final[dict[str, Any]] = {
     **CLARABEL_SETTINGS,
     "tol_gap_abs": 1e-11,
     "tol_gap_rel": 1e-11,
 }
-"""Settings for programs where a small term of the objective decides."""
+"""Options of Clarabel for programs where a small term of the objective decides."""
 
 REFINED_SETTINGS: Final[dict[str, Any]] = {**CLARABEL_SETTINGS, "iterative_refinement_enable": True}
-"""For a second try."""
+"""Options of Clarabel for a retry, with iterative refinement."""
 
 _cvxpy = threading.Lock()
 """CVXPY counts its variables for all threads, and loses count where two define at a time."""
 
 
 class Definition(NamedTuple):
-    """A program in CVXPY.
+    """A conic program written in CVXPY.
 
     Attributes
     ----------
     problem : Problem
     variables : tuple of Variable
-        What is wanted beside the loads, and these.
+        Variables that the caller reads, in order; the hands' loads z come last.
     rows : tuple of Constraint
-        The balance, limits, and hard rows.
+        The balance of wrenches, the limits, and the hard rows.
     """
 
     problem: cp.Problem
@@ -80,10 +80,10 @@ class Definition(NamedTuple):
 
 
 class StanceProgram(ABC):
-    """A program for the rows of a stance.
+    """A conic program whose constraints are the balance, limits and hard rows of a stance.
 
-    The hands' loads z (M,) are one below the other, so that Σ_h G_h z_h is G z, and L and H are
-    block-diagonal.
+    The scaled loads z, shape (M,), are those of all hands one below the other. So the balance
+    Σ_h G_h z_h is G z, and L and H are block-diagonal.
 
     Parameters
     ----------
@@ -92,15 +92,19 @@ class StanceProgram(ABC):
     Attributes
     ----------
     data : StanceData
-    G, L, l0, H, h : ndarray
-        Of all hands.
+    G : ndarray, shape (nb, M)
+        Balance: body wrench per load.
+    L, l0 : ndarray, shapes (Σ nl, M), (Σ nl,)
+        Limits of all hands: utilisations L z + l0.
+    H, h : ndarray, shapes (Σ nh, M), (Σ nh,)
+        Hard rows of all hands: H z ≤ h.
     size : int
-        M.
+        Number of loads M.
     """
 
     settings: Sequence[Mapping[str, Any]] = (CLARABEL_SETTINGS, REFINED_SETTINGS)
     wanted: int = 0
-    """How many of the variables before the loads are wanted."""
+    """Number of leading variables, before the loads, that `run` returns."""
 
     def __init__(self, data: StanceData) -> None:
         self.data = data
@@ -113,18 +117,18 @@ class StanceProgram(ABC):
 
     @abstractmethod
     def define(self) -> Definition:
-        """Return the program."""
+        """Return the program written in CVXPY."""
 
     @abstractmethod
     def conic(self) -> ConicProgram:
-        """Return the program as its solver takes it.
+        """Return the program in the solver's form.
 
-        Columns: what is wanted beside the loads, what is not, and the loads. Rows: further
-        equations, the balance, equations, limits, hard rows, and others.
+        Columns: the `wanted` variables, auxiliary variables, then the loads z. Rows: further
+        equations, the balance, further equations, limits, hard rows, further inequalities or cones.
         """
 
     def loads(self) -> cp.Variable:
-        """Return z."""
+        """Return a CVXPY variable for the scaled loads z of all hands, shape (M,)."""
         import cvxpy as cp
 
         return cp.Variable(self.size)
@@ -132,7 +136,15 @@ class StanceProgram(ABC):
     def rows(
         self, z: cp.Variable, cap: cp.Expression | float
     ) -> tuple[cp.Constraint, cp.Constraint, cp.Constraint]:
-        """Return the balance, the limits at a utilisation, and the hard rows."""
+        """Return the CVXPY constraints of the loads z: balance, limits at a utilisation, hard rows.
+
+        Parameters
+        ----------
+        z : Variable, shape (M,)
+            Scaled loads of all hands.
+        cap : Expression or float
+            Largest utilisation: a number, a scalar, or one value for each limit row.
+        """
         return (
             self.G @ z == self.data.offset,
             self.L @ z + self.l0 <= cap,
@@ -142,19 +154,26 @@ class StanceProgram(ABC):
     def blocks(
         self, front: int, above: Array | None = None, below: int = 0
     ) -> tuple[Array, Columns, Array]:
-        """Return columns before the loads', the loads', and b.
-
-        With the balance, the limits at 0 and the hard rows. The first columns are zero, and so is
-        what else b has.
+        """Return the parts of the solver's matrix and right-hand side that all programs share.
 
         Parameters
         ----------
         front : int
-            How many columns come before the loads.
+            Number of columns before those of the loads.
         above : ndarray, shape (rows, M), optional
-            What stands above the balance in the columns of the loads.
+            Rows above the balance, in the columns of the loads.
         below : int, optional
-            Rows below, in which the loads are not.
+            Number of rows below the hard rows; zero in the columns of the loads.
+
+        Returns
+        -------
+        columns : ndarray, shape (all rows, front)
+            Zeros, to be filled in by the caller.
+        loads : Columns
+            Columns of the loads: the rows above, balance, limits and hard rows.
+        b : ndarray, shape (all rows,)
+            Right-hand side of the balance, of the limits at utilisation 0 and of the hard rows;
+            zero in the other rows.
         """
         rows = self.data.rows
         loads, first = rows.columns, 0
@@ -168,21 +187,22 @@ class StanceProgram(ABC):
 
     @property
     def of_limits(self) -> slice:
-        """Rows of the limits where no others are above the balance."""
+        """Indices of the limit rows in the solver's form, if the balance comes first."""
         return slice(len(self.G), len(self.G) + len(self.L))
 
     def solve(self) -> Outcome:
-        """Return how it ends."""
+        """Solve the program, and return its loads or its infeasibility certificate."""
         return self.run()[0]
 
     def run(self) -> tuple[Outcome, Array | None]:
-        """Solve it.
+        """Solve the program in the solver's form; if that fails, retry refined, then with CVXPY.
 
         Returns
         -------
         outcome : Outcome
-        further : ndarray or None
-            What is wanted beside the loads; None where there is no solution.
+            Loads and dual values, or an infeasibility certificate.
+        further : ndarray, shape (wanted,), or None
+            The `wanted` variables before the loads; None without a solution.
         """
         program = self.conic()
         found = WAITING_SOLVERS.solve(program, self.settings[0])
@@ -205,7 +225,20 @@ class StanceProgram(ABC):
         return self._read(found.status, found.iterations, found.value, found.x, duals)
 
     def by_definition(self, own: Mapping[str, Any] | None = None) -> tuple[Outcome, Array | None]:
-        """Let CVXPY solve it, with these options; by default those of Clarabel itself."""
+        """Solve the CVXPY definition of the program.
+
+        Parameters
+        ----------
+        own : mapping of str to any, optional
+            Arguments of ``cvxpy.Problem.solve``; by default Clarabel with CVXPY's options for it.
+
+        Returns
+        -------
+        outcome : Outcome
+            Loads and dual values, or an infeasibility certificate.
+        further : ndarray, shape (wanted,), or None
+            The `wanted` variables before the loads; None without a solution.
+        """
         import cvxpy as cp
 
         left = deadline.left()

@@ -1,4 +1,4 @@
-"""Support function of a hand's wrench space, by one linear program kept for many directions."""
+"""Support function of a hand's wrench space, by a linear program kept for many directions."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ __all__ = ["SilentHighs", "Support"]
 
 
 class SilentHighs(highspy.Highs):
-    """HiGHS without output, its banner included.
+    """Linear-programming solver HiGHS without any printed output.
 
     Parameters
     ----------
     options : dict of str to any
-        Options of HiGHS.
+        Options of HiGHS by name.
     """
 
     def __init__(self, options: dict[str, Any]) -> None:
@@ -31,16 +31,25 @@ class SilentHighs(highspy.Highs):
             self.setOptionValue(name, value)
 
     def optimal(self) -> bool:
-        """Solve the program, and return whether the solver reports an optimum."""
+        """Solve the linear program; return True if HiGHS reports an optimum."""
         self.run()
         return bool(self.getModelStatus() == highspy.HighsModelStatus.kOptimal)
 
     def enableCallbacks(self) -> None:
-        """Silence the solver, which prints its banner in here otherwise."""
+        """Switch the output of HiGHS off. HiGHS calls this method before it prints its banner."""
         self.silent()
 
     def load(self, A: Array, columns: tuple[Array, Array], rows: tuple[Array, Array]) -> None:
-        """Take rows A x without costs, and the bounds of x and of A x."""
+        """Load the feasibility problem of bounds on x and on A x, with zero costs.
+
+        Parameters
+        ----------
+        A : ndarray, shape (rows, columns)
+        columns : tuple of ndarray, shape (columns,)
+            Lower and upper bounds of x.
+        rows : tuple of ndarray, shape (rows,)
+            Lower and upper bounds of A x.
+        """
         (count, size), entries = A.shape, A.T != 0.0
         starts = np.append(0, entries.sum(axis=1).cumsum())
         self.passModel(
@@ -61,13 +70,16 @@ class SilentHighs(highspy.Highs):
 
 
 class Support:
-    """The support function of a hand's wrenches at a utilisation. For one caller at a time.
+    """Support function of all wrenches that a hand can exert at a utilisation. Not thread-safe.
+
+    Each call solves a linear program by the simplex method, warm-started from the direction before.
 
     Parameters
     ----------
     space : WrenchSpace
+        Set of the hand's wrenches.
     cap : float
-        The utilisation.
+        Largest utilisation of the limits.
     """
 
     def __init__(self, space: WrenchSpace, cap: float) -> None:
@@ -81,10 +93,18 @@ class Support:
         self._columns = np.arange(A.shape[1], dtype=np.int32)
 
     def __call__(self, direction: Array) -> float:
-        """Return the most of direction · w, shape (6,), of wrenches w on the rock in H.
+        """Return the largest product of a direction with a wrench of the hand.
 
-        Infinite where there is no end to it, −∞ where there is no wrench, and where the solver does
-        not say.
+        Parameters
+        ----------
+        direction : ndarray, shape (6,)
+            In the hand frame H [1/N, 1/(N·m)].
+
+        Returns
+        -------
+        float
+            max direction · w over the wrenches w on the rock, in H. ∞ if there is no maximum; −∞ if
+            the set is empty, or the solver reports neither an optimum nor an unbounded program.
         """
         solver = self._solver
         solver.changeColsCost(len(self._columns), self._columns, -(direction @ self._generators))

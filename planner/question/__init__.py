@@ -1,4 +1,4 @@
-"""Questions: a stance, its load, its limits."""
+"""Questions: a stance with its load, limits, objective and extras."""
 
 import lazy_loader
 

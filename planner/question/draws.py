@@ -1,4 +1,4 @@
-"""Draws of numbers as hands: what each makes of a stance's hand and of its surfaces."""
+"""Monte Carlo samples of a stance's uncertain parameters: hand model and surfaces of each."""
 
 from __future__ import annotations
 
@@ -23,22 +23,28 @@ __all__ = ["DrawnHand", "drawn_hands", "drawn_quantities"]
 
 
 class DrawnHand(NamedTuple):
-    """A hand, and what a tile holds, with the numbers of one draw.
+    """Hand model and surface parameters of one sample.
 
     Attributes
     ----------
     model : HandModel
+        Hand with the sample's parameter values.
     surfaces : ParameterTable
-        All numbers of the surfaces.
+        The sample's parameters of all surfaces.
     """
 
     model: HandModel
     surfaces: ParameterTable
 
     def surface(self, usual: Surface) -> Surface:
-        """Return what a tile holds in this draw where it usually holds what a surface says.
+        """Return a stance's surface with this sample's parameter values.
 
-        A caller's own numbers stay; of a preset, so does how many half-planes stand for it.
+        Parameters
+        ----------
+        usual : Surface
+            Surface in the stance. If it is one of the presets, its values are replaced by the
+            sample's, and its number of half-planes stays. A surface with the caller's values is
+            returned unchanged.
         """
         if usual.name is None:
             return usual
@@ -52,19 +58,24 @@ class DrawnHand(NamedTuple):
 def drawn_hands(
     hand: HandModel, draws: tuple[ParameterSample, ...] | None = None
 ) -> tuple[DrawnHand, ...]:
-    """Return what draws make of a hand.
+    """Return the hand model and the surfaces of each Monte Carlo sample. Cached.
 
     Parameters
     ----------
     hand : HandModel
-        Of the stance: what a draw leaves open is as with this one.
+        Hand of the stance. Parameters that a sample does not contain have the values of this hand.
     draws : tuple of ParameterSample, optional
-        The bundled ones by default.
+        Samples; the bundled ones by default.
+
+    Returns
+    -------
+    tuple of DrawnHand
+        One for each sample.
 
     Raises
     ------
     InvalidInputError
-        If a draw makes no possible hand, or surface; the field begins with its number.
+        If a sample's values make no possible hand or surface; the field begins with its index.
     """
     if draws is None:
         draws = bundled_draws(hand.table)
@@ -85,19 +96,22 @@ def drawn_hands(
 def drawn_quantities(
     hand: HandModel, draws: tuple[ParameterSample, ...] | None, surfaces: frozenset[str | None]
 ) -> dict[str, Array]:
-    """Return the numbers in which draws differ, shape (draws,) each, by their names.
+    """Return the values of each uncertain parameter over all samples, by name.
 
     Parameters
     ----------
-    hand, draws
-        As of `drawn_hands`.
+    hand : HandModel
+        Hand of the stance.
+    draws : tuple of ParameterSample or None
+        Samples; None: the bundled ones.
     surfaces : frozenset of str or None
-        Names of the surfaces that hands are on; numbers of others are left out.
+        Names of the surfaces that the hands are on. Parameters of other surfaces are left out, and
+        so are parameters with the same value in all samples.
 
     Returns
     -------
-    dict of str to ndarray
-        In SI units, by ``section.entry``, with ``[i]`` for each number of a list.
+    dict of str to ndarray, shape (draws,)
+        Values in SI units. A name is ``section.entry``, with ``[i]`` for each number of a list.
     """
     named = {name for name in surfaces if name is not None}
     on_presets = named | {"defaults"} if named else named

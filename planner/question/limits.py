@@ -1,6 +1,6 @@
-"""Names and limits in a question: objectives, extras, and caps on a plan and on an advice.
+"""Limits of a question: caps on a plan, ranges of an advice, and names of objectives and extras.
 
-They travel, so that they are here without numbers of numpy's.
+They are msgspec structs without numpy arrays, so that they can be sent as they are.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ Want = Literal["load_factor", "prices", "model", "robust", "spread", "clearance"
 Frame = Literal["hand", "body", "world"]
 
 LEAST_LIMIT: Final = 1e-3
-"""Least force or torque that counts as a limit [N, N·m]: a smaller one is nothing but rounding."""
+"""Least force or torque that is valid as a limit [N, N·m]; a smaller one is a rounding error."""
 
 MOST_MARGIN: Final = 1e3
-"""Largest margin or least tension that may be asked for [N]."""
+"""Largest hold margin or least tension that may be given [N]."""
 
 Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
 JointTorque = Annotated[float, Meta(ge=0.0, le=1e6)]
@@ -57,15 +57,16 @@ Utilisation = Annotated[float, Meta(ge=1e-3, le=1.0)]
 
 
 class ForceCap(Strict, frozen=True):
-    """The most that a hand may do to its rock.
+    """Cap on the force that a hand exerts on its rock.
 
     Attributes
     ----------
     largest_force : float, or sequence of (float, pair of float or None), length 3
-        Whatever its direction; or along each axis the largest either way, the least and the
-        largest, which are not above and not below zero and may be infinite, or None for no cap [N].
+        One number: largest force in any direction [N]. Three entries, one for each axis of
+        ``frame``: the largest force either way, or a pair of the least (≤ 0) and the largest (≥ 0)
+        force, which may be infinite, or None for no cap [N].
     frame : {'hand', 'body', 'world'}
-        Whose axes they are.
+        Frame of the axes: the hand frame H, the body frame B or the world frame W.
     """
 
     largest_force: Annotated[
@@ -106,7 +107,7 @@ class ForceCap(Strict, frozen=True):
 
     @property
     def most(self) -> float | tuple[tuple[float, float], ...]:
-        """The force in any direction, or the least and the largest along each axis [N]."""
+        """Largest force in any direction, or the least and largest force along each axis [N]."""
         given = self.largest_force
         return tuple(map(_range, given)) if isinstance(given, Sequence) else float(given)
 
@@ -122,26 +123,27 @@ def _range(axis: float | Sequence[float] | None) -> tuple[float, float]:
 
 
 class Limits(Strict, frozen=True):
-    """Caps that the caller puts on the plan.
+    """Limits that the caller puts on a plan.
 
     Attributes
     ----------
     utilisation : float
-        Largest utilisation that still counts as ``optimal``, in (0, 1].
+        Cap on the utilisation: the largest that still counts as ``optimal``, in (0, 1].
     tendon_tension : float, optional
-        Of every tendon [N]; the hand's own maximum if that is less.
+        Largest tension of every tendon [N]; the hand's maximum counts if it is less.
     joint_torque : float or mapping of str to (float or sequence of float), optional
-        Of every joint, or by limb, in place of the robot's own figures [N·m]; zero of a joint
-        without a motor, which bears nothing. Of a joint that slides it is a force [N].
+        Torque limit of every joint, or by limb, in place of the robot's limits [N·m]; of a
+        prismatic joint a force [N]. Zero, valid in a list only, for a joint without a motor.
     per_hand : mapping of str to ForceCap
-        By limb.
+        Cap on each hand's force, by limb.
     tension_change : float, optional
         Largest change of a tendon's tension from the present one [N].
     hold_margin : float
-        Force by which every tile on rock is to be short of being dragged backwards, and every bare
-        frame pressed on [N].
+        Force by which every tile on rock must stay short of being dragged backward, and every bare
+        frame must press on the rock [N].
     least_tension : float
-        Of every tendon [N]: a slack finger that holds by its wrist's travel alone is a trap.
+        Least tension of every tendon [N]. It rules out fingers with slack tendons that grip only by
+        the wrist's travel.
     """
 
     utilisation: Utilisation = 1.0
@@ -194,7 +196,15 @@ class Limits(Strict, frozen=True):
 
 
 def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
-    """Return the error about the most that joints may bear."""
+    """Return the error for invalid joint torque limits.
+
+    Parameters
+    ----------
+    given : sequence of float
+        The invalid values.
+    field : str
+        Their field in the question.
+    """
     return InvalidFieldError(
         f"must be at least {LEAST_LIMIT:g} N·m, or in a list 0 for a joint without a motor "
         f"(not all of a limb), got {', '.join(f'{most:g}' for most in given)}",
@@ -203,14 +213,14 @@ def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
 
 
 class LimbStiffness(Strict, frozen=True, kw_only=True):
-    """The stiffness with which limbs hold their wrists at pose targets.
+    """Stiffness with which limbs keep their wrists at pose targets.
 
     Attributes
     ----------
     position : float
-        Along each axis of H [N/m].
+        Along each axis of the hand frame H [N/m].
     angle : float
-        About each axis of H [N·m/rad].
+        About each axis of the hand frame H [N·m/rad].
     """
 
     position: Annotated[float, Meta(ge=1.0, le=1e9, description="along each axis of H [N/m]")]
@@ -225,19 +235,19 @@ class LimbStiffness(Strict, frozen=True, kw_only=True):
 
     @property
     def each(self) -> tuple[float, ...]:
-        """Stiffness of each component of a wrist's twist [N/m, N·m/rad]."""
+        """Stiffness of each component of a wrist's twist, length 6 [N/m, N·m/rad]."""
         return (self.position,) * 3 + (self.angle,) * 3
 
 
 class BodyRange(Strict, frozen=True):
-    """The range in which an advice may move the body from where it is.
+    """Range in which an advice may move the body from its present pose.
 
     Attributes
     ----------
     shift : float
-        Along each axis of B, either way [m].
+        Largest shift along each axis of the body frame B, either way [m].
     tilt : float
-        About one axis of B through the centre of mass, either way [rad].
+        Largest rotation about one axis of B through the centre of mass, either way [rad].
     """
 
     shift: Annotated[

@@ -1,6 +1,6 @@
-"""Loads: what a robot weighs and carries, how it is to move, and the wrench that this takes.
+"""Load of a robot: its mass, payloads and acceleration, and the body wrench that they need.
 
-A load travels, so that it is here without the libraries that it is weighed with.
+A load is a msgspec struct, so that it can be sent; numerical libraries are imported when needed.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ __all__ = ["Load", "Weights"]
 
 
 class Weights(NamedTuple):
-    """The weight of a robot whose joints are known.
+    """Weight of a robot whose joint angles are known.
 
     Attributes
     ----------
     body_wrench : ndarray, shape (6,)
-        That the rock must exert for the weight and acceleration of the robot's own links, in B
-        [N, N·m].
+        Wrench that the rock must exert for the weight and acceleration of the robot's links,
+        without payloads, in the body frame B [N, N·m].
     com : ndarray, shape (3,)
-        Centre of mass of these, in B [m].
+        Centre of mass of the links, in B [m].
     payloads : ndarray, shape (p, 3)
-        Places of the load's payloads, in B [m].
+        Positions of the load's payloads, in B [m].
     """
 
     body_wrench: Array
@@ -48,21 +48,21 @@ class Weights(NamedTuple):
 
 
 class Load(Strict, frozen=True):
-    """The body's weight and motion; by default the robot's own weight, at rest.
+    """Mass, payloads and acceleration of the body; by default the robot's weight, at rest.
 
     Attributes
     ----------
     mass : float, optional
-        Of the robot with its hands [kg]; that of its file by default. Where joints are known, what
-        it is above or below that counts at the centre of mass of the posture, on the body.
+        Mass of the robot with its hands [kg]; by default that of the robot's file. If joints are
+        known, the difference from the robot's file acts at the centre of mass of the posture.
     com : tuple of float, optional
-        Centre of mass in B [m]; that of the posture where joints are known, else that of the
-        robot's file.
+        Centre of mass in the body frame B [m]; by default that of the posture if joints are known,
+        else that of the robot's file.
     acceleration, angular_acceleration : tuple of float
-        Of the body in W [m/s², rad/s²]; the body does not turn yet. The angular one needs joints,
-        which give how the robot's mass is spread, and no com.
+        Of the body, in the world frame W [m/s², rad/s²], with no angular velocity. An angular
+        acceleration requires joints, which give the inertia, and no ``com``.
     payloads : tuple of Payload
-        Masses on links, beside ``mass``.
+        Masses on links or in hands, in addition to ``mass``.
     """
 
     mass: Annotated[
@@ -95,24 +95,25 @@ class Load(Strict, frozen=True):
 
     @property
     def own(self) -> bool:
-        """True where the mass and its centre are the robot's own."""
+        """True if no mass and no centre of mass is given, so that the robot's count."""
         return self.mass is None and self.com is None
 
     def body_wrench(self, stance: Stance, weights: Weights | None = None) -> Array:
-        """Return the resultant that the rock must exert on the robot, in B, shape (6,) [N, N·m].
+        """Return the body wrench: what the rock must exert on the robot, in B, shape (6,) [N, N·m].
 
-        ``f = m (a − g)`` at the centre of mass, and the same of each payload at its place.
+        The force is ``m (a − g)`` at the centre of mass: mass m, acceleration a, gravity g. Each
+        payload adds the same at its position.
 
         Parameters
         ----------
         stance : Stance
         weights : Weights, optional
-            Where joints are known.
+            Weight of the robot, if joints are known.
 
         Raises
         ------
         InvalidInputError
-            If a number is none, or needs joints that are not known; the field is relative to the
+            If a value is invalid, or needs joints that are not known; the field is relative to the
             load.
         """
         from hand_models.base import finite_vector
@@ -138,9 +139,12 @@ class Load(Strict, frozen=True):
         return checked_body_wrench(found, None)
 
     def motion(self, stance: Stance) -> tuple[Array, Array]:
-        """Return the acceleration of B's origin less gravity, and the angular one, in B.
+        """Return the body's linear acceleration minus gravity, and its angular acceleration.
 
-        Shapes (3,) each [m/s², rad/s²].
+        Returns
+        -------
+        linear, angular : ndarray, shape (3,)
+            In the body frame B, of its origin [m/s², rad/s²].
         """
         from hand_models.base import finite_vector
 
@@ -150,13 +154,13 @@ class Load(Strict, frozen=True):
         return into_body @ (acceleration - stance.gravity), into_body @ angular
 
     def payload_places(self, stance: Stance) -> Array:
-        """Return where payloads are while joints are not known, in B, shape (p, 3) [m].
+        """Return the positions of payloads if joints are not known, in B, shape (p, 3) [m].
 
         Raises
         ------
         InvalidInputError
-            If one is neither on the body nor in a hand of the stance; the field is relative to the
-            load.
+            If a payload is neither on the body nor in a hand of the stance; the field is relative
+            to the load.
         """
         import numpy as np
 

@@ -1,4 +1,4 @@
-"""Questions about a stance: what the body needs, what is best, and what must not be."""
+"""Questions about a stance: its load, limits and objective, and the extras of the answer."""
 
 from __future__ import annotations
 
@@ -24,44 +24,45 @@ __all__ = ["MOST_DRAWS", "OwnObjective", "Question"]
 
 
 class OwnObjective(Protocol):
-    """An objective that is not named but given: a `planner.solving.Objective`."""
+    """Objective that the caller defines: an object as `planner.solving.Objective`."""
 
     name: ClassVar[str]
 
 
 MOST_DRAWS: Final = 100
-"""Largest number of a caller's own samples: each costs a plan and a load factor."""
+"""Largest number of samples that a caller may give: each costs a plan and a load factor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """A stance, and what is asked of it.
+    """A stance with a load, limits and an objective: the input of the planner.
 
     Attributes
     ----------
     stance : Stance
     body_wrench : ndarray, shape (6,), optional
-        In B [N, N·m]; computed from ``load`` if it is not given.
+        Wrench that the rock must exert on the robot, in the body frame B [N, N·m]; by default
+        computed from ``load``.
     load : Load
-        Its acceleration and payloads count in the joints' torques whether or not the body wrench is
-        given.
+        Mass, payloads and acceleration. Acceleration and payloads count in the joint torques even
+        if the body wrench is given.
     limits : Limits
     want : frozenset of str
         Extras: 'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance' and 'advice'.
     objective : {'max_margin', 'min_effort'} or planner.solving.Objective
-        Least utilisation; or least sum of squared relative tensions and joint torques, at a
-        utilisation within the limits; or an objective of the caller's own.
+        'max_margin': least utilisation. 'min_effort': least sum of squared relative tensions and
+        joint torques, at a utilisation within the limits. Or an object with the caller's objective.
     present : mapping of str to ndarray, shape (4,)
-        Tensions of tendons now, by limb [N].
+        Present tendon tensions by limb [N]; only of hands with fixed wrists.
     deadline : float, optional
-        How long the answer may take [s]; as long as it takes by default.
+        Time that the answer may take [s]; unbounded by default.
     draws : tuple of ParameterSample, optional
         Samples of the ``spread``; those of ``draws.toml`` by default.
     explain : bool
-        Whether it is proven and reported what keeps an overloaded or infeasible stance from a plan.
-        That a plan is the least, and that there is none, is always checked.
+        Whether an overloaded or infeasible stance is explained by a certificate. Whether a plan is
+        the least, and whether there is none, is checked in any case.
     body_range : BodyRange
-        How far the ``advice`` may move the body.
+        Range in which the ``advice`` may move the body.
     """
 
     stance: Stance
@@ -160,17 +161,24 @@ class Question:
                     raise no_torque(most, f"limits.joint_torque.{limb}")
 
     def bare(self) -> Question:
-        """Return the same question for the least utilisation, without extras and deadline."""
+        """Return the question for the least utilisation, without extras, samples and deadline."""
         least: Objective = "max_margin"
         return replace(self, want=frozenset(), draws=None, deadline=None, objective=least)
 
     def needed_wrench(self, weights: Weights | None = None) -> Array:
-        """Return the body wrench that is planned for, shape (6,) [N, N·m].
+        """Return the body wrench: what the rock must exert on the robot, in B, shape (6,) [N, N·m].
+
+        It is the question's ``body_wrench`` if given, else computed from its ``load``.
 
         Parameters
         ----------
         weights : Weights, optional
-            What the robot weighs, where its joints are known.
+            Weight of the robot, if its joints are known.
+
+        Raises
+        ------
+        InvalidInputError
+            If the load is not valid; the field is relative to the load.
         """
         if self.body_wrench is not None:
             return self.body_wrench

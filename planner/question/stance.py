@@ -1,4 +1,4 @@
-"""Stances: the places of the body, its hands and its joints."""
+"""Stances: poses of the body and of its hands on their holds, and joint angles."""
 
 from __future__ import annotations
 
@@ -29,11 +29,25 @@ __all__ = [
 WristMode = Literal["fixed", "floating", "compliant"]
 
 EARTH_GRAVITY: Final = (0.0, 0.0, -9.81)
-"""Gravity in W unless a request gives another [m/s²] (the contract's figure)."""
+"""Default gravity in the world frame W [m/s²] (the contract's figure)."""
 
 
 def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
-    """Refuse limbs that the robot does not have."""
+    """Check that all keys of a mapping are limbs of the robot.
+
+    Parameters
+    ----------
+    named : mapping of str to object
+        Mapping whose keys are checked.
+    robot : Robot
+    field : str
+        Field that the error names.
+
+    Raises
+    ------
+    InvalidInputError
+        If a key is not a limb of the robot.
+    """
     for limb in named:
         if limb not in robot.limbs:
             raise InvalidInputError(
@@ -42,7 +56,21 @@ def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
 
 
 def known_choice(value: str, known: Sequence[str], field: str) -> None:
-    """Refuse what is none of those that are known."""
+    """Check that the value of a field is one of the known choices.
+
+    Parameters
+    ----------
+    value : str
+    known : sequence of str
+        Valid values.
+    field : str
+        Field that the error names.
+
+    Raises
+    ------
+    InvalidInputError
+        If the value is not one of them.
+    """
     if value not in known:
         raise InvalidInputError(
             f"unknown {field} {value!r}; known are {', '.join(known)}", field=field
@@ -50,7 +78,19 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
 
 
 def checked_body_wrench(wrench: Array, field: str | None) -> Array:
-    """Return a body wrench; refuse one that is absurdly large."""
+    """Return a wrench unchanged, shape (6,) [N, N·m], after a check of its size.
+
+    Parameters
+    ----------
+    wrench : ndarray, shape (6,)
+    field : str or None
+        Field that the error names.
+
+    Raises
+    ------
+    InvalidInputError
+        If a component exceeds 1e12 N or N·m, or is NaN.
+    """
     most = 1e12  # [N, N·m] larger, the unit is wrong
     if not np.abs(wrench).max() <= most:
         raise InvalidInputError(
@@ -82,38 +122,43 @@ def _possible(pose: Pose, field: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class HandOnHold:
-    """One hand of a stance.
+    """One hand of a stance, with its hold and the hold's surface.
 
     Attributes
     ----------
     limb : str
-        One of the robot's limbs.
+        Limb of the robot that has the hand.
     pose : Pose
-        H in W.
+        Pose of the hand frame H in the world frame W.
     hold : Hold
+        Shape of the rock.
     surface : Surface
+        Strength of a spine tile on the rock.
     hold_pose : Pose, optional
-        The hold's frame in W.
+        Pose of the hold's frame in W.
     hold_in_hand : Pose, optional
-        The hold's frame in H. With neither, the hand is seated on the hold.
+        Pose of the hold's frame in H. If neither pose is given, the hand is seated on the hold.
     grasp : Grasp
+        How the fingers close: closing tension and angles of the outer fingers.
     wrist : {'fixed', 'floating', 'compliant'}
-        Whether its motors give each tendon the tension that the plan asks for while the wrist keeps
-        its pose, stand still while the wrist gives way, or drive the tendons while it does.
+        ``fixed``: the wrist keeps its pose, motors give each tendon its planned tension.
+        ``floating``: motors stand still, the wrist moves. ``compliant``: motors drive the tendons,
+        the wrist moves.
     wrist_travel : WristTravel, optional
         Range in which a compliant wrist may settle; `WristTravel` by default.
     tendon_preload : ndarray, shape (4,), optional
-        Tensions that the tendons of a floating hand hold at rest [N]; the closing tension by
-        default.
+        Tensions of a floating hand's tendons at rest [N]; the closing tension by default.
     wrench : tuple of float or None, length 6, optional
-        What the hand must exert on the rock, in H [N, N·m]; components that are None are free.
+        Prescribed wrench of the hand on the rock, in H [N, N·m]; None for a free component.
     seat : {'rest', 'best'}
-        How a hand is seated for which neither pose is given: as its grasp would have it, or near
-        there where it holds most (`hand_models.fixed_wrist.seat_search`).
+        How a hand without a pose of its hold is seated: ``rest``: as its grasp closes; ``best``:
+        near that pose, where it can exert most (`hand_models.fixed_wrist.seat_search`).
     seat_direction : ndarray, shape (6,), optional
-        In which wrench on the rock, in H, the best seat is to hold most; the pull-off by default.
+        Wrench on the rock, in H, in whose direction the best seat can exert most; the pull-off by
+        default.
     at : Pose, optional
-        Where on the hold the hand is seated: a frame, in the hold's, that takes that one's place.
+        Where on the hold the hand is seated: a frame in the hold's frame, used in place of that
+        frame.
     """
 
     limb: str
@@ -184,7 +229,7 @@ class HandOnHold:
             object.__setattr__(self, "seat_direction", direction)
 
     def placed_hold(self) -> Pose | None:
-        """Return the hold's frame in H, or None if the hand is to be seated."""
+        """Return the pose of the hold's frame in H; None if the hand is to be seated."""
         if self.hold_pose is None:
             return self.hold_in_hand
         axes = self.pose.rotation.T
@@ -200,18 +245,19 @@ class Stance:
     Attributes
     ----------
     hands : tuple of HandOnHold
-        Between one and the number of the robot's limbs, each limb once.
+        One to as many hands as the robot has limbs; each limb at most once.
     body : Pose
-        B in W.
+        Pose of the body frame B in the world frame W.
     gravity : ndarray, shape (3,)
         In W [m/s²].
     robot : Robot
     joints : mapping of str to (ndarray or 'solve'), 'solve' or None
-        Angles of each limb's joints [rad], [m] of joints that slide, of every limb that holds on
-        at least; or that they are to be found, of a limb or of all. None: nothing is said of them,
-        and torques do not count.
+        Joint angles by limb [rad], of prismatic joints [m]; needed for every limb with a hand in
+        the stance. 'solve', for one limb or for all: found by inverse kinematics. None: joints are
+        not known, and joint torques do not count.
     limb_stiffness : LimbStiffness, optional
-        With which limbs hold wrists that give way: plans then have a pose target for each.
+        Stiffness with which limbs keep compliant or floating wrists at their targets; if given,
+        plans contain a pose target for each such wrist.
     """
 
     hands: tuple[HandOnHold, ...]
@@ -250,13 +296,13 @@ class Stance:
 
     @property
     def given_joints(self) -> dict[str, Array]:
-        """Angles that are given, by limb."""
+        """Joint angles that the stance gives, by limb, shape (n,) [rad]; prismatic joints [m]."""
         joints = {} if self.joints is None or isinstance(self.joints, str) else self.joints
         return {limb: each for limb, each in joints.items() if not isinstance(each, str)}
 
     @property
     def solved_limbs(self) -> frozenset[str]:
-        """Limbs that hold on, and whose angles are to be found."""
+        """Limbs with a hand whose joint angles are to be found by inverse kinematics."""
         holding = [hand.limb for hand in self.hands]
         if self.joints is None or isinstance(self.joints, str):
             return frozenset(holding if self.joints else ())

@@ -1,4 +1,4 @@
-"""Results: a plan and its hands, as arrays and one by one, recovered from loads."""
+"""Results: plans and their hands, recovered from the solver's loads."""
 
 import lazy_loader
 

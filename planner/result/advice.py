@@ -1,4 +1,4 @@
-"""Changes that would make a stance hold, or hold more, planned and verified."""
+"""Changes of a question that make its stance feasible or lower its utilisation, all verified."""
 
 from __future__ import annotations
 
@@ -25,40 +25,42 @@ AdviceKind = Literal[
 
 
 class Advice(Struct, frozen=True):
-    """A change of a question, planned and verified as the changed question would be.
+    """A change of a question, with the verified plan of the changed question.
 
     Attributes
     ----------
     kind : str
         ``body``: shift and tilt it; ``place``: move or turn a hand on its rock, which stays;
-        ``grasp``: take a hold, or all, with outer fingers or closing tension otherwise;
-        ``let_go``: without a hand; ``free_hand``: with one more, if rock is there; ``new_hold``:
-        with a hand elsewhere, if rock is there; ``strength``: a stronger hold, or all;
-        ``mass``: a lighter body; ``pair``: two of these; ``combination``: more of them.
+        ``grasp``: close one or all hands with other angles of outer fingers or closing tensions;
+        ``let_go``: remove a hand; ``free_hand``: add a hand, if rock is there; ``new_hold``: put a
+        hand elsewhere, if rock is there; ``strength``: one or all holds stronger; ``mass``: a
+        lighter body; ``pair``: two of these; ``combination``: more than two.
     limbs : list of str
-        Whose hands it is about; none for the body.
+        Limbs whose hands change; empty for the body.
     sentence : str
         What to do, in the words of the question; for ``strength`` and ``mass`` a condition.
     changes : dict of str to any
-        Fields of the plan request by their paths, and their new values. Null takes a field away,
-        and a hand. A hand whose value is the path of another one is new, and a copy of that one
-        but for its other values in here. Hands are counted as in the question: new ones come
-        first, hands are taken away last.
+        New values of fields of the plan request, by path. Null removes a field, or a hand. A hand
+        whose value is the path of another hand is new: a copy of that hand, except for the further
+        values given here. Indices of hands are those of the question: new hands are added first,
+        hands are removed last.
     size : float
-        How large the change is: the body's shift over 0.1 m plus its tilt over 0.2 rad; a hand's
-        way over 0.02 m plus its turn over 0.5 rad; the turn of outer fingers over π/2 and the
-        change of closing tension over 10 N, summed over hands; 2 for a hand more, less or
-        elsewhere; ln of how many times as strong holds become over ln 1.1, summed over hands; ln of
-        how many times lighter the body becomes over ln 1.1. Of several changes the
-        sum.
+        Size of the change, without unit. Body: shift over 0.1 m plus tilt over 0.2 rad. Place:
+        distance over 0.02 m plus turn over 0.5 rad. Grasp: turn of outer fingers over π/2 plus
+        change of closing tension over 10 N, summed over hands. Hand added, removed or put
+        elsewhere: 2. Strength: ln of the factor over ln 1.1, summed over hands. Mass: ln of the
+        factor by which the body is lighter over ln 1.1. Several changes: the sum.
     status : str
-        ``optimal`` or ``overloaded``, with the change.
+        Status of the changed question's plan: ``optimal`` or ``overloaded``.
     utilisation : float
+        Utilisation of the changed question's plan.
     load_factor : float or None
+        Load factor of the changed question; None if none was found.
     load_factor_status : {'found', 'at_least', 'unbounded', 'none', 'not_finished'}
-        Whether it is there; why not: there is no end to it, there is none, or no time to find it.
+        Whether the load factor was found; if not, why: it is unbounded, there is none, or the
+        deadline expired first.
     holds : bool
-        Whether the utilisation is within the cap that was asked for.
+        Whether the utilisation is within the question's cap.
     """
 
     kind: AdviceKind

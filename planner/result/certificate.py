@@ -1,6 +1,6 @@
-"""Certificate that there is no plan: one struct over the kind of its vectors and of hands' sets.
+"""Infeasibility certificate of a question, generic in the types of its vectors and wrench spaces.
 
-In the planner these are arrays and wrench spaces, in a reply lists and what travels of a set.
+In the planner these are arrays and `WrenchSpace`; in a reply, lists and serialised spaces.
 """
 
 from __future__ import annotations
@@ -18,56 +18,58 @@ SetOfWrenches = TypeVar("SetOfWrenches")
 
 
 class CertificateOf(Struct, Generic[AnyVector, SetOfWrenches], frozen=True, kw_only=True, eq=False):
-    """Why no plan balances the body, or none within a cap on the utilisation.
+    """Infeasibility certificate: why no plan balances the body, or none within a utilisation cap.
 
-    Checked without the solver: for every body wrench w that the hands can give, and the wrenches v
-    of theirs on the rock with which they do,
+    A Farkas certificate, checked without the solver. For every body wrench w that the hands can
+    give, by wrenches v of the hands on the rock,
 
-        d · w + Σ c · v ≤ supremum < needed = d · W + Σ c · V
+        d · w + Σ c · v ≤ supremum < needed = d · W + Σ c · V.
 
-    for the body wrench W asked for and the components V of hands' wrenches that are given. Where d
-    and all c are zero, rows contradict each other whatever the hands are to give.
+    W is the body wrench asked for, V the prescribed components of hands' wrenches, d and c are the
+    ``direction`` and ``held``. If d and all c are zero, rows contradict each other whatever the
+    hands must give.
 
     Attributes
     ----------
     utilisation : float or None
-        The cap within which there is no plan; None: there is none at any utilisation.
+        Cap within which there is no plan; None: there is none at any utilisation.
     direction : vector, length 6
-        d in B [1/N, 1/(N·m)], of unit length in the program's units of 300 N and 30 N·m; zero where
-        what the body needs plays no part.
+        d in the body frame B [1/N, 1/(N·m)], of unit length in the program's units of 300 N and
+        30 N·m; zero if the body wrench plays no part.
     held : mapping of str to vector, length 6
-        c in H [1/N, 1/(N·m)] of each hand that is given a wrench, by limb; zero for components that
-        are free.
+        c in the hand frame H [1/N, 1/(N·m)] of each hand with a prescribed wrench, by limb; zero
+        for free components.
     supremum : float
-        Over all loads up to 10⁶ N that keep to hard rows and, within a cap, to limits.
+        Largest value over all loads up to 10⁶ N within hard rows and, within a cap, limits.
     needed : float
-        Larger than ``supremum``.
+        Value that the question needs; larger than ``supremum``.
     shortfall : vector, length 6, or None
-        What is missing in B: the body wrench asked for minus the nearest that can be had. None
-        where nothing can: the hands' own rows, or the wrenches they are given, leave no loads. None
-        also where a deadline came before it was found; the direction is not zero then.
+        Missing wrench, in B: the body wrench asked for minus the nearest feasible one. None if no
+        body wrench is feasible: hard rows, or prescribed hand wrenches, leave no loads. None also
+        if a deadline expired first; the direction is then not zero.
     nearest : vector, length 6, or None
-        That nearest body wrench.
+        Nearest feasible body wrench, in B.
     blocking : sequence of LimitName
-        Rows that keep the hands from giving more in that direction; empty where no hand has
-        anything at all to give. The caller's own limits come first, then other limits, then hard
-        rows; of each of these the weightiest.
+        Active rows, which keep the hands from giving more in the direction; empty if no hand can
+        give anything at all. First the caller's limits, then other limits, then hard rows; in each
+        group the one with the largest weight first.
     irreducible : sequence of LimitName or None
-        Limits and hard rows (all rows of a name together) and given wrenches of hands
-        (``held_wrench``) that by themselves leave no balance, each of them needed for that. Others
-        may be in the way, too. In the order of ``blocking``. Empty where loads of any sign, up to
-        10⁶ N, would not balance it. None where rounding or a deadline leaves the set undecided.
+        Irreducible infeasible subset: limits, hard rows (all rows of a name together) and
+        prescribed hand wrenches (``held_wrench``) that alone leave no balance, each of them needed
+        for that. Other rows may be in the way, too. In the order of ``blocking``. Empty if even
+        loads of any sign, up to 10⁶ N, do not balance the body. None if rounding or a deadline left
+        the subset undecided.
     irreducible_up_to : float or None
-        Loads up to which they are proven to leave no balance [N], at least 10⁶: far beyond any
-        strength, but rows that are all but parallel may meet beyond. None where no loads of any
-        size balance, or there is no set.
+        Largest loads for which the subset is proven to leave no balance [N]; at least 10⁶, far
+        beyond any strength, but nearly parallel rows may meet beyond. None if no loads of any size
+        balance the body, or there is no subset.
     sufficient : sequence of LimitName or None
-        Those of them without any one of which, all other rows in place, there is a plan: within
-        the cap, or at any utilisation. Empty if no single one does. None where that is undecided,
-        or the set has more than 24 members and others alone are not in the way.
+        Members of the subset whose removal alone makes the question feasible: within the cap, or at
+        any utilisation. Empty if no single removal does. None if undecided, or if the subset has
+        more than 16 members and other rows alone are not in the way.
     wrench_spaces : mapping of str to set, or UNSET
-        The hands' sets that are meant, by limb; none where no hand has a part in it. In a reply
-        they come with ``"want": ["model"]`` where there is no plan.
+        Wrench spaces to which the certificate refers, by limb; none if no hand has a part in it. In
+        a reply they come with ``"want": ["model"]`` if there is no plan.
     """
 
     utilisation: float | None = None

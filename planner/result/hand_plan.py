@@ -1,7 +1,7 @@
-"""The hands of a plan: what they carry, as arrays, one by one or all, and finger by finger.
+"""Loads of the hands of a plan: as arrays, hand by hand or all together, and finger by finger.
 
-Its numbers are stored once, in arrays over its tiles and its tendons. Fingers and tiles as they
-travel are made of these when they are asked for.
+The numbers are stored once, in arrays over tiles and tendons. `Finger` and `Tile` structs, as a
+reply contains them, are made from the arrays on demand.
 """
 
 from __future__ import annotations
@@ -26,27 +26,28 @@ __all__ = ["HandPlan", "PlanArrays", "WristPlan"]
 
 @dataclass(frozen=True, eq=False)
 class WristPlan:
-    """The way that the wrist of a floating hand goes.
+    """Planned pose of a compliant or floating wrist, with its accuracy and stability.
 
     Attributes
     ----------
     twist : ndarray, shape (6,)
-        ξ of H about its origin at rest [m, rad].
+        Twist ξ of the hand frame H from rest, about H's origin [m, rad].
     palm : PalmMode
-        How the palm carries: of the hand's sets, one for each, that which the plan is in.
+        Palm mode of the plan: which loads the palm carries (none, drag, pressure or both).
     rounds : int
-        How often all hands' sets were linearised.
+        Number of linearisations of all hands' sets.
     error : float
-        How far the set before the last was off where the wrist went: forces, and moments over
-        0.1 m [N]. The plan itself is exact.
+        Error of the last but one linearised set at the planned pose: forces, and moments over 0.1 m
+        [N]. The plan itself is exact.
     driven : bool
-        Whether the wrist is compliant: its motors keep the tensions at which the hand has closed.
+        True if the wrist is compliant: motors keep the tendon tensions. False if it is floating.
     pose_target : ndarray, shape (6,), or None
-        Where the limb's controller is to aim, as ``twist``: x + K⁻¹ w, for limbs of stiffness K;
-        None where nothing is said of it [m, rad].
+        Set-point of the limb's controller, a twist as ``twist``: x + K⁻¹ w, with twist x, wrench on
+        the rock w and limb stiffness K [m, rad]. None if the stance gives no limb stiffness.
     least_stiffness : float or None
-        Least eigenvalue of the symmetric part of K_g + K, of the hand on its rock and the limb;
-        turns over 0.1 m [N/m]. Where it is not positive the wrist does not stay.
+        Least eigenvalue of the symmetric part of K_g + K: stiffness of the hand on its rock, K_g,
+        plus that of the limb, K; rotations over 0.1 m [N/m]. The wrist is stable only if it is
+        positive.
     """
 
     twist: Array
@@ -60,45 +61,49 @@ class WristPlan:
 
 @dataclass(frozen=True, eq=False)
 class HandPlan:
-    """One hand of a plan. Vectors in H, forces on the rock, SI units; n tiles.
+    """Loads of one hand in a plan. Vectors are in H, forces act on the rock; SI units; n tiles.
 
     Attributes
     ----------
     limb : str
     wrench : ndarray, shape (6,)
+        Wrench of the hand on the rock [N, N·m].
     tensions : ndarray, shape (4,)
-        Of the tendons [N].
+        Tendon tensions [N].
     drives : ndarray, shape (3, 4)
         Torque [N·m] and current [A] of each motor, angle of each winch [rad].
     loads : ndarray, shape (n, 3)
         Shear, normal and lateral load of each tile [N].
     forces, positions : ndarray, shape (n, 3)
-        [N], [m]
+        Contact force of each tile [N], and the point where it acts [m].
     axes : ndarray, shape (n, 3, 3)
-        Rows: unit forces of shear, normal and lateral load.
-    engagement, limit_shares : ndarray, shape (n,)
-        Share of each tile's spines that are on the rock, and part of a whole tile's strength that
-        limits its load, as of `SettledHand`.
+        Rows: unit forces of each tile's shear, normal and lateral load.
+    engagement : ndarray, shape (n,)
+        Share of each tile's spines that are on the rock.
+    limit_shares : ndarray, shape (n,)
+        Share of a whole tile's strength that limits each tile's load, as in `SettledHand`.
     tile_utilisations : ndarray, shape (n,)
     tiles : tuple of SettledTile
-        Their names and contacts.
+        Finger, phalanx and contact state of each tile.
     half_planes : tuple of HalfPlane
-        Limits of each whole tile that is no nail.
+        Limits of a whole tile (for nails see ``nail_planes``).
     palm : Palm
     utilisation : float
+        Largest utilisation of the hand's limits.
     seating : Seating
-        Where the hold is in H.
+        Pose of the hold in H.
     closures : tuple of str
-        How each finger has ended on the hold, as of `SettledHand.closures`.
+        How each finger ended its closing, as in `SettledHand.closures`.
     space : WrenchSpace
-        The set that the program used; of a floating hand linearised where its wrist goes.
+        Wrench space that the program used; of a compliant or floating hand, linearised at the
+        planned wrist pose.
     laws : ndarray, shape (n, 2, 2), or None
-        Shear and normal load of each tile, each at zero tension [N] and per newton; None where the
-        wrist floats.
+        [tile, shear or normal load, at zero tension [N] or per newton of tension]; None if the
+        wrist is compliant or floating.
     nail_planes : mapping of int to tuple of HalfPlane
         Limits of each nail that hooks, by its index among the tiles.
     wrist : WristPlan or None
-        None for a hand with a fixed wrist.
+        Planned wrist pose; None for a fixed wrist.
     """
 
     limb: str
@@ -125,11 +130,17 @@ class HandPlan:
 
     @property
     def fingers(self) -> list[Finger]:
-        """The hand finger by finger, in the order of `FINGERS`, with the model of its tiles."""
+        """The fingers in the order of `FINGERS`, with load laws and half-planes of their tiles."""
         return self.finger_by_finger(model=True)
 
     def finger_by_finger(self, *, model: bool) -> list[Finger]:
-        """Return the fingers, with load laws and half-planes of their tiles if ``model``."""
+        """Return the fingers in the order of `FINGERS`.
+
+        Parameters
+        ----------
+        model : bool
+            Whether the tiles contain their load laws and half-planes.
+        """
         tiles: dict[str, list[Tile]] = {name: [] for name in FINGERS}
         arrays = (self.loads, self.positions, self.forces, self.axes, self.tile_utilisations)
         columns: Iterator[Any] = zip(self.tiles, *(each.tolist() for each in arrays), strict=True)
@@ -152,41 +163,56 @@ class HandPlan:
         return *law, planes
 
     def limits_of(self, tile: int) -> tuple[HalfPlane, ...]:
-        """Return the half-planes of a tile's spines on the rock, or of its nail, by its index."""
+        """Return the half-planes that limit a tile, or a nail, by its index among the tiles.
+
+        Capacities are scaled to the tile's spines on the rock.
+        """
         nail, share = self.nail_planes.get(tile), float(self.limit_shares[tile])
         if nail is not None or share in (0.0, 1.0):
             return self.half_planes if nail is None else nail
         return tuple(p._replace(capacity=share * p.capacity) for p in self.half_planes)
 
     def tile(self, finger: str | None, phalanx: str | None) -> int:
-        """Return the index of a tile among the hand's."""
+        """Return the index of a tile in the arrays of the hand.
+
+        Parameters
+        ----------
+        finger, phalanx : str or None
+            Names of the tile's finger and phalanx.
+        """
         return next(i for i, tile in enumerate(self.tiles) if tile[:2] == (finger, phalanx))
 
 
 class PlanArrays(NamedTuple):
-    """The numbers of all hands' plans, one hand after another, as `places_of` says.
+    """Loads of all hands in a plan, hand after hand in the order of `HandBatch`.
 
-    Vectors in each hand's H, forces on the rock, SI units; T tiles, F fingers, H hands.
+    Vectors are in each hand's frame H, forces act on the rock; SI units. T tiles, F fingers, H
+    hands.
 
     Attributes
     ----------
     tensions : ndarray, shape (F,)
+        Tendon tensions.
     drives : ndarray, shape (3, F)
         Torque and current of each motor, angle of each winch.
     loads : ndarray, shape (T, 3)
+        Shear, normal and lateral load of each tile.
     forces, points : ndarray, shape (T + H, 3)
-        Of all tiles, then of all palms, and where they act.
+        Contact forces of all tiles, then of all palms, and the points where they act.
     axes : ndarray, shape (T, 3, 3)
+        Rows: unit forces of each tile's shear, normal and lateral load.
     tile_utilisations, engagement : ndarray, shape (T,)
     palm_moments : ndarray, shape (H, 3)
     palm_utilisations : ndarray, shape (H,)
     wrenches : ndarray, shape (H, 6)
+        Wrench of each hand on the rock.
     utilisations : ndarray, shape (H,)
     tiles : tuple of tuple of SettledTile
+        Finger, phalanx and contact state of each hand's tiles.
     half_planes : tuple of tuple of HalfPlane
-        Of each hand's whole tiles.
+        Limits of a whole tile of each hand.
     engaged : tuple of sequence of int
-        Tiles of each palm.
+        Indices of each palm's tiles that are on the rock.
     wrists : tuple of WristPlan or None
     """
 
@@ -209,7 +235,7 @@ class PlanArrays(NamedTuple):
 
     @classmethod
     def of(cls, hands: Sequence[HandPlan]) -> PlanArrays:
-        """Return the numbers of hands' plans."""
+        """Concatenate the arrays of hands' plans."""
         palms = [hand.palm for hand in hands]
         return cls(
             tensions=concatenated([hand.tensions for hand in hands]),
@@ -232,20 +258,22 @@ class PlanArrays(NamedTuple):
 
     @property
     def palms(self) -> Array:
-        """Forces of the palms, shape (H, 3)."""
+        """Contact force of each palm, shape (H, 3) [N]."""
         return self.forces[len(self.loads) :]
 
     def hands(
         self, limbs: Sequence[str], known: HandBatch, spaces: Sequence[WrenchSpace]
     ) -> tuple[HandPlan, ...]:
-        """Return the numbers of settled hands with fixed wrists hand by hand, as parts of these.
+        """Split the arrays into plans of hands with fixed wrists; the plans share memory with them.
 
         Parameters
         ----------
         limbs : sequence of str
+            Limb of each hand.
         known : HandBatch
+            The settled hands.
         spaces : sequence of WrenchSpace
-            The sets that the program used.
+            Wrench space of each hand that the program used.
         """
         firsts, tiles, count = known.places.first.tolist(), len(self.loads), len(FINGERS)
         palm_used, used = self.palm_utilisations.tolist(), self.utilisations.tolist()

@@ -1,7 +1,7 @@
-"""Recover what each tile, tendon, motor and palm carries from a solution.
+"""Compute the loads of tiles, tendons, motors and palms from the solution of a program.
 
-Loads y of hands with fixed wrists are read all at once, by where everything is in them; of a
-floating hand the model itself says what it carries where its wrist goes.
+Loads y of hands with fixed wrists are converted for all hands at once. For a compliant or floating
+hand, the hand's model itself gives the loads at the planned wrist pose.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from planner.result.plain_parts import Palm
 __all__ = ["LoadRecovery", "recover_floating_hand"]
 
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
-"""Signs of a palm's shear along x and its pressing along z."""
+"""Signs of a palm's force on the rock: shear along x, pressing along z."""
 
 WRENCH_ROWS: Final = 6
 """Rows of a wrench."""
 
 NO_LOAD: Final = np.zeros(1)
-"""A load that a hand does not have, before all others."""
+"""Zero load, put before all others for hands that lack a load."""
 
 
 class _LoadLayout(NamedTuple):
@@ -161,23 +161,26 @@ def _layout_of(
 
 
 class LoadRecovery:
-    """Reads loads of hands with fixed wrists, all hands at once; made once for their rows.
+    """Conversion of loads y into tile, tendon, motor and palm loads, for hands with fixed wrists.
+
+    Set up once for the rows of H hands; `read` then converts all hands at once.
 
     Parameters
     ----------
     known : HandBatch
+        The settled hands.
     spaces : sequence of WrenchSpace
-        Their sets.
+        Wrench space of each hand.
     scaled : sequence of ScaledRows, optional
-        Their rows, if these are known.
+        Scaled rows of the wrench spaces, if already computed.
 
     Attributes
     ----------
     rows, at_rest : ndarray, shapes (H, 6 + nl, m), (H, 6 + nl)
-        Of loads in `LOAD_UNIT`, each hand's filled up with zeros to the most that one has: its
-        wrench on the rock [N, N·m], then the utilisations of its limits.
+        For loads z in `LOAD_UNIT`, ``rows z + at_rest`` are each hand's wrench on the rock [N,
+        N·m], then the utilisations of its limits. Padded with zeros to the largest hand.
     least : ndarray, shape (H, m)
-        What each load may be at least [N].
+        Lower bound of each load [N]: 0, or −∞ for loads of either sign.
     """
 
     def __init__(
@@ -221,13 +224,19 @@ class LoadRecovery:
         )
 
     def read(self, loads: Sequence[Array]) -> tuple[PlanArrays, Array, float]:
-        """Return what loads y of all hands say [N].
+        """Convert loads y of all hands into loads of tiles, tendons, motors and palms.
 
-        What may not be negative and is, by rounding, counts as zero.
+        Loads that must not be negative, but are by rounding, count as zero.
+
+        Parameters
+        ----------
+        loads : sequence of ndarray, shape (m,)
+            Loads y of each hand [N].
 
         Returns
         -------
         arrays : PlanArrays
+            Loads of all hands.
         used : ndarray, shape (sum of nl,)
             Utilisation of every limit row, hand by hand.
         effort : float
@@ -307,21 +316,27 @@ def recover_floating_hand(
     pose: WristPlan,
     stiffness: LimbStiffness | None = None,
 ) -> HandPlan:
-    """Turn the pose of a wrist that gives way into tile loads and forces, by the model itself.
+    """Compute the loads of a compliant or floating hand at a wrist pose, by the hand's model.
 
     Parameters
     ----------
     limb : str
     settled : SettledHand
-        At rest.
+        The hand at rest on its hold.
     wrist : FloatingWrist
+        Model of its wrist.
     space : WrenchSpace
-        Its set, linearised at that pose.
-    y : ndarray
-        The pose, in the set's columns.
+        Set of the hand, linearised at the pose.
+    y : ndarray, shape (m,)
+        Pose in the set's columns: twist from rest [m, rad], of a compliant hand tensions [N] first.
     pose : WristPlan
+        Planned wrist pose; its palm mode, pose target and stiffness are filled in.
     stiffness : LimbStiffness, optional
-        Of the limb.
+        Stiffness of the limb.
+
+    Returns
+    -------
+    HandPlan
     """
     hand, closed = wrist.hand, wrist.closed_at(y)
     found = wrist.hand_loads(y[None])

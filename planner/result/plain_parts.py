@@ -1,6 +1,7 @@
-"""Parts of a plan that are words and plain numbers: they travel as they are.
+"""Parts of a plan that are words and plain numbers, sent in a reply without conversion.
 
-A name that does not exist is None, and null on its way; what was not asked for is left out.
+A value that does not exist is None in Python and null in JSON; a field that was not asked for is
+left out.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ __all__ = [
 Vector = list[float]
 
 AnyVector = TypeVar("AnyVector")
-"""Kind of a part's vectors: arrays in the planner, lists in a reply."""
+"""Type of a part's vectors: arrays in the planner, lists in a reply."""
 
 
 class LimitName(Struct, frozen=True):
@@ -41,15 +42,15 @@ class LimitName(Struct, frozen=True):
     ----------
     limb : str
     finger, phalanx : str or None
-        None where the limit is not a finger's, or not a tile's.
+        None if the limit is not a finger's, or not a tile's.
     limit : str
         What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
         ``motor_torque``, ``motor_current``, ``finger_shear``, ``finger_lateral`` and, with its
         distal phalanx, ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``,
-        ``hand_load`` and, where it is capped, ``force_cap``; of a limb ``joint_torque``, or
-        ``joint_force`` of a joint that slides; or a hard row's name.
+        ``hand_load`` and, if the question caps it, ``force_cap``; of a limb ``joint_torque``, or
+        ``joint_force`` of a prismatic joint; or a hard row's name.
     joint : str or None
-        The joint whose torque it is.
+        Joint whose torque or force is limited; None for other limits.
     """
 
     limb: str
@@ -60,14 +61,14 @@ class LimitName(Struct, frozen=True):
 
 
 class Price(LimitName, frozen=True, kw_only=True):
-    """A limit that binds, and what one more unit of it would take off the utilisation.
+    """Shadow price of an active limit: decrease of the utilisation per unit more of the limit.
 
     Attributes
     ----------
     price : float
-        [1/unit]
+        Decrease of the utilisation [1/unit].
     unit : str
-        Of the limit's capacity: ``N``, ``N·m`` or ``A``.
+        Unit of the limit's capacity: ``N``, ``N·m`` or ``A``.
     """
 
     price: float
@@ -75,32 +76,36 @@ class Price(LimitName, frozen=True, kw_only=True):
 
     @classmethod
     def of(cls, name: LimitName, price: float, unit: str) -> Price:
-        """Return the price of a limit."""
+        """Return the shadow price of a limit, given the decrease of the utilisation per unit."""
         return cls(*astuple(name), price=price, unit=unit)
 
     @property
     def name(self) -> LimitName:
-        """The limit alone."""
+        """The limit without its price."""
         return LimitName(self.limb, self.finger, self.phalanx, self.limit, self.joint)
 
 
 LoadFactorStatus = Literal["found", "at_least", "unbounded", "none", "not_asked", "not_finished"]
-"""Status of a load factor: it is there, or that it is no less; no multiple of the body wrench is
-too much, or none can be held; it was not asked for, or a deadline came before."""
+"""Status of a load factor.
+
+``found``: it is the largest; ``at_least``: it is a lower bound; ``unbounded``: any multiple of the
+body wrench can be held; ``none``: no multiple can; ``not_asked``: the question did not ask for it;
+``not_finished``: the deadline expired first."""
 
 
 class LoadFactor(NamedTuple):
-    """The outcome of a search for a load factor.
+    """Result of the search for a load factor.
 
     Attributes
     ----------
     factor : float or None
+        Largest multiple of the body wrench found; None if none was found.
     least : bool
-        Whether it is only known to be no less.
+        True if ``factor`` is only a lower bound.
     unbounded : bool
-        Whether any multiple of the body wrench can be held.
+        True if any multiple of the body wrench can be held.
     unfinished : bool
-        Whether the deadline came before.
+        True if the deadline expired first.
     """
 
     factor: float | None = None
@@ -110,7 +115,7 @@ class LoadFactor(NamedTuple):
 
     @property
     def status(self) -> LoadFactorStatus:
-        """Status of the search, where it was asked for."""
+        """Status of the search, for a load factor that was asked for."""
         if self.unbounded:
             return "unbounded"
         if self.factor is not None:
@@ -119,13 +124,14 @@ class LoadFactor(NamedTuple):
 
 
 class Solver(Struct, frozen=True):
-    """The solver, and how it ended.
+    """The solver of a plan, and its status.
 
     Attributes
     ----------
     name, status : str
+        Name of the solver, and its status as CVXPY names it.
     iterations : int
-        Zero where the limits that bound in a plan before led to this one without it.
+        Zero if the plan follows from the active limits of an earlier plan, without the solver.
     """
 
     name: str
@@ -134,7 +140,7 @@ class Solver(Struct, frozen=True):
 
 
 class Time(Struct, frozen=True):
-    """The time that each part took [s]."""
+    """Computing time [s]: preparing the model, solving the program, and the total."""
 
     model: float
     solve: float
@@ -142,22 +148,23 @@ class Time(Struct, frozen=True):
 
 
 class TensionPath(Struct, frozen=True):
-    """The straight way from the present tensions to the planned ones.
+    """Straight-line interpolation from present to planned tensions, checked for safety.
 
     Attributes
     ----------
     safe : bool
-        Whether every point of it balances the body within the cap on the utilisation, hard rows
-        giving by 1 mN: no present tension is known better.
+        Whether every point of the path balances the body within the cap on the utilisation. Hard
+        rows may be exceeded by 1 mN, as no present tension is known better.
     safe_part : float
-        How much of it does, from the plan backward; zero where the plan itself does not.
+        Share of the path that is safe, from the plan backward, 0 to 1; zero if the plan itself is
+        beyond the cap.
     utilisation_at_present : float or None
-        The least at the present tensions; None if these balance the body at no utilisation.
+        Least utilisation at the present tensions; None if no utilisation balances the body there.
     largest_change : float
-        Of a tension [N].
+        Largest change of a tension along the path [N].
     limiting : list of LimitName
-        The limits and hard rows that end the safe part, the weightiest first; of a plan beyond the
-        cap those of which it uses most. Empty where the way is safe.
+        Limits and hard rows that end the safe part, the one with the largest weight first; for a
+        plan beyond the cap, the limits that it uses most. Empty if the path is safe.
     """
 
     safe: bool
@@ -175,17 +182,17 @@ class Finding(Struct, frozen=True):
     kind : str
         ``palm_away``, ``fingers_down``, ``body_in_rock``, ``body_reversed``, ``hands_overlap``,
         ``hand_in_body``, ``limbs_crossed``, ``out_of_reach``, ``gravity_up``, ``unit``,
-        ``hand_adds_nothing`` or, where joints are known, ``link_in_rock``, ``links_collide``,
+        ``hand_adds_nothing`` or, if joints are known, ``link_in_rock``, ``links_collide``,
         ``mass_below_limbs`` and ``com_off_posture``.
     field : str
-        Its place in the question, such as ``stance.hands[0].pose.orientation``.
+        Field of the question, such as ``stance.hands[0].pose.orientation``.
     message : str
-        What is odd, and the slip that it is likely to come of.
+        What is odd, and the mistake that is its likely cause.
     value : float
-        What was measured: how deep, how far, how much of its reach, a cosine, or the utilisation
-        without the hand; or the number that looks as if it were in another unit.
+        Measured value: a depth, a distance, a share of the reach, a cosine, or the utilisation
+        without the hand; or the number that seems to have a wrong unit.
     unit : str
-        Of that, such as ``m``, ``m/s²`` or ``1``.
+        Unit of ``value``, such as ``m``, ``m/s²`` or ``1``.
     """
 
     kind: str
@@ -201,12 +208,12 @@ class Distance(Struct, frozen=True):
     Attributes
     ----------
     between : list of str
-        Their names, such as ``hand of front_left``, ``rock of front_left``, ``body``; a link has
-        its own, or that of the joint that moves it.
+        Names of the two, such as ``hand of front_left``, ``rock of front_left``, ``body``; a link
+        has its name, or that of the joint that moves it.
     distance : float
-        Below zero: how deep one is in the other [m].
+        Least distance [m]; if negative, the depth of the overlap.
     points : list of (list of float)
-        The nearest point of each, in W [m].
+        Nearest point of each of the two, in the world frame W [m].
     """
 
     between: list[str]
@@ -215,18 +222,20 @@ class Distance(Struct, frozen=True):
 
 
 class Clearance(Struct, frozen=True, kw_only=True):
-    """The least distances about a stance; None where nothing was measured.
+    """Least distances between hands, links, body and rock (collision check); None if not measured.
 
     Links that are joined, and a hand with its own rock or the link that carries it, are left out.
 
     Attributes
     ----------
-    link_rock, link_link : Distance or None
-        Of a limb's link from rock; from another link, the body or another limb's hand.
+    link_rock : Distance or None
+        From a limb's link to rock.
+    link_link : Distance or None
+        From a limb's link to another link, the body or another limb's hand.
     hand_hand, hand_body : Distance or None
-        Of a hand from another hand, and from the body.
+        From a hand to another hand, and to the body.
     body_rock : Distance or None
-        Of the body from rock.
+        From the body to rock.
     unchecked : list of str
         What was not measured, and why.
     """
@@ -240,38 +249,40 @@ class Clearance(Struct, frozen=True, kw_only=True):
 
 
 class RobustLoadFactor(Struct, frozen=True):
-    """The load factor where the hands are not quite where they were put.
+    """Load factor for hands placed inaccurately: statistics over random placements of the rock.
 
-    Each hand is closed anew at ``places`` about its own, a scrambled Sobol sequence by its limb's
-    name, and the places of all hands are combined at random. H stays in W, so that body and joints
-    stay, too: it is the rock that is elsewhere. Quantiles are over all draws: one in which a hand
-    cannot be, or nothing can be held, has a load factor of zero.
+    Each hand is closed again at ``places`` poses near its given one, from a scrambled Sobol
+    sequence seeded by the limb's name. Poses of all hands are combined at random; each combination
+    is a draw. The hand frame H stays in the world frame W, with body and joints; the rock moves
+    instead. Quantiles are over all draws. In a draw where a hand cannot be closed, or nothing can
+    be held, the load factor is zero.
 
     Attributes
     ----------
     draws, without : int
-        Combinations of places, and those of them that have a load factor of zero.
+        Number of draws, and of draws with a load factor of zero.
     refused : dict of str to int
-        In how many draws a hand cannot be, by limb; those that always can are left out.
+        Number of draws in which a hand cannot be closed, by limb; limbs without such draws are left
+        out.
     position, angle : float
-        The scatter: to either side along each axis of H [m], and about each [rad].
+        Half width of the scatter: along each axis of H [m], and about each axis [rad].
     seed : int
-        Of the draws.
+        Seed of the random combinations.
     worst : float
-        Deprecated: the same as ``hundredth``. It was the least of the draws that had one, which
-        depends on how many there are.
+        Deprecated: the same as ``hundredth``. In old versions, the least load factor of the draws
+        that have one, which depends on their number.
     tenth : float
-        What it exceeds in nine in ten draws.
+        10 % quantile: the load factor is larger in nine of ten draws.
     tenth_interval : list of float, length 2
-        Interval that holds it with 95 % confidence, for this number of draws.
+        95 % confidence interval of ``tenth``, for this number of draws.
     hundredth : float
-        What it exceeds in 99 of a hundred draws.
+        1 % quantile: the load factor is larger in 99 of a hundred draws.
     hundredth_interval : list of float, length 2
-        The same of that.
+        95 % confidence interval of ``hundredth``.
     places : int
-        Of each hand.
+        Number of poses of each hand.
     reasons : dict of str to str
-        Why a hand cannot be at the first of its places where it cannot, by limb.
+        Why a hand cannot be closed at the first pose where it cannot, by limb.
     """
 
     draws: int
@@ -290,14 +301,14 @@ class RobustLoadFactor(Struct, frozen=True):
 
 
 class Palm(Struct, Generic[AnyVector], frozen=True, kw_only=True, eq=False):
-    """The palm: where it acts, its force on the rock there, and its moment about that point, in H.
+    """Load of the palm: contact point, force on the rock and moment about the point, in H.
 
     Attributes
     ----------
     position, force, moment : vector, length 3
         [m], [N], [N·m]
     engaged : sequence of int
-        Its tiles that are on the rock.
+        Indices of the palm's tiles that are on the rock.
     utilisation : float
     """
 
@@ -309,32 +320,35 @@ class Palm(Struct, Generic[AnyVector], frozen=True, kw_only=True, eq=False):
 
 
 class Tile(Struct, frozen=True):
-    """One finger tile of a plan. Vectors in H, forces on the rock, SI units.
+    """Load of one finger tile. Vectors are in the hand frame H, forces act on the rock; SI units.
 
-    A reply has the last three fields with ``"want": ["model"]``; the first two of them there are
-    only where the wrist is fixed.
+    A reply has the last three fields with ``"want": ["model"]``. Of those, ``load_at_zero`` and
+    ``load_per_newton`` are only there if the wrist is fixed.
 
     Attributes
     ----------
     phalanx : str
         ``base``, ``proximal``, ``middle`` or ``distal``, or ``nail``.
     contact : str
-        ``face``, ``edge``, ``frame`` where its phalanx only presses beside it, ``nail``, or
-        ``none`` where it touches nothing and carries nothing.
+        ``face``; ``edge``; ``frame``: the phalanx only presses on rock beside the tile; ``nail``;
+        ``none``: the tile touches and carries nothing.
     position : list of float, length 3
     force : list of float, length 3
         shear·shear_axis + normal·normal_axis + lateral·lateral_axis.
     shear, normal, lateral : float
+        Components of the force along the three axes [N].
     shear_axis, normal_axis, lateral_axis : list of float, length 3
+        Unit vectors.
     utilisation : float
-        Largest load over capacity of its half-planes; never below zero.
+        Largest ratio of load to capacity over the tile's half-planes; at least zero.
     load_at_zero : list of float, length 2
-        Shear and normal load at zero tension [N].
+        Shear and normal load at zero tendon tension [N].
     load_per_newton : list of float, length 2
-        The same per newton of tension.
+        Increase of shear and normal load per newton of tension.
     half_planes : list of list of float, length 4
-        [a_shear, a_normal, a_lateral, capacity] of each limit of the spines that are on the rock;
-        of a tile that is not on rock, of a whole one.
+        [a_shear, a_normal, a_lateral, capacity] of each limit a_shear·shear + a_normal·normal +
+        a_lateral·lateral ≤ capacity [N] of the tile's spines on the rock; for a tile that is not
+        on rock, of a whole tile.
     """
 
     phalanx: str
@@ -354,21 +368,21 @@ class Tile(Struct, frozen=True):
 
 
 class Finger(Struct, frozen=True):
-    """One finger of a plan: its tendon, its motor while it tightens that, and its tiles.
+    """One finger of a plan: tendon tension, motor load while tightening, and tiles.
 
     Attributes
     ----------
     name : str
     closure : str
-        How it has ended on its hold: ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped`` or
-        ``straight``.
+        How the finger ended its closing: ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped``
+        or ``straight``.
     tendon_tension : float
         [N]
     motor_torque, motor_current : float
-        [N·m], [A]
+        Of the motor while it tightens the tendon [N·m], [A].
     winch_angle : float
-        From the open finger to that tension, of a floating hand to the preload at which the motor
-        stands still [rad].
+        Rotation of the winch from the open finger to the planned tension [rad]; for a floating
+        hand, to the preload at which its motor stands still.
     tiles : list of Tile
         From the base outward.
     """

@@ -1,4 +1,4 @@
-"""Answers to questions about a stance: a plan, and of a stream what tendons are to hold."""
+"""Answers to questions about a stance: a plan, and tension set-points for a stream of wrenches."""
 
 from __future__ import annotations
 
@@ -34,79 +34,83 @@ SetPointSource = Literal["interpolated", "blended", "solved"]
 
 
 class Certificate(CertificateOf[Array, WrenchSpace], frozen=True, kw_only=True, eq=False):
-    """Why there is no plan, as the planner finds it: arrays, and the hands' wrench spaces."""
+    """Infeasibility certificate of the planner: why there is no plan, in arrays and spaces."""
 
     @property
     def spaces(self) -> Mapping[str, WrenchSpace]:
-        """The hands' sets that are meant, by limb."""
+        """Wrench spaces to which the certificate refers, by limb; empty if no hand has a part."""
         return self.wrench_spaces or {}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
-    """The answer. A value that does not exist for a status is None.
+    """Verified loads of all hands and tensions of all tendons: the answer to a question.
+
+    A value that does not exist for a status is None.
 
     Attributes
     ----------
     status : {'optimal', 'overloaded', 'infeasible', 'failed'}
     body_wrench : ndarray, shape (6,)
-        The one planned for, in B.
+        Body wrench that is planned for, in the body frame B [N, N·m].
     utilisation : float or None
+        Largest load over capacity of all limits.
     effort : float or None
-        Sum of squared relative tendon tensions and joint torques of the limbs that hold on.
+        Sum of squared relative tendon tensions and joint torques, of limbs whose hands are on rock.
     load_factor : float or None
-        Largest s for which s × body wrench has a plan with utilisation ≤ 1, if it was asked for and
-        exists.
+        Largest s for which s × body wrench has a plan with utilisation ≤ 1; None if it was not
+        asked for or does not exist.
     load_factor_status : {'found', 'at_least', 'unbounded', 'none', 'not_asked', 'not_finished'}
-        Whether it is there, and why not.
+        Whether the load factor was found; if not, why.
     load_factor_unbounded : bool
-        Whether there is no end to such s.
+        True if every multiple s has such a plan.
     limiting : LimitName or None
         The limit with the largest utilisation.
     hands : tuple of HandPlan or None
-        None where there is no balance.
+        Loads of each hand; None if nothing balances the body.
     prices : tuple of Price or None
-        What one more unit of each limit that binds would take off the utilisation.
+        Shadow prices of the active limits: decrease of the utilisation per unit more of a limit.
     effort_prices : tuple of Price or None
-        What it would take off the effort, where that is what is least; tensions and torques stay
-        measured by the limits as they are.
+        Decrease of the effort per unit more of a limit, if the objective is the effort. Relative
+        tensions and torques still refer to the unchanged limits.
     certificate : Certificate or None
-        Why there is no plan, or none within the cap; None where that was not to be explained.
+        Infeasibility certificate; None if there is a plan within the cap, or no explanation was
+        asked for.
     residual : ndarray, shape (6,), or None
-        Body wrench of the returned loads minus the one asked for.
+        Body wrench of the returned loads minus the one that is planned for, in B [N, N·m].
     joints, joint_torque : mapping of str to ndarray, shape (n,), or None
-        Of every limb [rad], [N·m]; None where the stance says nothing of joints, and of torques
-        where there is no balance.
+        Joint angles [rad] and torques [N·m] of every limb, by limb; of prismatic joints [m] and
+        [N]. None if the stance gives no joints; torques also if nothing balances the body.
     joint_torque_limit : mapping of str to ndarray, shape (n,), or None
-        What the joints bear: the caller's figures, or else the robot's [N·m]; zero for a joint
-        without a motor. Of joints that slide this is a force, the torque too [N], and where they
-        are a length [m].
+        Torque limits of the joints: the question's, else the robot's [N·m]; of prismatic joints
+        [N]. Zero for a joint without a motor.
     path : TensionPath or None
-        The way from the present tensions; None where none were given, or there is no plan.
+        Path from the present tensions to the plan; None if no present tensions were given, or there
+        is no plan.
     verified : bool
         Whether the independent check passed.
     reason : str
-        One sentence that a climber understands.
+        One sentence that explains the status to a climber.
     warnings : tuple of str
-        What is odd about the stance: the messages of its findings, hands that touch nothing. What a
-        deadline has left unfinished.
+        Messages of ``findings``, hands that touch nothing, and what a deadline left unfinished.
     solver : Solver
     time : Time
     findings : tuple of Finding
-        What is odd about the stance as a scene: is it meant?
+        What is odd about the stance as a scene, and may be a mistake.
     unfinished : tuple of str
-        What a deadline has left unfinished, by name: see `planner.deadline.Unfinished`. Values that
-        are missing for it are None.
+        Names of the parts that a deadline left unfinished, and whose values are therefore None: see
+        `planner.deadline.Unfinished`.
     robust : RobustLoadFactor or None
-        The load factor over a scatter of the hands' places, if it was asked for; None where the
-        body wrench is zero, any multiple of which is the same.
+        Load factor over random placements of the hands, if asked for; None if the body wrench is
+        zero, as all its multiples are the same.
     spread : Spread or None
-        Utilisation and load factor over draws of the numbers, if it was asked for.
+        Utilisation and load factor over Monte Carlo samples of parameters, if asked for.
     clearance : Clearance or None
-        The least distances, if they were asked for.
+        Least distances between hands, links, body and rock, if asked for.
     advice : tuple of Advice or None
-        What would make it hold, or hold more, if that was asked for: what
-        holds first, the smallest change first of that; of the rest that of most gain for its size.
+        Changes that would make the stance feasible or lower its utilisation, if asked for. First
+        the changes that make it feasible, the smallest first; then those with most gain for their
+        size.
     """
 
     status: Status
@@ -140,9 +144,9 @@ class Plan:
 
     @property
     def joint_shares(self) -> Mapping[str, Array] | None:
-        """Each joint's torque over what it bears, shape (n,) by limb; None where it is not known.
+        """Torque over torque limit of each joint, shape (n,) by limb; None if no torques are known.
 
-        A joint without a motor, whose limit is zero, has none: 0.
+        Zero for a joint without a motor, whose limit is zero.
         """
         torques, limits = self.joint_torque, self.joint_torque_limit
         if torques is None or limits is None:
@@ -154,39 +158,40 @@ class Plan:
 
     @property
     def joint_utilisation(self) -> float | None:
-        """Largest torque of a joint over what it bears; None where torques are not known."""
+        """Largest ratio of torque to torque limit over all joints; None if no torques are known."""
         shares = self.joint_shares
         return None if shares is None else max(float(np.max(each)) for each in shares.values())
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SetPoints:
-    """The tensions that tendons are to hold. Arrays are of all hands, in the stance's order.
+    """Tension set-points of all tendons for one body wrench; hands in the stance's order.
 
     Attributes
     ----------
     status : {'optimal', 'overloaded', 'infeasible', 'failed'}
-        As of a plan. Without a plan, all numbers but the wrench are None.
+        Status as of a `Plan`. Without a plan, all numbers but the wrench are None.
     body_wrench : ndarray, shape (6,)
-        The one asked for, in B [N, N·m].
+        Body wrench that is planned for, in B [N, N·m].
     verified : bool
-        Whether the independent check passed, or the proof that there is no plan.
+        Whether the independent check of the plan, or of the infeasibility certificate, passed.
     utilisation : float or None
-        The largest of all limits.
+        Largest utilisation of all limits.
     gap : float or None
-        The least utilisation of any plan is no more than this below: proven.
+        Proven bound: no plan has a utilisation that is less by more than this.
     tensions : ndarray, shape (hands, 4), or None
-        [N]
+        Tendon tensions [N].
     wrenches : ndarray, shape (hands, 6), or None
-        Of hands on the rock, in H [N, N·m].
+        Wrench of each hand on the rock, in H [N, N·m].
     loads : ndarray, shape (hands, m), or None
-        y: `WrenchStream.columns` of each hand, then zeros [N].
+        Loads y of each hand, in the order of `WrenchStream.columns`, then zeros [N].
     source : {'interpolated', 'blended', 'solved'}
-        Mixed from plans known before; solved for this wrench alone; or a mixture of both.
+        ``interpolated``: from known plans; ``solved``: for this wrench alone; ``blended``: a
+        mixture of both.
     winch_angle : ndarray, shape (hands, 4), or None
-        Where the winches are then, from the open finger [rad].
+        Angles of the winches at these tensions, from the open finger [rad].
     motor_torque, motor_current : ndarray, shape (hands, 4), or None
-        Of motors that tighten the tendons to their tensions [N·m], and what they draw then [A].
+        Torque [N·m] and current [A] of each motor while it tightens its tendon to the tension.
     reason : str or None
         Why there is no plan.
     """

@@ -1,4 +1,4 @@
-"""The spread of an answer: plan and load factor over draws of what nobody knows exactly."""
+"""Spread of a plan: statistics of utilisation and load factor over Monte Carlo samples."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["SPREAD_SETTINGS", "DrawnPlan", "Influence", "Quantiles", "Spread", "
 
 @dataclass(frozen=True, slots=True)
 class SpreadSettings:
-    """Numbers of samples from which statistics are given."""
+    """Thresholds for statistics over Monte Carlo samples."""
 
     many_draws: int = 20  # of which 5 % are one; of fewer the extremes are reported
     least_variation: float = 1e-4  # of numbers, over the largest: less is the solver's error
@@ -26,13 +26,14 @@ SPREAD_SETTINGS: Final = SpreadSettings()
 
 
 class DrawnPlan(Struct, frozen=True):
-    """The verified plan of a draw; None where there is no such plan, or number.
+    """Verified plan with the parameter values of one sample; None for a missing value.
 
     Attributes
     ----------
     utilisation, load_factor : float or None
+        Least utilisation and load factor of the sample.
     holds : bool
-        Whether it would be ``optimal``.
+        Whether the plan's status is ``optimal``: feasible at the cap on the utilisation.
     """
 
     utilisation: float | None = None
@@ -41,9 +42,9 @@ class DrawnPlan(Struct, frozen=True):
 
 
 class Quantiles(Struct, frozen=True):
-    """A number over draws: its 5, 50 and 95 % quantiles (linear between draws).
+    """Quantiles of a number over Monte Carlo samples: 5, 50 and 95 % (linear interpolation).
 
-    Of fewer than 20 draws: the least, the median and the largest.
+    With fewer than 20 samples ``low`` is the least, ``high`` the largest value.
     """
 
     low: float
@@ -52,7 +53,7 @@ class Quantiles(Struct, frozen=True):
 
     @classmethod
     def of(cls, values: Sequence[float | None]) -> Quantiles | None:
-        """Return the quantiles of the numbers that are there; None if none is."""
+        """Return the quantiles of the values that are not None; None if all are None."""
         import numpy as np
 
         there = [value for value in values if value is not None]
@@ -63,14 +64,15 @@ class Quantiles(Struct, frozen=True):
 
 
 class Influence(Struct, frozen=True):
-    """The share of the load factor's variation over the draws that goes with one drawn quantity.
+    """Sensitivity of the load factor to one uncertain parameter (Spearman rank correlation).
 
     Attributes
     ----------
     quantity : str
-        As in parameter files: ``rock.shear_limit``, ``finger.pulley_radii[1]``.
+        Name of the parameter as in parameter files: ``rock.shear_limit``,
+        ``finger.pulley_radii[1]``.
     share : float
-        ρ² in [0, 1]; see `Spread`.
+        Squared rank correlation ρ² with the load factor, in [0, 1]; see `Spread`.
     """
 
     quantity: str
@@ -78,39 +80,42 @@ class Influence(Struct, frozen=True):
 
 
 class Spread(Struct, frozen=True):
-    """A plan and its load factor over draws of the hand's and the rock's numbers.
+    """Spread of utilisation and load factor over Monte Carlo samples of uncertain parameters.
 
-    Body wrench, poses, joints and all that was asked stay; every draw has a plan of its own, which
-    is verified as any plan is. A draw has no plan where a hand cannot be in its place, nothing
-    balances the body, or none passes the checks; it counts as not holding.
+    The parameters are those of the hand and the rock. Body wrench, poses, joints and all else in
+    the question stay. Each sample (draw) has a plan, verified as any plan is. A sample has no plan
+    if a hand cannot be closed, nothing balances the body, or no plan passes the checks; it then
+    counts as not feasible.
 
     Attributes
     ----------
     draws, holds, without : int
-        Draws; those in which the stance holds within the cap on the utilisation; and those that
-        have no plan, of which some may have a load factor.
+        Number of samples; of samples with a plan within the cap on the utilisation; and of samples
+        without a plan, some of which may have a load factor.
     cap : float
-        That cap.
+        Cap on the utilisation.
     refused : dict of str to int
-        In how many draws a hand cannot be, by limb; those that always can are left out.
+        Number of samples in which a hand cannot be closed, by limb; limbs without such samples are
+        left out.
     utilisation : Quantiles or None
-        Over the draws that have one.
+        Over the samples with a plan.
     load_factor : Quantiles or None
-        Over all draws; one without a plan counts as 0. None where no draw has one.
+        Over all samples; a sample without plan and load factor counts as 0. None if no sample has a
+        load factor.
     hangs_on : list of Influence
         Deprecated: the same as ``sensitive_to``.
     utilisations, load_factors : list of float or None
-        Of each draw, in order.
+        Value of each sample, in order.
     sensitive_to : list of Influence
-        The drawn quantities with which most of the load factor's variation goes, the first three,
-        the largest share first. A share is the squared rank correlation
+        The three parameters to which the load factor is most sensitive, the largest share first. A
+        share is the squared Spearman rank correlation
 
             ρ² = (Σ_k a_k b_k)² / (Σ_k a_k² Σ_k b_k²)
 
-        of the quantity's ranks a and the load factor's ranks b among the draws that have one, less
-        their means; equal numbers have their mean rank. Quantities that vary together in the draws
-        share what they explain, so that shares do not add up to 1. Empty where the load factor does
-        not vary by more than 1e-4 of itself, or fewer than three draws have one.
+        of the parameter's ranks a_k and the load factor's ranks b_k over the samples k with a load
+        factor, minus their means; equal numbers have their mean rank. Parameters that vary together
+        share the variation that they explain, so shares do not add up to 1. Empty if the load
+        factor varies by at most 1e-4 of its size, or fewer than three samples have one.
     """
 
     draws: int
@@ -133,16 +138,17 @@ class Spread(Struct, frozen=True):
         refused: Mapping[str, int],
         drawn: Mapping[str, Array],
     ) -> Spread:
-        """Return what plans of all draws say.
+        """Compute the statistics over the plans of all samples.
 
         Parameters
         ----------
         plans : sequence of DrawnPlan, length n
         cap : float
-            On the utilisation.
+            Cap on the utilisation.
         refused : mapping of str to int
+            Number of samples in which a hand cannot be closed, by limb.
         drawn : mapping of str to ndarray, shape (n,)
-            The quantities by name, and what each is in every draw.
+            Values of each uncertain parameter over the samples, by name.
         """
         used, factors = [p.utilisation for p in plans], [p.load_factor for p in plans]
         some = any(factor is not None for factor in factors)

@@ -1,4 +1,4 @@
-"""Climbs, move by move."""
+"""Routes: climbs of several moves, planned stage by stage."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,7 +1,7 @@
-"""A route: a sequence of stances and moves, evaluated move by move.
+"""Routes: a start stance and moves, expanded into the stances (stages) to be planned in order.
 
-A move takes one limb to its next hold. Before it, the body may shift on all the hands it has; then
-the limb lifts (a stance without that hand); then it takes the new hold:
+A move takes one limb to its next hold. First the body may shift, with all hands on the rock. Then
+the limb lifts (a stance without that hand). Then the hand is placed on the new hold:
 
     start → [shift] → lift → place → [shift] → lift → place → …
 """
@@ -34,7 +34,7 @@ __all__ = ["Move", "OutOfReach", "Route", "RouteResult", "RouteStage", "in_route
 Phase = Literal["start", "shift", "lift", "place"]
 
 JointAngles = Array | Literal["solve"]
-"""Joint angles of a limb [rad]; ``solve`` if they are to be found."""
+"""Joint angles of a limb [rad], or 'solve' to find them by inverse kinematics."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +44,15 @@ class Move:
     Attributes
     ----------
     hand : HandOnHold
-        The limb on its new hold.
+        The limb's hand on its new hold.
     body : Pose, optional
-        Where the body shifts to first, on the hands it has; B in W.
+        Pose of the body frame B in the world frame W to which the body shifts first, on the hands
+        that are on the rock.
     joints : mapping of str to (ndarray or 'solve'), or 'solve'
-        Of a route with joints: angles by limb [rad], of those on the rock from the shift on, of the
-        limb that moves on its new hold. Limbs left out keep theirs, unless the body shifts or they
-        move: then they are found.
+        Joint angles by limb [rad], for routes whose start stance has joints. Angles of limbs on the
+        rock count from the shift on, those of the moving limb on its new hold. Limbs left out keep
+        their angles, except that all are found by inverse kinematics if the body shifts, and those
+        of the moving limb in any case.
     """
 
     hand: HandOnHold
@@ -68,17 +70,17 @@ class Route:
     start : Stance
     moves : tuple of Move
     load : Load
-        What the body weighs; the same all the way.
+        Mass, payloads and acceleration of the body, the same in every stage.
     limits : Limits
-        Those of a hand count while it is on the rock.
+        Limits of every stage. A cap on a hand's force counts while the hand is on the rock.
     objective : {'max_margin', 'min_effort'}
-        Of every stage.
+        Objective of every stage.
     explain : bool
-        As of every stage's question.
+        Whether each stage without a plan is explained by a certificate, as in `Question`.
     want : frozenset of str
-        Extras of every stage's question, beside its load factor.
+        Extras of every stage, in addition to the load factor.
     draws : tuple of ParameterSample, optional
-        As of every stage's question.
+        Samples of the ``spread`` of every stage, as in `Question`.
     """
 
     name: str
@@ -94,20 +96,22 @@ class Route:
 
 @dataclass(frozen=True, eq=False)
 class RouteStage:
-    """One stance of a climb.
+    """One stance of a route, with the question to be planned.
 
     Attributes
     ----------
     index : int
-        From zero, in climbing order.
+        Index of the stage from zero, in climbing order.
     move : int
-        The move it belongs to, from one; zero for the start.
+        Number of its move, from one; zero for the start.
     phase : {'start', 'shift', 'lift', 'place'}
     limb : str or None
-        The one that moves.
+        Limb that moves; None for the start.
     question : Question
-    paths : dict of str
-        Where the route gives ``hands[i]`` and ``body`` of its stance.
+        The stage's stance, load, limits and objective.
+    paths : dict of str to str
+        Field of the route that gives ``hands[i]``, ``body`` and ``joints.limb`` of the stance, for
+        error messages.
     """
 
     index: int
@@ -120,12 +124,14 @@ class RouteStage:
 
 @dataclass(frozen=True)
 class OutOfReach:
-    """A stage without a plan: no joint angles put its hands in their places.
+    """Answer for a stage that inverse kinematics cannot reach: it has no plan.
+
+    Its attributes are those that a `Plan` has, without values.
 
     Attributes
     ----------
     reason : str
-        Which limb, and how far it is from there.
+        Which limb does not reach its hand's pose, and the distance that is missing.
     """
 
     reason: str
@@ -143,14 +149,14 @@ class OutOfReach:
 
 @dataclass(frozen=True, eq=False)
 class RouteResult:
-    """A climb, planned stage by stage.
+    """Plans of all stages of a route.
 
     Attributes
     ----------
     route : Route
     stages : tuple of RouteStage
     plans : tuple of Plan or OutOfReach
-        One for each stage.
+        Answer for each stage.
     """
 
     route: Route
@@ -159,19 +165,22 @@ class RouteResult:
 
     @property
     def status(self) -> str:
-        """Status of the stage that is worst off; ``optimal`` where every stage is."""
+        """Worst status of all stages; ``optimal`` if every stage is.
+
+        From best to worst: optimal, overloaded, infeasible, unreachable, failed.
+        """
         # each worse than the one before
         order = ("optimal", "overloaded", "infeasible", "unreachable", "failed")
         return max((p.status for p in self.plans), key=order.index)
 
     @property
     def feasible(self) -> bool:
-        """True where every stage is ``optimal``."""
+        """True if every stage is ``optimal``."""
         return self.status == "optimal"
 
     @property
     def load_factor(self) -> float | None:
-        """The least of all stages; None where one has none, or where there is no end to any."""
+        """Least load factor of all stages; None if a stage has none, or all are unbounded."""
         factors: list[float] = []
         for p in self.plans:
             if p.load_factor is not None:
@@ -182,12 +191,12 @@ class RouteResult:
 
     @property
     def load_factor_unbounded(self) -> bool:
-        """True where the load factor of every stage is unbounded."""
+        """True if the load factor of every stage is unbounded."""
         return all(p.load_factor_unbounded for p in self.plans)
 
     @property
     def load_factor_status(self) -> LoadFactorStatus:
-        """Status of the least load factor of all stages: found, or why not."""
+        """Status of the route's load factor, the least of all stages."""
         found = {p.load_factor_status for p in self.plans}
         # that of the least is the first of these that any stage has
         order: tuple[LoadFactorStatus, ...]
@@ -196,7 +205,10 @@ class RouteResult:
 
     @property
     def crux(self) -> int:
-        """Index of the hardest stage: no way there, then no plan, then the largest utilisation."""
+        """Index of the hardest stage.
+
+        Unreachable is hardest, then infeasible, then failed, then the largest utilisation.
+        """
         return max(range(len(self.plans)), key=lambda i: _hardness(self.plans[i]))
 
 
@@ -207,13 +219,13 @@ def _hardness(answer: Plan | OutOfReach) -> tuple[int, float]:
 
 
 def stages(route: Route) -> Iterator[RouteStage]:
-    """Yield the stances of a climb in order.
+    """Yield the stances of a route in climbing order, each with its question.
 
     Raises
     ------
     InvalidInputError
-        If a move's limb holds nothing to start with, or is the only one that does, or a hand
-        cannot be where it is; the field is relative to the route.
+        If a move's limb is not in the start stance, or has the only hand on the rock, or a stance
+        is not valid; the field is relative to the route.
     """
     hands = {hand.limb: hand for hand in route.start.hands}
     for limb in route.limits.per_hand:
@@ -308,7 +320,15 @@ def _on_rock(
 
 
 def in_route(error: InvalidInputError, paths: Mapping[str, str]) -> InvalidInputError:
-    """Return the error of a stage's question with its field as the route names it."""
+    """Return a stage's error with its field renamed to the field of the route.
+
+    Parameters
+    ----------
+    error : InvalidInputError
+        Error whose field is relative to the stage's question; it is changed in place.
+    paths : mapping of str to str
+        Field of the route for each field of the stance, as in `RouteStage`.
+    """
     place = (error.field or "").removeprefix("stance.")
     for part, path in paths.items():
         rest = place.removeprefix(part)

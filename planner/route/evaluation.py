@@ -1,4 +1,4 @@
-"""A route evaluated: every stage planned, here or in processes."""
+"""Evaluate a route: plan every stage, in this process or in parallel worker processes."""
 
 from __future__ import annotations
 
@@ -22,21 +22,26 @@ def evaluate(
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> RouteResult:
-    """Plan every stance of a climb.
+    """Plan every stage of a route.
 
     Parameters
     ----------
     route : Route
     workers : int, optional
-        Processes; as many as there are cores where the route is long enough to be worth it. With
-        one, this process plans itself.
+        Number of worker processes. By default the number of cores for routes of at least 100
+        stages, else one. With one, this process plans all stages itself.
     progress : callable, optional
-        Called with (stages done, stages in all).
+        Called after each stage with (number of stages planned, number of stages).
+
+    Returns
+    -------
+    RouteResult
+        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles.
 
     Raises
     ------
     InvalidInputError
-        If a stance cannot be understood; ``field`` says which move's.
+        If a stance is not valid, or a move ends without contact; the field names the move.
     """
     todo = tuple(stages(route))
     if workers is None:
