@@ -98,7 +98,7 @@ def schema() -> dict[str, Any]:
 
 
 def part_name(title: str) -> str:
-    """Return the name of a class in the schema, without type parameters and mostly without ``Reply``.
+    """Return a class's name in the schema, without type parameters and mostly without ``Reply``.
 
     Parameters
     ----------
