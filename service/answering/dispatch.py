@@ -67,8 +67,8 @@ def answer_plan(
     Returns
     -------
     PlanReply or BriefPlanReply
-        A whole reply where the request's ``detail`` is ``full`` or not given, otherwise a brief
-        one.
+        A `PlanReply` if the request's ``detail`` is ``full`` or not given; a `BriefPlanReply`
+        otherwise.
 
     Raises
     ------

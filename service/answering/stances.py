@@ -218,9 +218,13 @@ def poses_of(messages: Mapping[str, requests.Pose | None]) -> dict[str, Pose]:
 def joints_of(
     message: dict[str, list[float] | Literal["solve"]] | Literal["solve"] | None,
 ) -> dict[str, Array | Literal["solve"]] | Literal["solve"] | None:
-    """Convert the joint angles of a request, by limb, from lists to arrays [rad, m if sliding].
+    """Convert the joint angles of a request's limbs from lists to arrays.
 
-    ``solve`` stays: the planner finds these angles by inverse kinematics.
+    Parameters
+    ----------
+    message : dict, 'solve' or None
+        Angles by limb [rad], of sliding joints [m]; or ``solve``, for a limb or for all limbs,
+        where the planner finds the angles by inverse kinematics.
     """
     if not isinstance(message, dict):
         return message

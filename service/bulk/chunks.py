@@ -42,14 +42,17 @@ Answerer = Callable[[bytes], Answer]
 
 @dataclass(frozen=True, slots=True)
 class BulkSettings:
-    """Sizes of chunks, and timeouts of bulk work."""
+    """Sizes of chunks and windows, and timeouts of bulk work.
+
+    A window is a batch of requests that are read together, and grouped into chunks.
+    """
 
     most_questions: int = 64
     """Maximum requests in a chunk; the whole chunk is retried when its worker dies."""
     most_bytes: int = 2**22
     """Maximum bytes of a chunk of several requests; times the workers, those of a window."""
     window: int = 2
-    """Chunks for each worker in a window; requests of one window are grouped together."""
+    """Chunks for each worker in a window."""
     windows_ahead: int = 3
     """Maximum windows that are in work beyond the request whose answer is returned next."""
     scheduler_timeout: float = 15.0
@@ -62,15 +65,14 @@ BULK_SETTINGS: Final = BulkSettings()
 
 
 class Setting(NamedTuple):
-    """Settings that all requests of one bulk run share. A setting is pickled and sent to workers.
+    """Settings that all requests of a bulk run share. A setting is pickled and sent to workers.
 
     Attributes
     ----------
     robot : RobotFile or None
         The only robot that is planned for; None for the bundled robots.
     hand : ParameterTable or None
-        Hand parameters that differ from the bundled hand; values that a request gives replace
-        these.
+        Hand parameters that differ from the bundled hand; values in a request take precedence.
     folder : Path or None
         Folder that relative names of mesh files start from; None if requests may not name files.
     form : Format
@@ -86,8 +88,8 @@ class Setting(NamedTuple):
     kind : str
         Type of all requests: `ServiceName.PLAN` or `ServiceName.ROUTE`.
     make : callable or None
-        Called once in each worker; returns a function that answers one encoded request. It replaces
-        the handlers of plans and routes.
+        Called once in each worker; returns a function that maps an encoded request to its `Answer`.
+        This function replaces the handlers of plans and routes.
     """
 
     robot: RobotFile | None = None

@@ -179,7 +179,7 @@ class _Work:
         """Questions in a chunk."""
 
     def take_more(self, following: int) -> None:
-        """Give out chunks of new questions, while not too many are ahead of one that is due."""
+        """Dispatch chunks of new requests, up to a bounded number beyond the next answer."""
         width = self._pool.width
         count = self._together * width * BULK_SETTINGS.window
         most, ahead = width * BULK_SETTINGS.most_bytes, BULK_SETTINGS.windows_ahead - 1
@@ -191,7 +191,7 @@ class _Work:
             self._give_all(self._window(count, most))
 
     def collect(self) -> None:
-        """Wait for answers; the questions of a chunk that is lost are asked one by one."""
+        """Wait for answers; dispatch the requests of a lost chunk again, one by one."""
         for number, result in self._pool.collect():
             chunk = self.chunks.pop(number)
             self._bytes -= chunk.size

@@ -1,4 +1,4 @@
-"""Header of a table in progress; it identifies the run, so that only that run is resumed."""
+"""Header of a table in progress; it identifies the run, and only that run may resume the table."""
 
 from __future__ import annotations
 

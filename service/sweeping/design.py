@@ -63,8 +63,8 @@ class Design:
         Parameters
         ----------
         request : PlanRequest
-            Request in which the fields vary. Of its extras only the load factor is kept, and it is
-            not explained.
+            Request in which the fields vary. Its plans have the load factor, no other extras, and no
+            explanation.
         variations : sequence of Variation
             Fields that vary, with their values.
         samples : int, optional

@@ -175,7 +175,7 @@ def sweep(
         Number of processes; by default one for few points, and one for each core for many.
     on : str or distributed.Client, optional
         Where points are planned: ``processes``, ``here``, ``dask:local``, the address of a Dask
-        scheduler, or its client; by default as the number of workers requires.
+        scheduler, or its client; by default ``here`` for one worker, otherwise ``processes``.
     hand : ParameterTable, optional
         Hand parameters that differ from the bundled hand.
     robot : RobotFile, optional

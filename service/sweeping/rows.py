@@ -168,7 +168,8 @@ def asking(
         The only robot that is planned for; None for the bundled robots.
     on : str or distributed.Client, optional
         ``processes``, ``here``, ``local`` for a temporary Dask cluster on this machine, the address
-        of a Dask scheduler, or its client; by default processes, if they are faster.
+        of a Dask scheduler, or its client; by default ``here`` for one worker, otherwise
+        ``processes``.
 
     Returns
     -------
@@ -204,7 +205,17 @@ def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[Sweep
 
 
 def sweep_row(design: Design, point: Point, payload: bytes) -> SweepRow:
-    """Convert the encoded answer for a point, in MessagePack, into the result of the point."""
+    """Convert the answer for a point into the result of the point.
+
+    Parameters
+    ----------
+    design : Design
+        Points of the sweep.
+    point : Point
+        The point's values.
+    payload : bytes
+        Reply or error reply, encoded as MessagePack.
+    """
     row = msgspec.msgpack.decode(payload, type=SweepRow)
     return msgspec.structs.replace(row, point=point, cap=design.cap(point))
 

@@ -86,7 +86,7 @@ def spread_sentence(spread: Spread) -> str:
     -------
     str
         In how many samples the stance is feasible, the parameter with the largest sensitivity with
-        its rank correlation, and how many samples have no plan or no load factor.
+        its Spearman rank correlation, and how many samples have no plan or no load factor.
     """
     said = f"feasible in {spread.holds} of {spread.draws} samples"
     if spread.cap < 1.0:

@@ -38,7 +38,8 @@ def print_plan(
 ) -> None:
     """Print a plan: status, loads of hands, tendons, joint torques, and the extras of the reply.
 
-    The advice of the reply is not printed; see `print_advice`.
+    Extras are shadow prices, the infeasibility certificate, the spread over samples, robustness and
+    clearance. The advice of the reply is not printed; see `print_advice`.
 
     Parameters
     ----------
