@@ -63,7 +63,7 @@ class Design:
         Parameters
         ----------
         request : PlanRequest
-            Request in which the fields vary. Its plans have the load factor, no other extras, and no
+            Request in which the fields vary. Its plans have the load factor, no other extras and no
             explanation.
         variations : sequence of Variation
             Fields that vary, with their values.
