@@ -1,4 +1,4 @@
-"""Answer requests: bytes in, bytes of replies out."""
+"""Request handlers of the service: decode and dispatch a request, encode its reply as bytes."""
 
 import lazy_loader
 

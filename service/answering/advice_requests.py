@@ -1,4 +1,4 @@
-"""Apply an advice to a plan request; the new request's plan gives what the advice promised."""
+"""Apply an advice to a plan request: the changed request gets the plan that the advice promised."""
 
 from __future__ import annotations
 
@@ -19,13 +19,20 @@ __all__ = ["advised", "rewritten"]
 
 
 def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
-    """Return a request with the changes of an advice about it; it asks for no advice itself.
+    """Return a plan request with the changes of an advice applied, and without ``want: advice``.
 
     Parameters
     ----------
     request : PlanRequest
+        Request whose reply has the advice.
     advice : Advice
-        Advice from the reply to the request.
+        One advice of that reply; its ``changes`` are values by the paths of the request's fields.
+
+    Returns
+    -------
+    PlanRequest
+        A new request; the given one is unchanged. A plan of the new request has the utilisation
+        that the advice names.
     """
     want = [each for each in request.want if each != "advice"]
     message = msgspec.to_builtins(replace(request, want=want))
@@ -50,16 +57,24 @@ def advised(request: PlanRequest, advice: Advice) -> PlanRequest:
 
 
 def rewritten(text: bytes, before: PlanRequest, after: PlanRequest) -> bytes:
-    """Return a request's text with another request's changes, and all else unchanged.
+    """Edit the JSON text of a request so that it decodes to another request.
 
-    Fields keep their order, and unchanged numbers keep their digits.
+    Only fields that differ between the two requests change. All other fields keep their order, and
+    their numbers keep their digits.
 
     Parameters
     ----------
     text : bytes
-        JSON.
-    before, after : PlanRequest
-        Request of the text, and the one that is wanted.
+        JSON text of ``before``.
+    before : PlanRequest
+        Request that the text decodes to.
+    after : PlanRequest
+        Request that the new text is to decode to.
+
+    Returns
+    -------
+    bytes
+        JSON text of ``after``.
     """
     found = _rewritten(msgspec.Raw(text), msgspec.to_builtins(before), msgspec.to_builtins(after))
     return msgspec.json.encode(found)

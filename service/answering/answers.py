@@ -1,4 +1,4 @@
-"""Turn the planner's plan, with its arrays, into a reply of plain numbers, whole or brief."""
+"""Convert the planner's plans, which have arrays, into replies of plain lists and numbers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,17 @@ PartT = TypeVar("PartT")
 
 
 class Planned(NamedTuple):
-    """Planner's question of a request, its plan, and the reply."""
+    """A plan request's question and plan, as the planner has them, and the reply to the client.
+
+    Attributes
+    ----------
+    question : Question
+        The planner's question that was built from the request.
+    plan : Plan
+        The planner's answer to the question, with arrays.
+    reply : PlanReply or BriefPlanReply
+        The plan as plain lists and numbers, in the detail that the request wants.
+    """
 
     question: Question
     plan: Plan
@@ -50,7 +60,26 @@ class Planned(NamedTuple):
         *,
         model: bool,
     ) -> Planned:
-        """Return a plan with a reply of this detail; ``model`` as for `plan_reply`."""
+        """Build the reply of a plan, and return it together with the question and the plan.
+
+        Parameters
+        ----------
+        question : Question
+            The planner's question.
+        answer : Plan
+            Plan of the question.
+        identifier : str or None
+            The request's ``id``, which the reply repeats.
+        detail : {'set_points', 'hands', 'full'}
+            How much of the plan the reply contains: set-points alone; the loads of the hands, too;
+            or the whole plan.
+        model : bool
+            True if a full reply has the load laws of tiles and the wrench spaces of hands.
+
+        Returns
+        -------
+        Planned
+        """
         reply: replies.PlanReply | replies.BriefPlanReply
         if detail == "full":
             reply = plan_reply(answer, identifier, model=model)
@@ -61,20 +90,38 @@ class Planned(NamedTuple):
         return cls(question, answer, reply)
 
     def in_detail(self, detail: Detail, *, model: bool = False) -> Planned:
-        """Return the plan with a reply of this detail."""
+        """Return the same question and plan with a reply in another detail.
+
+        Parameters
+        ----------
+        detail : {'set_points', 'hands', 'full'}
+            How much of the plan the new reply contains; see `of`.
+        model : bool, optional
+            True if a full reply has the load laws of tiles and the wrench spaces of hands.
+
+        Returns
+        -------
+        Planned
+        """
         return Planned.of(self.question, self.plan, self.reply.id, detail, model=model)
 
 
 def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.PlanReply:
-    """Return a plan as a reply.
+    """Convert a plan into a whole reply.
 
     Parameters
     ----------
     answer : Plan
+        The planner's plan.
     identifier : str or None
-        The request's ``id``.
+        The request's ``id``, which the reply repeats.
     model : bool
-        True if tiles have their load laws and hands their wrench spaces.
+        True if the reply has the load laws of tiles and the wrench spaces of hands.
+
+    Returns
+    -------
+    PlanReply
+        All of the plan as plain lists and numbers; infinite numbers are None.
     """
     hands, proof = answer.hands, answer.certificate
     return replies.PlanReply(
@@ -120,7 +167,15 @@ def _certificate(proof: Certificate, model: bool) -> replies.CertificateReply:
 
 
 def as_lists(part: Struct, kind: type[PartT]) -> PartT:
-    """Return a struct over arrays as the same struct over lists."""
+    """Convert a struct that contains NumPy arrays into a struct type with lists in the same fields.
+
+    Parameters
+    ----------
+    part : msgspec.Struct
+        Struct with arrays.
+    kind : type
+        Struct type to return.
+    """
     return msgspec.convert(msgspec.to_builtins(part, enc_hook=_listed_number), kind)
 
 
@@ -132,15 +187,22 @@ def _listed_number(value: Any) -> Any:
 def brief_plan_reply(
     answer: Plan, identifier: str | None, *, hands: bool
 ) -> replies.BriefPlanReply:
-    """Return a plan as a reply.
+    """Convert a plan into a brief reply: status, utilisation, and the set-points of each hand.
 
     Parameters
     ----------
     answer : Plan
+        The planner's plan.
     identifier : str or None
-        The request's ``id``.
+        The request's ``id``, which the reply repeats.
     hands : bool
-        True if the reply also has the loads of the hands.
+        True if the reply also has wrenches, motor torques and currents of the hands, the load
+        factor, the joint angles, warnings, findings and times. Otherwise the reason is cut to 120
+        bytes.
+
+    Returns
+    -------
+    BriefPlanReply
     """
     points = None if answer.hands is None else [_set_points(h, hands) for h in answer.hands]
     reply = replies.BriefPlanReply(
@@ -179,14 +241,14 @@ def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
 
 
 def cut_reason(reason: str) -> str:
-    """Return a sentence; only the beginning of a long one."""
+    """Shorten a reply's reason to at most 120 bytes; a cut text ends in an ellipsis."""
     # at most 120 bytes: replies with set-points have to be small
     short = reason.encode()[:120].decode(errors="ignore")
     return reason if short == reason else f"{short[:-3]}…"
 
 
 def finite(value: float | None) -> float | None:
-    """Return a number for a reply; None if it is infinite or there is none."""
+    """Return a number as a float for a reply; None for None, for infinity and for NaN."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 
@@ -215,7 +277,18 @@ def _hand_reply(part: HandPlan, model: bool) -> replies.HandReply:
 
 
 def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
-    """Return the state of a wrist; None stands for a fixed one."""
+    """Convert the state of a wrist in a plan into the reply's `Wrist`.
+
+    Parameters
+    ----------
+    wrist : WristPlan or None
+        Twist and palm mode of a floating or compliant wrist; None for a fixed wrist.
+
+    Returns
+    -------
+    Wrist
+        Its ``mode`` is ``fixed``, ``floating`` or ``compliant``; the twist is of H [m, rad].
+    """
     if wrist is None:
         return replies.Wrist(mode="fixed")
     return replies.Wrist(
@@ -230,7 +303,19 @@ def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
 
 
 def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
-    """Return H in W of the hands that were given by a place on a rock; unset if there is none."""
+    """Return the poses of the hands that the request places by a point on the rock.
+
+    Parameters
+    ----------
+    stance : Stance
+        The planner's stance, in which every hand has a pose.
+
+    Returns
+    -------
+    dict of str to PlacedFrame, or UNSET
+        Pose of H in W by limb: position [m] and unit quaternion (x, y, z, w). `msgspec.UNSET` if
+        the request gives all hands by poses.
+    """
     poses = {hand.limb: _frame(hand.pose) for hand in stance.hands if hand.at is not None}
     return poses or UNSET
 
@@ -242,14 +327,27 @@ def _frame(pose: Pose) -> replies.PlacedFrame:
 
 
 def seating_reply(seating: Seating) -> replies.SeatingReply:
-    """Return where a hold is in H."""
+    """Convert the pose of a hold in the hand frame H, and the rule that chose it, into a reply."""
     return replies.SeatingReply(
         rule=seating.rule, pose=_frame(seating.pose), backed_off=float(seating.backed_off)
     )
 
 
 def wrench_set_reply(space: WrenchSpace) -> replies.WrenchSet:
-    """Return the generators and named rows of a wrench space."""
+    """Convert a wrench space into its reply: origin, generators, and one named row for each limit.
+
+    Parameters
+    ----------
+    space : WrenchSpace
+        Wrenches w = o + V y on the rock, in H, over the hand's loads y [N], shape (m,).
+
+    Returns
+    -------
+    WrenchSet
+        Limit rows come first, then hard rows. A row has ``coefficients``, shape (m,), a
+        ``constant`` and a ``capacity``: at utilisation ω, coefficients · y + constant is at most
+        ω times the capacity for a limit, and at most the capacity for a hard row.
+    """
     numbers = (
         np.vstack([space.L, space.H]),
         np.concatenate([space.l0, np.zeros(len(space.h))]),

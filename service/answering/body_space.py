@@ -1,4 +1,4 @@
-"""Answer body-space requests: all wrenches that a stance can hold."""
+"""Answer body-space requests: which body wrenches the hands of a stance together can exert."""
 
 from __future__ import annotations
 
@@ -21,7 +21,17 @@ __all__ = ["Explored", "explore"]
 
 
 class Explored(NamedTuple):
-    """Body space, the section of it that was asked for, and the reply."""
+    """A body space, the section that the request wants, and the reply to the client.
+
+    Attributes
+    ----------
+    space : BodySpace
+        The planner's set of body wrenches.
+    section : BodySection
+        Polygon of the body space in the plane of the request's two axes.
+    reply : BodySpaceReply
+        Capability, section and accelerations as plain lists and numbers.
+    """
 
     space: BodySpace
     section: BodySection
@@ -29,20 +39,27 @@ class Explored(NamedTuple):
 
 
 def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explored:
-    """Answer a body-space request.
+    """Compute the body space of a stance: extents, one section, and largest accelerations.
 
     Parameters
     ----------
     request : BodySpaceRequest
+        Stance, body wrench or load, limits, the section's axes, and directions of acceleration.
     robots : Robots, optional
-        Those that may be asked about.
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    Explored
+        Body space, section, and the reply.
 
     Raises
     ------
     InvalidInputError
-        If the request is impossible; the field is relative to it.
+        If the request is impossible. The error's ``field`` is a path in the request.
     SolverError
-        If a program has no answer that passes the checks.
+        If the solution of an optimisation problem does not pass its checks.
     """
     start = time.perf_counter()
     directions = [_unit(given, f"directions[{i}]") for i, given in enumerate(request.directions)]

@@ -1,4 +1,4 @@
-"""Answer a query: bytes in, bytes out, also for bytes that are no valid request."""
+"""Dispatch requests to their handlers: bytes in, bytes out, also for bytes that are no request."""
 
 from __future__ import annotations
 
@@ -54,24 +54,51 @@ log = logging.getLogger(__name__)
 def answer_plan(
     request: PlanRequest, robots: Robots = BUNDLED_ROBOTS
 ) -> PlanReply | BriefPlanReply:
-    """Answer a plan request.
+    """Answer a plan request: build the planner's question, solve it, and return the reply.
 
     Parameters
     ----------
     request : PlanRequest
+        Stance, load, limits, and the extras that are wanted.
     robots : Robots, optional
-        Those that may be asked about.
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    PlanReply or BriefPlanReply
+        A `PlanReply` if the request's ``detail`` is ``full`` or not given; a `BriefPlanReply`
+        otherwise.
 
     Raises
     ------
     InvalidInputError
-        If the request is impossible; the field is relative to it.
+        If the request is impossible. The error's ``field`` is a path in the request.
     """
     return planned(request, robots).reply
 
 
 def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
-    """Answer a plan request as `answer_plan` does, and keep the question and the plan."""
+    """Answer a plan request as `answer_plan` does, and return question and plan with the reply.
+
+    Parameters
+    ----------
+    request : PlanRequest
+        Stance, load, limits, and the extras that are wanted.
+    robots : Robots, optional
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    Planned
+        The planner's question, its plan, and the reply.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request is impossible. The error's ``field`` is a path in the request.
+    """
     detail = request.detail or "full"
     if detail != "full":
         # compute only what the reply contains
@@ -84,7 +111,19 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
 
 
 def answer_with_advice(answer: Planned) -> Planned:
-    """Return an answer with advice, if its reply is whole and has none yet."""
+    """Add advice to an answer: search for changes of the question that lower its utilisation.
+
+    Parameters
+    ----------
+    answer : Planned
+        Answer to a plan request.
+
+    Returns
+    -------
+    Planned
+        Plan and reply with advice. The given answer itself if its reply is brief, or if its plan
+        has advice already.
+    """
     if not isinstance(answer.reply, PlanReply) or answer.plan.advice is not None:
         return answer
     found = planner.with_advice(answer.question, answer.plan)
@@ -133,7 +172,7 @@ SERVICES_BY_NAME: Final[dict[str, _Service]] = {
         SetPointsRequest, lambda asked, _, streams: streams.set_points(asked)
     ),
 }
-"""Services over zenoh, by the last part of the key."""
+"""Request type and handler of each service over zenoh, by the last part of the service's key."""
 
 
 def handle(
@@ -148,33 +187,43 @@ def handle(
     files: MeshFiles | None = None,
     revised: Callable[[Any], Any] | None = None,
 ) -> Answer:
-    """Answer a query.
+    """Answer one query: decode the request, dispatch it to its handler, and encode the reply.
 
     Parameters
     ----------
     key : str
-        Key that ends in the name of one of `SERVICES_BY_NAME`, or in ``route``.
+        Zenoh key. Its last part names one of `SERVICES_BY_NAME`, or is ``route``.
     payload : bytes
+        Encoded request.
     encoding : str, optional
-        Zenoh's name of it; the answer's is of the same format.
+        Zenoh encoding of the payload, such as ``application/json``. The answer has the same
+        format.
     hand : ParameterTable, optional
-        Entries of the hand in which the service's is not the bundled one; a request's own entries
-        go on top.
+        Parameter values of the service's hand that differ from the bundled hand. Values that a
+        request gives replace these.
     robots : Robots, optional
-        Those that may be asked about.
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
     started : float, optional
-        When a request's deadline began, on the clock of `time.perf_counter`; now by default.
+        Time from which the request's deadline counts, on the clock of `time.perf_counter` [s]; now
+        by default.
     streams : Streams, optional
-        Those that may be asked; by default those of this process that belong to no service.
+        Wrench streams that requests for set-points may use; by default the streams of this process
+        that belong to no service.
     files : MeshFiles, optional
-        Those that a plan request may name; none by default.
+        Reader of the mesh files that a plan request may name. By default such a request is refused.
     revised : callable, optional
-        Returns the request to answer in place of a request that has been decoded.
+        Maps the decoded request to the request that is answered in its place.
 
     Returns
     -------
     Answer
-        A reply, or a structured error; nothing is raised but a lack of memory.
+        An encoded reply, or an encoded error reply.
+
+    Raises
+    ------
+    MemoryError
+        If memory runs out. All other errors become error replies.
     """
     form, kind = Format.JSON, None
 

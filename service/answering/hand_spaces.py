@@ -1,4 +1,4 @@
-"""Answer wrench-space requests: all wrenches that one hand of a stance can carry."""
+"""Answer wrench-space requests: which wrenches one hand of a stance can exert on its hold."""
 
 from __future__ import annotations
 
@@ -34,12 +34,32 @@ View = TypeVar("View")
 def answer_wrench_space(
     request: WrenchSpaceRequest, robots: Robots = BUNDLED_ROBOTS
 ) -> WrenchSpaceReply:
-    """Answer a wrench-space request; parameters as for `answer_plan`.
+    """Compute the wrench space of one hand of a stance.
+
+    Parameters
+    ----------
+    request : WrenchSpaceRequest
+        Stance, the limb of the hand, and which views of the set are wanted.
+    robots : Robots, optional
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    WrenchSpaceReply
+        Contacts and closures of the hand, generators and rows of the set, and as wanted its
+        vertices, half-spaces (convex hull), capability, and capability at uncertain places.
 
     Raises
     ------
     InvalidInputError
-        If the request is impossible, or would cost too much.
+        If the request is impossible. The error's ``field`` is a path in the request.
+    UnsupportedError
+        If the hand's wrist is compliant: the set is then no polyhedron.
+    LimitError
+        If a wanted view would take too long.
+    SolverError
+        If a view could not be computed.
     """
     asked = stance(request.stance, robots)
     step = "the hand's wrench space was known"

@@ -1,4 +1,4 @@
-"""Read mesh files that requests name, so that requests contain whole meshes."""
+"""Read the mesh files that requests name, so that requests contain whole meshes."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ RequestT = TypeVar("RequestT", bound=Request)
 
 
 class MeshFiles:
-    """Mesh files; each is read once, and again if it has changed.
+    """Reader of mesh files, with an LRU cache of the last eight; a changed file is read again.
 
     Parameters
     ----------
     folder : Path
-        Folder that their names are relative to.
+        Folder that relative names of mesh files start from.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -35,12 +35,23 @@ class MeshFiles:
         self._read: BoundedStore[Hashable, Mesh] = BoundedStore("mesh files", 8)
 
     def whole(self, request: RequestT) -> RequestT:
-        """Return a request with vertices and faces in place of the files that it names.
+        """Replace the mesh files that a request names by their vertices and faces.
+
+        Parameters
+        ----------
+        request : Request
+            Request of any kind; only plan requests and routes name files.
+
+        Returns
+        -------
+        Request
+            A new request without files.
 
         Raises
         ------
         InvalidInputError
-            If one cannot be read; the field is relative to the request.
+            If a file cannot be read, or a mesh has both a file and vertices or faces. The error's
+            ``field`` is a path in the request.
         """
         replace = msgspec.structs.replace
         if isinstance(request, (PlanRequest, RouteRequest)):
@@ -56,15 +67,21 @@ class MeshFiles:
         return request
 
     def named(self, request: PlanRequest, given: PlanRequest, folder: Path) -> PlanRequest:
-        """Return a whole request with files in place of vertices and faces again.
+        """Replace vertices and faces in a request by the mesh files that they were read from.
 
         Parameters
         ----------
         request : PlanRequest
+            Request with whole meshes, as `whole` returns it.
         given : PlanRequest
-            Request that it was made of, with its files.
+            Request that names the files, as it was before `whole`.
         folder : Path
-            Folder for relative names; absolute names stay.
+            Folder that relative names are to start from; absolute names stay.
+
+        Returns
+        -------
+        PlanRequest
+            A new request that names the files.
         """
         replace = msgspec.structs.replace
 

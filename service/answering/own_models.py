@@ -1,10 +1,10 @@
-"""Put a hand and a robot of the caller's own into questions.
+"""Put the caller's hand parameters and robot file into requests.
 
-Entries of a hand travel as ``{section: {entry: {value, unit, source, note}}}``. Whoever is nearer
-to the question has the last word on an entry: the command line over a stance's file, a request over
-the service, which may have a hand of its own, over the bundled hand. A robot's file stays where
-plans are made; over the network only its name travels. A stance that names no robot is for the one
-that is there, and a stance that names another is refused.
+Hand parameters travel as ``{section: {entry: {value, unit, source, note}}}``. An entry may be given
+in several places; the first of these counts: the command line, the stance's file or request, the
+service's hand, the bundled hand. A robot's file stays where plans are made: only the robot's name
+travels over the network. A stance that names no robot is planned for the robot that is served; a
+stance that names an unknown robot is refused.
 """
 
 from __future__ import annotations
@@ -51,22 +51,32 @@ RequestT = TypeVar(
 )
 
 Builder = Callable[[ParameterTable | None], Robot]
-"""Function that builds a robot from all numbers of its hands."""
+"""Function that builds a robot from its hands' parameters; None for the bundled parameters."""
 
 Robots = Mapping[str, Builder]
-"""Robots of stances, by name; the first is the default."""
+"""Robots that a stance may name, with the functions that build them; the first is the default."""
 
 BUNDLED_ROBOTS: Final[Robots] = {DEFAULT_ROBOT: robosimian}
-"""Bundled robots."""
+"""The robots of this package, by name."""
 
 
 def read_hand(path: Path) -> ParameterTable:
-    """Return a file's entries, which together with the bundled ones make a possible hand.
+    """Read hand parameters from a TOML file, and check that they describe a possible hand.
+
+    Parameters
+    ----------
+    path : Path
+        TOML file in the form of ``hand.toml``, with only the entries that differ from it.
+
+    Returns
+    -------
+    ParameterTable
+        The entries of the file alone.
 
     Raises
     ------
     InvalidInputError
-        In one line that names file, entry and value.
+        If an entry is invalid. The message is one line that names file, entry and value.
     """
     own = load_own_hand(path)
     with in_file(str(path)):
@@ -75,12 +85,23 @@ def read_hand(path: Path) -> ParameterTable:
 
 
 def read_draws(path: Path) -> list[Draw]:
-    """Return a file's draws: TOML with a list ``draws``, each as in a request.
+    """Read Monte Carlo samples of uncertain parameters from a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        TOML file with a list ``[[draws]]``. Each entry has ``hand`` or ``surfaces``, or both, as in
+        a plan request.
+
+    Returns
+    -------
+    list of Draw
+        One sample for each entry.
 
     Raises
     ------
     InvalidInputError
-        In one line that names file, draw, entry and value.
+        If a sample is invalid. The message is one line that names file, sample, entry and value.
     """
     with in_file(str(path)):
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -100,14 +121,32 @@ def read_draws(path: Path) -> list[Draw]:
 
 
 def with_hand(request: RequestT, own: ParameterTable | None) -> RequestT:
-    """Return a request for a hand with these entries, over those that it names itself."""
+    """Return a request with the caller's hand parameters, which replace those of its stance.
+
+    Parameters
+    ----------
+    request : Request
+        Request with a stance.
+    own : ParameterTable or None
+        Hand parameters that take precedence over the request's; with None the request is returned
+        unchanged.
+    """
     if own is None:
         return request
     return _asking_for(request, request.stance.hand or {}, _entries(own))
 
 
 def over_default(request: RequestT, default: ParameterTable | None) -> RequestT:
-    """Return a request whose missing entries of the hand are the service's defaults."""
+    """Return a request with default hand parameters where its stance gives none.
+
+    Parameters
+    ----------
+    request : Request
+        Request with a stance.
+    default : ParameterTable or None
+        Hand parameters of the service; those of the request take precedence. With None the request
+        is returned unchanged.
+    """
     if default is None:
         return request
     return _asking_for(request, _entries(default), request.stance.hand or {})
@@ -131,12 +170,22 @@ def _asking_for(request: RequestT, low: Mapping[str, Any], high: Mapping[str, An
 
 
 def read_robot(path: Path) -> RobotFile:
-    """Return the content of a robot's file and of its URDF, which describe a possible robot.
+    """Read a robot's TOML file and its URDF, and check that they describe a possible robot.
+
+    Parameters
+    ----------
+    path : Path
+        TOML file of the robot, which names the URDF.
+
+    Returns
+    -------
+    RobotFile
+        Name and texts of both files.
 
     Raises
     ------
     InvalidInputError
-        In one line that names file, entry and value.
+        If the robot is impossible. The message is one line that names file, entry and value.
     """
     file = RobotFile.load(path)
     robot_of(file)
@@ -144,17 +193,35 @@ def read_robot(path: Path) -> RobotFile:
 
 
 def robots_of(file: RobotFile | None) -> Robots:
-    """Return the robots that are planned for: that of a file alone, or those that are bundled."""
+    """Return the robots that a stance may name: the robot of a file alone, or the bundled robots.
+
+    Parameters
+    ----------
+    file : RobotFile or None
+        The only robot; None for the bundled robots.
+
+    Returns
+    -------
+    Robots
+        Functions that build the robots, by name.
+    """
     return BUNDLED_ROBOTS if file is None else {file.name: partial(robot_of, file)}
 
 
 def builder_of(name: str | None, robots: Robots) -> Builder:
-    """Return the builder of the robot of that name; by default the first.
+    """Return the function that builds the robot of a given name.
+
+    Parameters
+    ----------
+    name : str or None
+        Name in the stance; None for the first robot.
+    robots : Robots
+        Known robots by name.
 
     Raises
     ------
     InvalidInputError
-        If there is none of that name.
+        If no robot has this name.
     """
     chosen = next(iter(robots)) if name is None else name
     if chosen not in robots:
@@ -165,12 +232,19 @@ def builder_of(name: str | None, robots: Robots) -> Builder:
 
 
 def with_robot(request: RequestT, file: RobotFile | None) -> RequestT:
-    """Return a request for the robot of a file.
+    """Return a request whose stance names the robot of a file.
+
+    Parameters
+    ----------
+    request : Request
+        Request with a stance.
+    file : RobotFile or None
+        Robot to plan for; with None the request is returned unchanged.
 
     Raises
     ------
     InvalidInputError
-        If it names another.
+        If the stance names another robot.
     """
     if file is None:
         return request

@@ -1,4 +1,4 @@
-"""Convert requests to the planner's questions and climbs, and climbs to replies."""
+"""Convert requests into the planner's questions and routes, and results of routes into replies."""
 
 from __future__ import annotations
 
@@ -29,18 +29,25 @@ __all__ = ["climb", "question", "route_of"]
 
 
 def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Question:
-    """Return the planner's question of a plan request.
+    """Convert a plan request into the planner's question.
 
     Parameters
     ----------
     request : PlanRequest
+        Decoded request.
     robots : Robots, optional
-        Those that may be asked about.
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    Question
+        Stance with hands closed on their holds, and load, limits, objective and extras.
 
     Raises
     ------
     InvalidInputError
-        If a part of it is impossible; the field is relative to the request.
+        If a part of the request is impossible. The error's ``field`` is a path in the request.
     """
     if request.body_wrench is not None and request.load is not None:
         raise InvalidInputError("give body_wrench or load, not both", field="body_wrench")
@@ -60,12 +67,24 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
 
 
 def route_of(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> Route:
-    """Return the climb of a route file; parameters as for `question`.
+    """Convert a route request into the planner's route: a start stance and a sequence of moves.
+
+    Parameters
+    ----------
+    request : RouteRequest
+        Decoded route file.
+    robots : Robots, optional
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    Route
 
     Raises
     ------
     InvalidInputError
-        If a part of it is impossible; the field is relative to the file.
+        If a part of the route is impossible. The error's ``field`` is a path in the route file.
     """
     from planner import Move, Route
 
@@ -97,18 +116,25 @@ def _draws(messages: Sequence[requests.Draw]) -> tuple[ParameterSample, ...] | N
 
 
 def climb(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) -> RouteReply:
-    """Answer a route, in this process alone.
+    """Plan all stages of a route in this process, and return the reply with its hardest stage.
 
     Parameters
     ----------
     request : RouteRequest
+        Start stance, moves, load and limits.
     robots : Robots, optional
-        Those that may be asked about.
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    RouteReply
+        Status and numbers of each stage, and the index of the crux, the hardest stage.
 
     Raises
     ------
     InvalidInputError
-        If the route is impossible; the field is relative to it.
+        If the route is impossible. The error's ``field`` is a path in the request.
     """
     from planner import evaluate
 

@@ -1,4 +1,4 @@
-"""Fit replies into the bytes that the caller allows: less detail, or an error with sizes."""
+"""Fit replies into the client's limit of bytes: less detail, or an error that lists sizes."""
 
 from __future__ import annotations
 
@@ -19,21 +19,30 @@ __all__ = ["fitted"]
 
 
 def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Reply, bytes]:
-    """Return a reply of no more bytes than the request allows, and its bytes.
+    """Encode a reply so that it takes no more bytes than the request's ``max_reply_bytes``.
 
-    Where the request does not say how much detail it wants, the most that fits is taken.
+    Where the request gives no ``detail``, the reply has the most detail that fits.
 
     Parameters
     ----------
     request : Request
+        Request that is answered.
     found : Reply or Planned
-        Answer in full, as requested.
+        The answer with everything that was requested.
     form : Format
+        Encoding of the reply.
+
+    Returns
+    -------
+    reply : Reply
+        The reply that fits.
+    payload : bytes
+        The encoded reply.
 
     Raises
     ------
     LimitError
-        If it does not fit; the message has the sizes of smaller replies.
+        If no reply fits. The message lists the sizes of smaller replies [bytes].
     """
     reply = found.reply if isinstance(found, Planned) else found
     payload = form.encode(reply)

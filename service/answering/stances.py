@@ -1,4 +1,4 @@
-"""Convert stances of requests to the planner's: hands on their holds."""
+"""Convert the stance of a request into the planner's stance: hands closed on their holds."""
 
 from __future__ import annotations
 
@@ -25,31 +25,49 @@ from service.answering.own_models import BUNDLED_ROBOTS, Robots, builder_of
 __all__ = ["Rocks", "array_of", "hands_on_rocks", "joints_of", "poses_of", "stance", "with_rocks"]
 
 MESHES_OF_REQUESTS: Final[BoundedStore[Hashable, Mesh]] = BoundedStore("meshes of requests", 8)
-"""Cache of meshes, by everything that they are built of, with the hands settled on each."""
+"""LRU cache of eight meshes by vertices, faces and parameters, with the hands settled on each."""
 
 Rocks = Mapping[str, tuple[rock.Hold, Pose | None]]
-"""Rocks of a stance by name, each with its frame in W if that is given."""
+"""Rocks of a stance by name: each rock's shape, and its pose in W, or None where none is given."""
 
 
 def stance(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> Stance:
-    """Return the stance of a request.
+    """Convert the stance of a request into the planner's stance.
 
     Parameters
     ----------
     message : requests.Stance
+        Body pose, hands on holds, and optionally robot, hand parameters, rocks and joints.
     robots : Robots, optional
-        Those that may be asked about.
+        Robots that a stance may name, with their builders; bundled robots by default.
+
+    Returns
+    -------
+    Stance
 
     Raises
     ------
     InvalidInputError
-        If a part of it is impossible; the field begins with ``stance``.
+        If the stance is impossible, or too large (`LimitError`); ``field`` begins with ``stance``.
     """
     return with_rocks(message, robots)[0]
 
 
 def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tuple[Stance, Rocks]:
-    """Return the stance of a request, and its rocks by name; otherwise as `stance`."""
+    """Convert the stance of a request, and return it with its rocks; parameters as for `stance`.
+
+    Returns
+    -------
+    stance : Stance
+        The planner's stance.
+    rocks : Rocks
+        Shape and pose of each rock by name, for further hands that refer to them.
+
+    Raises
+    ------
+    InvalidInputError
+        As `stance` raises.
+    """
     with errors_under("stance"):
         _check_costs(message)
         build = builder_of(message.robot, robots)
@@ -73,21 +91,28 @@ def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tup
 def hands_on_rocks(
     messages: Sequence[requests.Hand], kind: SpinyHand, rocks: Rocks, path: str
 ) -> list[HandOnHold]:
-    """Return hands on their holds; those with a place on a rock have the poses they take there.
+    """Convert the hands of a request; compute the poses of hands that are placed on a rock.
 
     Parameters
     ----------
     messages : sequence of requests.Hand
+        Hands, each with a pose or with a place on a rock.
     kind : SpinyHand
-        Hand of the robot.
+        Model of the robot's hands.
     rocks : Rocks
+        Rocks that the hands may refer to by name.
     path : str
-        Path of the hands in the message.
+        Path of the hands in the request, such as ``hands``.
+
+    Returns
+    -------
+    list of HandOnHold
+        One for each message, with the pose of the hand in W.
 
     Raises
     ------
     InvalidInputError
-        If one is impossible, or refers to no rock; the field begins with the path.
+        If a hand is impossible, or its rock is unknown; ``field`` begins with the path.
     """
     paths = [f"{path}[{i}]" for i in range(len(messages))]
     given: dict[str, requests.Pose | None] = {}
@@ -115,18 +140,10 @@ def _hand(
     numbers: ParameterTable,
     rocks: Rocks,
 ) -> HandOnHold:
-    """Return a hand on its hold; one with a place stands at its rock's pose until it is placed.
+    """Return a hand on its hold; one with a place gets its rock's pose until it is placed.
 
-    Parameters
-    ----------
-    message : requests.Hand
-    at : str
-        Path of the hand.
-    poses : mapping of str to Pose
-        Given poses, by their paths.
-    numbers : ParameterTable
-        Parameters of the robot's hands.
-    rocks : Rocks
+    ``at``: path of the hand in the request; ``poses``: given poses by path; ``numbers``:
+    parameters of the robot's hands.
     """
     surface = _surface(message.surface)
     pose, in_hand = poses.get(f"{at}.pose"), poses.get(f"{at}.hold.pose_in_hand")
@@ -186,7 +203,13 @@ def _placed_hold(
 
 
 def poses_of(messages: Mapping[str, requests.Pose | None]) -> dict[str, Pose]:
-    """Return the poses that are given, by their paths; raises as `Pose.from_quaternions`."""
+    """Return the poses that are given, by their paths in the request; leave out missing ones.
+
+    Raises
+    ------
+    InvalidInputError
+        If a pose is impossible, such as a quaternion of zeros; ``field`` begins with its path.
+    """
     given = {path: pose for path, pose in messages.items() if pose is not None}
     found = Pose.from_quaternions([(at, p.position, p.orientation) for at, p in given.items()])
     return dict(zip(given, found, strict=True))
@@ -195,7 +218,14 @@ def poses_of(messages: Mapping[str, requests.Pose | None]) -> dict[str, Pose]:
 def joints_of(
     message: dict[str, list[float] | Literal["solve"]] | Literal["solve"] | None,
 ) -> dict[str, Array | Literal["solve"]] | Literal["solve"] | None:
-    """Return the joints of a request, with arrays of angles."""
+    """Convert the joint angles of a request's limbs from lists to arrays.
+
+    Parameters
+    ----------
+    message : dict, 'solve' or None
+        Angles by limb [rad], of sliding joints [m]; or ``solve``, for a limb or for all limbs,
+        where the planner finds the angles by inverse kinematics.
+    """
     if not isinstance(message, dict):
         return message
     return {
@@ -205,7 +235,7 @@ def joints_of(
 
 
 def array_of(values: Sequence[float] | None) -> Array | None:
-    """Return numbers as an array, if there are any."""
+    """Convert a list of numbers into an array; None stays None."""
     return None if values is None else np.array(values)
 
 
@@ -323,13 +353,7 @@ def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Me
 
 
 def _check_costs(stance: requests.Stance) -> None:
-    """Refuse hands that would cost too much together.
-
-    Raises
-    ------
-    LimitError
-        The field is relative to the stance.
-    """
+    """Raise `LimitError`, with a field relative to the stance, for hands that cost too much."""
     # a plan of wrists that give way is found in several rounds
     rounds = 4
     # four hands with 64 half-planes have some 7500 rows in a program

@@ -1,4 +1,4 @@
-"""Keep the wrench streams of a service: declare, ask and release them."""
+"""Keep the wrench streams of a service's clients: declare streams, ask for set-points, release."""
 
 from __future__ import annotations
 
@@ -30,18 +30,27 @@ class _Kept(NamedTuple):
 
 
 def opened(request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchStream:
-    """Return the stream that a request declares, for the caller to close.
+    """Build the wrench stream that a request declares; the caller has to close the stream.
 
     Parameters
     ----------
     request : StreamRequest
+        Stance with fixed wrists, first body wrench or load, limits, and interpolation radius.
     robots : Robots, optional
-        Those that may be asked about.
+        Robots that a request may name, with the functions that build them; bundled robots by
+        default.
+
+    Returns
+    -------
+    WrenchStream
+        Source of set-points for body wrenches near the first one.
 
     Raises
     ------
     InvalidInputError
-        If the request is impossible; the field is relative to it.
+        If the request is impossible. The error's ``field`` is a path in the request.
+    UnsupportedError
+        If streams do not support a part of the request, such as ``limits.tension_change``.
     """
     if request.limits.tension_change is not None:
         raise UnsupportedError(
@@ -60,19 +69,20 @@ def opened(request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchStr
 
 
 class Streams:
-    """Streams by their identifiers. Safe to use from several threads.
+    """Wrench streams of a service, by identifier. Safe to use from several threads.
 
     Parameters
     ----------
     owner : str, optional
-        Client that declares the streams.
+        Client that owns the streams which are declared through this object.
     among : Streams, optional
-        Streams to share: the client can use all of them, and owns those that it declares.
+        Streams to share: the client can ask all of these, and owns only those that it declares.
 
     Attributes
     ----------
     most : int
-        Most streams; beyond it, the client with most loses the one that was used longest ago.
+        Maximum number of streams. When one more is declared, the client with most streams loses
+        the one of its streams that was used least recently.
     """
 
     def __init__(self, owner: str = "", among: Streams | None = None) -> None:
@@ -82,11 +92,38 @@ class Streams:
         self._kept: OrderedDict[str, _Kept] = OrderedDict() if among is None else among._kept
 
     def of(self, owner: str) -> Streams:
-        """Return the same streams for a client."""
+        """Return a view of the same streams, through which a client declares streams as its own.
+
+        Parameters
+        ----------
+        owner : str
+            Identifier of the client.
+        """
         return Streams(owner, self)
 
     def declare(self, request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> StreamReply:
-        """Answer a declaration; parameters and errors as of `opened`."""
+        """Build a stream, keep it under a new identifier, and plan its first body wrench.
+
+        Parameters
+        ----------
+        request : StreamRequest
+            Stance, first body wrench or load, limits, and interpolation radius.
+        robots : Robots, optional
+            Robots that a request may name; bundled robots by default.
+
+        Returns
+        -------
+        StreamReply
+            Identifier of the stream, interpolation radius [N], and status and utilisation at the
+            first body wrench.
+
+        Raises
+        ------
+        InvalidInputError
+            If the request is impossible. The error's ``field`` is a path in the request.
+        DeadlineError
+            If the request's deadline has passed.
+        """
         start = time.perf_counter()
         stream, identifier = opened(request, robots), uuid.uuid4().hex
         try:
@@ -132,12 +169,21 @@ class Streams:
         return len(self._kept)
 
     def set_points(self, request: SetPointsRequest) -> SetPointsReply:
-        """Answer a question for set-points.
+        """Return the tendon tensions of all hands for a body wrench, from a declared stream.
+
+        Parameters
+        ----------
+        request : SetPointsRequest
+            Identifier of the stream, and the body wrench in B [N, N·m].
+
+        Returns
+        -------
+        SetPointsReply
 
         Raises
         ------
         InvalidInputError
-            If there is no such stream.
+            If no stream has this identifier, or the body wrench is invalid.
         """
         start = time.perf_counter()
         with self._lock:
@@ -157,14 +203,14 @@ class Streams:
         return reply
 
     def release(self, identifier: str) -> None:
-        """Release a stream."""
+        """Close the stream of an identifier; an unknown identifier is ignored."""
         with self._lock:
             kept = self._kept.pop(identifier, None)
         if kept is not None:
             kept.stream.close()
 
     def close(self) -> None:
-        """Release all streams."""
+        """Close all streams of all clients."""
         with self._lock:
             gone = list(self._kept.values())
             self._kept.clear()
@@ -179,17 +225,27 @@ def set_points_reply(
     start: float,
     detail: Detail = "full",
 ) -> SetPointsReply:
-    """Return set-points as a reply.
+    """Convert the set-points of a stream into a reply.
 
     Parameters
     ----------
     identifier : str
+        Identifier of the stream.
     stream : WrenchStream
+        Stream that the set-points come from.
     points : SetPoints
+        Tensions, winch angles and wrenches of all hands.
     start : float
-        Time of arrival of the question, on the clock of `time.perf_counter`.
+        Time when the request arrived, on the clock of `time.perf_counter` [s].
     detail : {'set_points', 'hands', 'full'}, optional
-        With ``set_points``, hands have their tensions alone; the other two are the same.
+        With ``set_points``, hands have only tensions and winch angles; the other two values give
+        the same whole reply.
+
+    Returns
+    -------
+    SetPointsReply
+        Tensions [N], winch angles [rad], motor torques [N·m], motor currents [A] and wrenches
+        [N, N·m] by hand; ``took`` is the time since ``start`` [s].
     """
     reply = SetPointsReply(
         stream=identifier,
@@ -226,7 +282,7 @@ def _hands(stream: WrenchStream, points: SetPoints) -> list[HandSetPoints] | Non
 
 
 def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
-    """Return set-points with the hands' tensions and winches alone, and a short reason."""
+    """Return set-points with only tensions and winch angles, and with a reason cut to 120 bytes."""
     return replace(
         whole,
         reason=cut_reason(whole.reason) if whole.reason else whole.reason,
@@ -237,4 +293,4 @@ def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
 
 
 LOCAL_STREAMS: Final = Streams()
-"""Streams of this process that belong to no service."""
+"""Wrench streams of this process that belong to no service."""

@@ -1,6 +1,7 @@
-"""Bulk work: any number of questions, answered in chunks, here, in processes or on a cluster.
+"""Bulk work: answer any number of plan requests in this process, in local processes, or on Dask.
 
-questions → chunks of bytes → `answer_chunk`, wherever → answers in order → lines or a table
+Requests are grouped into chunks of bytes; a pool of workers answers the chunks with `answer_chunk`;
+answers come back in the order of the requests, and are written as lines of JSON or as a table.
 """
 
 import lazy_loader

@@ -1,7 +1,8 @@
-"""Chunks of questions: which belong together, and the one function that answers them.
+"""Chunks of requests: the grouping of similar requests, and the function that answers a chunk.
 
-It is the same wherever it runs, so that answers are equal to the last digit; their times aside, and
-what a deadline has left out. Questions that have hands on the same holds are answered together.
+`answer_chunk` is the same function in every kind of worker, so that answers are equal to the last
+digit, except for times and for results that a deadline has cut. Requests with hands on the same
+holds are answered together, because the models of rocks and hands are then built once.
 """
 
 from __future__ import annotations
@@ -41,48 +42,54 @@ Answerer = Callable[[bytes], Answer]
 
 @dataclass(frozen=True, slots=True)
 class BulkSettings:
-    """Sizes and times of bulk work."""
+    """Sizes of chunks and windows, and timeouts of bulk work.
+
+    A window is a batch of requests that are read together, and grouped into chunks.
+    """
 
     most_questions: int = 64
-    """Most questions in a chunk: what is tried again where its process has died."""
+    """Maximum requests in a chunk; the whole chunk is retried when its worker dies."""
     most_bytes: int = 2**22
-    """Most bytes of a chunk of several questions, and of a window for each process."""
+    """Maximum bytes of a chunk of several requests; times the workers, those of a window."""
     window: int = 2
-    """Chunks for each process that are made of questions that came together."""
+    """Chunks for each worker in a window."""
     windows_ahead: int = 3
-    """Such windows that may be ahead of the question whose answer is due."""
+    """Maximum windows that are in work beyond the request whose answer is returned next."""
     scheduler_timeout: float = 15.0
-    """Wait for a Dask scheduler, for its first worker, or for a result to come over [s]."""
+    """Timeout for a Dask scheduler, for its first worker, and for the transfer of a result [s]."""
     check_interval: float = 1.0
-    """Between checks that the scheduler is still there, while no result comes [s]."""
+    """Time between checks that the Dask scheduler still runs, while no result comes [s]."""
 
 
 BULK_SETTINGS: Final = BulkSettings()
 
 
 class Setting(NamedTuple):
-    """Settings that all questions of some bulk work share.
+    """Settings that all requests of a bulk run share. A setting is pickled and sent to workers.
 
     Attributes
     ----------
     robot : RobotFile or None
-        The only robot that is planned for; those that are bundled by default.
+        The only robot that is planned for; None for the bundled robots.
     hand : ParameterTable or None
-        Entries in which hands are not the bundled one; a request's own go on top.
+        Hand parameters that differ from the bundled hand; values in a request take precedence.
     folder : Path or None
-        Names of mesh files in requests are relative to it; with None requests name none.
+        Folder that relative names of mesh files start from; None if requests may not name files.
     form : Format
-        Format of questions and answers.
+        Encoding of requests and answers.
     explain : bool or None
-        Whether what keeps a stance from a plan is explained; None: as each request says.
+        Whether infeasible stances are explained (irreducible infeasible subset); None to do as each
+        request says.
     brief : bool
-        Whether only what a table shows is asked for.
+        True if answers contain only the columns of a table.
     versions : dict of str to str or None, or None
-        Versions of packages at the asking process; None where the same installation answers.
+        Package versions of the client, which workers compare with their versions; None if workers
+        use the same installation.
     kind : str
-        Kind of all questions: `ServiceName.PLAN` or `ServiceName.ROUTE`.
+        Type of all requests: `ServiceName.PLAN` or `ServiceName.ROUTE`.
     make : callable or None
-        Called once in each process; returns what answers questions that are of neither kind.
+        Called once in each worker; returns a function that maps an encoded request to its `Answer`.
+        This function replaces the handlers of plans and routes.
     """
 
     robot: RobotFile | None = None
@@ -97,30 +104,37 @@ class Setting(NamedTuple):
 
 
 def own_versions() -> dict[str, str | None]:
-    """Return the versions of the packages on which the last digits of answers depend."""
+    """Return the versions of the packages that can change the last digits of answers.
+
+    Returns
+    -------
+    dict of str to str or None
+        Version by package name; None for a package that is not installed.
+    """
     names = DISTRIBUTION_NAME, "numpy", "scipy", "clarabel"
     return {name: installed_version(name) for name in names}
 
 
 def answer_chunk(setting: bytes, chunk: list[bytes]) -> list[Answer]:
-    """Answer a chunk of questions, in whatever process.
+    """Answer a chunk of requests; workers of every kind call this function.
 
     Parameters
     ----------
     setting : bytes
-        A pickled `Setting`: models and files are built once for each that is new to the process.
+        A pickled `Setting`. Each process builds the models and reads the files of a new setting
+        once.
     chunk : list of bytes
-        Encoded questions.
+        Encoded requests.
 
     Returns
     -------
     list of Answer
-        In the order of the questions.
+        Encoded replies or error replies, in the order of the requests.
 
     Raises
     ------
     CruxError
-        If other versions of packages ask than are to answer.
+        If this process has other versions of the packages than the client.
     """
     answer = _answerers.get(setting, partial(_answerer, setting))
     return [answer(payload) for payload in chunk]
@@ -187,14 +201,14 @@ def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanReque
 
 
 class About(NamedTuple):
-    """Digests of what must be prepared for a question.
+    """Digests of a request's rocks and hands; requests with equal digests share prepared models.
 
     Attributes
     ----------
     rock : bytes
-        Rocks and holds, wherever hands are on them.
+        Digest of the shapes of all rocks and holds.
     hands : bytes
-        Hands and their poses on these.
+        Digest of all hands with their poses and holds, and of the hand parameters.
     """
 
     rock: bytes = b""
@@ -216,7 +230,20 @@ class _Request(msgspec.Struct):
 
 
 def about(payload: bytes, form: Format) -> About:
-    """Return what a request is about, as it is written; nothing where it cannot be read."""
+    """Return the digests of a request's rocks and hands; empty digests if it cannot be decoded.
+
+    Parameters
+    ----------
+    payload : bytes
+        Encoded request.
+    form : Format
+        Encoding of the request.
+
+    Returns
+    -------
+    About
+        Digests of the encoded bytes: two texts for the same rock give two digests.
+    """
     try:
         stance = form.decode(payload, _Request).stance
         holds = [form.decode(bytes(hand), _Hand).hold for hand in stance.hands]
@@ -234,9 +261,18 @@ def _digest(*parts: msgspec.Raw) -> bytes:
 
 
 def grouping_order(abouts: Sequence[About]) -> list[int]:
-    """Return the indices of questions so that what is about the same stands together.
+    """Return an order of requests in which requests with the same rocks and hands are neighbours.
 
-    Groups, and questions within them, stay in the order of their first ones.
+    Parameters
+    ----------
+    abouts : sequence of About
+        Digests of each request.
+
+    Returns
+    -------
+    list of int
+        Indices of the requests. Groups are in the order of their first requests, and requests keep
+        their order within a group.
     """
     rocks: dict[bytes, int] = {}
     hands: dict[About, int] = {}

@@ -1,6 +1,6 @@
-"""Answers as rows: the columns that a table of plans may have, with their units.
+"""Columns of the tables of plans and routes, with units, and the conversion of replies into rows.
 
-A column's name ends in its unit, if it has one, wherever it stands: ``front_left_fx_N``.
+If a column has a unit, its name ends in the unit, as in ``front_left_fx_N``.
 """
 
 from __future__ import annotations
@@ -22,17 +22,21 @@ Kind = Literal["int", "float", "bool", "text"]
 
 
 class Column(NamedTuple):
-    """A column of a table.
+    """Column of a table that is written to a file.
 
     Attributes
     ----------
     name : str
+        Head of the column.
     kind : {'int', 'float', 'bool', 'text'}
+        Type of the values.
     unit : str
-        ``1`` for a number that has none; empty where there is no number.
+        Unit of the numbers, ``1`` for numbers without a unit; empty for bool and text.
     meaning : str
+        Description of the values, in a few words.
     path : tuple of str or int
-        Keys and indices to its value in a reply as `row_of` reads it; by default the name alone.
+        Keys and indices of the value in a decoded reply; by default the name alone. Hands are keyed
+        by limb here, and the hardest stage of a route is ``hardest``.
     """
 
     name: str
@@ -43,12 +47,22 @@ class Column(NamedTuple):
 
     @property
     def is_index(self) -> bool:
-        """True for the column that every table begins with."""
+        """True for the first column of plans and routes, the index of the request."""
         return self.name == "index"
 
 
 class TableRow(msgspec.Struct):
-    """Row of a table for one answer: the chosen values, and always its status and error."""
+    """Row of a table, for one answer.
+
+    Attributes
+    ----------
+    values : list
+        Values of all columns except ``index``.
+    status : str or None
+        Status of the plan or route; None for an error.
+    error : ErrorDetail or None
+        The error; None for a plan or route.
+    """
 
     values: list[Any]
     status: str | None = None
@@ -56,7 +70,19 @@ class TableRow(msgspec.Struct):
 
 
 def columns_of(limbs: Sequence[str], explained: bool = False) -> tuple[Column, ...]:
-    """Return all columns that a table of plans for a robot may have."""
+    """Return all columns of a table of plans for a robot.
+
+    Parameters
+    ----------
+    limbs : sequence of str
+        Names of the robot's limbs; each has columns for its hand.
+    explained : bool, optional
+        True to include the columns of an explanation (irreducible infeasible subset).
+
+    Returns
+    -------
+    tuple of Column
+    """
     return tuple(_columns(limbs, explained))
 
 
@@ -86,7 +112,7 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
 
 
 def route_columns() -> tuple[Column, ...]:
-    """Return all columns of a table of routes."""
+    """Return all columns of a table of routes, one row for each route."""
     return tuple(_route_columns())
 
 
@@ -135,20 +161,26 @@ def _failed() -> Iterator[Column]:
 def chosen_columns(
     wanted: str | None, limbs: Sequence[str], explained: bool = False
 ) -> tuple[Column, ...]:
-    """Return the columns of a table, in their usual order, ``index`` always among them.
+    """Select columns of a table of plans by name or pattern; ``index`` is always included.
 
     Parameters
     ----------
     wanted : str or None
-        Names with commas between them, ``*`` in them for any text; None for all.
+        Names separated by commas; ``*`` matches any text. None selects all columns.
     limbs : sequence of str
+        Names of the robot's limbs.
     explained : bool, optional
-        Whether there are explanations.
+        True if the columns of an explanation can be selected.
+
+    Returns
+    -------
+    tuple of Column
+        In the usual order of the table.
 
     Raises
     ------
     InvalidInputError
-        If a name is none of a column.
+        If a name or pattern matches no column.
     """
     known = columns_of(limbs, explained)
     if wanted is None:
@@ -169,7 +201,20 @@ def chosen_columns(
 
 
 def row_of(payload: bytes, columns: Sequence[Column]) -> TableRow:
-    """Return a reply in JSON, brief or whole, or an error as a row of columns but ``index``."""
+    """Convert an encoded reply or error reply into a row of a table.
+
+    Parameters
+    ----------
+    payload : bytes
+        JSON of a whole or brief plan reply, of a route reply, or of an error reply.
+    columns : sequence of Column
+        Columns of the table; ``index`` is skipped.
+
+    Returns
+    -------
+    TableRow
+        A value is None where the reply does not have it.
+    """
     reply = msgspec.json.decode(payload)
     error = reply.get("error")
     values = _readable(reply)

@@ -1,4 +1,4 @@
-"""Any number of questions, answered in order: chunks go out, come back, and are tried again."""
+"""Answer any number of requests in order: dispatch chunks to workers, and retry lost ones."""
 
 from __future__ import annotations
 
@@ -44,52 +44,54 @@ def evaluate(
     brief: bool = False,
     kind: str = ServiceName.PLAN,
 ) -> Generator[Answer, None, None]:
-    """Answer any number of plan requests or routes, in order, errors in their places.
+    """Answer any number of plan requests or routes; yield answers and errors in request order.
 
-    Questions are taken as there is work for them: some chunks are ahead at most, however many there
-    are. A process that dies is replaced, and its chunk tried once more; of one that is lost again,
-    the questions are asked one by one, and the one of which its processes die, twice, is ``lost``.
-    To break it off, close it.
+    Requests are read as they are needed; only a bounded number of chunks is in work at a time. When
+    a worker dies, it is replaced and its chunk is retried once. If the chunk is lost again, its
+    requests are retried one by one; a request that is lost twice on its own gets an error of kind
+    ``lost``. Close the generator to cancel the work.
 
     Parameters
     ----------
     questions : iterable of bytes, PlanRequest, RouteRequest or Answer
-        Bytes are encoded requests; an answer is one that is known without asking.
+        Bytes are encoded requests. An `Answer` is returned in its place, unchanged.
     on : str or distributed.Client, optional
-        ``processes`` of this machine, ``here`` for this process alone, ``tcp://HOST:PORT`` of a
-        Dask scheduler or its client, ``dask:local`` for a cluster of this machine's own.
+        Where the requests are answered: ``processes`` of this machine, ``here`` in this process,
+        ``tcp://HOST:PORT`` of a Dask scheduler or its client, or ``dask:local`` for a temporary
+        Dask cluster on this machine.
     workers : int, optional
-        Processes of this machine; by default one a core.
+        Number of processes of this machine; by default one for each core.
     hand : ParameterTable, optional
-        Entries in which hands are not the bundled one; a request's own go on top.
+        Hand parameters that differ from the bundled hand; values that a request gives replace
+        these.
     robot : RobotFile, optional
-        The only robot that is planned for; those that are bundled by default.
+        The only robot that is planned for; by default the bundled robots.
     folder : Path, optional
-        That names of mesh files in requests are relative to, wherever they are answered; by default
-        requests name none.
+        Folder that relative names of mesh files start from; by default requests may not name files.
     form : Format, optional
-        Of questions and answers.
+        Encoding of requests and answers.
     explain : bool, optional
-        Whether what keeps stances from plans is explained; by default as each request says.
+        Whether infeasible stances are explained (irreducible infeasible subset); by default as each
+        request says.
     brief : bool, optional
-        Whether plans are answered with only what a table shows: of what requests want only the
-        load factor, and no hand in all detail unless it is explained.
+        True to return only the values of a table: of the extras that requests want only the load
+        factor, and hands in brief unless they are explained.
     kind : str, optional
-        Of the questions: ``plan`` or ``route``.
+        Type of all requests: ``plan`` or ``route``.
 
     Yields
     ------
     Answer
-        The very same bytes wherever they were made, but for ``time``, and for what a deadline has
-        left out.
+        Encoded reply or error reply of each request. All kinds of workers return the same bytes,
+        except for ``time`` and for results that a deadline has cut.
 
     Raises
     ------
     InvalidInputError
         If ``on`` or ``workers`` is impossible, or Dask is not installed.
     CruxError
-        If no process can be started, or a cluster is gone: what is not yet answered can be asked
-        again.
+        If no process can be started, or the cluster is gone. Requests without an answer can then be
+        asked again.
     """
     setting = Setting(robot, hand, folder, form, explain, brief, kind=kind)
     with pool_on(on, workers, setting) as pool:
@@ -113,7 +115,27 @@ def answered(
     pool: Pool,
     form: Format = Format.JSON,
 ) -> Generator[Answer, None, None]:
-    """Yield the answers to questions in order, made by a pool that has been entered."""
+    """Answer requests with a pool of workers; yield the answers in the order of the requests.
+
+    Parameters
+    ----------
+    questions : iterable of bytes, PlanRequest, RouteRequest or Answer
+        Encoded or decoded requests; an `Answer` is returned in its place, unchanged.
+    pool : Pool
+        Pool of workers whose context has been entered.
+    form : Format, optional
+        Encoding of requests and answers.
+
+    Yields
+    ------
+    Answer
+        Encoded reply or error reply of each request.
+
+    Raises
+    ------
+    CruxError
+        If no process can be started, or the cluster is gone.
+    """
     work = _Work(enumerate(questions), pool, form)
     following = 0
     while True:
@@ -157,7 +179,7 @@ class _Work:
         """Questions in a chunk."""
 
     def take_more(self, following: int) -> None:
-        """Give out chunks of new questions, while not too many are ahead of one that is due."""
+        """Dispatch chunks of new requests, up to a bounded number beyond the next answer."""
         width = self._pool.width
         count = self._together * width * BULK_SETTINGS.window
         most, ahead = width * BULK_SETTINGS.most_bytes, BULK_SETTINGS.windows_ahead - 1
@@ -169,7 +191,7 @@ class _Work:
             self._give_all(self._window(count, most))
 
     def collect(self) -> None:
-        """Wait for answers; the questions of a chunk that is lost are asked one by one."""
+        """Wait for answers; dispatch the requests of a lost chunk again, one by one."""
         for number, result in self._pool.collect():
             chunk = self.chunks.pop(number)
             self._bytes -= chunk.size

@@ -1,4 +1,4 @@
-"""Tables as files: rows as CSV or Parquet, written whole or not at all."""
+"""Write tables as CSV or Parquet files; a failure leaves no partial file behind."""
 
 from __future__ import annotations
 
@@ -14,16 +14,26 @@ from service.bulk.columns import Column
 __all__ = ["exporter_at", "write_csv"]
 
 Exporter = Callable[[Path, Sequence[Column], Iterable[list[Any]]], None]
-"""Writes rows with these columns at a path; `OSError` where that cannot be."""
+"""Function that writes rows with given columns to a file; raises `OSError` if it cannot."""
 
 
 def exporter_at(path: Path) -> Exporter | None:
-    """Return the writer of the kind of table that a path's ending names; None where it names none.
+    """Return the function that writes the file format of a path's ending.
+
+    Parameters
+    ----------
+    path : Path
+        File to write; the ending is ``.csv`` or ``.parquet``.
+
+    Returns
+    -------
+    callable or None
+        Takes a path, columns and rows; None for any other ending.
 
     Raises
     ------
     InvalidInputError
-        If it cannot be written, or a folder is there.
+        If pyarrow, which Parquet needs, is not installed, or the path is a folder.
     """
     exporter = {".csv": write_csv, ".parquet": _write_parquet}.get(path.suffix.lower())
     if exporter is _write_parquet:
@@ -41,7 +51,22 @@ def exporter_at(path: Path) -> Exporter | None:
 
 
 def write_csv(path: Path, columns: Sequence[Column], rows: Iterable[list[Any]]) -> None:
-    """Write CSV, with the columns' names in its first line; `OSError` where that cannot be."""
+    """Write a table as a CSV file; the first line has the names of the columns.
+
+    Parameters
+    ----------
+    path : Path
+        File to write, which is replaced as a whole.
+    columns : sequence of Column
+        Columns of the table.
+    rows : iterable of list
+        Values of each row, in the order of the columns.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
     with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([each.name for each in columns])

@@ -1,4 +1,4 @@
-"""Header of a table's rows: the work that they belong to, so that no other work resumes them."""
+"""Header of a table in progress; it identifies the run, and only that run may resume the table."""
 
 from __future__ import annotations
 
@@ -18,10 +18,24 @@ __all__ = ["Header", "digest_of", "new_header"]
 
 
 class Header(msgspec.Struct):
-    """First line of a table: the work that its rows belong to.
+    """First line of a table in progress: everything that determines the rows of the run.
 
-    ``hand``, ``robot``: digests of their numbers, null for the bundled ones. ``about``: other
-    inputs of the work, by name; of a stance a `digest_of`.
+    Attributes
+    ----------
+    crux : str or None
+        Version of crux that began the table.
+    columns : list of str
+        Names of the table's columns.
+    explain : bool
+        Whether infeasible stances are explained.
+    hand : str or None
+        Digest of hand parameters; None for the bundled hand.
+    robot : str or None
+        Digest of the robot file; None for the bundled robots.
+    v : int
+        Version of this format.
+    about : dict of str to str
+        Other inputs of the run, by name; a stance as its `digest_of`.
     """
 
     crux: str | None
@@ -33,7 +47,20 @@ class Header(msgspec.Struct):
     about: dict[str, str] = {}
 
     def check(self, before: bytes, path: Path) -> None:
-        """Refuse a line that is the header of other work, and say what has changed."""
+        """Check that a table in progress belongs to the same run as this header.
+
+        Parameters
+        ----------
+        before : bytes
+            First line of the table.
+        path : Path
+            File of the table, for the error message.
+
+        Raises
+        ------
+        InvalidInputError
+            If the line is no header, or differs from this one; the message names the changed input.
+        """
         try:
             there = msgspec.json.decode(before, type=Header)
         except (msgspec.DecodeError, UnicodeDecodeError):
@@ -65,7 +92,25 @@ def new_header(
     robot: RobotFile | None,
     about: dict[str, str] | None = None,
 ) -> Header:
-    """Return the header of a table that is to be begun, or gone on with."""
+    """Return the header of a table that is begun or resumed.
+
+    Parameters
+    ----------
+    columns : iterable of Column
+        Columns of the table.
+    explain : bool
+        Whether infeasible stances are explained.
+    hand : ParameterTable or None
+        Hand parameters that differ from the bundled hand.
+    robot : RobotFile or None
+        The only robot that is planned for; None for the bundled robots.
+    about : dict of str to str, optional
+        Other inputs that the rows depend on, by name.
+
+    Returns
+    -------
+    Header
+    """
     own_robot = None if robot is None else digest_of((robot.toml, robot.urdf))
     own_hand = None if hand is None else digest_of(sorted(hand.sections.items()))
     names = [each.name for each in columns]
@@ -73,5 +118,5 @@ def new_header(
 
 
 def digest_of(value: Any) -> str:
-    """Return a digest of plain values."""
+    """Return a SHA-256 digest of a plain value, as hexadecimal text."""
     return sha256(repr(value).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Requests of a file, one a line, read as needed."""
+"""Read the requests of a file, one JSON document for each line."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ __all__ = ["Asked", "Lines"]
 
 
 class Asked(Protocol):
-    """Questions whose answers are kept."""
+    """Protocol of a source of requests that can be read again to resume a run."""
 
     @property
     def count(self) -> int:
-        """Number of questions."""
+        """Number of requests."""
 
     def __iter__(self) -> Iterator[bytes]:
-        """Yield what each is known by when its answer is found again."""
+        """Yield bytes that identify each request when the run is resumed."""
 
     def questions(self) -> Iterator[bytes | Answer]:
-        """Yield them, encoded, or the answers of those that need not be asked."""
+        """Yield each encoded request, or an `Answer` for a request that need not be planned."""
 
 
 class Lines:
-    """The lines of a file, or of standard input, that are not blank.
+    """Lines of a file or of standard input, without blank lines; each line is one request.
 
     Parameters
     ----------
     source : str
-        A path, or ``-``: standard input is kept in a file of its own until the end.
+        Path of the file, or ``-`` for standard input, which is copied to a temporary file.
 
     Attributes
     ----------
     count : int
-        Number of lines.
+        Number of lines that are not blank.
 
     Raises
     ------
@@ -63,18 +63,32 @@ class Lines:
         return (line for _, line in self.numbered())
 
     def questions(self) -> Iterator[bytes]:
-        """Yield the lines."""
+        """Yield the lines that are not blank."""
         return iter(self)
 
     def numbered(self) -> Iterator[tuple[int, bytes]]:
-        """Yield each line, without its end, and its number in the file, from one."""
+        """Yield each line that is not blank, with its line number.
+
+        Yields
+        ------
+        number : int
+            Line number in the file, from one.
+        line : bytes
+            The line without its end.
+        """
         self._file.seek(0)
         for number, line in enumerate(self._file, start=1):
             if line.strip():
                 yield number, line.removesuffix(b"\n")
 
     def number(self, index: int) -> int:
-        """Return the number in the file of a line, by its place among those that are not blank."""
+        """Return the line number in the file, from one, of a request.
+
+        Parameters
+        ----------
+        index : int
+            Index of the request among the lines that are not blank, from zero.
+        """
         return next(number for i, (number, _) in enumerate(self.numbered()) if i == index)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Answer chunks in this process, in processes of this machine, or on Dask."""
+"""Pools that answer chunks of requests: this process, processes of this machine, or Dask."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ __all__ = ["LOCAL_CLUSTER", "Here", "Pool", "check_address", "pool_on", "whole_n
 log = logging.getLogger(__name__)
 
 LOCAL_CLUSTER: Final = "dask:local"
-"""A cluster of this machine's own, for as long as the work lasts."""
+"""Value of ``on`` for a temporary Dask cluster on this machine."""
 
 
 class Pool(Protocol):
-    """Takes chunks and gives their answers back, while it is entered.
+    """Protocol of a pool of workers that answer chunks of requests, while its context is entered.
 
     Attributes
     ----------
     width : int
-        Chunks that are worked on at a time.
+        Number of chunks that are answered at the same time.
     """
 
     @property
@@ -47,14 +47,36 @@ class Pool(Protocol):
     def __exit__(self, *error: object) -> None: ...
 
     def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
-        """Let a chunk be answered; those about the same are best answered in one process."""
+        """Queue a chunk for the workers; `collect` returns its answers.
+
+        Parameters
+        ----------
+        number : int
+            Number of the chunk, chosen by the caller.
+        item : list of bytes
+            Encoded requests.
+        about : hashable, optional
+            Digest of the chunk's rocks; a pool may prefer a worker that has had the same digest.
+        """
 
     def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
-        """Wait until some chunks are answered, and return their numbers and answers."""
+        """Wait until at least one chunk is answered or lost.
+
+        Returns
+        -------
+        list of (int, list of Answer or Lost)
+            Number of each finished chunk, with its answers in request order, or why it was lost.
+        """
 
 
 class Here:
-    """The calling process itself; it answers one question at a time."""
+    """Pool without workers: the calling process answers the chunks, one at a time.
+
+    Parameters
+    ----------
+    setting : bytes
+        A pickled `Setting`.
+    """
 
     width = 1
 
@@ -69,11 +91,11 @@ class Here:
         self._queue.clear()
 
     def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
-        """Keep a chunk until answers are collected."""
+        """Queue a chunk, which `collect` answers; ``about`` is ignored."""
         self._queue.append((number, item))
 
     def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
-        """Answer a chunk."""
+        """Answer the oldest queued chunk, and return its number and answers."""
         number, chunk = self._queue.popleft()
         return [(number, answer_chunk(self._setting, chunk))]
 
@@ -83,12 +105,17 @@ def _answering(setting: bytes) -> Callable[[list[bytes]], list[Answer]]:
 
 
 def whole_number(workers: Any) -> int:
-    """Return a number of processes, checked.
+    """Check a number of processes, and return it as an int.
+
+    Parameters
+    ----------
+    workers : object
+        Number of processes.
 
     Raises
     ------
     InvalidInputError
-        If it is no whole number of at least 1.
+        If the value is no whole number of at least 1.
     """
     try:
         count = 0 if isinstance(workers, bool) else operator.index(workers)
@@ -102,21 +129,28 @@ def whole_number(workers: Any) -> int:
 
 
 def pool_on(on: Any, workers: int | None, setting: Setting) -> Pool:
-    """Return where chunks are answered.
+    """Return the pool of workers that a name or an address stands for.
 
     Parameters
     ----------
-    on : str or Client
-        ``processes``, ``here``, ``dask:local`` for a cluster of this machine's own, the address of
-        a Dask scheduler, or a `distributed.Client`.
+    on : str or distributed.Client
+        ``processes``, ``here``, ``dask:local`` for a temporary cluster on this machine, the address
+        of a Dask scheduler, or its client.
     workers : int or None
-        Processes of this machine; by default one a core.
+        Number of processes of this machine; None for one on each core.
     setting : Setting
+        Settings that all requests share.
+
+    Returns
+    -------
+    Pool
+        Enter its context to start or connect the workers.
 
     Raises
     ------
     InvalidInputError
-        If ``on`` is nothing of that kind, or ``workers`` is given for a cluster that has its own.
+        If ``on`` is none of these, Dask is not installed, or ``workers`` is given with an address
+        or a client.
     """
     if on == "here":
         return Here(pickle.dumps(setting))
@@ -130,11 +164,12 @@ def pool_on(on: Any, workers: int | None, setting: Setting) -> Pool:
 
 
 def check_address(address: object) -> None:
-    """Refuse what is no address of a Dask scheduler.
+    """Raise an error for a text that is not the address of a Dask scheduler, ``tcp://HOST:PORT``.
 
     Raises
     ------
     InvalidInputError
+        If the scheme of the address is unknown.
     """
     text = str(address)
     try:
@@ -150,21 +185,22 @@ def check_address(address: object) -> None:
 
 
 class DaskPool:
-    """A cluster's workers, each of its threads a place to answer a chunk.
+    """Pool of Dask workers; the Dask scheduler balances the load over their threads.
 
     Parameters
     ----------
-    on : str or Client
-        `LOCAL_CLUSTER`, a scheduler's address, or a client.
+    on : str or distributed.Client
+        `LOCAL_CLUSTER`, the address of a scheduler, or a client of one.
     workers : int or None
-        Of a cluster of this machine's own.
+        Number of processes of a local cluster; None for one on each core.
     setting : bytes
-        As `answer_chunk` takes it.
+        A pickled `Setting`, which workers unpickle once.
 
     Raises
     ------
     InvalidInputError
-        If ``distributed`` is not installed, or ``on`` is no address.
+        If ``distributed`` is not installed, ``on`` is no address, or ``workers`` is given with an
+        address.
     """
 
     def __init__(self, on: Any, workers: int | None, setting: bytes) -> None:
@@ -234,7 +270,7 @@ class DaskPool:
 
     @property
     def width(self) -> int:
-        """Threads that the workers have now, which come and go."""
+        """Number of threads of all workers now, at least 1; workers may join and leave."""
         try:
             threads: dict[str, int] = self._client.nthreads()
         except OSError:
@@ -242,7 +278,7 @@ class DaskPool:
         return max(1, sum(threads.values()))
 
     def put(self, number: int, item: list[bytes], about: Hashable = None) -> None:
-        """Submit a chunk."""
+        """Submit a chunk to the Dask scheduler; ``about`` is ignored."""
         future = self._client.submit(answer_chunk, self._setting, item, pure=False)
         self._open[number] = future
         self._await(number, future)
@@ -251,12 +287,12 @@ class DaskPool:
         future.add_done_callback(lambda done: self._done.put((number, done)))
 
     def collect(self) -> list[tuple[int, list[Answer] | Lost]]:
-        """Wait until a chunk is answered or lost.
+        """Wait until a chunk is answered or lost, and return its number and answers.
 
         Raises
         ------
         CruxError
-            If the scheduler is gone, or a worker cannot answer at all.
+            If the scheduler is gone, or a worker raised an error instead of answering.
         """
         while True:
             if self._client.status != "running":

@@ -1,7 +1,8 @@
-"""The state of a run: a file of JSON lines, one an answer, that only grows.
+"""Write the answers of a bulk run to a file of JSON lines, from which a broken run is resumed.
 
-Its whole lines are what is done, whatever has ended the run; a last one that is cut off is asked
-again. Lines are replies, or rows of a table with what they answer.
+The file only grows. Its complete lines are the finished answers, however the run ended; the request
+of an incomplete last line is asked again. Lines are replies, or table rows with a digest of the
+request that they answer.
 """
 
 from __future__ import annotations
@@ -40,30 +41,32 @@ class _Outcome(NamedTuple):
 
 
 class Run(ABC):
-    """Answers in the order of their questions, in a file that only grows.
+    """Answers of a bulk run, in the order of the requests, appended to a file of JSON lines.
 
     Parameters
     ----------
     file : Path or None
-        Of the lines; None where nothing is kept.
+        File of the lines; None to write no file.
     resume : bool
-        Whether the lines that are there are kept.
+        True to keep the lines of an existing file, and to continue after them.
     asked : Asked
-        All questions, those that the file answers among them.
+        All requests of the run, including those that the file answers.
     header : Header, optional
-        First line of the file.
+        First line of the file; None for a file without a header.
 
     Attributes
     ----------
+    file : Path or None
+        File of the lines.
     tally : Tally
-        Of all answers, with those that were there before.
+        Counts of all answers, including those of an existing file.
 
     Raises
     ------
     InvalidInputError
-        If the file's lines do not answer these questions.
+        If the existing lines do not answer these requests.
     OSError
-        If it cannot be read.
+        If the file cannot be read.
     """
 
     def __init__(
@@ -78,7 +81,13 @@ class Run(ABC):
 
     @contextmanager
     def open(self) -> Iterator[None]:
-        """Be ready to write while this is entered; `OSError` where that cannot be."""
+        """Open the file for writing, as a context manager; an incomplete last line is removed.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
         if self.file is None:
             yield
             return
@@ -93,7 +102,22 @@ class Run(ABC):
             yield
 
     def write(self, question: bytes, payload: bytes, seconds: float) -> None:
-        """Take the answer to the next question; `OSError` where it cannot be written."""
+        """Append the answer to the next request to the file, and count the answer.
+
+        Parameters
+        ----------
+        question : bytes
+            The request, as `Asked` yields it.
+        payload : bytes
+            Encoded reply or error reply.
+        seconds : float
+            Time that the answer took [s].
+
+        Raises
+        ------
+        OSError
+            If the line cannot be written.
+        """
         line, outcome = self._line(question, payload, seconds)
         if self._out is not None:
             _append(line, self._out)
@@ -163,16 +187,18 @@ class _Reply(msgspec.Struct):
 
 
 class ReplyLines(Run):
-    """Replies, one a line, in a file, on standard output, or nowhere.
+    """Replies of a bulk run as lines of JSON: in a file, on standard output, or nowhere.
 
     Parameters
     ----------
     file : Path or None
+        File of the lines; None to write no file.
     shown : bool
-        Whether they go to standard output where there is no file.
+        True to print the replies on standard output if ``file`` is None.
     resume : bool
+        True to keep the lines of an existing file, and to continue after them.
     asked : Asked
-        As of `Run`.
+        All requests of the run, including those that the file answers.
     """
 
     def __init__(self, file: Path | None, shown: bool, resume: bool, asked: Asked) -> None:
@@ -211,17 +237,27 @@ class _RowLine(TableRow, omit_defaults=True, kw_only=True):
 
 
 class TableLines(Run):
-    """Rows of a table, in a file of lines beside it, ``TABLE.jsonl``; the table is its export.
+    """Rows of a table, appended to a file ``TABLE.jsonl``; the table itself is exported at the end.
 
     Parameters
     ----------
     table : Path
-        ``.csv`` or ``.parquet``.
+        File of the table, ``.csv`` or ``.parquet``.
     columns : sequence of Column
+        Columns of the table.
     header : Header
+        Header of the rows, which identifies the run.
     resume : bool
+        True to keep the rows of an existing file, and to continue after them.
     asked : Asked
-        As of `Run`.
+        All requests of the run, including those that the file answers.
+
+    Raises
+    ------
+    InvalidInputError
+        If an existing file is not from this program, or its rows are of another run.
+    OSError
+        If the file cannot be read.
     """
 
     def __init__(
@@ -271,25 +307,39 @@ class TableLines(Run):
             )
 
     def row(self, payload: bytes) -> TableRow:
-        """Return what the table says of the answer to the next question."""
+        """Convert the encoded answer to the next request into a row of the table."""
         return row_of(payload, self._described)
 
     @contextmanager
     def open(self) -> Iterator[None]:
-        """Be ready to write while this is entered, and write the table when all is answered."""
+        """Open the file of rows for writing, as a context manager; on exit, export the table.
+
+        The table is not exported if the context ends with an exception.
+
+        Raises
+        ------
+        OSError
+            If the rows or the table cannot be written.
+        """
         with super().open():
             yield
         self.export()
 
     def export(self) -> None:
-        """Write the table of what is answered, whole or not at all; `OSError` as `open`."""
+        """Write the table of all rows so far, as CSV or Parquet; a failure leaves no partial table.
+
+        Raises
+        ------
+        OSError
+            If the table cannot be written.
+        """
         values = (row.values for row in self.rows())
         if self._numbered:
             values = ([i, *each] for i, each in enumerate(values))
         self._export(self._table, self._described, values)
 
     def rows(self) -> Iterator[TableRow]:
-        """Yield the rows of what is answered, in order."""
+        """Read the finished rows from the file, and yield them in the order of the requests."""
         assert self.file is not None
         with self.file.open("rb") as lines:
             for line in islice(lines, 1, 1 + self.tally.count):

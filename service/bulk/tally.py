@@ -1,4 +1,4 @@
-"""Count the answers of bulk work as they come, by status and by kind of error."""
+"""Count the answers of a bulk run, by status and by kind of error."""
 
 from __future__ import annotations
 
@@ -13,19 +13,24 @@ __all__ = ["Tally"]
 
 
 class Tally:
-    """Counts of answers.
+    """Counts and times of the answers of a bulk run.
 
     Attributes
     ----------
     count : int
-    statuses, kinds : Counter of str
-        Plans by status, errors by kind.
+        Number of all answers.
+    statuses : Counter of str
+        Number of plans by status.
+    kinds : Counter of str
+        Number of errors by kind.
     times : dict of str to array of float
-        How long plans have taken, by status [s].
-    bad, first_bad : int, (int, ErrorDetail) or None
-        Errors that are their requests' fault; the index and error of the first.
+        Times that plans took, by status [s].
+    bad : int
+        Number of errors whose cause is the request.
+    first_bad : tuple of (int, ErrorDetail), or None
+        Index of the first request with such an error, and the error.
     further_bad : list of int
-        Indices of those after the first, five at most.
+        Indices of the next requests with such errors, at most five.
     """
 
     def __init__(self) -> None:
@@ -39,7 +44,17 @@ class Tally:
     def add(
         self, status: str | None, error: ErrorDetail | None = None, seconds: float | None = None
     ) -> None:
-        """Count an answer: a plan's status, or an error."""
+        """Count one answer: a plan, or an error.
+
+        Parameters
+        ----------
+        status : str or None
+            Status of the plan; ignored for an error.
+        error : ErrorDetail, optional
+            The error; None for a plan.
+        seconds : float, optional
+            Time that the plan took [s]; not counted if it is None.
+        """
         if error is not None:
             self.kinds[error.kind] += 1
             if error.kind in REQUEST_KINDS:
@@ -55,11 +70,24 @@ class Tally:
         self.count += 1
 
     def middle_and_longest(self, status: str | None = None) -> tuple[float | None, float | None]:
-        """Return the median and the longest of the times of a status, or of all [s]."""
+        """Return the median and the maximum of the times that plans took.
+
+        Parameters
+        ----------
+        status : str, optional
+            Status of the plans that count; by default all plans.
+
+        Returns
+        -------
+        median : float or None
+            Median time [s]; None if no time is known.
+        longest : float or None
+            Maximum time [s]; None if no time is known.
+        """
         times = [t for key, each in self.times.items() if status in (None, key) for t in each]
         return (statistics.median(times), max(times)) if times else (None, None)
 
     @property
     def errors(self) -> str:
-        """Errors by kind, in words; empty where there are none."""
+        """Number of errors of each kind as text, such as ``2 invalid, 1 lost``; empty for none."""
         return ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))

@@ -1,6 +1,7 @@
-"""Plan while fields of a request vary: points, answers, table, border, pictures.
+"""Sweeps: plan a stance while fields of the request vary, over a grid or random samples.
 
-request, variations → Design (points, and the question at each) → rows → Sweep
+A `Design` builds a request for each point from the fields that vary; the answers become rows; a
+`Sweep` has the rows, the table, the borders between feasible and infeasible, and the pictures.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Find where a stance stops holding over one variable: between two points, to a tolerance."""
+"""Find the border of feasibility over one variable, by bisection and interpolation."""
 
 from __future__ import annotations
 
@@ -15,23 +15,29 @@ from service.sweeping.rows import SweepRow
 __all__ = ["BORDER_TOLERANCE", "Border", "Held", "borders", "held"]
 
 BORDER_TOLERANCE: Final = 1e-3
-"""Tolerance of a border, over the range that varies."""
+"""Default tolerance of a border, as a share of the range that varies."""
 
 
 class Border(msgspec.Struct, frozen=True):
-    """Two values next to each other, of which one holds and one does not, as real plans show.
+    """Border of feasibility over one variable: two close values, one feasible and one not.
+
+    Both values have been planned.
 
     Attributes
     ----------
     path : str
+        Path of the request's field that varies.
     unit : str or None
-    holds, fails : float
-        No farther apart than the tolerance.
+        Unit of the field, if it is known.
+    holds : float
+        Value at which the stance is feasible.
+    fails : float
+        Value at which the stance is overloaded or infeasible.
     tolerance : float
-        In the unit; what it was asked for, but where whole numbers or a point without an answer
-        leave more.
+        Largest distance of the two values, in the unit: the tolerance that was wanted, or more
+        where values are whole numbers or a plan failed.
     plans : int
-        That were needed to find it, beside the points.
+        Number of plans that the search took, besides the points of the sweep.
     """
 
     path: str
@@ -43,7 +49,7 @@ class Border(msgspec.Struct, frozen=True):
 
     @property
     def words(self) -> str:
-        """The border in one sentence; the value shown is on the side that holds."""
+        """The border as a sentence, with the feasible value first."""
         towards = "up to" if self.fails > self.holds else "from"
         unit = "" if self.unit is None else f" {self.unit}"
         whole = self.tolerance >= 1.0 and self.holds.is_integer() and self.fails.is_integer()
@@ -56,9 +62,13 @@ class Border(msgspec.Struct, frozen=True):
 
 
 class Held(NamedTuple):
-    """An interval of one variable in which points hold; its ends where they stop, interpolated.
+    """Interval of one variable in which the points of a sweep are feasible.
 
-    ``low`` or ``high`` is None where it goes on to the end of what varied.
+    Attributes
+    ----------
+    low, high : float or None
+        Ends of the interval, interpolated between neighbouring points; None where the interval goes
+        on to the end of the range.
     """
 
     low: float | None
@@ -68,17 +78,25 @@ class Held(NamedTuple):
 def borders(
     design: Design, rows: Sequence[SweepRow], tolerance: float, plan: Callable[[float], SweepRow]
 ) -> Iterator[Border]:
-    """Yield every border that two neighbouring points show, if one number varies alone.
+    """Search for the border between any two neighbouring points of which exactly one is feasible.
+
+    Nothing is searched unless exactly one number varies. Points without an answer are passed over.
 
     Parameters
     ----------
     design : Design
+        Points of the sweep.
     rows : sequence of SweepRow
-        Of its points.
+        Results of all points.
     tolerance : float
-        Over the range of the number.
+        Tolerance of a border, as a share of the range that varies.
     plan : callable
-        Plans at one more value.
+        Plans the request at a given value of the variable; returns a `SweepRow`.
+
+    Yields
+    ------
+    Border
+        In the order of the variable.
     """
     place = design.number
     if place is None:
@@ -124,14 +142,19 @@ def _narrowed(
 
 
 def held(rows: Sequence[SweepRow], place: int) -> Iterator[Held]:
-    """Yield where rows hold, in the order of a variable, by interpolation between them.
+    """Find the intervals of a variable in which rows are feasible, by interpolation between rows.
 
     Parameters
     ----------
     rows : sequence of SweepRow
-        That differ in one variable, in its order.
+        Results that differ in one variable, in the order of this variable.
     place : int
-        Of that variable in their points.
+        Index of the variable in the points.
+
+    Yields
+    ------
+    Held
+        Each interval, in the order of the variable.
     """
     groups = [list(group) for _, group in itertools.groupby(rows, lambda row: row.holds)]
     for before, group, after in zip([None, *groups], groups, [*groups[1:], None], strict=False):
@@ -147,7 +170,22 @@ def _between(holds: SweepRow, fails: SweepRow, place: int) -> float:
 
 
 def crossing(holds: SweepRow, fails: SweepRow, place: int) -> float | None:
-    """Return where utilisation over its cap passes 1 by linear interpolation; None if unknown."""
+    """Interpolate where the utilisation equals the cap, between a feasible row and another row.
+
+    Parameters
+    ----------
+    holds : SweepRow
+        Feasible row.
+    fails : SweepRow
+        Row beyond the cap.
+    place : int
+        Index of the variable in the points.
+
+    Returns
+    -------
+    float or None
+        Value of the variable; None if a utilisation is unknown, or does not grow towards ``fails``.
+    """
     if holds.margin is None or fails.margin is None or not fails.margin > holds.margin:
         return None
     share = (1.0 - holds.margin) / (fails.margin - holds.margin)
@@ -156,7 +194,7 @@ def crossing(holds: SweepRow, fails: SweepRow, place: int) -> float | None:
 
 
 def at(row: SweepRow, place: int) -> float:
-    """Return the number that varies in a row."""
+    """Return a row's value of the variable with the given index, as a float."""
     value = row.point[place]
     assert isinstance(value, (int, float))
     return float(value)

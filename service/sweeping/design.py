@@ -1,4 +1,4 @@
-"""Build the questions of a sweep: points where a request varies, and the request at each."""
+"""Design of a sweep: the points, a grid or Latin hypercube samples, and the request at each."""
 
 from __future__ import annotations
 
@@ -24,22 +24,23 @@ if TYPE_CHECKING:
 __all__ = ["Design", "Point"]
 
 Point = tuple[Value, ...]
-"""A value of each variation."""
+"""Point of a sweep: one value for each variation."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """Points at which a request is asked, with the fields that vary at each.
+    """Points of a sweep, and the request at each point.
 
     Attributes
     ----------
     variations : tuple of Variation
+        Fields that vary, with their values.
     targets : tuple of Target
-        What their paths mean.
+        Places in the request that the paths of the variations lead to.
     points : tuple of Point
-        Of a grid, the last variation fastest.
+        Values of all variations at each point; in a grid the last variation varies fastest.
     sampled : bool
-        Whether they are samples, and no grid.
+        True for samples of a Latin hypercube, false for a grid.
     """
 
     variations: tuple[Variation, ...]
@@ -57,28 +58,27 @@ class Design:
         seed: int = 0,
         robots: Robots | None = None,
     ) -> Self:
-        """Return a grid of all values, or samples of them.
+        """Build the points of a sweep: a grid of all values, or a Latin hypercube of samples.
 
         Parameters
         ----------
         request : PlanRequest
-            What stays as it is. What it wants besides the load factor is left out, and so is every
+            Request in which the fields vary. Its plans have the load factor, no other extras and no
             explanation.
         variations : sequence of Variation
+            Fields that vary, with their values.
         samples : int, optional
-            Points of a Latin hypercube in place of the grid: of each range they have one value in
-            each of so many equal parts, of a list each value as often as another, if that is
-            possible.
+            Number of Latin hypercube samples, in place of the grid. A range has one sample in each
+            of as many equal parts; the values of a list occur equally often, as far as possible.
         seed : int, optional
-            Of the samples.
+            Seed of the random numbers.
         robots : Robots, optional
-            Those that may be asked about; by default those that are bundled.
+            Robots that the request may name; bundled robots by default.
 
         Raises
         ------
         InvalidInputError
-            If a path means nothing in the request, one variation is within another, or a value
-            cannot be.
+            If a path leads to no field, two variations set the same field, or a value is invalid.
         LimitError
             If there are too many points.
         """
@@ -114,14 +114,14 @@ class Design:
         return len(self.points)
 
     def __iter__(self) -> Iterator[bytes]:
-        """Yield the encoded request at each point."""
+        """Yield the request at each point, encoded as MessagePack."""
         return map(self.payload, self.points)
 
     questions = __iter__
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Paths with their units, as ``load.mass [kg]``."""
+        """Path and unit of each variation, such as ``load.mass [kg]``."""
         return tuple(
             each.path if target.unit is None else f"{each.path} [{target.unit}]"
             for each, target in zip(self.variations, self.targets, strict=True)
@@ -129,22 +129,27 @@ class Design:
 
     @property
     def varying(self) -> list[int]:
-        """The places of the variations with more than one value; the first if there is none."""
+        """Indices of the variations with more than one value; ``[0]`` if there is none."""
         return [i for i, each in enumerate(self.variations) if len(each.values) > 1] or [0]
 
     @property
     def number(self) -> int | None:
-        """The place of the one number that varies alone; None where it does not."""
+        """Index of the variation, if exactly one varies and its values are numbers; else None."""
         place, *others = self.varying
         return None if others or not self.variations[place].numbers else place
 
     def places_of(self, over: Sequence[str]) -> list[int]:
-        """Return the places of two variations by their paths.
+        """Return the indices of two variations.
+
+        Parameters
+        ----------
+        over : sequence of str, length 2
+            Paths of the two variations.
 
         Raises
         ------
         InvalidInputError
-            If there are none, or they are the same.
+            If the paths are not two different variations of this design.
         """
         paths = [each.path for each in self.variations]
         if len(over) != 2 or over[0] == over[1] or not {*over} <= {*paths}:
@@ -154,7 +159,19 @@ class Design:
         return [paths.index(path) for path in over]
 
     def payload(self, point: Point, form: Format = Format.MSGPACK) -> bytes:
-        """Return the encoded request at a point."""
+        """Return the encoded request at a point.
+
+        Parameters
+        ----------
+        point : Point
+            A value for each variation.
+        form : Format, optional
+            Encoding of the request.
+
+        Returns
+        -------
+        bytes
+        """
         varied: list[Steps] = []
         for target, value in zip(self.targets, point, strict=True):
             for steps in target.steps:
@@ -164,7 +181,7 @@ class Design:
         return form.encode(self._paths.document)
 
     def cap(self, point: Point) -> float:
-        """Return the utilisation up to which a point holds."""
+        """Return the cap on the utilisation at a point, up to which the stance is feasible."""
         for target, value in zip(self.targets, point, strict=True):
             is_cap = target.steps == (("limits", "utilisation"),)
             if is_cap and isinstance(value, (int, float)):

@@ -1,8 +1,8 @@
-"""Paths into a plan request: which numbers or words they mean, and what would be valid there.
+"""Paths of fields in a plan request: find the places that a path leads to, and set their values.
 
-A request is a document here, of plain lists and dicts in which every field has its value or its
-default. What a path leads through and is left out is put there, and a surface's preset is replaced
-by its numbers.
+A request is a document here, of plain lists and dicts in which all fields are filled in with their
+values or defaults. Optional parts that a path leads through are created, and a surface that is
+given by the name of a preset is replaced by the preset's numbers.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from service.wire import PossibleType, entered, field_names, places_at
 __all__ = ["Paths", "Steps", "Target", "set_value"]
 
 Steps = tuple[str | int, ...]
-"""Keys and indices from the document to a value."""
+"""Keys and indices that lead from a document to one value in it."""
 
 KEYED_TYPES: Final = (inspect.StructType, inspect.DictType)
 LISTED_TYPES: Final = (inspect.ListType, inspect.TupleType, inspect.VarTupleType)
 
 
 class Target(NamedTuple):
-    """A place that a path means.
+    """Places in a document that a path leads to.
 
     Attributes
     ----------
     steps : tuple of Steps
-        To the value in the document; several where the path has a ``*``.
+        Keys and indices that lead to each value; several if the path has a ``*``.
     unit : str or None
-        Of a number there, where it is known.
+        Unit of the number there, if it is known.
     whole : bool
-        Whether a number there is a whole one.
+        True if only whole numbers are valid there.
     """
 
     steps: tuple[Steps, ...]
@@ -49,14 +49,14 @@ class Target(NamedTuple):
 
 @dataclass
 class Paths:
-    """Finds what paths mean in one document, and opens it where they lead.
+    """Lookup of paths in one document.
 
     Attributes
     ----------
     document : dict
-        A plan request; changed in place.
-    presets : dict
-        Names of the surfaces that were replaced by their numbers, by the steps to them.
+        A plan request as plain lists and dicts; changed in place.
+    presets : dict of Steps to str
+        Names of surface presets that were replaced by their numbers, by the place of the surface.
     """
 
     document: dict[str, Any]
@@ -64,24 +64,30 @@ class Paths:
 
     @classmethod
     def into(cls, request: PlanRequest) -> Paths:
-        """Return paths into a request, without its draws."""
+        """Convert a plan request into a document, without samples of parameters (``draws``)."""
         document = _filled(request)
         del document["draws"]
         document["stance"].setdefault("gravity", list(EARTH_GRAVITY))
         return cls(document)
 
     def target(self, path: str) -> Target:
-        """Return what a path means.
+        """Find the places that a path leads to, and create missing parts on the way.
 
         Parameters
         ----------
         path : str
-            Names and indices with dots between them; the stance's own fields may begin it.
+            Names and indices with dots between them, as ``load.mass``. Hands are named by limb, and
+            ``*`` stands for all entries. A path may begin with a field of the stance.
+
+        Returns
+        -------
+        Target
 
         Raises
         ------
         InvalidInputError
-            If there is no such field; the message lists the names that are valid there.
+            If the path leads to no field, or to one that is no number or word. The message has the
+            valid names.
         """
         names = path.replace("[", ".").replace("]", "").split(".")
         if names[0] in _fields(Stance):
@@ -106,7 +112,16 @@ class Paths:
         )
 
     def follow(self, varied: Iterable[Steps]) -> None:
-        """Let a preset's other forces follow its shear limit, as in its parameter file."""
+        """Scale the other strengths of surface presets with their shear limits.
+
+        In a preset, pull-off limit, lateral limit and shear scatter are proportional to the shear
+        limit. They keep this ratio unless they vary themselves.
+
+        Parameters
+        ----------
+        varied : iterable of Steps
+            Places whose values have been set.
+        """
         given = set(varied)
         for steps, name in self.presets.items():
             preset = Preset.named(name)
@@ -213,7 +228,17 @@ class Paths:
 
 
 def set_value(document: Any, steps: Steps, value: Any) -> None:
-    """Set a value in a document."""
+    """Set the value at one place of a document.
+
+    Parameters
+    ----------
+    document : dict or list
+        Document, which is changed in place.
+    steps : Steps
+        Keys and indices that lead to the value.
+    value : object
+        New value.
+    """
     _at(document, steps[:-1])[steps[-1]] = value
 
 

@@ -1,4 +1,4 @@
-"""The picture of a sweep: curves over one variable, a map over two, panels of maps over more."""
+"""Plot a sweep: curves over one variable, a map over two, and panels of maps over more."""
 
 from __future__ import annotations
 
@@ -29,11 +29,21 @@ LINE_STYLES: Final[dict[str, dict[str, Any]]] = {
 }
 
 Columns = dict[str, Any]
-"""Arrays over the rows that are drawn: state, holds, utilisation, load factor, margin, x, y."""
+"""Arrays over the rows of a panel: state, holds, utilisation, load factor, margin, x and y."""
 
 
 class Look(NamedTuple):
-    """Look of the points of a state: marker, colour, words; and of cells without a utilisation."""
+    """Style of the points of one state.
+
+    Attributes
+    ----------
+    marker, colour : str
+        Marker and colour of a point.
+    words : str
+        Text in the legend.
+    fill, hatch : str
+        Colour and hatch of a map's cell without a utilisation; empty for states that have one.
+    """
 
     marker: str
     colour: str
@@ -48,31 +58,33 @@ STATE_LOOKS: Final[dict[State, Look]] = {
     "infeasible": Look("x", "0.35", "infeasible: nothing balances the body", "0.75", "////"),
     "error": Look("+", "tab:orange", "no answer: see the column error", "white", "xx"),
 }
-"""From the best to the worst."""
+"""Style of each state, from the best state to the worst."""
 
 
 def plot_sweep(sweep: Sweep, path: Path, title: str, over: Sequence[str] | None = None) -> None:
-    """Draw a sweep.
+    """Plot a sweep to a file.
 
-    A grid over one number is drawn as curves of utilisation and load factor, over a number and
-    words as a curve for each word, and over two numbers as a map. Over more there is a map over the
-    first two numbers for up to six values of the next variable, each cell the worst over all
-    others. Two things that are sampled are drawn as points over both; more, as utilisation over
-    each.
+    A grid over one number becomes curves of utilisation and load factor; over a number and words, a
+    curve for each word; over two numbers, a map of the utilisation. A grid over more variables
+    becomes maps over the first two numbers, for up to six values of the next variable; each cell
+    has the worst result over all other variables. Samples become points over two variables; of more
+    variables, plots of the utilisation over each.
 
     Parameters
     ----------
     sweep : Sweep
+        Results of the sweep.
     path : Path
-        PNG, PDF or SVG.
+        PNG, PDF or SVG file to write.
     title : str
-    over : sequence of str, optional
-        Paths of the two variations over which it is drawn instead.
+        Title of the figure.
+    over : sequence of str, length 2, optional
+        Paths of the two variables of the map, in place of the choice above.
 
     Raises
     ------
     InvalidInputError
-        If ``over`` does not name two of them.
+        If ``over`` does not name two variables of the sweep.
     """
     design = sweep.design
     varying, sampled = design.varying, design.sampled
@@ -96,17 +108,20 @@ def plot_sweep(sweep: Sweep, path: Path, title: str, over: Sequence[str] | None 
 
 
 class Side:
-    """A variation as an axis.
+    """Axis of a plot, over one variation.
 
     Attributes
     ----------
     place : int
-        Of the variation.
+        Index of the variation.
     label : str
+        Path and unit of the variation.
     values : list of Value
-        Numbers in their order, words in the order given.
+        Numbers in ascending order; words in the order given.
     words : list of str
-        Instead of numbers along the axis; empty where there are numbers.
+        Tick labels, if the values are words; empty for numbers.
+    places : ndarray, shape (values,)
+        Coordinate of each value along the axis.
     """
 
     def __init__(self, sweep: Sweep, place: int) -> None:
@@ -122,13 +137,13 @@ class Side:
         self.places = np.array(range(len(self.words)) if self.words else self.values, float)
 
     def of(self, rows: Sequence[SweepRow]) -> Array:
-        """Return where rows are along the axis."""
+        """Return the coordinates of rows along the axis, shape (rows,)."""
         found = (self.places[self.values.index(row.point[self.place])] for row in rows)
         return np.fromiter(found, float)
 
     @property
     def edges(self) -> Array:
-        """Ends of the values' cells along the axis: halfway to the next value."""
+        """Ends of the values' cells along the axis, halfway between values, shape (values + 1,)."""
         if len(self.places) == 1:
             return np.array([self.places[0] - 0.5, self.places[0] + 0.5])
         middle = 0.5 * (self.places[1:] + self.places[:-1])
@@ -136,7 +151,7 @@ class Side:
         return np.array([first, *middle, last])
 
     def label_axis(self, axis: Any) -> None:
-        """Write what varies along an axis, and the words instead of numbers if it has words."""
+        """Set the label of a matplotlib axis, and its tick labels if the values are words."""
         axis.set_label_text(self.label, fontsize=9)
         if self.words:
             turned = sum(map(len, self.words)) > 40 and axis.axis_name == "x"

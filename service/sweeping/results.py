@@ -1,4 +1,4 @@
-"""A sweep: its rows, its table as CSV, its summary, and where it stops holding."""
+"""Run a sweep, and return its rows, borders, table and summary."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ __all__ = ["Sweep", "sweep", "with_borders"]
 
 
 class Sweep(NamedTuple):
-    """Results of plans while fields of a request vary.
+    """Results of a sweep.
 
     Attributes
     ----------
     design : Design
-        What varies, and where.
+        Fields that vary, and the points.
     rows : tuple of SweepRow
-        In the order of the design's points.
+        Result of each point, in the order of the design's points.
     borders : tuple of Border
-        Where it stops holding, over one variable.
+        Borders between feasible and other points; empty unless exactly one number varies.
     """
 
     design: Design
@@ -45,31 +45,43 @@ class Sweep(NamedTuple):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of points of each status."""
+        """Number of points by status: optimal, overloaded, infeasible, failed and error."""
         found = Counter(row.status for row in self.rows)
         statuses = ("optimal", "overloaded", "infeasible", "failed", "error")
         return {status: found[status] for status in statuses}
 
     @property
     def extremes(self) -> tuple[SweepRow, ...]:
-        """The points of least and of most utilisation; none where no point has one."""
+        """Rows with the least and the largest utilisation; empty if no row has a utilisation."""
         rows = [row for row in self.rows if row.utilisation is not None]
         return tuple(
             pick(rows, key=lambda row: row.utilisation or 0.0) for pick in (min, max) if rows
         )
 
     def write_table(self, path: Path) -> None:
-        """Write a row for each point, as CSV.
+        """Write the rows as a CSV file.
+
+        Parameters
+        ----------
+        path : Path
+            File to write.
 
         Raises
         ------
         OSError
-            If it cannot be written.
+            If the file cannot be written.
         """
         write_csv(path, sweep_columns(self.design), (row.cells for row in self.rows))
 
     def summary(self) -> dict[str, Any]:
-        """Return what a program needs to know: what varied, how many hold, and the borders."""
+        """Summarise the sweep as JSON values.
+
+        Returns
+        -------
+        dict
+            Variations, number of points, of answers and of each status, errors by kind, the points
+            of least and largest utilisation, and the borders.
+        """
         variations, sampled = self.design.variations, self.design.sampled
         paths = [each.path for each in variations]
         ends: list[Any] = [
@@ -103,7 +115,24 @@ class Sweep(NamedTuple):
 def with_borders(
     design: Design, rows: Sequence[SweepRow], robot: RobotFile | None, tolerance: float
 ) -> Sweep:
-    """Return a sweep of which every point is answered, with its borders, which take more plans."""
+    """Search for the borders of feasibility of a design whose points are all planned.
+
+    Parameters
+    ----------
+    design : Design
+        Points of the sweep.
+    rows : sequence of SweepRow
+        Result of each point.
+    robot : RobotFile or None
+        The only robot that is planned for; None for the bundled robots.
+    tolerance : float
+        Tolerance of a border, as a share of the range that varies.
+
+    Returns
+    -------
+    Sweep
+        The search plans some more points in this process, if exactly one number varies.
+    """
     ask = asking(1, 1, robot)
 
     def plan(value: float) -> SweepRow:
@@ -129,35 +158,42 @@ def sweep(
     progress: Callable[[int, int], None] | None = None,
     tolerance: float = BORDER_TOLERANCE,
 ) -> Sweep:
-    """Return the results of plans while fields of a request vary.
+    """Plan a stance at all points of a sweep, and find the borders of feasibility.
 
     Parameters
     ----------
     request : PlanRequest
+        Request in which fields vary.
     variations : sequence of Variation or str
-        As ``load.mass=60:120:7`` or ``hands.front_left.surface=rock,concrete-fine``.
+        Fields that vary, as ``load.mass=60:120:7`` or
+        ``hands.front_left.surface=rock,concrete-fine``.
     samples : int, optional
-        Points of a Latin hypercube, in place of the grid of all values.
+        Number of Latin hypercube samples, in place of the grid of all values.
     seed : int, optional
-        Of the samples.
+        Seed of the random numbers.
     workers : int, optional
-        Processes; by default as many as are worth it.
+        Number of processes; by default one for few points, and one for each core for many.
     on : str or distributed.Client, optional
-        As of `service.bulk.evaluate`; by default processes, where they are worth it.
+        Where points are planned: ``processes``, ``here``, ``dask:local``, the address of a Dask
+        scheduler, or its client; by default ``here`` for one worker, otherwise ``processes``.
     hand : ParameterTable, optional
-        Entries in which hands are not the bundled one.
+        Hand parameters that differ from the bundled hand.
     robot : RobotFile, optional
-        In place of the bundled ones.
+        The only robot that is planned for; by default the bundled robots.
     progress : callable, optional
         Called with (points done, points in all).
     tolerance : float, optional
-        Of the border over one variable, over the range that varies.
+        Tolerance of a border, as a share of the range that varies.
+
+    Returns
+    -------
+    Sweep
+        A point whose request is invalid, or whose plan failed, has its error in its row.
 
     Raises
     ------
     InvalidInputError
-        If a path means nothing in the request, or a value cannot be. What is wrong at some points
-        only is reported in their rows.
+        If a path leads to no field of the request, or a value is invalid.
     LimitError
         If there are too many points.
     """

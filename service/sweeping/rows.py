@@ -1,4 +1,4 @@
-"""Result of each point of a sweep: a row of a table, kept as a line that a sweep resumes from."""
+"""Rows of a sweep: the result of each point, and the file of rows from which a sweep is resumed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Ask", "PointRows", "State", "SweepRow", "asking", "rows_at", "sweep_columns"]
 
 Ask = Callable[[Iterable[bytes]], Generator[Answer, None, None]]
-"""Yields the answers to encoded requests, in order."""
+"""Function that takes encoded requests and yields their answers, in order."""
 
 State = Literal["holds", "overloaded", "infeasible", "error"]
 
@@ -41,26 +41,30 @@ RESULT_COLUMNS: Final = (
     *(Column(part, "text", "", f"{part} of the limit that is used most") for part in LIMIT_PARTS),
     Column("error", "text", "", "why there is no plan"),
 )
-"""Columns after those of what varies."""
+"""Columns of the results, which follow the columns of the variations."""
 
 
 class SweepRow(msgspec.Struct, frozen=True):
-    """Result of one point of a sweep; as in a reply, but for its point and cap.
+    """Result of one point of a sweep.
 
     Attributes
     ----------
     point : tuple
-        A value of each variation.
+        A value for each variation.
     status : str
-        Of the plan, or ``error``.
-    utilisation, load_factor : float or None
+        Status of the plan, or ``error``.
+    utilisation : float or None
+        Largest utilisation of all limits; None if there is no plan.
+    load_factor : float or None
+        Largest multiple of the body wrench at utilisation 1; None if unbounded or not known.
     load_factor_unbounded : bool
+        True if there is no largest multiple.
     limiting : LimitName or None
-        What limits the plan.
+        Limit with the largest utilisation.
     error : ErrorDetail or None
         Why there is no plan.
     cap : float
-        Utilisation up to which this point holds.
+        Cap on the utilisation at this point, up to which the stance is feasible.
     """
 
     point: Point = ()
@@ -74,12 +78,12 @@ class SweepRow(msgspec.Struct, frozen=True):
 
     @property
     def holds(self) -> bool:
-        """True if there is a plan within its limits."""
+        """True if the point is feasible: its plan is within all limits."""
         return self.status == "optimal"
 
     @property
     def state(self) -> State:
-        """State as it is drawn; an error where the planner failed, too."""
+        """Status for pictures: ``holds`` for optimal, and ``error`` for a failed plan, too."""
         match self.status:
             case "optimal":
                 return "holds"
@@ -92,19 +96,19 @@ class SweepRow(msgspec.Struct, frozen=True):
 
     @property
     def answered(self) -> bool:
-        """True if there is an answer, if only that the request at this point is invalid."""
+        """True if the point need not be asked again: planned, or its request is invalid."""
         if self.error is not None:
             return self.error.kind in REQUEST_KINDS
         return self.state != "error"
 
     @property
     def margin(self) -> float | None:
-        """Utilisation over its cap; None where there is none."""
+        """Ratio of the utilisation to its cap, 1 at the limit; None without a utilisation."""
         return None if self.utilisation is None else self.utilisation / self.cap
 
     @property
     def complaint(self) -> str | None:
-        """Error in one line; None where there is none."""
+        """The error as one line of kind, field and message; None without an error."""
         if self.error is None:
             return "the planner failed" if self.state == "error" else None
         field = "" if self.error.field is None else f"{self.error.field}: "
@@ -112,7 +116,7 @@ class SweepRow(msgspec.Struct, frozen=True):
 
     @property
     def cells(self) -> list[Any]:
-        """Cells of the point in the table."""
+        """Values of the row for the table: the point's values, then those of `RESULT_COLUMNS`."""
         point = [
             word_of(each) if each is None or isinstance(each, bool) else each for each in self.point
         ]
@@ -122,7 +126,17 @@ class SweepRow(msgspec.Struct, frozen=True):
 
     @classmethod
     def read(cls, design: Design, point: Point, line: bulk.TableRow) -> SweepRow:
-        """Return the row of a point that was written as a line."""
+        """Convert a row of the file, from which a sweep is resumed, into the result of a point.
+
+        Parameters
+        ----------
+        design : Design
+            Points of the sweep.
+        point : Point
+            The point's values.
+        line : TableRow
+            Row of the file, with the values that `cells` returns.
+        """
         names = (column.name for column in RESULT_COLUMNS)
         known = dict(zip(names, line.values[len(point) :], strict=True))
         factor, unbounded = known["load_factor"], known["load_factor"] == "inf"
@@ -142,10 +156,25 @@ class SweepRow(msgspec.Struct, frozen=True):
 def asking(
     count: int, workers: int | None, robot: RobotFile | None, on: str | Client | None = None
 ) -> Ask:
-    """Return what answers encoded requests, some ``count`` of them in all.
+    """Return a function that answers encoded requests in this process, in processes or on Dask.
 
-    ``on`` is as of `service.bulk.evaluate`, or ``local``; by default processes, where they are
-    worth it.
+    Parameters
+    ----------
+    count : int
+        Number of requests, from which the number of processes is chosen.
+    workers : int or None
+        Number of processes; None to choose.
+    robot : RobotFile or None
+        The only robot that is planned for; None for the bundled robots.
+    on : str or distributed.Client, optional
+        ``processes``, ``here``, ``local`` for a temporary Dask cluster on this machine, the address
+        of a Dask scheduler, or its client; by default ``here`` for one worker, otherwise
+        ``processes``.
+
+    Returns
+    -------
+    callable
+        Takes encoded requests, and yields an `Answer` for each, in order.
     """
     if on is None:
         workers = worth(count, workers)
@@ -155,20 +184,44 @@ def asking(
 
 
 def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[SweepRow]:
-    """Yield the row of each point, in order."""
+    """Plan points of a sweep, and yield the result of each point, in order.
+
+    Parameters
+    ----------
+    design : Design
+        Builds the request at a point.
+    points : sequence of Point
+        Points to plan.
+    ask : callable
+        Answers encoded requests; see `asking`.
+
+    Yields
+    ------
+    SweepRow
+    """
     answers = ask(design.payload(point) for point in points)
     for point, answer in zip(points, answers, strict=True):
         yield sweep_row(design, point, answer.payload)
 
 
 def sweep_row(design: Design, point: Point, payload: bytes) -> SweepRow:
-    """Return the row of a point whose answer is there."""
+    """Convert the answer for a point into the result of the point.
+
+    Parameters
+    ----------
+    design : Design
+        Points of the sweep.
+    point : Point
+        The point's values.
+    payload : bytes
+        Reply or error reply, encoded as MessagePack.
+    """
     row = msgspec.msgpack.decode(payload, type=SweepRow)
     return msgspec.structs.replace(row, point=point, cap=design.cap(point))
 
 
 def sweep_columns(design: Design) -> tuple[Column, ...]:
-    """Return the columns of a design's table: what varies, and what that comes to."""
+    """Return the columns of a sweep's table: one for each variation, then `RESULT_COLUMNS`."""
     varied = zip(design.labels, design.variations, design.targets, strict=True)
     return (
         *(
@@ -180,25 +233,29 @@ def sweep_columns(design: Design) -> tuple[Column, ...]:
 
 
 class PointRows(TableLines):
-    """Rows of points, beside a table that is written of them.
+    """Rows of a sweep's points, appended to a file beside the table, from which a sweep is resumed.
 
     Parameters
     ----------
     request : PlanRequest
+        Request in which fields vary.
     design : Design
-        Of that request.
+        Points of the sweep.
     seed : int
-        Of its samples.
+        Seed of the design's samples.
     path : Path
+        File of the table, ``.csv`` or ``.parquet``.
     resume : bool
-        Whether rows that are there are kept.
+        True to keep the rows of an existing file, and to continue after them.
     hand : ParameterTable or None
+        Hand parameters that differ from the bundled hand.
     robot : RobotFile or None
+        The only robot that is planned for; None for the bundled robots.
 
     Raises
     ------
     InvalidInputError
-        If the sweep of that file is another one.
+        If the existing rows are of another sweep.
     """
 
     def __init__(
@@ -221,12 +278,12 @@ class PointRows(TableLines):
         super().__init__(path, columns, header, resume, design)
 
     def row(self, payload: bytes) -> bulk.TableRow:
-        """Return the cells of the point that is next."""
+        """Convert the encoded answer to the next point into a row of the file."""
         row = sweep_row(self._design, self._design.points[self.tally.count], payload)
         return bulk.TableRow(row.cells, None if row.error else row.status, row.error)
 
     @property
     def points(self) -> list[SweepRow]:
-        """Rows of the points that are answered."""
+        """Results of all points that are answered so far."""
         pairs = zip(self._design.points, self.rows(), strict=False)
         return [SweepRow.read(self._design, point, line) for point, line in pairs]

@@ -1,4 +1,4 @@
-"""Vary a field of a request: its path, and the values that it takes."""
+"""Variation of a sweep: the path of a request's field, and the values that the field takes."""
 
 from __future__ import annotations
 
@@ -14,23 +14,29 @@ from hand_models.base import InvalidInputError
 __all__ = ["Value", "Variation", "word_of"]
 
 Value = float | bool | str | None
-"""Value of a field: a number, a word, or what JSON has besides."""
+"""Value of a field: a number, a word, a boolean, or None for null."""
 
 
 @dataclass(frozen=True)
 class Variation:
-    """A field of a request, and the values that it takes.
+    """Field of a request that varies in a sweep, and the values that it takes.
 
     Attributes
     ----------
     path : str
-        Of the field, with dots, as ``load.mass`` or ``hands.front_left.surface.shear_limit``:
-        hands by limb, entries of lists by index, ``*`` for all of either.
+        Path of the field, with dots, as ``load.mass`` or
+        ``hands.front_left.surface.shear_limit``. Hands are named by limb, entries of lists by
+        index; ``*`` stands for all hands or entries.
     values : tuple of float, bool, str or None
-        In the order in which they are shown, each once; of a range for samples its two ends will
-        do.
+        Different values, in the order in which they are shown. For a range that is sampled, its
+        two ends are enough.
     ranged : bool
-        Whether samples may be anywhere between the first value and the last.
+        True if samples may take any value between the first and the last.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no value, a value is repeated or not finite, or a range is empty.
     """
 
     path: str
@@ -55,7 +61,13 @@ class Variation:
         return all(type(value) in (int, float) for value in self.values)
 
     def text(self, *, sampled: bool = False) -> str:
-        """Return it as `parse` reads it; of a range for samples its ends."""
+        """Return the variation as text that `parse` reads.
+
+        Parameters
+        ----------
+        sampled : bool, optional
+            True to write a range without its count, ``PATH=LOW:HIGH``.
+        """
         if not self.ranged:
             return f"{self.path}={','.join(map(word_of, self.values))}"
         count = "" if sampled else f":{len(self.values)}"
@@ -63,12 +75,21 @@ class Variation:
 
     @classmethod
     def over(cls, path: str, low: float, high: float, count: int = 2) -> Self:
-        """Return a range, of so many values at equal distances.
+        """Return a variation over a range, with values at equal distances.
+
+        Parameters
+        ----------
+        path : str
+            Path of the field.
+        low, high : float
+            Ends of the range, in the unit of the field.
+        count : int, optional
+            Number of values, from 2 to 10,000.
 
         Raises
         ------
         InvalidInputError
-            If LOW is not below HIGH, or there are fewer than two values.
+            If ``low`` is not below ``high``, or the count is out of range.
         """
         if not (math.isfinite(low) and math.isfinite(high)):
             raise InvalidInputError(f"must be finite numbers, got {low:g}:{high:g}", field=path)
@@ -85,19 +106,19 @@ class Variation:
 
     @classmethod
     def parse(cls, text: str, *, sampled: bool = False) -> Self:
-        """Read ``PATH=LOW:HIGH:COUNT`` or ``PATH=VALUE,VALUE,...``.
+        """Read a variation from ``PATH=LOW:HIGH:COUNT`` or ``PATH=VALUE,VALUE,...``.
 
         Parameters
         ----------
         text : str
-            Numbers in SI units.
+            Text of the variation; numbers are in SI units.
         sampled : bool, optional
-            Whether the range may be without its COUNT, which samples do not need.
+            True if a range may have no count, because samples need none.
 
         Raises
         ------
         InvalidInputError
-            If it is not of this form, or there cannot be such values.
+            If the text is not of this form, or its values are invalid.
         """
         path, _, given = (part.strip() for part in text.partition("="))
         if not path or not given:
@@ -115,7 +136,7 @@ class Variation:
 
 
 def word_of(value: Value) -> str:
-    """Return a value as a caller writes it."""
+    """Return a value as a variation is written: six digits, ``true``, ``false`` or ``null``."""
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Results as tables for a person."""
+"""Print results as tables of text in a terminal."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Print the body space of a stance as tables for a person."""
+"""Print the body space of a stance as tables of text."""
 
 from __future__ import annotations
 
@@ -26,7 +26,15 @@ __all__ = ["print_body_space"]
 
 
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:
-    """Print the body space of a stance."""
+    """Print the body space of a stance: extents by axis, one section, and largest accelerations.
+
+    Parameters
+    ----------
+    reply : BodySpaceReply
+        Body wrenches that the hands together can exert, in B [N, N·m].
+    out : Console
+        Console to print on.
+    """
     used = "" if reply.utilisation is None else f"   utilisation {reply.utilisation:.3f}"
     known = f"{used}   {1e3 * reply.time.total:.0f} ms"
     out.print(Text.assemble(in_colour(reply.status, reply.status.upper()), known))

@@ -1,4 +1,4 @@
-"""Define exit statuses, and where commands keep their verbosity, without loading a planner."""
+"""Exit statuses of commands, and the key of their verbosity; imports no planner."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Final
 __all__ = ["VERBOSITY_KEY", "ExitStatus"]
 
 VERBOSITY_KEY: Final = "crux.verbosity"
-"""Key in the ``meta`` of a command's context: 1 for more output, -1 for less."""
+"""Key of the verbosity in the ``meta`` of a click context: 1 for more output, -1 for less."""
 
 
 class ExitStatus(IntEnum):
-    """Exit status of a command."""
+    """Exit status of a command: done, failed, invalid input, or overloaded."""
 
     DONE = 0
     FAILED = 1
@@ -21,7 +21,14 @@ class ExitStatus(IntEnum):
 
     @classmethod
     def of(cls, status: str) -> ExitStatus:
-        """Return the exit status of a plan's status, or of a route's."""
+        """Return the exit status for the status of a plan or a route.
+
+        Parameters
+        ----------
+        status : str
+            ``optimal`` gives DONE; ``overloaded``, ``infeasible`` and ``unreachable`` give
+            OVERLOADED; any other status gives FAILED.
+        """
         match status:
             case "optimal":
                 return cls.DONE

@@ -1,4 +1,4 @@
-"""Print the extras of a plan for a person: advice, spread and robustness."""
+"""Print the extras of a plan: advice, spread over samples, and robustness."""
 
 from __future__ import annotations
 
@@ -22,14 +22,30 @@ __all__ = [
 
 
 def words_of(advice: Advice, *, holding: bool = False) -> str:
-    """Return in words what one change would do; ``holding``: the stance already holds."""
+    """Return an advice as a sentence, with the utilisation that the change would give.
+
+    Parameters
+    ----------
+    advice : Advice
+        One change of the question, planned and verified.
+    holding : bool, optional
+        True if the stance is feasible without the change.
+    """
     what = "better" if holding else "feasible" if advice.holds else "less overloaded"
     colon = "" if advice.sentence.startswith("if ") else ":"
     return f"{what} (utilisation {advice.utilisation:.2f}){colon} {advice.sentence}"
 
 
 def print_advice(reply: PlanReply, out: Console) -> None:
-    """Print the advice of a plan, or that no change that was tried lowers the utilisation."""
+    """Print the three best changes that a plan's advice has, or that no change helps.
+
+    Parameters
+    ----------
+    reply : PlanReply
+        Reply with advice; nothing is printed if it has none.
+    out : Console
+        Console to print on.
+    """
     holding = reply.status == "optimal"
     # the three best changes
     for advice in islice(reply.advice or (), 3):
@@ -40,9 +56,17 @@ def print_advice(reply: PlanReply, out: Console) -> None:
 
 
 def with_interval(value: float, spread: Quantiles | None) -> str:
-    """Return a number with its 5 to 95 % interval, if that is known.
+    """Return a number as text, with its interval from the 5 % to the 95 % quantile.
 
-    The interval has the first decimal in which its ends differ, the number one more.
+    The interval is rounded to the first decimal in which its ends differ, and the number to one
+    decimal more.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    spread : Quantiles or None
+        Quantiles of the number over samples of the parameters; None to print the number alone.
     """
     if spread is None:
         return f"{value:.3f}"
@@ -51,7 +75,19 @@ def with_interval(value: float, spread: Quantiles | None) -> str:
 
 
 def spread_sentence(spread: Spread) -> str:
-    """Return in how many samples a stance holds, its largest sensitivity, and what was left out."""
+    """Return a sentence about a Monte Carlo study of uncertain parameters.
+
+    Parameters
+    ----------
+    spread : Spread
+        Results over all samples.
+
+    Returns
+    -------
+    str
+        In how many samples the stance is feasible, the parameter with the largest sensitivity with
+        its Spearman rank correlation, and how many samples have no plan or no load factor.
+    """
     said = f"feasible in {spread.holds} of {spread.draws} samples"
     if spread.cap < 1.0:
         said += f" within a utilisation of {spread.cap:g}"
@@ -69,7 +105,18 @@ def spread_sentence(spread: Spread) -> str:
 
 
 def robust_sentence(robust: RobustLoadFactor) -> str:
-    """Return the load factor for places of the hands near the given ones, in a sentence."""
+    """Return a sentence about the load factor over sampled places of the hands.
+
+    Parameters
+    ----------
+    robust : RobustLoadFactor
+        Load factor over places near the given ones.
+
+    Returns
+    -------
+    str
+        Quantiles of the load factor, and hands that cannot be at some of the places.
+    """
     low, high = robust.tenth_interval
     said = f"10 % quantile {robust.tenth:.3f} ({low:.3f} to {high:.3f}), "
     said += f"1 % quantile {robust.hundredth:.3f}"

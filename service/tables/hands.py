@@ -1,4 +1,4 @@
-"""Print what one hand carries: on its hold, near it, and in a search with a floating wrist."""
+"""Print the wrenches that one hand can exert: by its wrench space, near its pose, or by search."""
 
 from __future__ import annotations
 
@@ -22,7 +22,15 @@ __all__ = ["print_failures", "print_robust", "print_survey", "print_wrench_space
 
 
 def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
-    """Print the wrench space of one hand."""
+    """Print the wrench space of one hand: contacts, closures, and capability by axis.
+
+    Parameters
+    ----------
+    reply : WrenchSpaceReply
+        Wrenches that the hand can exert on the rock, in H [N, N·m].
+    out : Console
+        Console to print on.
+    """
     seat = ", ".join(f"{1e3 * value:.1f}" for value in reply.seating.pose.position)
     out.print(Text.assemble((reply.limb, "bold"), f" of {reply.robot}"))
     off = 1e3 * reply.seating.backed_off
@@ -57,7 +65,15 @@ def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
 
 
 def print_robust(robust: replies.RobustCapability, out: Console) -> None:
-    """Print the capability in each component for places of the hand near the given one."""
+    """Print the capability of a hand over sampled places near the given one, by axis.
+
+    Parameters
+    ----------
+    robust : RobustCapability
+        Quantiles of the reach along each axis of H [N, N·m].
+    out : Console
+        Console to print on.
+    """
     title = (
         f"what is left of that at {robust.draws} places "
         f"within {1e3 * robust.position:g} mm and {1e3 * robust.angle:g} mrad"
@@ -140,7 +156,20 @@ def _nearby_sentence(closing: replies.ClosingSequenceReply) -> str:
 
 
 def survey_json(survey: Survey) -> dict[str, Any]:
-    """Return the search as JSON values: extreme wrenches, poses, and what lets go at each."""
+    """Convert the search over poses of a floating wrist into JSON values.
+
+    Parameters
+    ----------
+    survey : Survey
+        Result of the search.
+
+    Returns
+    -------
+    dict
+        Number of poses ``tried`` and ``held`` (no limit exceeded); extreme ``wrenches`` in H
+        [N, N·m], their ``twists`` of the wrist [m, rad] and ``limiting`` limits; and ``ends``, the
+        farthest wrench along each axis and sign, such as ``+fx``.
+    """
     found = survey.found
     return {
         "tried": found.tried,
@@ -173,7 +202,15 @@ def _limit(row: Row | None) -> dict[str, str | None] | None:
 
 
 def print_survey(survey: Survey, out: Console) -> None:
-    """Print how far the hand goes along each axis, and which tiles let go first."""
+    """Print the search over poses of a floating wrist: reach by axis, and limits exceeded first.
+
+    Parameters
+    ----------
+    survey : Survey
+        Result of the search.
+    out : Console
+        Console to print on.
+    """
     found = survey.found
     out.print(
         f"search: at {found.held} of {found.tried} poses of the wrist nothing lets go; "
@@ -202,7 +239,16 @@ def _print_survey_ends(survey: Survey, out: Console) -> None:
 
 
 def print_failures(limiting: Sequence[Row | None], out: Console) -> None:
-    """Print how often each tile of each finger, or another part, lets go first."""
+    """Print how often each tile of each finger, or another part, is the first to exceed its limit.
+
+    Parameters
+    ----------
+    limiting : sequence of Row or None
+        Limit that is reached first at each wrench; None for a hard row, nearly always of a tile
+        that would be dragged backwards.
+    out : Console
+        Console to print on.
+    """
     # without a limit, a part that can only push or only pull would have to do the other: nearly
     # always a tile
     dragged = (None, "a tile dragged backwards")

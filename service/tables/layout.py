@@ -1,4 +1,4 @@
-"""Lay out tables in 80 columns: rows of structs under a title, each column with its unit."""
+"""Lay out tables in 80 columns: rows under a title, each column with its unit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,13 @@ __all__ = [
 
 
 def console(stderr: bool = False) -> Console:
-    """Return the console on standard output, or on standard error."""
+    """Return a rich console on standard output, at least 80 columns wide, or on standard error.
+
+    Parameters
+    ----------
+    stderr : bool, optional
+        True for standard error, with the width of the terminal.
+    """
     from rich.console import Console
 
     screen = Console(highlight=False, stderr=stderr)
@@ -38,7 +44,15 @@ def console(stderr: bool = False) -> Console:
 
 
 def in_colour(status: str, word: str | None = None) -> Text:
-    """Return a status, or a word in its place, in bold and in its colour."""
+    """Return a status as bold text: green for optimal, red for overloaded, infeasible or failed.
+
+    Parameters
+    ----------
+    status : str
+        Status that determines the colour.
+    word : str, optional
+        Text in place of the status.
+    """
     from rich.text import Text
 
     bad = status in {"overloaded", "infeasible", "failed"}
@@ -47,7 +61,7 @@ def in_colour(status: str, word: str | None = None) -> Text:
 
 
 def print_warnings(warnings: Iterable[str], out: Console) -> None:
-    """Print warnings, one below the other."""
+    """Print each warning on lines of its own."""
     from rich.text import Text
 
     for warning in warnings:
@@ -55,7 +69,15 @@ def print_warnings(warnings: Iterable[str], out: Console) -> None:
 
 
 def short(value: float, digits: int) -> str:
-    """Return a number with at most so many decimals, fewer if it is large."""
+    """Return a number as text, with fewer decimals if the number is large.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    digits : int
+        Maximum number of decimals; a number from 100 on has at most one, from 1000 on none.
+    """
     # from 1e4 on, a number has no decimals; from a tenth of it on, it has one
     while digits and abs(value) >= 1e4 / 10.0**digits:
         digits -= 1
@@ -63,7 +85,7 @@ def short(value: float, digits: int) -> str:
 
 
 class PrintedColumn(NamedTuple):
-    """A column of a table.
+    """Column of a table that is printed.
 
     Attributes
     ----------
@@ -71,13 +93,13 @@ class PrintedColumn(NamedTuple):
         Head of the column, with the unit.
     value : str or callable, optional
         Path of the value in a row (attributes, keys and indices with dots between them), or a
-        function of the row; by default the attribute of the head's name.
+        function of the row. By default the attribute that has the head's name.
     form : str or callable
         Format of numbers, as `format` takes it, or a function that returns their text.
     scale : float, optional
-        Factor of the numbers, for their unit.
+        Factor that converts numbers to the unit in the head.
     kind : {'name', 'number', 'text'}
-        Names are not wrapped, numbers are aligned right, texts are wrapped.
+        Layout: names are not wrapped, numbers are aligned right, texts are wrapped.
     """
 
     head: str
@@ -87,7 +109,13 @@ class PrintedColumn(NamedTuple):
     kind: Literal["name", "number", "text"] = "name"
 
     def cell(self, row: Any) -> str | Text:
-        """Return the text of a row's cell; ``-`` if there is no value."""
+        """Return the text of this column's cell in a row; ``-`` if the row has no value.
+
+        Parameters
+        ----------
+        row : object
+            Struct, mapping or sequence that the path of the value leads into.
+        """
         from rich.text import Text
 
         found = self.value(row) if callable(self.value) else self._found(row)
@@ -115,7 +143,23 @@ text = partial(PrintedColumn, kind="text")
 def in_order(
     names: Iterable[str], numbers: Iterable[str] = (), texts: Iterable[str] = (), form: str = ""
 ) -> list[PrintedColumn]:
-    """Return columns of rows that are sequences: names, numbers in one form, and texts."""
+    """Return columns for rows that are sequences; the i-th column shows the i-th cell.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Heads of the first columns, whose cells are not wrapped.
+    numbers : iterable of str, optional
+        Heads of the next columns, which have numbers.
+    texts : iterable of str, optional
+        Heads of the last columns, whose cells are wrapped.
+    form : str, optional
+        Format of the numbers, as `format` takes it.
+
+    Returns
+    -------
+    list of PrintedColumn
+    """
     columns = [*map(name, names), *map(partial(number, form=form), numbers), *map(text, texts)]
     return [column._replace(value=str(i)) for i, column in enumerate(columns)]
 
@@ -136,20 +180,22 @@ def print_rows(
     Parameters
     ----------
     rows : iterable
-        Structs, or sequences of cells.
+        Rows: structs, or sequences of cells.
     columns : iterable of PrintedColumn
+        Columns of the table.
     out : Console
+        Console to print on.
     title : str, optional
-        Printed above it, in bold.
+        Title above the table, in bold.
     groups : bool, optional
-        True if a gap separates rows with different first cells.
+        True to separate rows with different first cells by a gap.
     style : callable, optional
-        Returns the style of a row.
+        Returns the rich style of a row.
     heads : bool, optional
-        True if the columns' heads are shown.
+        True to show the heads of the columns.
     padding : int, optional
-        Spaces at either side of a cell; at one side if a table without texts is wider than the
-        console.
+        Spaces at both sides of a cell; only at the right if the table is wider than the console and
+        has no columns of text.
     """
     from rich import box
     from rich.table import Table
@@ -178,5 +224,5 @@ def print_rows(
 
 
 def axis_unit(axis: str) -> str:
-    """Return the unit of a component of a wrench."""
+    """Return the unit of a wrench's component: N for a force ``fx``, N·m for a moment ``mx``."""
     return "N" if axis.startswith("f") else "N·m"

@@ -1,4 +1,4 @@
-"""Lock the output of a command: two runs on one output would mix their answers."""
+"""Lock the output file of a command, so that two runs cannot write to the same output."""
 
 from __future__ import annotations
 
@@ -17,19 +17,22 @@ __all__ = ["write_alone"]
 
 
 def write_alone(file: Path, output: Path | None = None) -> None:
-    """Lock an output against other runs until the running command or its process ends.
+    """Lock an output file against other processes until the running click command ends.
+
+    The lock is a file ``.NAME.lock`` beside the output. Devices and pipes are not locked. On a file
+    system without locks, a remark is printed instead.
 
     Parameters
     ----------
     file : Path
-        A file that is written; the lock is beside it, ``.NAME.lock``.
+        File that the command writes.
     output : Path, optional
-        The output as it was given; by default the file.
+        Name of the output in error messages; by default ``file``.
 
     Raises
     ------
     InvalidInputError
-        If another process has the lock, or it cannot be written.
+        If another process has the lock, or the lock file cannot be written.
     """
     click.get_current_context().with_resource(_alone_at(file, output or file))
 

@@ -1,4 +1,4 @@
-"""Plans and climbs as tables for a person, in 80 columns."""
+"""Print plans and routes as tables of text, in 80 columns."""
 
 from __future__ import annotations
 
@@ -36,16 +36,21 @@ def print_plan(
     without_palm: replies.PlanReply | None = None,
     brief: bool = False,
 ) -> None:
-    """Print a plan without its advice.
+    """Print a plan: status, loads of hands, tendons, joint torques, and the extras of the reply.
+
+    Extras are shadow prices, the infeasibility certificate, the spread over samples, robustness and
+    clearance. The advice of the reply is not printed; see `print_advice`.
 
     Parameters
     ----------
     reply : PlanReply
+        The plan.
     out : Console
+        Console to print on.
     without_palm : PlanReply, optional
-        The same question's answer with every palm left out.
+        Plan of the same question without palms, whose load factor is printed, too.
     brief : bool, optional
-        True if only status and reason are printed.
+        True to print only the status, the reason and the sentence about samples.
     """
     spread = reply.spread if isinstance(reply.spread, planner.Spread) else None
     known = [f"   {part}" for part in _first_line(reply, spread)]
@@ -268,7 +273,17 @@ def _print_clearance(clearance: planner.Clearance, out: Console) -> None:
 
 
 def print_route(result: planner.RouteResult, files: Mapping[str, Path], out: Console) -> None:
-    """Print a climb, stage by stage, its crux, and where its files are."""
+    """Print a route: status and utilisation of each stage, the crux, and the written files.
+
+    Parameters
+    ----------
+    result : RouteResult
+        Plans of all stages.
+    files : mapping of str to Path
+        Written files, by what they contain.
+    out : Console
+        Console to print on.
+    """
     out.print(Text.assemble((result.route.name, "bold"), f": {len(result.route.moves)} moves"))
     numbers = {"util": "utilisation", "load factor": "load_factor", "joints": "joint_utilisation"}
     if all(plan.joint_utilisation is None for plan in result.plans):

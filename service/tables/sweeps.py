@@ -1,4 +1,4 @@
-"""Print a sweep: the number of points that hold, and the border where they stop holding."""
+"""Print a sweep as tables of text: points, feasible ranges, and borders of feasibility."""
 
 from __future__ import annotations
 
@@ -18,7 +18,17 @@ ItemT = TypeVar("ItemT")
 
 
 def print_sweep(sweep: Sweep, out: Console) -> None:
-    """Print the table of a sweep: its points over one variable, its border over two."""
+    """Print a sweep: points over one variable, or feasible ranges over two; counts and borders.
+
+    Over other variables, the points of least and largest utilisation are printed.
+
+    Parameters
+    ----------
+    sweep : Sweep
+        Results of the sweep.
+    out : Console
+        Console to print on.
+    """
     design = sweep.design
     varying = design.varying
     numbers = [i for i in varying if design.variations[i].numbers]

@@ -1,4 +1,4 @@
-"""Print results and progress of commands, draw pictures, and return exit statuses."""
+"""Write results and progress of commands to the terminal, and convert errors of writing files."""
 
 from __future__ import annotations
 
@@ -35,30 +35,43 @@ __all__ = [
 
 
 def verbosity() -> int:
-    """Return the verbosity: 1 for more output than by default (0), -1 for less."""
+    """Return the verbosity of the running command: 1 for more output, 0 by default, -1 for less."""
     context = click.get_current_context(silent=True)
     level: int = 0 if context is None else context.meta.get(VERBOSITY_KEY, 0)
     return level
 
 
 def remark(message: str) -> None:
-    """Write one line on standard error, unless verbosity is -1."""
+    """Print one line on standard error, unless the verbosity is -1."""
     if verbosity() >= 0:
         note(message)
 
 
 def note(message: str) -> None:
-    """Write one line on standard error."""
+    """Print one line on standard error."""
     click.echo(f"crux: {' '.join(message.split())}", err=True)
 
 
 def say(result: object) -> None:
-    """Write a result as one line of JSON."""
+    """Print a result on standard output as one line of JSON."""
     click.echo(msgspec.json.encode(result))
 
 
 def show(reply: replies.PlanReply | replies.BriefPlanReply, as_json: bool) -> int:
-    """Write a plan, and return its exit status; a brief reply is written as JSON."""
+    """Print a plan as tables or as JSON, and return the exit status of the command.
+
+    Parameters
+    ----------
+    reply : PlanReply or BriefPlanReply
+        The plan; a brief reply is always printed as JSON.
+    as_json : bool
+        True to print JSON.
+
+    Returns
+    -------
+    int
+        An `ExitStatus`, from the status of the plan.
+    """
     from service.tables.extras import print_advice
     from service.tables.plans import print_plan
 
@@ -73,7 +86,7 @@ def show(reply: replies.PlanReply | replies.BriefPlanReply, as_json: bool) -> in
 
 
 def tell_solver(reply: replies.PlanReply) -> None:
-    """Write how a plan was found, if verbosity is 1."""
+    """Print solver, iterations and times of a plan on standard error, if the verbosity is 1."""
     if verbosity() > 0:
         solver, time = reply.solver, reply.time
         note(
@@ -84,14 +97,44 @@ def tell_solver(reply: replies.PlanReply) -> None:
 
 
 def write_plan_picture(answer: answering.Planned, picture: Path) -> None:
-    """Draw a plan in its stance."""
+    """Plot the stance and the plan of an answer to a file.
+
+    Parameters
+    ----------
+    answer : Planned
+        Question and plan.
+    picture : Path
+        File to write; its ending names the format.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file cannot be written.
+    CruxError
+        If the disk is full or fails.
+    """
     with writing(picture):
         planner.plot_plan(answer.plan, answer.question, picture)
 
 
 @contextmanager
 def writing(path: Path, field: str = "--plot") -> Iterator[None]:
-    """Turn an error in writing a file into one line that names the option if it is at fault."""
+    """Convert errors of writing a file, within this context, into errors of one line.
+
+    Parameters
+    ----------
+    path : Path
+        File that is written.
+    field : str, optional
+        Option of the command that names the file.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file cannot be written.
+    CruxError
+        If the disk is full or fails.
+    """
     try:
         yield
     except OSError as error:
@@ -102,7 +145,15 @@ def writing(path: Path, field: str = "--plot") -> Iterator[None]:
 
 @contextmanager
 def filling_folder() -> Iterator[None]:
-    """Turn an error in writing a folder into one line about it."""
+    """Convert errors of writing into a folder, within this context, into errors of one line.
+
+    Raises
+    ------
+    InvalidInputError
+        If a file cannot be written.
+    CruxError
+        If the disk is full or fails.
+    """
     try:
         yield
     except OSError as error:
@@ -119,22 +170,28 @@ def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError
 
 
 class Progress(Protocol):
-    """Function that takes the work done, the total, and optionally a few words."""
+    """Protocol of a function that reports progress: work done, total, and a few words if wanted."""
 
     def __call__(self, done: int, total: int, words: str = "") -> None: ...
 
 
 @contextmanager
 def progress(title: str, *, line: str | None = None, counted: bool = False) -> Iterator[Progress]:
-    """Show a bar on standard error while the work lasts; yield the function that updates it.
+    """Show a progress bar on standard error, within this context.
 
     Parameters
     ----------
     title : str
+        Text before the bar.
     line : str, optional
-        Written at the first step, where no bar can be shown.
+        Text to print once, at the first step, if standard error is no terminal.
     counted : bool, optional
-        True if counts, the time left and words are also shown.
+        True to show counts in place of percentages.
+
+    Yields
+    ------
+    Progress
+        Function that updates the bar.
     """
     from rich import progress as bars
 
@@ -162,14 +219,22 @@ def progress(title: str, *, line: str | None = None, counted: bool = False) -> I
 
 
 def waiting(title: str, request: PlanRequest) -> AbstractContextManager[None]:
-    """Show that an answer takes a while, as plans with wrists that give way do."""
+    """Show a title on the terminal while a plan with floating or compliant wrists is computed.
+
+    Parameters
+    ----------
+    title : str
+        Text to show.
+    request : PlanRequest
+        Request that is answered; nothing is shown if all its wrists are fixed.
+    """
     floats = any(hand.wrist != "fixed" for hand in request.stance.hands)
     return working(title) if floats else nullcontext()
 
 
 @contextmanager
 def working(title: str) -> Iterator[None]:
-    """Show on a terminal's standard error what is being done, unless verbosity is -1."""
+    """Show a title on the terminal within this context, unless the verbosity is -1."""
     screen = console(stderr=True)
     shown = screen.is_terminal and verbosity() >= 0
     with screen.status(title) if shown else nullcontext():

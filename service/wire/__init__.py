@@ -1,4 +1,4 @@
-"""Wire format of messages: encodings, checks, errors, keys and schemas."""
+"""Wire format of messages: encodings, validation, errors, zenoh keys, and JSON Schema."""
 
 import lazy_loader
 

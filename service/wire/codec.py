@@ -1,4 +1,4 @@
-"""Encode and decode messages as JSON or MessagePack, named by a zenoh encoding."""
+"""Encode messages as JSON or MessagePack, and decode and validate requests."""
 
 from __future__ import annotations
 
@@ -35,32 +35,36 @@ __all__ = [
 MessageT = TypeVar("MessageT")
 
 LARGEST_REQUEST: Final = 2**26
-"""Most bytes of a request; a stance takes a few thousand, a scan of 200,000 triangles about 10⁷."""
+"""Maximum bytes of a request: a stance has some thousand, a scan of 200,000 triangles about 10⁷."""
 
 LARGEST_ERROR: Final = 4096
-"""Most bytes of an error reply."""
+"""Maximum bytes of an error reply."""
 
 
 LATER_FIELDS: Final = {"confidence": "leave it out: tile limits are nominal"}
-"""Fields of later versions, with the advice for a request that has them."""
+"""Request fields that this version does not support, each with advice for the error message."""
 
 
 class Format(Enum):
-    """Format of a message; the value is its encoding."""
+    """Encoding of a message, JSON or MessagePack; the enum's value is the media type."""
 
     JSON = "application/json"
     MSGPACK = "application/msgpack"
 
     @classmethod
     def named(cls, encoding: str) -> Format:
-        """Return the format of a zenoh encoding, whatever schema it names after a semicolon.
+        """Return the format that a zenoh encoding names; a schema after a semicolon is ignored.
 
-        No encoding, and zenoh's own default, mean JSON.
+        Parameters
+        ----------
+        encoding : str
+            Such as ``application/json;crux.PlanReply@1``. An empty encoding, and zenoh's default
+            ``zenoh/bytes``, mean JSON.
 
         Raises
         ------
         MalformedError
-            If the encoding is of neither format.
+            If the encoding is neither JSON nor MessagePack.
         """
         plain = encoding.partition(";")[0].strip().lower()
         if plain in {"", "zenoh/bytes", "text/json"}:
@@ -73,29 +77,36 @@ class Format(Enum):
             ) from None
 
     def label(self, message: msgspec.Struct) -> str:
-        """Return the encoding of a message with its schema, as in ``…/json;crux.PlanReply@1``."""
+        """Return the zenoh encoding of a message with its schema: ``…/json;crux.PlanReply@1``."""
         return f"{self.value};{_schema_name(type(message))}"
 
     @staticmethod
     def is_labelled(encoding: str, kind: type[msgspec.Struct]) -> bool:
-        """Return whether an encoding names the schema of a kind of message."""
+        """Return True if a zenoh encoding names the schema of a given message type."""
         return encoding.partition(";")[2] == _schema_name(kind)
 
     def encode(self, message: object) -> bytes:
-        """Return a message as bytes."""
+        """Encode a message as bytes in this format."""
         if self is Format.JSON:
             return msgspec.json.encode(message)
         return msgspec.msgpack.encode(message)
 
     def decode(self, payload: bytes, kind: type[MessageT]) -> MessageT:
-        """Return bytes as a message.
+        """Decode bytes of this format into a message.
+
+        Parameters
+        ----------
+        payload : bytes
+            Encoded message.
+        kind : type
+            Message type to return.
 
         Raises
         ------
         msgspec.ValidationError
-            If the bytes are another message.
+            If the bytes are of this format, but do not match the message type.
         MalformedError
-            If the bytes are no message.
+            If the bytes are empty, or not of this format.
         """
         if not payload:
             raise MalformedError(f"empty: nothing was sent, a {kind.__name__} is needed")
@@ -116,21 +127,23 @@ def _schema_name(kind: type[msgspec.Struct]) -> str:
 
 
 class Answer(NamedTuple):
-    """Answer to the caller: a reply, or an error.
+    """Answer to a client: an encoded reply, or an encoded error reply.
 
     Attributes
     ----------
     payload : bytes
+        Encoded reply.
     encoding : str
-        Encoding of the payload, with its schema.
+        Zenoh encoding of the payload, with its schema.
     good : bool
-        True for a reply, false for an error.
+        True for a reply, false for an error reply.
     status : str
-        Status of a reply that has one; the kind of an error.
+        Status of the reply, such as ``optimal``, or ``done`` for a reply without one; for an error
+        reply the kind of error.
     seconds : float
-        Duration of the work [s].
+        Wall-clock time that the answer took [s].
     cost : float
-        Processor time of it [s], which other programs on the machine do not change.
+        Processor time that the answer took [s]; other programs on the machine do not change it.
     """
 
     payload: bytes
@@ -142,12 +155,25 @@ class Answer(NamedTuple):
 
 
 def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.JSON) -> MessageT:
-    """Return bytes as a request that has passed every check which needs no model.
+    """Decode and validate a request, with every check that does not need a hand model.
+
+    The checks are: size, encoding, field types and bounds, finite numbers, repeated keys, and
+    fields that this version does not support.
+
+    Parameters
+    ----------
+    payload : bytes
+        Encoded request.
+    kind : type
+        Request type to return.
+    form : Format, optional
+        Encoding of the payload.
 
     Raises
     ------
     InvalidInputError
-        With the field to blame; as `MalformedError` or `UnsupportedError` where that is the case.
+        If the request is invalid. The error names the field, and is a `LimitError`,
+        `MalformedError` or `UnsupportedError` where one of these applies.
     """
     check_size(len(payload), kind)
     try:
@@ -213,7 +239,7 @@ def _check(value: object, path: str = "") -> None:
 
 
 def most_bytes(kind: type) -> int:
-    """Return the most bytes of a request of a kind; a larger one is not decoded."""
+    """Return the maximum bytes of a request of a given type; larger payloads are not decoded."""
     if kind is SetPointsRequest:
         # it has no rock
         return 2**12
@@ -224,12 +250,18 @@ def most_bytes(kind: type) -> int:
 
 
 def check_size(size: int, kind: type) -> None:
-    """Refuse a payload of too many bytes.
+    """Raise an error for a payload that is larger than its request type allows.
+
+    Parameters
+    ----------
+    size : int
+        Size of the payload [bytes].
+    kind : type
+        Type of the request.
 
     Raises
     ------
     LimitError
-        If a request of that kind may not have so many.
     """
     most = most_bytes(kind)
     if size > most:
@@ -259,16 +291,30 @@ class _Bounded(msgspec.Struct):
 
 
 def identifier(payload: bytes, form: Format, kind: type | None = None) -> str | None:
-    """Return a request's ``id``, also of an invalid request; None if it cannot be read.
+    """Return a request's ``id``, also if the rest of the request is invalid.
 
-    It is not read from a payload that is too large for the kind of request.
+    Parameters
+    ----------
+    payload : bytes
+        Encoded request, in the format ``form``.
+    form : Format
+    kind : type, optional
+        Request type, whose maximum of bytes applies; by default `LARGEST_REQUEST`.
+
+    Returns
+    -------
+    str or None
+        None if the request has no ``id``, cannot be decoded, or is too large.
     """
     read = _part(payload, form, kind, _Named)
     return None if read is None else read.id
 
 
 def most_error_bytes(payload: bytes, form: Format, kind: type | None = None) -> int:
-    """Return how many bytes an error reply to a request may take; parameters as `identifier`."""
+    """Return the maximum bytes of an error reply to a request; parameters as for `identifier`.
+
+    This is the request's ``max_reply_bytes``, but at most `LARGEST_ERROR`.
+    """
     read = _part(payload, form, kind, _Bounded)
     most = None if read is None else read.max_reply_bytes
     return LARGEST_ERROR if most is None else min(most, LARGEST_ERROR)
@@ -290,21 +336,20 @@ def encode_error(
     kind: str | None = None,
     most: int = LARGEST_ERROR,
 ) -> Answer:
-    """Return an error reply as an answer.
-
-    Texts are cut if the reply would have more than `LARGEST_ERROR` bytes, or more than the
-    caller allows.
+    """Encode an error as an error reply, with texts cut to fit a maximum of bytes.
 
     Parameters
     ----------
     error : CruxError
+        Error with kind, message and field.
     form : Format
+        Encoding of the reply.
     name : str, optional
-        The request's ``id``.
+        The request's ``id``, which the reply repeats.
     kind : str, optional
-        Kind in the reply; by default the error's own.
+        Kind of error in the reply; by default the kind of ``error``.
     most : int, optional
-        Bytes that it may take, at least `service.requests.LEAST_REPLY_BYTES`.
+        Maximum bytes of the reply, at least `service.requests.LEAST_REPLY_BYTES`.
     """
     status = error.kind if kind is None else kind
     # most encoded bytes of each text; every id that a request may have fits

@@ -1,4 +1,4 @@
-"""Refuse objects with a key twice; a decoder would silently take the last one."""
+"""Refuse requests in which an object has the same key twice; a decoder would keep only the last."""
 
 from __future__ import annotations
 
@@ -19,12 +19,17 @@ LONG_LIST: Final = re.compile(rb":[ \t\n\r]*\[[-+0-9.eE,\[\] \t\n\r]{1000,}\](?=
 
 
 def refuse_in_json(payload: bytes) -> None:
-    """Refuse a payload that has been decoded, if an object in it has a key twice.
+    """Raise an error if an object in a JSON payload has the same key twice.
+
+    Parameters
+    ----------
+    payload : bytes
+        JSON that has been decoded without an error.
 
     Raises
     ------
     MalformedError
-        With the key's path.
+        If a key is repeated; the error's ``field`` is the path of the key.
     """
     short = LONG_LIST.sub(b":[]", payload) if _is_long(payload) else payload
     found: list[_Repeated] = []
@@ -41,12 +46,17 @@ def refuse_in_json(payload: bytes) -> None:
 
 
 def refuse_in_msgpack(payload: bytes) -> None:
-    """Refuse a payload that has been decoded, if a map in it has a key twice.
+    """Raise an error if a map in a MessagePack payload has the same key twice.
+
+    Parameters
+    ----------
+    payload : bytes
+        MessagePack that has been decoded without an error.
 
     Raises
     ------
     MalformedError
-        With the key's path.
+        If a key is repeated; the error's ``field`` is the path of the key.
     """
     if not _is_long(payload):
         again = msgspec.msgpack.encode(msgspec.msgpack.decode(payload))

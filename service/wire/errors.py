@@ -1,4 +1,4 @@
-"""Define the errors between a caller and the service."""
+"""Errors that a client of the service can get, each with its ``kind`` on the wire."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ __all__ = [
 ]
 
 REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", "limit", "unreachable"})
-"""Kinds of error in the request; the same request would fail again."""
+"""Kinds of error whose cause is the request; a retry of the same request would fail again."""
 
 
 class BusyError(CruxError):
-    """A question that a service has no room for now.
+    """The service's queue is full; the client should retry later.
 
     Parameters
     ----------
     message : str
+        Error message.
     retry_after : float
-        Time after which to ask again [s].
+        Time after which the client should retry [s].
 
     Attributes
     ----------
-    retry_after
+    retry_after : float
+        Time after which the client should retry [s].
     """
 
     kind = "busy"
@@ -42,26 +44,35 @@ class BusyError(CruxError):
 
 
 class MalformedError(InvalidInputError):
-    """Bytes that are not the encoding they claim to be, or too many of them."""
+    """The request is not in the encoding that it claims to be in, or its structure is broken."""
 
     kind = "malformed"
 
 
 class ServiceError(CruxError):
-    """The service's own error reply.
+    """An error reply of the service, raised at the client.
 
     Parameters
     ----------
     kind : str
-        As in the reply.
+        Kind of error, from the reply.
     message : str
+        Error message, from the reply.
     field : str, optional
+        Path of the request's field that is to blame.
     retry_after : float, optional
-        Time after which to ask a busy service again [s].
+        Time after which to retry, from a busy service [s].
 
     Attributes
     ----------
-    kind, message, field, retry_after
+    kind : str
+        Kind of error.
+    message : str
+        Error message.
+    field : str or None
+        Path of the request's field that is to blame.
+    retry_after : float or None
+        Time after which to retry [s].
     """
 
     def __init__(
@@ -78,18 +89,18 @@ class ServiceError(CruxError):
 
 
 class LostError(CruxError):
-    """A request that no process lived to answer."""
+    """Every worker that got the request died before it answered."""
 
     kind = "lost"
 
 
 class NoServiceError(CruxError):
-    """Nobody answered: no service, or one that died with the question in its hands."""
+    """No service can be reached, or the service ended before it answered."""
 
     kind = "no_service"
 
 
 class ServiceTimeout(CruxError):  # noqa: N818 - a timeout says what it is
-    """The service took the question but did not answer in time."""
+    """The service did not answer before the client's timeout."""
 
     kind = "timeout"

@@ -1,4 +1,4 @@
-"""Build the JSON Schema of every message."""
+"""Build the JSON Schema of all requests and replies."""
 
 from __future__ import annotations
 
@@ -56,9 +56,14 @@ ALIKE: Final = frozenset({"Hand"})
 
 
 def schema() -> dict[str, Any]:
-    """Return one schema whose ``$defs`` hold every message; a valid document is one of them.
+    """Build one JSON Schema for all messages; a document is valid if it is one of the messages.
 
-    ``keys`` has for each key the request, null if it takes none, and the reply.
+    Returns
+    -------
+    dict
+        The schema, draft 2020-12. Besides ``$defs`` with all types, the entry ``keys`` has the
+        types of request, reply and error for each zenoh key; the request is null for a key that
+        takes none.
     """
     wholes, parts = msgspec.json.schema_components(
         (*MESSAGE_KINDS, Quantity), ref_template="#/$defs/{name}"
@@ -93,7 +98,19 @@ def schema() -> dict[str, Any]:
 
 
 def part_name(title: str) -> str:
-    """Return the schema's name of a class: no parameters, and no Reply after a part of a reply."""
+    """Return a class's name in the schema, without type parameters and mostly without ``Reply``.
+
+    Parameters
+    ----------
+    title : str
+        Name of the class, such as ``Palm[list[float]]``.
+
+    Returns
+    -------
+    str
+        Name of the class; without the ending ``Reply`` if the class is only a part of a reply, and
+        no part of a request has the same name.
+    """
     name = title.partition("[")[0]
     short = name.removesuffix("Reply")
     return name if short in ALIKE or name in {each.__name__ for each in MESSAGE_KINDS} else short

@@ -1,4 +1,4 @@
-"""Define the keys of the service in zenoh's key space."""
+"""Keys of the service in zenoh's key space."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["DEFAULT_ROBOT", "ServiceName", "service_key"]
 
 
 class ServiceName(StrEnum):
-    """Last part of a key."""
+    """Last part of a zenoh key, which selects the handler of the request."""
 
     PLAN = "plan"
     WRENCH_SPACE = "wrench_space"
@@ -19,17 +19,25 @@ class ServiceName(StrEnum):
     HEALTH = "health"
     METRICS = "metrics"
     ROUTE = "route"
-    """Question of bulk work alone: it takes too long to be asked over zenoh."""
+    """Route requests of bulk work; they take too long to be answered over zenoh."""
     ALIVE = "alive"
-    """Liveliness token, present while the service runs."""
+    """Liveliness token, which exists while the service runs."""
     CLIENTS = "clients"
-    """Prefix of session identifiers in the liveliness tokens of clients."""
+    """Prefix of the liveliness tokens of clients; a session identifier follows."""
 
 
 DEFAULT_ROBOT: Final = "robosimian"
-"""Robot of a stance that names none."""
+"""Robot of a stance that names no robot."""
 
 
 def service_key(robot: str, name: str) -> str:
-    """Return the key of one of a robot's services, ``crux/<robot>/<name>``."""
+    """Return the zenoh key of a service, ``crux/<robot>/<name>``.
+
+    Parameters
+    ----------
+    robot : str
+        Name of the robot that the service plans for.
+    name : str
+        A `ServiceName`.
+    """
     return f"crux/{robot}/{name}"

@@ -1,4 +1,4 @@
-"""Turn an error of msgspec into the field to blame and its valid values, from the schema."""
+"""Convert a validation error of msgspec into a field path and a message with valid values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from service.requests import Later
 __all__ = ["PossibleType", "Step", "entered", "field_names", "places_at", "validation_error"]
 
 Step = str | int | None
-"""Step of a path; None for a key that the caller chose."""
+"""Step of a path: a field name, an index, or None for a key of a dict, which the client chooses."""
 
 Decoder = Callable[[Any], object]
 
@@ -28,19 +28,26 @@ Decoder = Callable[[Any], object]
 def validation_error(
     error: msgspec.ValidationError, kind: type, document: Callable[[], Any], decode: Decoder
 ) -> tuple[str | None, str]:
-    """Return the field's dotted path, or None for the whole message, and one line of error message.
+    """Convert a validation error of msgspec into a field path and an error message.
 
     Parameters
     ----------
     error : msgspec.ValidationError
-        Error from decoding a ``kind``.
+        Error from decoding a message.
     kind : type
-        Expected message.
+        Message type that was expected.
     document : callable
-        Returns the decoded message as plain lists and dicts, to look up keys that the caller
-        chose; None if those are not known.
+        Returns the message as plain lists and dicts, in which keys of dicts are looked up; or None
+        if the message cannot be decoded at all.
     decode : callable
-        Decodes such a document, or a part of it, as the message was; raises the same errors.
+        Validates plain lists and dicts as the message type; raises `msgspec.ValidationError`.
+
+    Returns
+    -------
+    field : str or None
+        Path of the field that is to blame, with dots and indices; None for the whole message.
+    message : str
+        One line; where possible with the valid values, and with the value that was given.
     """
     complaint, path = _parts(error)
     steps = _steps(path)
@@ -237,14 +244,36 @@ def _values(types: Iterable[inspect.Type]) -> list[str]:
 
 
 class PossibleType(NamedTuple):
-    """Type that is possible at a place, without its metadata, and the units of its numbers."""
+    """One type that a field may have, and the units of its numbers.
+
+    Attributes
+    ----------
+    kind : msgspec.inspect.Type
+        The type, without metadata such as bounds and descriptions.
+    units : tuple of str
+        One unit for all numbers; two units for equal halves of an array, as of a wrench; empty if
+        no unit is known.
+    """
 
     kind: inspect.Type
     units: tuple[str, ...]
 
 
 def places_at(kind: type, steps: Iterable[Step]) -> list[PossibleType]:
-    """Return the types that are possible at the end of a path into a message of a kind."""
+    """Return the types that a field may have, from its path in a message.
+
+    Parameters
+    ----------
+    kind : type
+        Message type.
+    steps : iterable of (str, int or None)
+        Path of the field: names, indices, and None for any key of a dict.
+
+    Returns
+    -------
+    list of PossibleType
+        One for each member of a union; empty if no such field exists.
+    """
     places = list(_bare(_known(kind)))
     for step in steps:
         places = entered(places, step)
@@ -252,7 +281,20 @@ def places_at(kind: type, steps: Iterable[Step]) -> list[PossibleType]:
 
 
 def entered(places: Iterable[PossibleType], step: Step) -> list[PossibleType]:
-    """Return the types that are possible one step further."""
+    """Return the types of an entry of a field, from the types that the field may have.
+
+    Parameters
+    ----------
+    places : iterable of PossibleType
+        Types of the field.
+    step : str, int or None
+        Name or index of the entry; None for any key of a dict.
+
+    Returns
+    -------
+    list of PossibleType
+        Empty if no type has such an entry.
+    """
     found: list[PossibleType] = []
     for place in places:
         parent = place.kind
@@ -273,7 +315,18 @@ def entered(places: Iterable[PossibleType], step: Step) -> list[PossibleType]:
 
 
 def field_names(types: Iterable[inspect.Type]) -> list[str]:
-    """Return the fields of the possible structs, each once, without those of later versions."""
+    """Return the field names of struct types, each once, without fields for later versions.
+
+    Parameters
+    ----------
+    types : iterable of msgspec.inspect.Type
+        Types; those that are no structs are ignored.
+
+    Returns
+    -------
+    list of str
+        Names in the order of the structs' fields, after the name of the tag field.
+    """
     names: list[str] = []
     for kind in types:
         if isinstance(kind, inspect.StructType):
