@@ -66,7 +66,7 @@ class CertificateOf(Struct, Generic[AnyVector, SetOfWrenches], frozen=True, kw_o
     sufficient : sequence of LimitName or None
         Members of the subset whose removal alone makes the question feasible: within the cap, or at
         any utilisation. Empty if no single removal does. None if undecided, or if the subset has
-        more than 16 members and other rows alone are not in the way.
+        more than 24 members and other rows alone are not in the way.
     wrench_spaces : mapping of str to set, or UNSET
         Wrench spaces to which the certificate refers, by limb; none if no hand has a part in it. In
         a reply they come with ``"want": ["model"]`` if there is no plan.
