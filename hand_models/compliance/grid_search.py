@@ -118,7 +118,10 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     if progress is not None:
         progress(total, total)
     if not held:
-        raise EmptySetError(f"none of {total} wrist poses is feasible")
+        raise EmptySetError(
+            f"none of {total} wrist poses of the grid is within every limit: try more poses per "
+            "axis, or another preload"
+        )
     return _pushed(grasp, box, outermost, total, held)
 
 

@@ -106,7 +106,7 @@ def read_scan(
     if not np.ptp(raw.points, axis=0).any():
         place = ", ".join(f"{x:g}" for x in raw.points[0])
         raise InvalidInputError(
-            f"all {len(raw.points):,} points of {path} are equal, ({place}); a scan has points at "
+            f"all {len(raw.points):,} points of {path} are at ({place}); a scan has points at "
             "different places",
             field="file",
         )

@@ -176,7 +176,7 @@ class View:
     def merged(
         self, spots: Iterable[Array], texts: Iterable[str], between: str, near: float
     ) -> list[tuple[Array, str]]:
-        """Return notes with their positions, in a side view with adjacent notes joined into one.
+        """Return notes with their positions; in side views, near notes are joined at the first one.
 
         Parameters
         ----------

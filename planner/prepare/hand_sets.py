@@ -121,7 +121,7 @@ class Sets(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """True if all rows are finite: no phalanx in contact loses its rock at the point."""
+        """True if no row is NaN: at the point every phalanx in contact still reaches its rock."""
         return all(
             np.isfinite(hand.L).all() and np.isfinite(hand.G).all() for hand in self.data.hands
         )

@@ -59,10 +59,10 @@ class TensionTrade(NamedTuple):
 
         u + w Σ (tension / maximum)²   with   u ≤ u* + r,   r = min(`given_away` u*, cap − u*) ≥ 0.
 
-    At the cap and beyond, r is zero. The plan is unique, as the objective is strictly convex; it
-    changes continuously with u* and the rows, as r is continuous. If tension would be traded for
-    nothing, the plan is the one of least utilisation and, among those, of least Σ (tension /
-    maximum)². No plan within u* + r has a sum that is less by more than r/w.
+    At the cap and beyond, r is zero: the plan is that of least utilisation and, among those, of
+    least Σ (tension / maximum)². The plan is unique, as the objective is strictly convex; it
+    changes continuously with u* and the rows, as r is continuous. No plan within u* + r has a sum
+    that is less by more than r/w.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class TensionTrade(NamedTuple):
     most : float
         Largest utilisation of the plan, u* + r.
     whole : float
-        Utilisation that may be spent far from the cap, `given_away` u*.
+        Value of r before the cap shortens it: `given_away` u*, a part of u* from ``plans.toml``.
     """
 
     weight: float

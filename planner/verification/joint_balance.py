@@ -247,12 +247,14 @@ class JointBalance(ResidualLimits):
         return residuals
 
     def stops(self, left: Array) -> Array:
-        """Return the torque with which each joint at a stop presses on it, shape (k,) [N·m].
+        """Return the torque that presses each of the k joints at a stop against it, (k,) [N·m].
+
+        Negative where the joint would leave its stop.
 
         Parameters
         ----------
         left : ndarray, shape (F, 3)
-            Residual of each joint's balance, positive if closing [N·m].
+            Residual of each joint's balance, F fingers of all hands; positive if closing [N·m].
         """
         return np.asarray(left[self.stop_fingers, self.stop_joints] * self._sides)
 

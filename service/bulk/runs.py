@@ -156,7 +156,10 @@ class Run(ABC):
         # each line of replies begins so
         reply = b'{"v":1,'
         if last and not heads and not last.startswith(reply[: len(last)]):
-            raise InvalidInputError(f"{file}: its end is not a reply", field="--resume")
+            raise InvalidInputError(
+                f"{file}: its end is not a reply of a batch",
+                field="--resume",
+            )
         return kept
 
 
@@ -217,7 +220,10 @@ class ReplyLines(Run):
         try:
             reply = msgspec.json.decode(line, type=_Reply)
         except (msgspec.DecodeError, UnicodeDecodeError):
-            raise InvalidInputError(f"{where}: not a reply", field="--resume") from None
+            raise InvalidInputError(
+                f"{where}: not a reply of a batch",
+                field="--resume",
+            ) from None
         name = identifier(question, Format.JSON)
         if reply.id != name:
             raise InvalidInputError(
@@ -226,7 +232,10 @@ class ReplyLines(Run):
                 field="--resume",
             )
         if reply.status is None and reply.error is None:
-            raise InvalidInputError(f"{where}: not a reply", field="--resume")
+            raise InvalidInputError(
+                f"{where}: not a reply of a batch",
+                field="--resume",
+            )
         return reply.outcome
 
 

@@ -173,7 +173,9 @@ def _many(
 ) -> int:
     """Evaluate any number of routes, and keep their results."""
     if any(os.path.abspath(name) == os.path.abspath(file) for name in routes.names):
-        raise InvalidInputError(f"{file}: is one of the routes", field="-o")
+        raise InvalidInputError(
+            f"{file} is one of the routes and would be overwritten; name another file", field="-o"
+        )
     tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
