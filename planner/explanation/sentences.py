@@ -64,6 +64,7 @@ LIMIT_WORDS: Final = {
     JOINT_TORQUE: _Words("its joints", "bears", "bear"),
     JOINT_FORCE: _Words("its joints", "bears", "bear"),
     "wrist_range": _Words("the wrist", barrier="goes no farther"),
+    "wrist_travel": _Words("the wrist", barrier="settles no farther"),
     "slack_tendon": _Words(barrier="cannot push"),
     "dragged_backwards": _Words(barrier="cannot be dragged away from the finger's base"),
     "joint_stop": _Words(barrier="cannot leave its joint's stop"),

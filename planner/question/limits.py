@@ -177,6 +177,12 @@ class Limits(Strict, frozen=True):
                 raise InvalidFieldError(
                     f"must be 0 to {MOST_MARGIN:g} N, got {least:g}", field=name
                 )
+        cap = self.tendon_tension
+        if cap is not None and self.least_tension > cap:
+            raise InvalidFieldError(
+                f"must be at most tendon_tension ({cap:g} N), got {self.least_tension:g}",
+                field="least_tension",
+            )
         torque = self.joint_torque
         if torque is None:
             return
@@ -223,15 +229,19 @@ class LimbStiffness(Strict, frozen=True, kw_only=True):
         About each axis of the hand frame H [N·m/rad].
     """
 
-    position: Annotated[float, Meta(ge=1.0, le=1e9, description="along each axis of H [N/m]")]
-    angle: Annotated[float, Meta(ge=1e-2, le=1e9, description="about each axis of H [N·m/rad]")]
+    position: Annotated[float, Meta(ge=100.0, le=1e9, description="along each axis of H [N/m]")]
+    angle: Annotated[float, Meta(ge=1.0, le=1e9, description="about each axis of H [N·m/rad]")]
 
     def __post_init__(self) -> None:
-        for name, value, unit in (
-            ("position", self.position, "N/m"),
-            ("angle", self.angle, "N·m/rad"),
+        # softer, a wrist would aim metres away: the unit is wrong
+        for name, value, least, unit in (
+            ("position", self.position, 100.0, "N/m"),
+            ("angle", self.angle, 1.0, "N·m/rad"),
         ):
-            check_positive(value, unit, name)
+            if not least <= value <= 1e9:
+                raise InvalidFieldError(
+                    f"must be {least:g} to 1e9 {unit}, got {value:g}", field=name
+                )
 
     @property
     def each(self) -> tuple[float, ...]:

@@ -186,7 +186,7 @@ class HandOnHold:
         if self.tendon_preload is not None:
             if self.wrist != "floating":
                 raise InvalidInputError(
-                    "requires wrist 'floating'; remove it for a fixed wrist",
+                    "requires wrist 'floating'; remove it for any other",
                     field="tendon_preload",
                 )
             preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")

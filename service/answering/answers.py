@@ -233,6 +233,10 @@ def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
     points = replies.HandSetPoints(
         limb=hand.limb, tensions=hand.tensions.tolist(), winch_angle=angle
     )
+    if hand.wrist is not None:
+        points.twist = hand.wrist.twist.tolist()
+        if hand.wrist.pose_target is not None:
+            points.pose_target = hand.wrist.pose_target.tolist()
     if whole:
         points.motor_torque, points.motor_current = torque, current
         points.wrench = hand.wrench.tolist()

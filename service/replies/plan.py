@@ -199,6 +199,8 @@ class HandSetPoints(Struct):
     - ``wrench``: force and moment of the hand on the rock, in H, about H's origin [N, N·m].
     - ``utilisation``: largest load over capacity of the hand's limits; only in a plan, not in a
       stream.
+    - ``twist``: where a compliant or floating wrist goes, about the pose that was given [m, rad].
+    - ``pose_target``: where a limb of the stance's ``limb_stiffness`` is to aim, as ``twist``.
     """
 
     limb: str
@@ -208,6 +210,8 @@ class HandSetPoints(Struct):
     motor_current: Vector | UnsetType = UNSET
     wrench: Vector | UnsetType = UNSET
     utilisation: float | UnsetType = UNSET
+    twist: Vector | UnsetType = UNSET
+    pose_target: Vector | UnsetType = UNSET
 
 
 class BriefPlanReply(StanceReply, kw_only=True):

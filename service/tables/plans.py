@@ -198,7 +198,7 @@ def _print_hands(hands: Sequence[replies.HandReply], out: Console) -> None:
     print_rows(hands, columns, out, "wrench on the rock, in H [N, N·m], and the palm's part")
     floating = [hand for hand in hands if hand.wrist.twist is not None]
     if floating:
-        title = "where floating wrists go (mm, mrad), and how their palms carry"
+        title = "where wrists go (mm, mrad), and how their palms carry"
         turns = enumerate(("vx", "vy", "vz", "wx", "wy", "wz"))
         columns = (
             name("hand", "limb"),
