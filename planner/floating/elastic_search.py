@@ -68,16 +68,39 @@ def find_wrists(
     """
     if hands.together is None or goal is not LEAST_USE:
         return solve_wrists(hands, start, budget, most, goal)
+    # where the least utilisation is worth more than a missing wrench, the price is too low
+    price = SETTINGS.price
+    now, rounds = _descended(hands, goal, start, price, budget, most)
+    found = made_exact(hands, goal, now, rounds, budget)
+    while not found.exact and now.sets.finite and price < 1e3 * SETTINGS.price:
+        if budget.ended or now.measure.missing + now.measure.excess > 0.1:  # no equilibrium near
+            break
+        price *= 10.0
+        now, rounds = _descended(hands, goal, now.point, price, budget, most)
+        found = made_exact(hands, goal, now, rounds, budget)
+    proven = found.exact and gap(goal, found, found.outcome) <= SETTINGS.closeness
+    return replace(found, found="least") if proven else found
+
+
+def _descended(
+    hands: HandSets,
+    goal: Goal,
+    start: LinearisationPoint,
+    price: float,
+    budget: Budget,
+    most: int,
+) -> tuple[WristSolution, int]:
+    """Lower the merit at a price from a start; return where that ends, and the rounds it took."""
     within = 1.0  # one `TWIST_UNIT` and 100 N, for which linearised sets are good
     now = searching(hands, goal, start, within)
     firm = _firm(now.sets)
-    merit, rounds, past = _merit(now), 0, [math.inf] * 6
+    merit, rounds, past = _merit(now, price), 0, [math.inf] * 6
     while rounds < most and not budget.ended:
         rounds += 1
         if past[-6] - merit < 1e-3 * merit:  # six rounds for a thousandth: it creeps along a kink
             break
         past.append(merit)
-        outcome = programs.elastic(now.sets.data, SETTINGS.price, now.point.loads, firm)
+        outcome = programs.elastic(now.sets.data, price, now.point.loads, firm)
         budget.spend()
         if not outcome.solved:
             break
@@ -85,12 +108,12 @@ def find_wrists(
         if promised < 1e-5:  # of the utilisation: nothing better about the point
             break
         there = _moved(hands, goal, now, outcome.loads, within)
-        after = _merit(there)
+        after = _merit(there, price)
         for _ in range(3):
             if not there.sets.finite or merit - after >= 0.7 * promised:
                 break
             restored = repaired(hands, goal, there, within)
-            better = _merit(restored)
+            better = _merit(restored, price)
             if not better < after:
                 break
             there, after = restored, better
@@ -104,18 +127,14 @@ def find_wrists(
         if within < 1e-3:  # only a kink spoils steps of a micrometre and 0.1 N
             break
         now = searching(hands, goal, now.point, within, error=now.error)
-    found = made_exact(hands, goal, now, rounds, budget)
-    proven = found.exact and gap(goal, found, found.outcome) <= SETTINGS.closeness
-    return replace(found, found="least") if proven else found
+    return now, rounds
 
 
-def _merit(state: WristSolution) -> float:
+def _merit(state: WristSolution, price: float) -> float:
     """Return the utilisation, and what is wrong at its price; infinite where rock is lost."""
     if not state.sets.finite:
         return math.inf
-    return state.measure.utilisation + SETTINGS.price * (
-        state.measure.missing + state.measure.excess
-    )
+    return state.measure.utilisation + price * (state.measure.missing + state.measure.excess)
 
 
 def _moved(

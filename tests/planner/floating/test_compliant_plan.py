@@ -172,6 +172,20 @@ def test_a_limb_that_aims_at_its_pose_target_exerts_the_wrench() -> None:
     assert problems(question, replace(answer, hands=hands))
 
 
+@pytest.mark.parametrize(("which", "mass"), [((0,), 0.0), ((0, 2), 1.0)])
+def test_hands_of_which_little_is_asked_have_a_plan(which: tuple[int, ...], mass: float) -> None:
+    question = asked()
+    hands = tuple([question.stance.hands[i] for i in which])
+    question = replace(question, stance=replace(question.stance, hands=hands))
+    if mass:
+        load = msgspec.structs.replace(question.load, mass=mass)
+        answer = plan(replace(question, load=load))
+    else:
+        answer = plan(replace(question, body_wrench=np.zeros(6)))
+    assert answer.status == "optimal"
+    assert answer.utilisation < 0.3
+
+
 def test_hands_that_would_close_otherwise_where_they_go_are_named() -> None:
     def doubted(name: str) -> set[str]:
         words = [each for each in plan(asked(name)).warnings if "closed where its wrist" in each]
