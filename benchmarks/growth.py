@@ -107,7 +107,7 @@ def _curve(
 
 
 def _programs(size: int, sets: Sequence[Sets]) -> dict[tuple[str, int], Way]:
-    raw = Clarabel([unique(scaled(each)) for each in sets], program.SHARP)
+    raw = Clarabel([unique(scaled(each)) for each in sets], program.SHARP_SETTINGS)
     return {(OURS, size): lambda k: solvers.unique(sets[k].data), (RAW, size): raw.updated}
 
 

@@ -37,7 +37,7 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
     _, hands = assemble(question, None, needed)
     sets = hands.sets(hands.at_rest(hands.idle))
     data, goals = scaled(sets), [wrench / WRENCH_UNIT for wrench in wrenches]
-    raw = Clarabel([unique(data._replace(wrench=goal)) for goal in goals], program.SHARP)
+    raw = Clarabel([unique(data._replace(wrench=goal)) for goal in goals], program.SHARP_SETTINGS)
     whole = whole_blocks([sets.data.turned(goal) for goal in goals])
     known = KnownStance(question)
     given: list[SetPoints] = []

@@ -221,7 +221,7 @@ def whole_blocks(stances: Sequence[StanceData]) -> Clarabel:
         _dense(program_of(unique_program, each).conic())
         for each in (StanceData.of(hands, stances[0].wrench), *stances)
     )
-    return Clarabel(programs, program.SHARP, full)
+    return Clarabel(programs, program.SHARP_SETTINGS, full)
 
 
 def _dense(asked: ConicProgram) -> Conic:

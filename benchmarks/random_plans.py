@@ -82,7 +82,7 @@ def answer(seed: int) -> Answer:
     )
     _, hands = assemble(question, None, question.needed_wrench())
     sets = hands.sets(hands.at_rest(hands.idle))
-    settings = program.SHARP
+    settings = program.SHARP_SETTINGS
     tolerances = {name: value for name, value in settings.items() if name.startswith("tol_")}
     plain = unique(si(question, sets))
     return Answer(

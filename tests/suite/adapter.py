@@ -6,6 +6,7 @@ import csv
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -100,8 +101,9 @@ def _coarse(problem: dict[str, Any]) -> Iterator[None]:
         return
     study = load_study(problem["command"][1])
     with ExitStack() as patched:
-        for name, value in numbers.items():
-            # figures share their search and pull
-            module = study if hasattr(study, name) else pulling
-            patched.enter_context(patch.object(module, name, value))
+        # figures share their search and pull
+        for module, name in ((study, "STUDY_SETTINGS"), (pulling, "PULLING_SETTINGS")):
+            settings = getattr(module, name)
+            own = {key: value for key, value in numbers.items() if hasattr(settings, key)}
+            patched.enter_context(patch.object(module, name, replace(settings, **own)))
         yield

@@ -159,13 +159,13 @@ def test_a_person_reads_the_torques_of_every_joint(
     assert err == ""
     assert max(len(row) for row in out.splitlines()) <= 80
     assert "joint torques [N·m]" in out
-    table = out.partition("joint torques")[2].partition("take off the utilisation")[0]
+    table = out.partition("joint torques")[2].partition("decrease of the utilisation")[0]
     rows = [row.split() for row in table.splitlines()]
     (left,) = [row for row in rows if row[:1] == ["left"] and len(row) == 9]
     assert sum(cell.endswith("*") for cell in left) == 1
     assert left[7] == "8"
     assert float(left[8]) > 1.0
-    assert "left1_joint" in out.partition("take off the utilisation")[2]
+    assert "left1_joint" in out.partition("decrease of the utilisation")[2]
 
 
 @pytest.mark.parametrize("named", ["arms", None])
