@@ -15,9 +15,9 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("hand_models", "planner", "service")
 
 LIMITS = {
-    "docstrings that are fragments": 5,
-    "old words in the source": 25,
-    "old words in the documents": 10,
+    "docstrings that are fragments": 0,
+    "old words in the source": 12,
+    "old words in the documents": 4,
     "module constants of one word": 16,
     "public names defined twice": 14,
     "public names defined twice without a reason": 0,

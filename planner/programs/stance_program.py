@@ -259,8 +259,8 @@ class StanceProgram(ABC):
         if status in SOLVED_STATUSES:
             x = np.concatenate([np.atleast_1d(variable.value) for variable in variables])
         values = [row.dual_value for row in rows if row.size]
-        told = status in (*SOLVED_STATUSES, *INFEASIBLE_STATUSES)
-        if told and all(each is not None for each in values):
+        ended = status in (*SOLVED_STATUSES, *INFEASIBLE_STATUSES)
+        if ended and all(each is not None for each in values):
             duals = np.concatenate(values)
         if status == cp.USER_LIMIT and left is not None:
             status = OUT_OF_TIME
