@@ -115,8 +115,8 @@ class FingerLoads(NamedTuple):
     directions: Numbers
     reached: NDArray[np.bool_]
 
-    def of(self, finger: int) -> FingerLoads:
-        """Return the loads of the finger with the index ``finger``, shapes (m, …)."""
+    def of(self, finger: int | slice) -> FingerLoads:
+        """Return the loads of one finger, shapes (m, …), or of a slice of them, (F, m, …)."""
         return FingerLoads(*(part[finger] for part in self))
 
     @property

@@ -19,18 +19,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError, skew
-from hand_models.compliance.compliant_finger import (
-    COMPLEX_STEP,
-    CompliantFingers,
-    FingerAtRest,
-    FingerLoads,
-)
+from hand_models.compliance.compliant_finger import CompliantFingers, FingerAtRest, FingerLoads
+from hand_models.compliance.grasp import complex_steps, slopes
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
@@ -110,20 +107,23 @@ class CompliantHand:
         self.frames = hand.frames(settled.grasp.outer_rotation)
         self.scheme: MotorScheme = scheme
         self.fingers = [self._finger(i, name) for i, name in enumerate(FINGERS)]
-        self._together = CompliantFingers(self.fingers, scheme)
-        self._alone = [CompliantFingers([finger], scheme) for finger in self.fingers]
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
         self.palm_stiffness = np.zeros(2)
+        rubs = hand.palm_friction, hand.palm_own_friction
         for share, tiles in settled.palm.layers:
-            sharing = share_load(
-                tuple(hand.palm_contact[i] for i in tiles),
-                hand.palm_spring,
-                hand.palm_friction,
-                hand.palm_own_friction,
-            )
+            contacts = tuple(hand.palm_contact[i] for i in tiles)
+            sharing = share_load(contacts, hand.palm_spring, *rubs)
             each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
             self.palm_stiffness += share * np.array(each)
+
+    @cached_property
+    def _together(self) -> CompliantFingers:
+        return CompliantFingers(self.fingers, self.scheme)
+
+    @cached_property
+    def _alone(self) -> list[CompliantFingers]:
+        return [CompliantFingers([finger], self.scheme) for finger in self.fingers]
 
     def _finger(self, i: int, name: str) -> FingerAtRest:
         settled, hand = self.settled, self.settled.hand
@@ -169,8 +169,7 @@ class CompliantHand:
             Tension at which each finger has closed before the wrist moves [N]; the preload by
             default.
         """
-        closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
-        bases = self._bases(range(len(FINGERS)), twists, closed if tensions is None else tensions)
+        bases = self._bases(range(len(FINGERS)), twists, tensions)
         return self._loads(twists, self._together.loads(*bases))
 
     def _loads(self, twists: Numbers, found: FingerLoads) -> HandLoads:
@@ -222,8 +221,7 @@ class CompliantHand:
         FingerLoads
             Shapes (m, …).
         """
-        closed = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
-        return self._alone[i].loads(*self._bases([i], twists, closed)).of(0)
+        return self._alone[i].loads(*self._bases([i], twists)).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
         """Return the lateral loads of one finger's tiles at twists of the wrist.
@@ -253,10 +251,12 @@ class CompliantHand:
         return self._own[i]
 
     def _bases(
-        self, fingers: Iterable[int], twists: Numbers, tensions: Numbers
+        self, fingers: Iterable[int], twists: Numbers, tensions: Numbers | None = None
     ) -> tuple[Numbers, Numbers, Numbers, Numbers, Numbers]:
         """Return how bases of fingers move in their planes, (F, m), as `CompliantFingers.loads`."""
         v, turn, each = twists[:, :3], twists[:, 3:], []
+        if tensions is None:
+            tensions = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
         for i in fingers:
             frame = self.frames[i]
             moved = _moved(frame.joint, v, turn)
@@ -327,8 +327,7 @@ class CompliantHand:
             Derivative of the wrench on the rock by the twist [N/m, N/rad, N, N·m/rad].
         """
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
-        loads = self.loads(at + 1j * COMPLEX_STEP * np.eye(6))
-        return np.asarray(self.wrenches(loads).imag.T / COMPLEX_STEP)
+        return slopes(self.wrenches(self.loads(complex_steps(at))))
 
 
 class CompliantHands:
@@ -363,7 +362,7 @@ class CompliantHands:
         bases = [np.concatenate(parts) for parts in zip(*each, strict=True)]
         found = self._together.loads(*bases)
         return [
-            hand._loads(own, FingerLoads(*(part[count * h : count * (h + 1)] for part in found)))
+            hand._loads(own, found.of(slice(count * h, count * (h + 1))))
             for h, (hand, own) in enumerate(zip(self.hands, twists, strict=True))
         ]
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -88,6 +87,11 @@ class CompliantWrist(FloatingWrist):
         travel: WristTravel | None = None,
     ) -> None:
         self.travel = WristTravel() if travel is None else travel
+        # hard rows in newtons: a millimetre counts as 100 N, ten milliradians as much
+        scale, (least, most) = np.array([1e5] * 3 + [1e4] * 3), self.travel.bounds
+        sides = np.hstack([np.zeros((len(scale), len(TENDONS))), np.diag(scale)])
+        room = np.concatenate([scale * most, scale * np.negative(least)])
+        self._travel = np.vstack([sides, -sides]), room
         self.palm_carries = bool(hand.settled.palm.engaged)
         super().__init__(hand, tension_limit)
 
@@ -98,8 +102,13 @@ class CompliantWrist(FloatingWrist):
     def _load_rows(self) -> LoadRows:
         rows = super()._load_rows()
         # no row says which way the palm goes: its law is the same either way
-        kept = tuple([row for row in rows.names if not row.limit.endswith("_reversed")])
-        return rows._replace(names=kept)
+        kept = [row for row in rows.names if not row.limit.endswith("_reversed")]
+        travel = [
+            Row(None, None, "wrist_travel", "hard", f"wrist_travel/{name.split('/')[1]}{sign}")
+            for sign in "+-"
+            for name in WRIST_COLUMNS
+        ]
+        return rows._replace(names=(*kept, *travel))
 
     def palm_modes(self) -> tuple[PalmMode, ...]:
         return ("off",)
@@ -124,50 +133,14 @@ class CompliantWrist(FloatingWrist):
     def linearised_each(
         self, twists: Array, palm: PalmMode | None = None, within: ArrayLike | None = None
     ) -> list[WrenchSpace]:
-        none = np.zeros((0, len(self.columns))), np.zeros(0)
         carried = [
             loads if self.palm_carries else loads._replace(palm=0.0 * loads.palm)
             for loads in self._stepped(twists)
         ]
         return [
-            self._bounded(self._about(at, self._grasp_loads(loads), *none, within))
+            self._about(at, self._grasp_loads(loads), *self._travel, within)
             for at, loads in zip(twists, carried, strict=True)
         ]
-
-    def _bounded(self, space: WrenchSpace) -> WrenchSpace:
-        """Return a set with hard rows that keep the wrist within its travel."""
-        names, H = _travel_rows()
-        least, most = self.travel.bounds
-        h = np.concatenate([most, np.negative(least)]) * np.abs(H[:, len(TENDONS) :]).sum(axis=1)
-        return WrenchSpace(
-            origin=space.origin,
-            generators=space.generators,
-            columns=space.columns,
-            rows=(*space.rows, *names),
-            L=space.L,
-            l0=space.l0,
-            s=space.s,
-            H=np.vstack([space.H, H]),
-            h=np.concatenate([space.h, h]),
-            D=space.D,
-        )
-
-
-@lru_cache(maxsize=1)
-def _travel_rows() -> tuple[tuple[Row, ...], Array]:
-    """Return names (12,) and slopes (12, 10) of a wrist's travel: in newtons, as hard rows are.
-
-    A millimetre counts as 100 N, ten milliradians as much.
-    """
-    names = [
-        Row(None, None, "wrist_travel", "hard", f"wrist_travel/{name.split('/')[1]}{sign}")
-        for sign in "+-"
-        for name in WRIST_COLUMNS
-    ]
-    sides = np.diag([1e5] * 3 + [1e4] * 3)
-    H = np.hstack([np.zeros((12, len(TENDONS))), np.vstack([sides, -sides])])
-    H.setflags(write=False)
-    return tuple(names), H
 
 
 class CompliantWrists:

@@ -16,13 +16,11 @@ that its utilisation is the least, or the result is marked unproven.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array
 from planner import programs
 from planner.deadline import Budget
 from planner.floating.goals import LEAST_USE, SETTINGS, Goal
@@ -68,16 +66,15 @@ def find_wrists(
     """
     if hands.together is None or goal is not LEAST_USE:
         return solve_wrists(hands, start, budget, most, goal)
+    point = start
     # where the least utilisation is worth more than a missing wrench, the price is too low
-    price = SETTINGS.price
-    now, rounds = _descended(hands, goal, start, price, budget, most)
-    found = made_exact(hands, goal, now, rounds, budget)
-    while not found.exact and now.sets.finite and price < 1e3 * SETTINGS.price:
-        if budget.ended or now.measure.missing + now.measure.excess > 0.1:  # no equilibrium near
+    for price in (SETTINGS.price * rise for rise in (1.0, 10.0, 100.0, 1000.0)):
+        now, rounds = _descended(hands, goal, point, price, budget, most)
+        found, point = made_exact(hands, goal, now, rounds, budget), now.point
+        if found.exact or budget.ended or not now.sets.finite:
             break
-        price *= 10.0
-        now, rounds = _descended(hands, goal, now.point, price, budget, most)
-        found = made_exact(hands, goal, now, rounds, budget)
+        if now.measure.missing + now.measure.excess > 0.1:  # no equilibrium near
+            break
     proven = found.exact and gap(goal, found, found.outcome) <= SETTINGS.closeness
     return replace(found, found="least") if proven else found
 
@@ -107,7 +104,8 @@ def _descended(
         promised = merit - outcome.value
         if promised < 1e-5:  # of the utilisation: nothing better about the point
             break
-        there = _moved(hands, goal, now, outcome.loads, within)
+        point = replace(now.point, loads=outcome.loads)
+        there = searching(hands, goal, point, within, now.sets)
         after = _merit(there, price)
         for _ in range(3):
             if not there.sets.finite or merit - after >= 0.7 * promised:
@@ -117,16 +115,18 @@ def _descended(
             if not better < after:
                 break
             there, after = restored, better
-        gained = (merit - after) / promised
+        gained, resized = (merit - after) / promised, within
         if after < merit - 1e-9:
             now, merit = there, after
-            within = min(2.0 * within, 4.0) if gained > 0.7 else within
-            within = 0.5 * within if gained < 0.25 else within
+            resized = min(2.0 * within, 4.0) if gained > 0.7 else within
+            resized = 0.5 * within if gained < 0.25 else resized
         else:
-            within *= 0.4
-        if within < 1e-3:  # only a kink spoils steps of a micrometre and 0.1 N
+            resized = 0.4 * within
+        if resized < 1e-3:  # only a kink spoils steps of a micrometre and 0.1 N
             break
-        now = searching(hands, goal, now.point, within, error=now.error)
+        if resized != within:
+            within = resized
+            now = searching(hands, goal, now.point, within, error=now.error)
     return now, rounds
 
 
@@ -135,13 +135,6 @@ def _merit(state: WristSolution, price: float) -> float:
     if not state.sets.finite:
         return math.inf
     return state.measure.utilisation + price * (state.measure.missing + state.measure.excess)
-
-
-def _moved(
-    hands: HandSets, goal: Goal, now: WristSolution, loads: Sequence[Array], within: float
-) -> WristSolution:
-    point = LinearisationPoint(tuple(loads), now.point.palms, now.point.factor)
-    return searching(hands, goal, point, within, now.sets)
 
 
 def _firm(sets: Sets) -> NDArray[np.bool_]:
