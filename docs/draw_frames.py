@@ -11,6 +11,7 @@ import numpy as np
 
 from hand_models import Cylinder, Grasp, SpinyHand, Surface
 from hand_models.base import Array
+from hand_models.hand import SettledHand
 
 PICTURE = Path(__file__).parent / "frames.png"
 DIAMETER = 0.3
@@ -27,6 +28,14 @@ def triad(axes: Any, origin: Array, directions: Array, size: float, name: str) -
     axes.text(*away, name, fontsize=13, fontweight="bold", ha="center", va="center")
 
 
+def finger_chain(settled: SettledHand, index: int) -> Array:
+    """Return the joints and the end of a finger of a closed hand in H, shape (4, 3) [m]."""
+    frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
+    finger, up = settled.fingers[index], np.array([0.0, 0.0, 1.0])
+    places = np.array([*(contact.joint for contact in finger.contacts), finger.pin])
+    return np.asarray(frame.joint + places[:, :1] * frame.along + places[:, 1:] * up)
+
+
 def draw_hand(axes: Any) -> None:
     """Draw a hand on a log in its own frame H, with the frames of one finger."""
     grasp = Grasp(outer_rotation=math.pi)
@@ -36,16 +45,9 @@ def draw_hand(axes: Any) -> None:
     axes.scatter(*palm.T, marker="s", s=90, color="0.6", label="palm tiles", depthshade=False)
     frames = settled.hand.frames(grasp.outer_rotation)
     up = np.array([0.0, 0.0, 1.0])
-    for i, (frame, finger) in enumerate(zip(frames, settled.fingers, strict=True)):
-        joints = [
-            frame.joint + x * frame.along + z * up
-            for x, z in (contact.joint for contact in finger.contacts)
-        ]
-        last = finger.contacts[-1]
-        tip = joints[-1] + finger.model.joint_spacing * (
-            math.cos(last.angle) * frame.along + math.sin(last.angle) * up
-        )
-        chain = np.array([*joints, tip])
+    for i, frame in enumerate(frames):
+        chain = finger_chain(settled, i)
+        *joints, tip = chain
         axes.plot(*chain.T, "-o", color="black", linewidth=3, markersize=4)
         tiles = settled.positions[settled.finger_of == i]
         axes.scatter(*tiles.T, marker="s", s=25, color="tab:orange", depthshade=False)

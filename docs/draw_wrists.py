@@ -12,8 +12,9 @@ import matplotlib.pyplot as plt
 import msgspec
 import numpy as np
 
+from draw_frames import finger_chain
 from hand_models import Pose, spiny_hand
-from hand_models.base import Array, turns_about
+from hand_models.base import turns_about
 from hand_models.hand import FINGERS, SettledHand
 from planner import plan
 from planner.prepare import settle_hand
@@ -23,20 +24,6 @@ from service.commands.stances import read_request
 
 PICTURE = Path(__file__).parent / "wrists.png"
 LIMB, SHOWN = "rear_left", ("inner_left", "outer_left")
-
-
-def chain(settled: SettledHand, name: str) -> Array:
-    """Return the joints and the tip of a finger of a closed hand in H, shape (5, 3) [m]."""
-    index = FINGERS.index(name)
-    frame = settled.hand.frames(settled.grasp.outer_rotation)[index]
-    finger, up = settled.fingers[index], np.array([0.0, 0.0, 1.0])
-    places = [
-        frame.joint + x * frame.along + z * up
-        for x, z in (contact.joint for contact in finger.contacts)
-    ]
-    last, length = finger.contacts[-1], finger.model.joint_spacing
-    end = np.cos(last.angle) * frame.along + np.sin(last.angle) * up
-    return np.array([*places, places[-1] + length * end])
 
 
 def draw(axes: Any, settled: SettledHand, hand: HandPlan) -> None:
@@ -51,7 +38,7 @@ def draw(axes: Any, settled: SettledHand, hand: HandPlan) -> None:
     )
     mm = 1e3
     for name in SHOWN:
-        rest, after = chain(settled, name), chain(there, name)
+        rest, after = (finger_chain(each, FINGERS.index(name)) for each in (settled, there))
         after = after @ moved.rotation.T + moved.position
         axes.plot(mm * rest[:, 0], mm * rest[:, 2], "-o", color="0.6", linewidth=2, markersize=3)
         axes.plot(mm * after[:, 0], mm * after[:, 2], "-o", color="tab:blue", markersize=3)
