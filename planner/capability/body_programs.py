@@ -325,8 +325,8 @@ def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
     loads, palms = list(point.loads), list(point.palms)
     for i, hand in enumerate(planned.hands):
         if hand.wrist is not None:
-            tensions = hand.tensions[: len(point.loads[i]) - len(hand.wrist.twist)]
-            loads[i] = np.concatenate([tensions, hand.wrist.twist])
+            driven = [hand.tensions] if hand.wrist.driven else []
+            loads[i] = np.concatenate([*driven, hand.wrist.twist])
             palms[i] = hand.wrist.palm
     return LinearisationPoint(tuple(loads), tuple(palms))
 

@@ -32,53 +32,52 @@ def changed_contacts(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
     """
     stance = prepared.question.stance
     moved = [
-        (hand, settled, place)
+        (hand, hand.wrist.twist, settled, place)
         for hand, settled, place in zip(hands, prepared.batch.hands, stance.hands, strict=True)
         if hand.wrist is not None and hand.wrist.driven
     ]
-    asked = [
-        replace(
-            place,
-            hold_pose=None,
-            hold_in_hand=_pose(hand.wrist.twist).inverse() @ settled.seating.pose,
-        )
-        for hand, settled, place in moved
-        if hand.wrist is not None
-    ]
+    asked = []
+    for _, twist, settled, place in moved:
+        there = Pose(twist[:3], turns_about(twist[3:])).inverse() @ settled.seating.pose
+        asked.append(replace(place, hold_pose=None, hold_in_hand=there))
     closed = settle_each(stance.robot.hand, asked) if asked else []
-    for (hand, settled, _), again in zip(moved, closed, strict=True):
+    for (hand, twist, settled, _), again in zip(moved, closed, strict=True):
         if isinstance(again, InvalidInputError):
             yield f"{hand.limb}: no hand closes where the wrist goes; contacts may have changed"
             continue
-        worst, finger = _largest_change(hand, settled, again)
+        where = f"{hand.limb}: if the hand closed where its wrist goes,"
+        worst, finger = _largest_change(hand, twist, settled, again)
+        other = next(
+            (
+                name
+                for name, before, after in zip(FINGERS, settled.fingers, again.fingers, strict=True)
+                if before.bearing != after.bearing
+            ),
+            None,
+        )
         if worst > 5e-3:  # [rad] of a joint
             yield (
-                f"{hand.limb}: if the hand closed where its wrist goes, joints of {finger} would "
-                f"be {1e3 * worst:.0f} mrad elsewhere: contacts may have changed; a shorter "
-                "wrist_travel is surer"
+                f"{where} joints of {finger} would be {1e3 * worst:.0f} mrad elsewhere: contacts "
+                "may have changed; a shorter wrist_travel is surer"
             )
+        elif other is not None:
+            yield f"{where} other phalanges of {other} would touch; a shorter wrist_travel is surer"
 
 
-def _pose(twist: Array) -> Pose:
-    """Return the pose of H after a twist about H at rest [m, rad]."""
-    return Pose(twist[:3], turns_about(twist[3:]))
-
-
-def _largest_change(hand: HandPlan, settled: SettledHand, again: SettledHand) -> tuple[float, str]:
+def _largest_change(
+    hand: HandPlan, twist: Array, settled: SettledHand, again: SettledHand
+) -> tuple[float, str]:
     """Return how far phalanges are from those of a hand that closed there [rad], and the finger."""
-    assert hand.wrist is not None
     worst, where = 0.0, FINGERS[0]
     for i, frame in enumerate(settled.hand.frames(settled.grasp.outer_rotation)):
         tiles = np.flatnonzero(settled.finger_of == i)[-len(PHALANGES) :]
         # from x toward z is against the sense of the axis across, z × x
-        turned = -float(hand.wrist.twist[3:] @ frame.across)
+        turned = -float(twist[3:] @ frame.across)
         pairs = zip(tiles, settled.fingers[i].contacts, again.fingers[i].contacts, strict=True)
         for tile, before, after in pairs:
             drag = hand.axes[tile, 0]
             along = complex(-drag @ frame.along, -drag[2]) * cmath.rect(1.0, -before.tilt)
-            off = cmath.phase(along * cmath.rect(1.0, -turned - after.angle))
-            if before.kind != after.kind and "none" in (before.kind, after.kind):
-                off = max(abs(off), 6e-3)
-            if abs(off) > worst:
-                worst, where = abs(off), FINGERS[i]
+            off = abs(cmath.phase(along * cmath.rect(1.0, -turned - after.angle)))
+            if off > worst:
+                worst, where = off, FINGERS[i]
     return worst, where

@@ -158,9 +158,15 @@ class Limits(Strict, frozen=True):
     ] = None
     hold_margin: Annotated[
         float,
-        Meta(ge=0.0, le=1e3, description="by which tiles are short of being dragged backwards [N]"),
+        Meta(
+            ge=0.0,
+            le=MOST_MARGIN,
+            description="by which tiles are short of being dragged backwards [N]",
+        ),
     ] = 0.0
-    least_tension: Annotated[float, Meta(ge=0.0, le=1e3, description="of every tendon [N]")] = 0.0
+    least_tension: Annotated[
+        float, Meta(ge=0.0, le=MOST_MARGIN, description="of every tendon [N]")
+    ] = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.utilisation <= 1.0:

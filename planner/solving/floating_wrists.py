@@ -40,14 +40,11 @@ class FloatingSolution(Solution):
         Result of the search for the least utilisation.
     factor : LargestFactor or None
         The largest load factor that the search met.
-    driven : tuple of bool
-        True for hands whose wrist is compliant: their motors keep the tendons' tensions.
     """
 
     search: WristSolution
     usual: WristSolution
     factor: LargestFactor | None
-    driven: tuple[bool, ...]
 
     @property
     def proven(self) -> bool:
@@ -87,13 +84,13 @@ class FloatingSolution(Solution):
 
     def _at(self, search: WristSolution) -> FloatingSolution:
         """Return the same with the loads of a search, of which nothing is proven without proof."""
-        pairs = zip(search.point.loads, search.point.palms, self.driven, strict=True)
+        pairs = zip(search.point.loads, search.point.palms, strict=True)
         poses = tuple(
             [
                 None
                 if palm is None
-                else WristPlan(y[-len(WRIST_COLUMNS) :], palm, search.rounds, search.error, driven)
-                for y, palm, driven in pairs
+                else WristPlan(y[-len(WRIST_COLUMNS) :], palm, search.rounds, search.error)
+                for y, palm in pairs
             ]
         )
         found = replace(
@@ -149,7 +146,6 @@ def floating_solution(
         search=search,
         usual=search,
         factor=factor,
-        driven=tuple([wrist is not None and wrist.driven for wrist in prepared.hands.wrists]),
     )
     if not search.exact:
         return replace(found, sets=prepared.hands.sets(search.point))
