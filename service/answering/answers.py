@@ -234,9 +234,11 @@ def _set_points(hand: HandPlan, whole: bool) -> replies.HandSetPoints:
         limb=hand.limb, tensions=hand.tensions.tolist(), winch_angle=angle
     )
     if hand.wrist is not None:
-        points.twist = hand.wrist.twist.tolist()
-        if hand.wrist.pose_target is not None:
-            points.pose_target = hand.wrist.pose_target.tolist()
+        target = hand.wrist.pose_target
+        if target is not None:
+            points.pose_target = target.tolist()
+        if whole or target is None:
+            points.twist = hand.wrist.twist.tolist()
     if whole:
         points.motor_torque, points.motor_current = torque, current
         points.wrench = hand.wrench.tolist()

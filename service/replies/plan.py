@@ -189,7 +189,9 @@ class PlanReply(StanceReply, kw_only=True):
 class HandSetPoints(Struct):
     """Set-points of one hand: what a controller sends to its four tendons.
 
-    With ``"detail": "set_points"`` a reply has ``limb``, ``tensions`` and ``winch_angle`` alone.
+    With ``"detail": "set_points"`` a reply has ``limb``, ``tensions``, ``winch_angle`` and, for a
+    wrist that moves, either ``pose_target`` or, where the stance gives no ``limb_stiffness``,
+    ``twist``.
 
     - ``limb``: name of the limb that carries the hand.
     - ``tensions``: tensions of the four tendons [N].
