@@ -128,7 +128,7 @@ def _raced(
 
 def _sets(question: Question) -> Sets:
     hands = _gathered(question)
-    return hands.sets(hands.at_rest(hands.idle))
+    return hands.sets(hands.at_rest())
 
 
 def _gathered(question: Question) -> HandSets:
@@ -144,7 +144,7 @@ def _tiles(sizes: Sequence[int], rounds: int, tick: Callable[[], object]) -> Cur
             hands.with_sets([_with_tiles(space, size) for space in hands.spaces])
             for hands in stances
         ]
-        ways |= _programs(size, [hands.sets(hands.at_rest(hands.idle)) for hands in fewer])
+        ways |= _programs(size, [hands.sets(hands.at_rest()) for hands in fewer])
     return _raced("more tiles (4 hands)", "tiles of each hand", sizes, ways, rounds, tick)
 
 

@@ -35,7 +35,7 @@ def known_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
     places = [number if number < rounds else 0 for number in range(rounds + WARM)]
     wrenches = [needed + place * way for place in places]
     _, hands = assemble(question, None, needed)
-    sets = hands.sets(hands.at_rest(hands.idle))
+    sets = hands.sets(hands.at_rest())
     data, goals = scaled(sets), [wrench / WRENCH_UNIT for wrench in wrenches]
     raw = Clarabel([unique(data._replace(wrench=goal)) for goal in goals], program.SHARP_SETTINGS)
     whole = whole_blocks([sets.data.turned(goal) for goal in goals])

@@ -66,7 +66,7 @@ def known(number: int) -> Known:
     """A measured stance, its hands' sets and its utilisation."""
     asked = question_of(number)
     _, hands = assemble(asked, None, asked.needed_wrench())
-    sets = hands.sets(hands.at_rest(hands.idle))
+    sets = hands.sets(hands.at_rest())
     return Known(asked, hands, sets, solvers.unique(sets.data).value)
 
 
@@ -272,7 +272,7 @@ def _others(rivals: Rivals, rounds: int, tick: Callable[[], object]) -> Table:
 
     def ours(number: int) -> None:
         hands = stances[number]
-        solvers.unique(hands.sets(hands.at_rest(hands.idle)).data)
+        solvers.unique(hands.sets(hands.at_rest()).data)
 
     ways: dict[str, Way] = {
         "floor": rivals.unique.updated,

@@ -81,7 +81,7 @@ def answer(seed: int) -> Answer:
         [[finger.tendon_tension for finger in hand.fingers] for hand in found.hands or ()]
     )
     _, hands = assemble(question, None, question.needed_wrench())
-    sets = hands.sets(hands.at_rest(hands.idle))
+    sets = hands.sets(hands.at_rest())
     settings = program.SHARP_SETTINGS
     tolerances = {name: value for name, value in settings.items() if name.startswith("tol_")}
     plain = unique(si(question, sets))

@@ -75,7 +75,7 @@ def solved_stance():
     question = question_of()
     wrench = question.needed_wrench()
     batch, hands = assemble(question, None, wrench)
-    spaces, data = hands.sets(hands.at_rest(hands.idle))
+    spaces, data = hands.sets(hands.at_rest())
     return question, batch, spaces, data, solvers.unique(data), wrench
 
 

@@ -3,7 +3,6 @@ from .compliant_hand import CompliantHand as CompliantHand
 from .compliant_wrist import (
     CompliantWrist as CompliantWrist,
     CompliantWrists as CompliantWrists,
-    DrivenHand as DrivenHand,
 )
 from .directional_limit import (
     Farthest as Farthest,

@@ -9,8 +9,9 @@ the finger (Section 5.3: linear elasticity),
 
 with Y the lateral load of each tile, y its displacement across the finger's plane, k the stiffness
 of its spines on the rock, ℓ its distance along the finger from the joint and h its distance from
-the finger's axis. The engaged palm tiles drag the rock and share that load on their tendon when the
-palm moves toward −x, and press on the rock when the palm moves into it; they neither push nor pull.
+the finger's axis. The engaged palm tiles drag the rock by the palm's travel toward −x and share
+that load on their tendon; each presses by its travel past its gap to the rock. A spring of
+stiffness k carries k d²/(2 δ) at a travel d up to its onset δ, and k (d − δ/2) beyond.
 
 Forces and places are in H *at rest*: the tiles are anchored in the rock, which does not move.
 """
@@ -109,13 +110,12 @@ class CompliantHand:
         self.fingers = [self._finger(i, name) for i, name in enumerate(FINGERS)]
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
-        self.palm_stiffness = np.zeros(2)
+        self.palm_shear_stiffness = 0.0
         rubs = hand.palm_friction, hand.palm_own_friction
         for share, tiles in settled.palm.layers:
             contacts = tuple(hand.palm_contact[i] for i in tiles)
             sharing = share_load(contacts, hand.palm_spring, *rubs)
-            each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
-            self.palm_stiffness += share * np.array(each)
+            self.palm_shear_stiffness += share * float(sharing.tile_stiffness.sum())
 
     @cached_property
     def _together(self) -> CompliantFingers:
@@ -193,14 +193,13 @@ class CompliantHand:
             positions[:, phalanges] += place[..., 1:] * up
             axes[:, phalanges, 0] = -(u[..., :1] * frame.along + u[..., 1:] * up)
             axes[:, phalanges, 1] = u[..., :1] * up - u[..., 1:] * frame.along
-        palm = self.palm_loads(twists)
         return HandLoads(
             shears=shears,
             normals=normals,
             laterals=laterals,
             tensions=tensions,
             stop_torques=self._pushing(found.stop_torques),
-            palm=np.where(palm.real > 1e-20, palm, 0.0 * palm),
+            palm=self.palm_loads(twists),
             positions=positions,
             axes=axes,
             reached=reached,
@@ -215,11 +214,6 @@ class CompliantHand:
             Index of the finger in `FINGERS`.
         twists : ndarray, shape (m, 6)
             [m, rad]
-
-        Returns
-        -------
-        FingerLoads
-            Shapes (m, …).
         """
         return self._alone[i].loads(*self._bases([i], twists)).of(0)
 
@@ -279,16 +273,15 @@ class CompliantHand:
         return np.stack(pushing, axis=-1) if pushing else nothing
 
     def palm_loads(self, twists: Numbers) -> Numbers:
-        """Return the palm's shear and pressing as two-sided springs, shape (m, 2) [N].
-
-        A load is negative where the palm moves away from the rock and so carries nothing.
-
-        Parameters
-        ----------
-        twists : ndarray, shape (m, 6)
-            [m, rad]
-        """
-        return self.palm_travel(twists) * self.palm_stiffness
+        """Return the palm's shear toward −x and its pressing, (m, 2) [N], at twists (m, 6)."""
+        travel, palm = self.palm_travel(twists), self.settled.palm
+        if not palm.engaged:
+            return 0.0 * travel
+        # [m] 0.1 mm of shear and 0.02 mm of pressing, over which a search sees the springs begin
+        shear = self.palm_shear_stiffness * _compressed(travel[:, 0], 1e-4)
+        beyond = travel[:, 1:] - np.maximum(palm.gaps[list(palm.engaged)], 0.0)
+        stiffness = self.settled.hand.palm_pressing_stiffness * np.array(palm.engagement)
+        return np.stack([shear, _compressed(beyond, 2e-5) @ stiffness], axis=-1)
 
     def palm_travel(self, twists: Numbers) -> Numbers:
         """Return the palm's travel toward −x and into the rock, (m, 2) [m], at twists (m, 6)."""
@@ -375,6 +368,12 @@ def own_shears(found: FingerLoads, count: int) -> Numbers:
     if count == len(PHALANGES):
         return found.shears
     return np.concatenate([found.base_shears[:, None], found.shears], axis=1)
+
+
+def _compressed(travel: Numbers, onset: float) -> Numbers:
+    """Return how far one-sided springs are compressed that grow stiff over ``onset`` [m]."""
+    part = np.where(travel.real < onset, np.where(travel.real > 0.0, travel, 0.0), onset)
+    return np.asarray(part / onset * (travel - 0.5 * part))
 
 
 def _moved(place: Array, v: Numbers, turn: Numbers) -> Numbers:

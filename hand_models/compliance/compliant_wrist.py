@@ -3,63 +3,27 @@
 The hand has closed at the tensions f of its tendons; then its wrist moves by a twist ξ, and each
 motor keeps its tension. The loads are affine in f at a given ξ and curved in ξ, so that the set
 linearised about y = (f, ξ) is exact there, and a good approximation within about 1 mm and 20 N.
-
-Each palm tile presses by its travel past its gap to the rock, and drags by the wrist's travel
-toward −x. Both springs set in with the smooth law ½ k (d + √(d² + δ²)) (stiffness k, travel d,
-rounding δ), so that a search finds their gradient before contact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hand_models.base import Array
 from hand_models.compliance.compliant_hand import CompliantHand, CompliantHands, HandLoads
-from hand_models.compliance.floating_wrist import PALM_MODES, WRIST_COLUMNS, FloatingWrist, PalmMode
+from hand_models.compliance.floating_wrist import WRIST_COLUMNS, FloatingWrist
 from hand_models.compliance.grasp import LoadRows, complex_steps, rows_of_range
 from hand_models.compliance.rolling import Numbers
-from hand_models.hand import FINGERS, SettledHand, WristTravel
-from hand_models.wrench_spaces import Row, WrenchSpace
+from hand_models.hand import FINGERS, WristTravel
+from hand_models.wrench_spaces import Row
 
-__all__ = ["CompliantWrist", "CompliantWrists", "DrivenHand"]
+__all__ = ["CompliantWrist", "CompliantWrists"]
 
 TENDONS: Final = tuple(f"{finger}/tension" for finger in FINGERS)
 """Columns of a driven hand's set for its tendon tensions f [N]."""
-
-
-class DrivenHand(CompliantHand):
-    """A settled hand whose motors keep their tensions while its wrist moves.
-
-    Parameters
-    ----------
-    settled : SettledHand
-        Not in a fingernail grasp.
-    """
-
-    def __init__(self, settled: SettledHand) -> None:
-        super().__init__(settled, scheme="tension")
-        palm = settled.palm
-        self._gaps = np.maximum(palm.gaps[list(palm.engaged)], 0.0)
-        self._pressing = settled.hand.palm_pressing_stiffness * np.array(palm.engagement)
-
-    def palm_loads(self, twists: Numbers) -> Numbers:
-        travel = self.palm_travel(twists)
-        if not self.settled.palm.engaged:
-            return 0.0 * travel
-        # 0.1 mm of shear and 0.02 mm of pressing over which the springs set in [m]
-        shear = self.palm_stiffness[0] * _set_in(travel[:, 0], 1e-4)
-        pressed = _set_in(travel[:, 1:] - self._gaps, 2e-5)
-        return np.stack([shear, pressed @ self._pressing], axis=-1)
-
-
-def _set_in(travel: Numbers, rounding: float) -> Numbers:
-    """Return how far one-sided springs are compressed, rounded about no travel [m]."""
-    return np.asarray(0.5 * (travel + np.sqrt(travel * travel + rounding * rounding)))
 
 
 class CompliantWrist(FloatingWrist):
@@ -69,7 +33,8 @@ class CompliantWrist(FloatingWrist):
 
     Parameters
     ----------
-    hand : DrivenHand
+    hand : CompliantHand
+        Its motors keep their tensions (scheme ``tension``).
     tension_limit : float, optional
         A caller's cap on every tendon [N].
     travel : WristTravel, optional
@@ -82,7 +47,7 @@ class CompliantWrist(FloatingWrist):
 
     def __init__(
         self,
-        hand: DrivenHand,
+        hand: CompliantHand,
         tension_limit: float | None = None,
         travel: WristTravel | None = None,
     ) -> None:
@@ -92,7 +57,6 @@ class CompliantWrist(FloatingWrist):
         sides = np.hstack([np.zeros((len(scale), len(TENDONS))), np.diag(scale)])
         room = np.concatenate([scale * most, scale * np.negative(least)])
         self._travel = np.vstack([sides, -sides]), room
-        self.palm_carries = bool(hand.settled.palm.engaged)
         super().__init__(hand, tension_limit)
 
     @property
@@ -101,28 +65,12 @@ class CompliantWrist(FloatingWrist):
 
     def _load_rows(self) -> LoadRows:
         rows = super()._load_rows()
-        # no row says which way the palm goes: its law is the same either way
-        kept = [row for row in rows.names if not row.limit.endswith("_reversed")]
         travel = [
             Row(None, None, "wrist_travel", "hard", f"wrist_travel/{name.split('/')[1]}{sign}")
             for sign in "+-"
             for name in WRIST_COLUMNS
         ]
-        return rows._replace(names=(*kept, *travel))
-
-    def palm_modes(self) -> tuple[PalmMode, ...]:
-        return ("off",)
-
-    def palm_mode(self, y: Array, given: PalmMode) -> PalmMode:
-        shear, inward = self.hand.palm_travel(y[None, len(TENDONS) :])[0].tolist()
-        gap = self.hand.settled.palm.gaps[list(self.hand.settled.palm.engaged)].min(initial=np.inf)
-        return PALM_MODES[self.palm_carries and shear > 0.0, self.palm_carries and inward > gap]
-
-    def without_palm(self) -> CompliantWrist:
-        """Return a copy whose palm carries no load; both share one cache of loads."""
-        idle = copy(self)
-        idle.palm_carries = False
-        return idle
+        return rows._replace(names=(*rows.names, *travel))
 
     def closed_at(self, y: Array) -> Array:
         return y[: len(TENDONS)]
@@ -130,17 +78,9 @@ class CompliantWrist(FloatingWrist):
     def hand_loads(self, y: Numbers) -> HandLoads:
         return self.hand.loads(y[:, len(TENDONS) :], y[:, : len(TENDONS)])
 
-    def linearised_each(
-        self, twists: Array, palm: PalmMode | None = None, within: ArrayLike | None = None
-    ) -> list[WrenchSpace]:
-        carried = [
-            loads if self.palm_carries else loads._replace(palm=0.0 * loads.palm)
-            for loads in self._stepped(twists)
-        ]
-        return [
-            self._about(at, self._grasp_loads(loads), *self._travel, within)
-            for at, loads in zip(twists, carried, strict=True)
-        ]
+    @property
+    def travel_rows(self) -> tuple[Array, Array]:
+        return self._travel
 
 
 class CompliantWrists:

@@ -7,14 +7,14 @@ pose ξ₀ it is a polyhedron,
     w = w_g(ξ₀) + K_g(ξ₀) (ξ − ξ₀),    f_t = f_t(ξ₀) + ∂f_t/∂ξ (ξ − ξ₀),
 
 (w the wrench, K_g the hand's stiffness, f_t the tendon tensions), with rows like those of a fixed
-wrist. The palm carries only where it moves against the rock, so each of its modes is a set of its
-own. A tendon's stick and slip stay as they are at ξ₀.
+wrist. A tendon's stick and slip stay as they are at ξ₀.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal
+from typing import ClassVar, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,6 @@ from hand_models.compliance.grasp import (
     LoadRows,
     complex_steps,
     rows_of_range,
-    slopes,
 )
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
@@ -42,7 +41,7 @@ WRIST_COLUMNS: Final = ("wrist/vx", "wrist/vy", "wrist/vz", "wrist/wx", "wrist/w
 """
 
 PalmMode = Literal["off", "drags", "presses", "drags_and_presses"]
-"""Mode in which a palm carries: not at all, by moving toward −x, by moving into the rock, or both.
+"""How a palm carries: not at all, by moving toward −x, by moving past its gap to the rock, or both.
 """
 
 PALM_MODES: Final[dict[tuple[bool, bool], PalmMode]] = {
@@ -66,13 +65,12 @@ class FloatingWrist(CompliantGrasp):
     hand : CompliantHand
     tension_limit : float, optional
         A caller's cap on every tendon [N]; the hand's maximum if that is less.
-    palm : {'off', 'drags', 'presses', 'drags_and_presses'}
-        Default mode of the palm in linearised sets.
+    palm_carries : bool
+        Whether the palm's springs carry load; only if one of its tiles is engaged.
     """
 
     hand: CompliantHand
     tension_limit: float | None = None
-    palm: PalmMode = "off"
 
     columns: ClassVar[tuple[str, ...]] = WRIST_COLUMNS
     range_rows = rows_of_range(WRIST_COLUMNS)
@@ -81,6 +79,7 @@ class FloatingWrist(CompliantGrasp):
 
     def __post_init__(self) -> None:
         self.layout = layout_of(self.hand.settled, sticking=False)
+        self.palm_carries = bool(self.hand.settled.palm.engaged)
         self.load_rows = self._load_rows()
         # loads at the complex steps from poses, by the poses
         self._kept: BoundedStore[bytes, HandLoads] = BoundedStore(
@@ -89,7 +88,7 @@ class FloatingWrist(CompliantGrasp):
         )
 
     def _load_rows(self) -> LoadRows:
-        """Return what loads and wrenches must keep to, but for the way of the palm."""
+        """Return what loads and wrenches must keep to."""
         settled, layout = self.hand.settled, self.layout
         n, structure = len(settled.tiles), settled.hand.structure
         tension, palm = 3 * n, 3 * n + len(FINGERS)
@@ -140,7 +139,9 @@ class FloatingWrist(CompliantGrasp):
         q = np.zeros(len(Q))
         q[row] = settled.drag_allowances[touching]
         held = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
-        return LoadRows(layout.rows, P, p, held, s, Q, q)
+        # no row says which way the palm goes: its law is the same either way
+        names = tuple(row for row in layout.rows if not row.limit.endswith("_reversed"))
+        return LoadRows(names, P, p, held, s, Q, q)
 
     def loads_at(self, twists: Numbers) -> GraspLoads:
         """Return loads e and wrenches w at poses of the wrist.
@@ -211,64 +212,48 @@ class FloatingWrist(CompliantGrasp):
             left = left[holds]
         return left
 
-    def palm_mode(self, y: Array, given: PalmMode) -> PalmMode:
-        """Return the mode in which the palm carries at a pose.
+    @property
+    def pressing(self) -> Array:
+        """Pose of the wrist, shape (d,), at which the nearest palm tile just meets the rock."""
+        y, palm = self.at_rest, self.hand.settled.palm
+        if self.palm_carries:
+            y[WRIST_COLUMNS.index("wrist/vz") - len(WRIST_COLUMNS)] += max(
+                0.0, min(palm.gaps[i] for i in palm.engaged)
+            )
+        return y
 
-        Parameters
-        ----------
-        y : ndarray, shape (d,)
-            The pose.
-        given : PalmMode
-            Mode in which the set was linearised; here it is returned as it is.
-        """
-        return given
+    def palm_mode(self, y: Array) -> PalmMode:
+        """Return how the palm carries at a pose y, shape (d,)."""
+        twist = y[-len(WRIST_COLUMNS) :]
+        shear, inward = self.hand.palm_travel(twist[None])[0].tolist()
+        gap = self.hand.settled.palm.gaps[list(self.hand.settled.palm.engaged)].min(initial=np.inf)
+        return PALM_MODES[self.palm_carries and shear > 0.0, self.palm_carries and inward > gap]
 
-    def palm_modes(self) -> tuple[PalmMode, ...]:
-        """Return the palm's modes, each with its set; ``off`` alone if no palm tile is engaged."""
-        if not self.hand.settled.palm.engaged:
-            return ("off",)
-        return tuple(PALM_MODES.values())
+    def without_palm(self) -> Self:
+        """Return a copy whose palm carries no load; both share one cache of loads."""
+        idle = copy(self)
+        idle.palm_carries = False
+        return idle
+
+    @property
+    def travel_rows(self) -> tuple[Array, Array]:
+        """Hard rows A y ≤ b that bound the wrist's travel, shapes (k, d), (k,) [N]; here none."""
+        return np.zeros((0, len(self.columns))), np.zeros(0)
 
     def linearised(
-        self,
-        twist: ArrayLike | None = None,
-        palm: PalmMode | None = None,
-        within: ArrayLike | None = None,
+        self, twist: ArrayLike | None = None, *, within: ArrayLike | None = None
     ) -> WrenchSpace:
-        """Return the wrench space linearised about a pose of the wrist.
+        return self.linearised_each(self._pose(twist)[None], within)[0]
 
-        Parameters
-        ----------
-        twist : array_like, shape (6,), optional
-            ξ₀, twist of the wrist [m, rad]; at rest by default.
-        palm : {'off', 'drags', 'presses', 'drags_and_presses'}, optional
-            Mode of the palm; the attribute ``palm`` by default.
-        within : array_like, shape (6,), optional
-            Largest change of each component of ξ from ξ₀ [m, rad], added as hard rows; no such rows
-            by default.
-
-        Returns
-        -------
-        WrenchSpace
-            Columns `WRIST_COLUMNS`; the limit rows of a fixed wrist, and hard rows that keep the
-            palm in its mode and the wrist within its range.
-        """
-        return self.linearised_each(self._pose(twist)[None], palm, within)[0]
-
-    def linearised_each(
-        self, twists: Array, palm: PalmMode | None = None, within: ArrayLike | None = None
-    ) -> list[WrenchSpace]:
+    def linearised_each(self, twists: Array, within: ArrayLike | None = None) -> list[WrenchSpace]:
         """Return the wrench space linearised about each of k poses of the wrist.
 
-        The loads at all poses are computed at once, and cached by pose: other palm modes and other
-        ranges reuse them.
+        The loads at all poses are computed at once, and cached by pose: other ranges reuse them.
 
         Parameters
         ----------
         twists : ndarray, shape (k, d)
             Poses of the wrist.
-        palm : {'off', 'drags', 'presses', 'drags_and_presses'}, optional
-            Mode of the palm; the attribute ``palm`` by default.
         within : array_like, shape (d,), optional
             Largest change of each component from its pose, added as hard rows.
 
@@ -277,22 +262,14 @@ class FloatingWrist(CompliantGrasp):
         list of WrenchSpace, length k
             Each as from `linearised`.
         """
-        palm = palm or self.palm
-        carries = next(np.array(ways) for ways, mode in PALM_MODES.items() if mode == palm)
-        found = []
-        for at, loads in zip(twists, self._stepped(twists), strict=True):
-            steps = complex_steps(at)
-            free, stiffness = self.hand.palm_loads(steps), self.hand.palm_stiffness
-            H, h = np.zeros((0, 6)), np.zeros(0)
-            if self.hand.settled.palm.engaged:
-                # a palm that carries moves against the rock; one that does not, away from it
-                commensurate = 1e5  # [N/m] with other rows
-                signs = np.where(carries, -commensurate, commensurate)
-                slope = slopes(free) / stiffness[:, None]
-                H, h = signs[:, None] * slope, signs * (slope @ at - free[0].real / stiffness)
-            carried = self._grasp_loads(loads._replace(palm=free * carries))
-            found.append(self._about(at, carried, H, h, within))
-        return found
+        carried = [
+            loads if self.palm_carries else loads._replace(palm=0.0 * loads.palm)
+            for loads in self._stepped(twists)
+        ]
+        return [
+            self._about(at, self._grasp_loads(loads), *self.travel_rows, within)
+            for at, loads in zip(twists, carried, strict=True)
+        ]
 
     def _stepped(self, twists: Array) -> list[HandLoads]:
         """Return the loads at the complex steps from each of some poses."""

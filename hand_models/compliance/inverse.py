@@ -12,7 +12,6 @@ start again at a few other poses.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,31 +73,20 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
     other_starts, farthest_start = 8, 2.0
     directions = np.random.default_rng(0).normal(size=(other_starts, 6)) * pose_units(WRIST_COLUMNS)
     shares = np.linspace(0.0, farthest_start, other_starts + 1)[1:]
-    ways: list[Array | None] = [None]
-    if hand.settled.palm.engaged:
-        ways += [np.array(way) for way in itertools.product((False, True), repeat=2)]
     found: list[WristPose] = []
     for start in (np.zeros(6), *(shares[:, None] * directions)):
-        for carries in ways:
-            found.append(_nearest(hand, wanted, start, carries))
-            if found[-1].converged:
-                return found[-1]
+        found.append(_nearest(hand, wanted, start))
+        if found[-1].converged:
+            return found[-1]
     return min(found, key=lambda pose: float(np.abs(pose.residual * WRENCH_SCALE).max()))
 
 
-def _nearest(hand: CompliantHand, wanted: Array, first: Array, carries: Array | None) -> WristPose:
-    """Return the pose of least residual that steps lead to.
-
-    Of a hand whose palm's shear and pressing carry both ways, or not at all, each as ``carries``
-    says; with None as they are, only against the rock.
-    """
+def _nearest(hand: CompliantHand, wanted: Array, first: Array) -> WristPose:
+    """Return the pose of least residual that steps from a first pose lead to."""
     units = pose_units(WRIST_COLUMNS)
 
     def wrenches(twists: Numbers) -> Numbers:
-        loads = hand.loads(twists)
-        if carries is not None:
-            loads = loads._replace(palm=hand.palm_loads(twists) * carries)
-        return np.asarray(hand.wrenches(loads) * WRENCH_SCALE)
+        return np.asarray(hand.wrenches(hand.loads(twists)) * WRENCH_SCALE)
 
     def residual(x: Array) -> Array:
         left = wrenches((x * units)[None])[0] - wanted * WRENCH_SCALE

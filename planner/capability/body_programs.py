@@ -24,7 +24,6 @@ from planner.prepare import (
     Posture,
     assemble,
     posture_at,
-    widest_at_rest,
 )
 from planner.programs import CAP_SLACK, WRENCH_UNIT, Outcome, Reached, StanceData
 from planner.question import Question
@@ -317,18 +316,15 @@ def size_of(direction: Array) -> float:
 
 
 def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
-    """Return where wrists that give way are in a plan; without one, at rest as they can do most."""
+    """Return where wrists that give way are in a plan; without one, at rest."""
     if planned.hands is None:
-        palms = [None if wrist is None else widest_at_rest(wrist)[0] for wrist in hands.wrists]
-        return hands.at_rest(palms)
-    point = hands.at_rest(hands.idle)
-    loads, palms = list(point.loads), list(point.palms)
+        return hands.at_rest()
+    loads = list(hands.at_rest().loads)
     for i, hand in enumerate(planned.hands):
         if hand.wrist is not None:
             driven = [hand.tensions] if hand.wrist.driven else []
             loads[i] = np.concatenate([*driven, hand.wrist.twist])
-            palms[i] = hand.wrist.palm
-    return LinearisationPoint(tuple(loads), tuple(palms))
+    return LinearisationPoint(tuple(loads))
 
 
 def _with_idle(data: StanceData, question: Question, where: Posture | None) -> StanceData:

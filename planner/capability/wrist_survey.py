@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hand_models.base import Array, EmptySetError
 from hand_models.compliance import (
-    PALM_MODES,
     Farthest,
     FloatingWrist,
     WristSearch,
@@ -30,8 +29,8 @@ class Survey:
         Feasible wrist poses and extreme wrenches.
     ends : tuple of (Farthest or None), length 12
         Pose and wrench at which a limit is exceeded, along +x, −x, +y, … of hand frame H, forces
-        before moments: the farthest of the local maxima that start at the search's farthest
-        wrenches. None if no search from there finds a feasible pose.
+        before moments: a local maximum, searched for from the pose whose wrench reaches farthest.
+        None if that search finds no feasible pose.
     """
 
     found: WristSearch
@@ -79,20 +78,9 @@ def survey(
 
 
 def _end(wrist: FloatingWrist, found: WristSearch, direction: Array) -> Farthest | None:
-    """Return the farthest limit that is reached, begun in each of the palm's ways of carrying."""
-    reach = found.wrenches @ direction
-    carries = wrist.hand.palm_loads(found.poses) > 0.0
-    best: Farthest | None = None
-    for (drags, presses), mode in PALM_MODES.items():
-        those = np.flatnonzero((carries == (drags, presses)).all(axis=1))
-        # a way of carrying whose farthest wrench is less than half as far is not tried
-        if not len(those) or reach[those].max() < 0.5 * reach.max():
-            continue
-        start = found.poses[those[int(reach[those].argmax())]]
-        try:
-            there = farthest(replace(wrist, palm=mode), direction, start)
-        except EmptySetError:
-            continue
-        if best is None or there.reach > best.reach:
-            best = there
-    return best
+    """Return the farthest limit that is reached from the pose whose wrench reaches farthest."""
+    start = found.poses[int((found.wrenches @ direction).argmax())]
+    try:
+        return farthest(wrist, direction, start)
+    except EmptySetError:
+        return None

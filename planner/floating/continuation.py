@@ -17,9 +17,8 @@ import numpy as np
 
 from planner import deadline
 from planner.deadline import Budget
-from planner.floating.elastic_search import find_wrists
+from planner.floating.elastic_search import find_wrists, first_plan, pressing
 from planner.floating.goals import SETTINGS
-from planner.floating.palm_modes import exchanged, first_plan, starts
 from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import TOLERANCES, HandSets
 from planner.programs import CAP_SLACK
@@ -54,7 +53,7 @@ class _Way(NamedTuple):
 def least_use(
     hands: HandSets, budget: Budget, near: WristSolution | None = None
 ) -> tuple[WristSolution, LargestFactor | None]:
-    """Search for the plan of least utilisation, over wrist poses and palm modes.
+    """Search for the plan of least utilisation, over wrist poses.
 
     If the utilisation exceeds 1, or no plan is found, the search continues from smaller multiples
     of the body wrench up to the largest that can be held, and on to the whole.
@@ -76,11 +75,15 @@ def least_use(
         Largest multiple of the body wrench found on the way; None if none was sought, as for a plan
         within its limits.
     """
-    choices = starts(hands, 1.0, budget)
     first = SETTINGS.first_programs
     plan = None if near is None else find_wrists(hands, near.point, budget.part(first))
     if plan is None or not plan.exact:
-        near, plan = None, first_plan(hands, 1.0, choices, budget.part(first))
+        near, plan = None, first_plan(hands, 1.0, budget.part(first))
+    if not _held(plan) and hands.springy and hands.together is None and near is None:
+        # palms carry nothing at rest: a search from there may not find what they can do, and
+        # driven hands with their bounded travel hardly reach it
+        there = find_wrists(hands, pressing(hands, 1.0), budget.part(first), SETTINGS.rounds_nearby)
+        plan = _better(plan, there)
     if deadline.expired():
         return plan, None
     most: LargestFactor | None = None
@@ -94,10 +97,6 @@ def least_use(
             plan = _better(plan, onward)
             if same or _held(plan):
                 break
-    if not plan.exact and not budget.ended:
-        plan = _better(plan, first_plan(hands, 1.0, choices, budget.part(first)))
-    if plan.exact:
-        plan = exchanged(hands, plan, budget.part(50))  # for trying its palms the other way
     if _held(plan) and most is not None and most.factor < 1.0:
         most = None
     return plan, most
@@ -158,7 +157,7 @@ def _ways(
         if deadline.expired():
             return
         part = budget.part(SETTINGS.first_programs)
-        start = first_plan(hands, fraction, starts(hands, fraction, part), part)
+        start = first_plan(hands, fraction, part)
         if start.exact:
             way = _way(hands, start, budget)
             if way is not None:
@@ -194,12 +193,8 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
         # a search for compliant wrists ends within some thousandths of the least
         near = CAP_SLACK if hands.together is None else 5e-4
         if 1.0 - near <= used <= 1.0 + CAP_SLACK:
-            better = exchanged(hands, now, budget)
-            if better is now:
-                sure = True
-                break
-            now = better
-            continue
+            sure = True
+            break
         # bracketed to 0.2 %, where Newton's method does not end
         if high < math.inf and high - low <= 2e-3 * high:
             sure = overloaded

@@ -27,7 +27,6 @@ from planner import programs
 from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists
 from planner.floating.goals import SETTINGS, Goal, bent_root
-from planner.floating.palm_modes import exchanged
 from planner.floating.wrist_iteration import WristSolution
 from planner.prepare import ExactMeasure, HandSets, LinearisationPoint, Sets
 from planner.programs import CAP_SLACK, Outcome, StanceData
@@ -181,5 +180,4 @@ def best_within(
     if not found.exact or least.value(found.measure) > least.value(plan.measure):
         sets = hands.sets(plan.point, 1.0, least.farthest)
         return replace(plan, found="unproven", sets=sets, outcome=least.solve(sets.data))
-    found = exchanged(hands, found, budget, least)
     return replace(found, rounds=plan.rounds + found.rounds)

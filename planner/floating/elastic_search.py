@@ -16,6 +16,7 @@ that its utilisation is the least, or the result is marked unproven.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +36,63 @@ from planner.floating.wrist_iteration import (
 from planner.prepare import HandSets, LinearisationPoint, Sets
 from planner.programs import WRIST_RANGE
 
-__all__ = ["find_wrists"]
+__all__ = ["find_wrists", "first_plan", "pressing"]
+
+
+def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
+    """Return the first plan found from one starting point after another, or the nearest failure.
+
+    Parameters
+    ----------
+    hands : HandSets
+    factor : float
+        Multiple of the body wrench to be balanced.
+    budget : Budget
+        Largest number of conic programs.
+
+    Returns
+    -------
+    WristSolution
+        A plan; if there is none, the failed search with the smallest missing wrench.
+    """
+    failed: list[WristSolution] = []
+    for start in _starts(hands, factor, budget):
+        most = SETTINGS.rounds_nearby if failed else SETTINGS.rounds
+        found = find_wrists(hands, start, budget, most)
+        if found.exact:
+            return found
+        failed.append(found)
+        if budget.ended:
+            break
+    return min(failed, key=lambda found: found.measure.missing)
+
+
+def pressing(hands: HandSets, factor: float) -> LinearisationPoint:
+    """Return the point at which the palms of all wrists that move just meet the rock."""
+    point = hands.at_rest()
+    loads = [
+        y if wrist is None else wrist.pressing
+        for wrist, y in zip(hands.wrists, point.loads, strict=True)
+    ]
+    return replace(point, loads=tuple(loads), factor=factor)
+
+
+def _starts(hands: HandSets, factor: float, budget: Budget) -> Iterator[LinearisationPoint]:
+    """Yield points at which a search may begin, the most promising first."""
+    rest = replace(hands.at_rest(), factor=factor)
+    if hands.springy:
+        # palms on their springs draw the search to where fingers hold little
+        yield find_wrists(hands.without_palms(), rest, budget, SETTINGS.rounds_nearby).point
+    yield rest
+    if hands.springy and hands.together is None:
+        yield pressing(hands, factor)
+    if hands.together is not None:
+        # closed harder, tiles are farther from being dragged backwards
+        loads = [
+            y if wrist is None or not wrist.driven else np.where(np.arange(len(y)) < 4, 80.0, y)
+            for wrist, y in zip(hands.wrists, rest.loads, strict=True)
+        ]
+        yield replace(rest, loads=tuple(loads))
 
 
 def find_wrists(

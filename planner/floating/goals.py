@@ -34,7 +34,7 @@ class FloatingSettings:
     Then the best plan found is returned. Four floating hands take some ten seconds."""
     first_programs: int = 70  # for a search for a first plan, at most
     effort_programs: int = 110  # for the search for least effort, at most
-    rounds: int = 40  # for one choice of palm modes, at most
+    rounds: int = 40  # from one starting point, at most
     rounds_nearby: int = 16  # from a plan, or where another search has failed, at most
     first_range: float = 4.0  # about a point, in `TWIST_UNIT`
     closeness: float = 4e-6  # of a point to the best of the sets about it, relative

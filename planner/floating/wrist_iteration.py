@@ -127,7 +127,7 @@ def solve_wrists(
     most: int = SETTINGS.rounds,
     goal: Goal = LEAST_USE,
 ) -> WristSolution:
-    """Search for the best wrist poses for a goal, with the palm modes of the start point.
+    """Search for the best wrist poses for a goal.
 
     If the search ends without proof, or its budget is spent, violations at the last point are
     corrected (`made_exact`). At a deadline the latest plan found on the way is returned.

@@ -12,7 +12,6 @@ from .hand_sets import (
     HandSets as HandSets,
     LinearisationPoint as LinearisationPoint,
     Sets as Sets,
-    widest_at_rest as widest_at_rest,
 )
 from .joint_posture import (
     Posture as Posture,

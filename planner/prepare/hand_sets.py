@@ -19,9 +19,7 @@ from hand_models.compliance import (
     CompliantHand,
     CompliantWrist,
     CompliantWrists,
-    DrivenHand,
     FloatingWrist,
-    PalmMode,
     pose_units,
 )
 from hand_models.hand import SettledHand
@@ -44,7 +42,7 @@ __all__ = [
     "HandSets",
     "LinearisationPoint",
     "Sets",
-    "widest_at_rest",
+    "error_at_rest",
     "wrist_at",
     "wrists_at",
 ]
@@ -59,14 +57,11 @@ class LinearisationPoint:
     loads : tuple of ndarray, shape (m,)
         y of each hand. Fixed wrist: loads [N]; floating: twist of the wrist [m, rad]; compliant:
         tensions [N] and twist [m, rad].
-    palms : tuple of PalmMode or None
-        Palm mode (which loads the palm carries) of each floating hand; None for a fixed wrist.
     factor : float
         Multiple of the body wrench that is to be balanced.
     """
 
     loads: tuple[Array, ...]
-    palms: tuple[PalmMode | None, ...]
     factor: float = 1.0
 
 
@@ -134,7 +129,7 @@ class HandSets:
     Attributes
     ----------
     spaces : tuple of WrenchSpace
-        Set of each hand; of compliant or floating hands at rest, with idle palms.
+        Set of each hand; of compliant or floating hands at rest.
     scaled : tuple of ScaledRows
         Scaled rows of these sets.
     wrists : tuple of FloatingWrist or None
@@ -204,24 +199,19 @@ class HandSets:
 
     @property
     def springy(self) -> bool:
-        """True if the palm of a compliant hand carries load by its springs."""
-        return any(isinstance(w, CompliantWrist) and w.palm_carries for w in self.wrists)
+        """True if the palm of a compliant or floating hand carries load by its springs."""
+        return any(w is not None and w.palm_carries for w in self.wrists)
 
     def without_palms(self) -> HandSets:
-        """Return the same hands, with palms of compliant hands that carry nothing."""
-        wrists = [w.without_palm() if isinstance(w, CompliantWrist) else w for w in self.wrists]
+        """Return the same hands, with palms of compliant or floating hands that carry nothing."""
+        wrists = [None if w is None else w.without_palm() for w in self.wrists]
         return replace(self, wrists=tuple(wrists))
 
-    @property
-    def idle(self) -> tuple[PalmMode | None, ...]:
-        """Palm modes of all hands in which no palm carries load."""
-        return tuple(None if wrist is None else "off" for wrist in self.wrists)
-
-    def at_rest(self, palms: Sequence[PalmMode | None]) -> LinearisationPoint:
+    def at_rest(self) -> LinearisationPoint:
         """Return the point with all wrists at rest, and no loads on hands with fixed wrists."""
         pairs = zip(self.wrists, self.spaces, strict=True)
         loads = [np.zeros(len(s.columns)) if w is None else w.at_rest for w, s in pairs]
-        return LinearisationPoint(tuple(loads), tuple(palms))
+        return LinearisationPoint(tuple(loads))
 
     def sets(
         self,
@@ -246,12 +236,10 @@ class HandSets:
             return Sets(self.spaces, data)
         self._prepare([y[None] for y in point.loads])
         spaces, parts = list(self.spaces), list(self.data.hands)
-        for i, (wrist, y, palm) in enumerate(
-            zip(self.wrists, point.loads, point.palms, strict=True)
-        ):
+        for i, (wrist, y) in enumerate(zip(self.wrists, point.loads, strict=True)):
             if wrist is not None:
                 reach = None if within is None else within * pose_units(wrist.columns)
-                space = wrist.linearised(y, palm, reach)
+                space = wrist.linearised(y, within=reach)
                 if farthest is not None:
                     space = _near_rest(space, farthest[i])
                 spaces[i], parts[i] = self._floating_hand(i, space)
@@ -303,7 +291,7 @@ class HandSets:
             slopes = np.zeros((1 + len(y), len(y)))
             if wrist is not None:
                 limit, hard = duals.limit_duals[i], duals.hard_duals[i]
-                each = wrist.linearised_each(poses[i], point.palms[i], within * units[i])
+                each = wrist.linearised_each(poses[i], within * units[i])
                 for j, space in enumerate(each):
                     hand = self._floating_hand(i, space)[1]
                     slopes[j] = hand.L.T @ limit + hand.H.T @ hard + hand.G.T @ balance
@@ -315,7 +303,7 @@ class HandSets:
     def near_rest(self, point: LinearisationPoint) -> bool:
         """Return whether every wrist's twist from rest is small (at most 50 `TWIST_UNIT`)."""
         # in `TWIST_UNIT`: beyond, no twist is small
-        return self.step(self.at_rest(point.palms), point.loads) <= 50.0
+        return self.step(self.at_rest(), point.loads) <= 50.0
 
     def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:
         """Return the largest move of a wrist from a point to given loads, in `TWIST_UNIT`."""
@@ -335,17 +323,13 @@ def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:
     return replace(space, h=np.where(ranges, np.minimum(space.h, most), space.h))
 
 
-def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
-    """Return the widest set at rest over the palm modes, and its largest linearisation error [N].
+def error_at_rest(wrist: FloatingWrist) -> float:
+    """Return the largest linearisation error of the set at rest [N].
 
-    The widest set contains the largest ball of twists, in `TWIST_UNIT`. The error is measured where
-    the set reaches farthest along ± each axis, if no phalanx in contact loses its rock there.
+    Measured where the set reaches farthest along ± each axis, if no phalanx in contact loses its
+    rock there.
     """
-    palms = wrist.palm_modes()
-    spaces = [wrist.linearised(palm=palm) for palm in palms]
-    rooms = [_room(space) for space in spaces]
-    best = int(np.argmax(rooms))
-    space, error = spaces[best], 0.0
+    space, error = wrist.linearised(), 0.0
     for direction in np.vstack([np.eye(6), -np.eye(6)]):
         slope = -(direction @ space.generators) * TWIST_UNIT
         result = scipy.optimize.linprog(
@@ -357,19 +341,7 @@ def widest_at_rest(wrist: FloatingWrist) -> tuple[PalmMode, WrenchSpace, float]:
         exact = wrist.hand.wrenches(wrist.hand.loads(twist[None]))[0]
         off = np.abs((space.wrench(twist) - exact) * WRENCH_SCALE).max()
         error = max(error, float(off)) if math.isfinite(off) else error
-    return palms[best], space, error
-
-
-def _room(space: WrenchSpace) -> float:
-    """Return the radius of the largest ball within a set, in `TWIST_UNIT`; −∞ if it is empty."""
-    rows = space.A * TWIST_UNIT
-    sizes = np.linalg.norm(rows, axis=1)[:, None]
-    goal = np.append(np.zeros(rows.shape[1]), -1.0)
-    bounds = [*[(None, None)] * rows.shape[1], (0.0, None)]
-    result = scipy.optimize.linprog(
-        goal, A_ub=np.hstack([rows, sizes]), b_ub=space.b, bounds=bounds
-    )
-    return -math.inf if result.fun is None else -float(result.fun)
+    return error
 
 
 def wrist_at(
@@ -384,7 +356,9 @@ def wrist_at(
         return None
     try:
         if hand.wrist == "compliant":
-            return CompliantWrist(DrivenHand(settled), tension_limit, hand.wrist_travel)
+            return CompliantWrist(
+                CompliantHand(settled, scheme="tension"), tension_limit, hand.wrist_travel
+            )
         return FloatingWrist(CompliantHand(settled, hand.tendon_preload), tension_limit)
     except InvalidInputError as error:
         if isinstance(error, UnsupportedError):

@@ -78,7 +78,7 @@ class PreparedStance:
         """Wrench spaces of all hands; of compliant or floating hands at rest with idle palms."""
         hands = self.hands
         if hands.floating:
-            return hands.sets(hands.at_rest(hands.idle))
+            return hands.sets(hands.at_rest())
         return Sets(hands.spaces, hands.data)
 
     def turned(self, wrench: Array) -> PreparedStance:

@@ -10,7 +10,7 @@ from hand_models.compliance import FloatingWrist, PalmMode
 from hand_models.fixed_wrist import PULL_OFF, best_seats, wrench_space
 from hand_models.hand import Placement, SettledHand, SpinyHand
 from hand_models.wrench_spaces import WrenchSpace
-from planner.prepare.hand_sets import widest_at_rest, wrist_at
+from planner.prepare.hand_sets import error_at_rest, wrist_at
 from planner.question import HandOnHold, Stance
 
 __all__ = [
@@ -123,9 +123,9 @@ class RestingHand(NamedTuple):
     settled : SettledHand
     space : WrenchSpace
         All wrenches that the hand can exert on the rock. Of a floating hand, the set linearised at
-        rest for the palm mode in which it is widest.
+        rest.
     palm : PalmMode or None
-        That palm mode; None for a fixed wrist.
+        How the palm carries at rest; None for a fixed wrist.
     error : float
         Largest linearisation error where the set reaches farthest along ± each axis: forces, and
         moments over 0.1 m [N]. Zero for a fixed wrist.
@@ -162,8 +162,8 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
         )
     if wrist is None:
         return RestingHand(settled, wrench_space(settled))
-    palm, space, error = widest_at_rest(wrist)
-    return RestingHand(settled, space, palm, error)
+    palm = wrist.palm_mode(wrist.at_rest)
+    return RestingHand(settled, wrist.linearised(), palm, error_at_rest(wrist))
 
 
 def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:

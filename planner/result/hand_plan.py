@@ -32,13 +32,13 @@ class WristPlan:
     ----------
     twist : ndarray, shape (6,)
         Twist ξ of the hand frame H from rest, about H's origin [m, rad].
-    palm : PalmMode
-        Palm mode of the plan: which loads the palm carries (none, drag, pressure or both).
     rounds : int
         Number of linearisations of all hands' sets.
     error : float
         Error of the last but one linearised set at the planned pose: forces, and moments over 0.1 m
         [N]. The plan itself is exact.
+    palm : PalmMode
+        Which loads the palm carries (none, drag, pressure or both).
     driven : bool
         True if the wrist is compliant: motors keep the tendon tensions. False if it is floating.
     pose_target : ndarray, shape (6,), or None
@@ -51,9 +51,9 @@ class WristPlan:
     """
 
     twist: Array
-    palm: PalmMode
     rounds: int
     error: float
+    palm: PalmMode = "off"
     driven: bool = False
     pose_target: Array | None = None
     least_stiffness: float | None = None

@@ -18,7 +18,7 @@ from planner.floating import (
     most_load,
     with_room,
 )
-from planner.prepare import PreparedStance
+from planner.prepare import HandSets, PreparedStance
 from planner.programs import CAP_SLACK, StanceData, tension_trade
 from planner.result import LoadFactor, WristPlan
 from planner.solving.dual_bounds import least_bound, unproven_sentences
@@ -67,8 +67,8 @@ class FloatingSolution(Solution):
         search = best_within(prepared.hands, self.search, cap, objective.goal, budget)
         found = replace(self, cap=cap).late(*late(objective.late))
         if not search.outcome.solved:
-            return found if deadline.expired() else found._at(search)
-        found = found._at(search)
+            return found if deadline.expired() else found._at(search, prepared.hands)
+        found = found._at(search, prepared.hands)
         if not found.proven:
             return replace(found, objective=objective, best=search.outcome)
         value = objective.value(search.sets.data, search.point.loads)
@@ -82,15 +82,14 @@ class FloatingSolution(Solution):
             faults=_unproven_use(self.usual, self.usual.outcome.value) + further,
         )
 
-    def _at(self, search: WristSolution) -> FloatingSolution:
+    def _at(self, search: WristSolution, hands: HandSets) -> FloatingSolution:
         """Return the same with the loads of a search, of which nothing is proven without proof."""
-        pairs = zip(search.point.loads, search.point.palms, strict=True)
         poses = tuple(
             [
                 None
-                if palm is None
-                else WristPlan(y[-len(WRIST_COLUMNS) :], palm, search.rounds, search.error)
-                for y, palm in pairs
+                if wrist is None
+                else WristPlan(y[-len(WRIST_COLUMNS) :], search.rounds, search.error)
+                for wrist, y in zip(hands.wrists, search.point.loads, strict=True)
             ]
         )
         found = replace(
@@ -151,7 +150,7 @@ def floating_solution(
         return replace(found, sets=prepared.hands.sets(search.point))
     used = search.measure.utilisation
     found = replace(found, most=tension_trade(used, cap).most, faults=_unproven_use(search, used))
-    return found._at(_less_tense_beside(prepared, search))
+    return found._at(_less_tense_beside(prepared, search), prepared.hands)
 
 
 def _unproven_use(search: WristSolution, used: float) -> tuple[str, ...]:

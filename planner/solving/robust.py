@@ -156,7 +156,7 @@ def _factors(
         there = [space for space in spaces if space is not None]
         if len(there) == len(spaces):
             moved = prepared.hands.with_sets(there)
-            data = moved.sets(moved.at_rest(moved.idle)).data
+            data = moved.sets(moved.at_rest()).data
             factors[k] = most_of_fixed(moved, data) or 0.0
     return factors
 

@@ -221,7 +221,7 @@ def _check_palm(
     """Check the force of the palm of a floating hand."""
     if not hand.palm.engaged:
         return
-    body, stiffness, whole = hand.hand, 0.0, 0.0
+    body, stiffness = hand.hand, 0.0
     for share, engaged in hand.palm.layers:
         sharing = share_load(
             tuple(body.palm_contact[i] for i in engaged),
@@ -230,17 +230,20 @@ def _check_palm(
             body.palm_own_friction,
         )
         stiffness += share * float(sharing.tile_stiffness.sum())
-        whole += share * len(engaged)
     step = moved(hand.palm.centre, wrist)
-    if wrist.driven:
-        # springs that set in over 0.1 mm of travel, and each tile's over 0.02 mm about its gap
-        shear = stiffness * (math.hypot(step[0], 1e-4) - step[0]) / 2.0
-        beyond = step[2] - np.maximum(hand.palm.gaps[list(hand.palm.engaged)], 0.0)
-        pressed = (np.hypot(beyond, 2e-5) + beyond) / 2.0
-        pressing = body.palm_pressing_stiffness * float(pressed @ hand.palm.engagement)
-    else:
-        shear = max(-stiffness * step[0], 0.0)
-        pressing = max(body.palm_pressing_stiffness * whole * step[2], 0.0)
+
+    # the integral of a stiffness that rises from zero to its whole over the onset [m]
+    def pressed(travel: float, onset: float) -> float:
+        rising, whole = min(max(travel, 0.0), onset), max(travel - onset, 0.0)
+        return rising**2 / (2.0 * onset) + whole
+
+    shear = stiffness * pressed(-float(step[0]), 1e-4)
+    pressing = sum(
+        share * body.palm_pressing_stiffness * pressed(float(step[2]) - max(gap, 0.0), 2e-5)
+        for share, gap in zip(
+            hand.palm.engagement, np.array(hand.palm.gaps)[list(hand.palm.engaged)], strict=True
+        )
+    )
     off = np.abs(force - np.array([-shear, 0.0, pressing])).max()
     if not off <= allowed:
         found.append(

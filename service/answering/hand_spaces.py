@@ -67,7 +67,7 @@ def answer_wrench_space(
     hand = resting_hand(asked, request.limb)
     settled = hand.settled
     deadline.check(step)
-    wrist = None if hand.palm is None else WristPlan(np.zeros(6), hand.palm, 1, hand.error)
+    wrist = None if hand.palm is None else WristPlan(np.zeros(6), 1, hand.error, hand.palm)
     named = wrench_set_reply(hand.space)
     reply = WrenchSpaceReply(
         id=request.id,

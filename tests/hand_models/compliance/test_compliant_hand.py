@@ -8,7 +8,7 @@ import pytest
 
 from hand_models import InvalidInputError
 from hand_models.base import UnsupportedError
-from hand_models.compliance import COMPLEX_STEP, PALM_MODES, CompliantHand, FloatingWrist
+from hand_models.compliance import COMPLEX_STEP, CompliantHand, FloatingWrist
 from hand_models.compliance.compliant_finger import CompliantFingers
 from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import FINGERS, Grasp
@@ -178,8 +178,9 @@ def test_at_rest_the_palm_does_not_stiffen_the_hand(name):
 def test_the_palm_neither_pushes_nor_pulls():
     hand = compliant("pinch")
     assert hand.settled.palm.engaged
+    into = 1e-4 + max(hand.settled.palm.gaps[i] for i in hand.settled.palm.engaged)
     away, against = (
-        hand.loads(np.array([[side * 1e-4, 0.0, -side * 1e-4, 0.0, 0.0, 0.0]])).palm[0]
+        hand.loads(np.array([[side * 1e-4, 0.0, -side * into, 0.0, 0.0, 0.0]])).palm[0]
         for side in (1.0, -1.0)
     )
     np.testing.assert_array_equal(away, 0.0)
@@ -215,8 +216,7 @@ def test_the_linearised_set_touches_the_exact_one_where_it_is_linearised(name):
     hand = compliant(name)
     wrist = FloatingWrist(hand)
     at = np.array([5e-5, 2e-5, -8e-5, 1e-3, -1e-3, 5e-4])
-    back, into = hand.palm_loads(at[None])[0] > 0.0
-    space = wrist.linearised(at, PALM_MODES[bool(back), bool(into)])
+    space = wrist.linearised(at)
     loads = hand.loads(at[None])
     np.testing.assert_allclose(space.wrench(at), hand.wrenches(loads)[0], atol=1e-8)
     verdict = wrist.evaluate(at[None])
@@ -266,10 +266,10 @@ def test_sets_at_many_poses_are_those_at_each():
     wrist = FloatingWrist(compliant("oblique"))
     poses = np.array([5e-5, 2e-5, -8e-5, 1e-3, -1e-3, 5e-4]) * np.arange(4)[:, None]
     within = np.full(6, 1e-3)
-    # one of them known already, with another way of the palm
-    wrist.linearised(poses[2], "drags")
-    many = wrist.linearised_each(poses, "presses", within)
+    # one of them known already, with another range
+    wrist.linearised(poses[2])
+    many = wrist.linearised_each(poses, within)
     for at, found in zip(poses, many, strict=True):
-        alone = FloatingWrist(wrist.hand).linearised(at, "presses", within)
+        alone = FloatingWrist(wrist.hand).linearised(at, within=within)
         for name in ("origin", "generators", "L", "l0", "s", "H", "h"):
             np.testing.assert_allclose(getattr(found, name), getattr(alone, name), rtol=1e-12)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hand_models.base import UnsupportedError, wrench_transport
-from hand_models.compliance import DrivenHand
+from hand_models.compliance import CompliantHand
 from hand_models.hand import WristTravel
 from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists
@@ -54,7 +54,7 @@ def test_the_model_confirms_the_plan_and_the_body_is_balanced() -> None:
     for place, hand in zip(question.stance.hands, answer.hands, strict=True):
         assert hand.wrist is not None
         assert hand.wrist.driven
-        model = DrivenHand(settle_hand(place, question.stance))
+        model = CompliantHand(settle_hand(place, question.stance), scheme="tension")
         loads = model.loads(hand.wrist.twist[None], hand.tensions[None])
         np.testing.assert_allclose(hand.loads, loads.tile_loads[0], atol=1e-9)
         np.testing.assert_allclose(hand.wrench, model.wrenches(loads)[0], atol=1e-9)
@@ -151,7 +151,8 @@ def test_a_limb_that_aims_at_its_pose_target_exerts_the_wrench() -> None:
     question = replace(question, stance=replace(question.stance, limb_stiffness=limbs))
     answer = plan(question)
     for place, hand in zip(question.stance.hands, answer.hands, strict=True):
-        wrist, model = hand.wrist, DrivenHand(settle_hand(place, question.stance))
+        wrist, settled = hand.wrist, settle_hand(place, question.stance)
+        model = CompliantHand(settled, scheme="tension")
         pull = (wrist.pose_target - wrist.twist) * ([5e3] * 3 + [100.0] * 3)
         np.testing.assert_allclose(pull, hand.wrench, atol=1e-9)
         # stiffness of the hand at its tensions, by central differences
@@ -213,7 +214,7 @@ def test_random_starts_within_the_travel_end_alike(name: str) -> None:
             least, most = map(np.array, wrist.travel.bounds)
             twist = least + (most - least) * rng.uniform(0.15, 0.85, 6)
             loads.append(np.concatenate([rng.uniform(10.0, 120.0, 4), twist]))
-        start = replace(hands.at_rest(hands.idle), loads=tuple(loads))
+        start = replace(hands.at_rest(), loads=tuple(loads))
         start = find_wrists(hands.without_palms(), start, Budget(320)).point
         found = find_wrists(hands, start, Budget(320))
         used.append(found.measure.utilisation if found.exact else np.inf)

@@ -22,7 +22,7 @@ from tests.suite.helpers.floating_hands import NEAR, PAIR, REAR, body_wrench, fl
 from tests.suite.helpers.stances import on_wall
 
 chance = np.random.default_rng(3)
-TWISTS = [2.4 * NEAR * part for part in chance.uniform(0.2, 1.0, (4, 6))[2:]] * np.array(
+TWISTS = [2.0 * NEAR * part for part in chance.uniform(0.2, 1.0, (4, 6))[2:]] * np.array(
     [[1.0] * 6, [1.0, -1.0] * 3]
 )
 """Of the wrists of `PAIR`: poses that they bear, and that others reach with less effort."""

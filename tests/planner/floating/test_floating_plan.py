@@ -47,7 +47,7 @@ def pair() -> tuple[Question, Plan]:
 
 def test_set_is_tangent_to_the_model():
     wrist = wrist_of(PAIR.hands[0], PAIR)
-    space = wrist.linearised(NEAR, "drags_and_presses")
+    space = wrist.linearised(NEAR)
     steps = 1e-4 * np.diag(TWIST_UNIT)
     up, down = (wrist.hand.wrenches(wrist.hand.loads(NEAR + sign * steps)) for sign in (1.0, -1.0))
     slopes = ((up - down) / (2.0 * np.diag(steps)[:, None])).T

@@ -31,7 +31,7 @@ def gathered(question: Question) -> tuple[HandSets, StanceData]:
     where = posture(question)
     wrench = question.needed_wrench(None if where is None else where.weights)
     _, hands = assemble(question, where, wrench)
-    return hands, hands.sets(hands.at_rest(hands.idle)).data
+    return hands, hands.sets(hands.at_rest()).data
 
 
 def on_body(stance, i: int, wrench: np.ndarray) -> np.ndarray:

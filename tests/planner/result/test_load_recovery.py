@@ -48,7 +48,7 @@ def read(stance, seed=0):
     """Settled hands, their sets, random loads, and what is read of these."""
     rng = np.random.default_rng(seed)
     batch, hands = assemble(ask(stance), None, np.zeros(6))
-    spaces, data = hands.sets(hands.at_rest(hands.idle))
+    spaces, data = hands.sets(hands.at_rest())
     loads = [random_loads(rng, space) for space in spaces]
     reader = LoadRecovery(batch, spaces)
     return batch.hands, spaces, data, loads, reader

@@ -386,7 +386,7 @@ def test_so_do_those_of_hands_whose_wrists_float(joint):
     given = [200.0] * 7
     given[joint] = 0.0
     limits = Limits(joint_torque=dict.fromkeys(LIMBS_OF_WALL, tuple(given)))
-    answer = plan(Question(stance, limits=limits))
+    answer = plan(Question(stance, load=Load(mass=90.0), limits=limits))
     assert answer.status == "optimal"
     assert answer.verified
     for torque in answer.joint_torque.values():

@@ -98,7 +98,7 @@ class Quadratic:
 
     @cached_property
     def data(self) -> StanceData:
-        return self.hands.sets(self.hands.at_rest(self.hands.idle)).data
+        return self.hands.sets(self.hands.at_rest()).data
 
     def solved(self) -> np.ndarray:
         """Loads of all hands by `solvers.effort`, proven with its small weights."""

@@ -60,7 +60,7 @@ def checked_by(question: Question):
     """The check that plans pass, and what reads loads for it."""
     known = StreamStance(question)
     prepared = KnownStance(replace(question, body_wrench=known.first)).prepared
-    spaces, data = prepared.hands.sets(prepared.hands.at_rest(prepared.hands.idle))
+    spaces, data = prepared.hands.sets(prepared.hands.at_rest())
     check = Check(prepared.question, prepared.batch, prepared.where)
     return known, data, LoadRecovery(prepared.batch, spaces), check
 

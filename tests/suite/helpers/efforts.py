@@ -50,7 +50,7 @@ def promised(question: Question, answer: Plan, cap: float) -> float:
     Effort is convex on them, so that it lies above its tangent at the plan.
     """
     _, hands = assemble(question, posture(question), answer.body_wrench)
-    data = hands.sets(hands.at_rest(hands.idle)).data.hands
+    data = hands.sets(hands.at_rest()).data.hands
     spaces = [hand.space for hand in answer.hands]
     loads = [loads_of(hand) for hand in answer.hands]
     slopes = []
