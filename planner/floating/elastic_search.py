@@ -40,7 +40,10 @@ __all__ = ["find_wrists", "first_plan", "pressing"]
 
 
 def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
-    """Return the first plan found from one starting point after another, or the nearest failure.
+    """Return a plan found from one starting point after another, or the nearest failure.
+
+    It is the first plan found, or the best one if palms of compliant hands carry load in it: their
+    springs begin at a gap, and the search is local.
 
     Parameters
     ----------
@@ -55,16 +58,24 @@ def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
     WristSolution
         A plan; if there is none, the failed search with the smallest missing wrench.
     """
-    failed: list[WristSolution] = []
+    searches: list[WristSolution] = []
     for start in _starts(hands, factor, budget):
-        most = SETTINGS.rounds_nearby if failed else SETTINGS.rounds
-        found = find_wrists(hands, start, budget, most)
-        if found.exact:
-            return found
-        failed.append(found)
-        if budget.ended:
+        most = SETTINGS.rounds_nearby if searches else SETTINGS.rounds
+        searches.append(find_wrists(hands, start, budget, most))
+        plans = [found for found in searches if found.exact]
+        if budget.ended or (plans and not _palms_carry(hands, plans[0].point)):
             break
-    return min(failed, key=lambda found: found.measure.missing)
+    if plans:
+        return min(plans, key=lambda found: found.measure.utilisation)
+    return min(searches, key=lambda found: found.measure.missing)
+
+
+def _palms_carry(hands: HandSets, point: LinearisationPoint) -> bool:
+    """Return whether the palm of a compliant hand carries load at a point."""
+    return any(
+        wrist is not None and wrist.driven and wrist.palm_mode(y) != "off"
+        for wrist, y in zip(hands.wrists, point.loads, strict=True)
+    )
 
 
 def pressing(hands: HandSets, factor: float) -> LinearisationPoint:
@@ -159,7 +170,7 @@ def _descended(
         if not outcome.solved:
             break
         promised = merit - outcome.value
-        if promised < 1e-5:  # of the utilisation: nothing better about the point
+        if promised < 1e-4:  # of the utilisation: nothing better about the point
             break
         point = replace(now.point, loads=outcome.loads)
         there = searching(hands, goal, point, within, now.sets)

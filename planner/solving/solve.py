@@ -21,7 +21,7 @@ from planner.question import Question, checked_body_wrench
 from planner.result import LoadFactor, Plan, Time
 from planner.solving.explained import explained_plan, unexplained
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
-from planner.solving.floating_wrists import floating_solution, wrench_is_given
+from planner.solving.floating_wrists import FloatingSolution, floating_solution, wrench_is_given
 from planner.solving.objectives import CappedObjective, objective_of
 from planner.solving.solution import Answer, Failed, Infeasible, Solution, load_factor_of
 from planner.solving.verified import Checks, prepare_checks, recover, verify
@@ -212,7 +212,9 @@ class KnownStance:
     """A prepared stance, for a planner that asks about one body wrench after the other.
 
     Hands, joints and wrench spaces are computed once. Each further query costs the check of its
-    plan, and a call of the solver unless the limits that bound the previous plan still bind.
+    plan, and a call of the solver unless the limits that bound the previous plan still bind. With
+    compliant wrists the search begins where the previous plan has put them; it is local, so that
+    its utilisation may differ from that of `plan` by some thousandths.
 
     Parameters
     ----------
@@ -255,11 +257,17 @@ class KnownStance:
         """
         start = time.perf_counter()
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
+        near = self._near
         with deadline.within(self.prepared.question.deadline, started=start):
             prepared = self.prepared.turned(wrench)
-            answer, solution = plan_on(prepared, start, self._checks, self._near)
-        if isinstance(solution, FixedSolution) and solution.start is not None:
-            self._near = solution
+            answer, solution = plan_on(prepared, start, self._checks, near)
+            if isinstance(near, FloatingSolution) and answer.status != "optimal":
+                # the search from the wrists of another wrench is local
+                answer, solution = plan_on(prepared, start, self._checks)
+        if isinstance(solution, FixedSolution):
+            self._near = near if solution.start is None else solution
+        elif isinstance(solution, FloatingSolution) and prepared.hands.together is not None:
+            self._near = solution if answer.status == "optimal" else near
         return answer
 
 

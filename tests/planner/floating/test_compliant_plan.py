@@ -81,6 +81,21 @@ def test_palms_never_make_a_plan_worse(name: str) -> None:
     assert with_palms.utilisation <= without.utilisation + 1e-3
 
 
+def test_neither_do_palms_of_floating_wrists() -> None:
+    used = {}
+    for palm in (True, False):
+        question = questions.question(read_request("wall-300-floating"))
+        hands = [
+            replace(hand, grasp=msgspec.structs.replace(hand.grasp, palm=palm))
+            if hand.wrist == "floating"
+            else hand
+            for hand in question.stance.hands
+        ]
+        used[palm] = plan(replace(question, stance=replace(question.stance, hands=tuple(hands))))
+    assert used[True].verified
+    assert used[True].utilisation <= used[False].utilisation + 1e-3
+
+
 def test_a_longer_travel_is_never_worse() -> None:
     used = [
         plan(asked(palm=False, travel=WristTravel(1e-3 * mm, 1e-3, 1e-2 * mm))).utilisation
@@ -100,6 +115,18 @@ def test_the_order_of_hands_does_not_matter() -> None:
 def test_a_known_stance_answers_as_a_plan_does() -> None:
     answer = KnownStance(asked()).plan(answered().body_wrench)
     assert answer.utilisation == pytest.approx(answered().utilisation, rel=1e-6)
+
+
+def test_a_known_stance_that_begins_at_its_last_wrists_ends_as_a_plan_does() -> None:
+    question, wrench = asked(), answered().body_wrench
+    known = KnownStance(question)
+    # the whole, some per cent aside, little of it, more than can be held, and the whole again
+    for share in (1.0, 0.96, 0.4, 1.3, 1.0):
+        found = known.plan(share * wrench)
+        expected = plan(replace(question, body_wrench=share * wrench))
+        assert found.verified
+        assert found.status == expected.status
+        assert found.utilisation == pytest.approx(expected.utilisation, rel=5e-3)
 
 
 @pytest.mark.parametrize("what", ["twist", "tension", "shear", "palm", "mode"])
