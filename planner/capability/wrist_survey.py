@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -78,9 +80,15 @@ def survey(
 
 
 def _end(wrist: FloatingWrist, found: WristSearch, direction: Array) -> Farthest | None:
-    """Return the farthest limit that is reached from the pose whose wrench reaches farthest."""
-    start = found.poses[int((found.wrenches @ direction).argmax())]
-    try:
-        return farthest(wrist, direction, start)
-    except EmptySetError:
-        return None
+    """Return the farthest limit that is reached, begun in each state of the palm."""
+    reach = found.wrenches @ direction
+    carries = wrist.hand.palm_loads(found.poses) > 0.0
+    starts, ends = [wrist.pressing], []
+    for state in itertools.product((False, True), repeat=2):  # whether it drags, and presses
+        those = np.flatnonzero((carries == state).all(axis=1))
+        if len(those):
+            starts.append(found.poses[those[int(reach[those].argmax())]])
+    for start in starts:
+        with contextlib.suppress(EmptySetError):
+            ends.append(farthest(wrist, direction, start))
+    return max(ends, key=lambda end: end.reach, default=None)
