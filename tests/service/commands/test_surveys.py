@@ -84,7 +84,7 @@ def test_a_floating_set_without_zero_shows_least_and_most(capsys, tmp_path):
     request = json.loads(Format.JSON.encode(read_request(STANCE)))
     for hand in request["stance"]["hands"]:
         if hand.get("wrist") == "floating":
-            hand["tendon_preload"] = [90.0] * 4
+            hand["tendon_preload"] = [20.0] * 4
     file = tmp_path / "tense.json"
     file.write_text(json.dumps(request))
     arguments = ["wrench-space", str(file), "--hand", "rear_left"]
