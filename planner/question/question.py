@@ -141,6 +141,7 @@ class Question:
                     + ", ".join(hand.limb for hand in self.stance.hands),
                     field=f"limits.per_hand.{limb}",
                 )
+        self._check_preloads()
         if limits.joint_torque is None:
             return
         if self.stance.joints is None:
@@ -159,6 +160,23 @@ class Question:
                     )
                 if isinstance(most, tuple) and not any(most):
                     raise no_torque(most, f"limits.joint_torque.{limb}")
+
+    def _check_preloads(self) -> None:
+        """Refuse a least tension above the preload of a floating hand, whose motors stand still."""
+        model, least = self.stance.robot.hand, self.limits.least_tension
+        for hand in self.stance.hands:
+            if hand.wrist != "floating":
+                continue
+            preload = hand.grasp.closing_tension or model.closing_tension
+            if hand.tendon_preload is not None:
+                preload = float(hand.tendon_preload.min())
+            if least > preload:
+                raise InvalidInputError(
+                    f"must be at most the tendon_preload of {hand.limb}, whose motors stand still "
+                    f"({preload:g} N), got {least:g} N; lower it, give more tendon_preload, or "
+                    "let the wrist be 'compliant'",
+                    field="limits.least_tension",
+                )
 
     def bare(self) -> Question:
         """Return the question for the least utilisation, without extras, samples and deadline."""
