@@ -13,6 +13,7 @@ from .hand_sets import (
     LinearisationPoint as LinearisationPoint,
     Sets as Sets,
     widest_at_rest as widest_at_rest,
+    wrists_at as wrists_at,
 )
 from .joint_posture import (
     Posture as Posture,
@@ -39,4 +40,5 @@ from .stance_constraints import (
     PASSIVE_JOINT as PASSIVE_JOINT,
     TENSION_CHANGE as TENSION_CHANGE,
     TOLERANCES as TOLERANCES,
+    StanceConstraints as StanceConstraints,
 )
