@@ -15,7 +15,12 @@ from rich.text import Text
 
 import planner
 from service import replies
-from service.tables.extras import robust_sentence, spread_sentence, with_interval
+from service.tables.extras import (
+    print_open_loop,
+    robust_sentence,
+    spread_sentence,
+    with_interval,
+)
 from service.tables.layout import (
     in_colour,
     in_order,
@@ -74,6 +79,8 @@ def print_plan(
         )
     if isinstance(reply.robust, planner.RobustLoadFactor):
         out.print(robust_sentence(reply.robust))
+    if isinstance(reply.open_loop, planner.OpenLoop):
+        print_open_loop(reply.open_loop, out)
     if isinstance(reply.clearance, planner.Clearance):
         _print_clearance(reply.clearance, out)
     if reply.hands is not None:

@@ -364,3 +364,13 @@ def test_a_table_has_where_wrists_go_and_limbs_aim(detail):
         assert twist == hand.wrist.twist.tolist()
         aim = [values[f"{hand.limb}_pose_target_{axis}"] for axis in TWIST]
         assert aim == hand.wrist.pose_target.tolist()
+
+
+def test_a_table_leaves_out_displaced_hands(tmp_path, capfd):
+    asked = compliant_request() | {"want": ["open_loop"], "open_loop": {"samples": 1}}
+    lines, path = tmp_path / "requests.jsonl", tmp_path / "table.csv"
+    lines.write_text(json.dumps(asked) + "\n", encoding="utf-8")
+    run_command_line(["batch", str(lines), "-o", str(path), "--json"])
+    (row,) = content(path)
+    assert row["status"] == "optimal"
+    assert float(row["front_left_pose_target_vx_m"]) != 0.0
