@@ -1,5 +1,5 @@
 from .compliant_finger import COMPLEX_STEP as COMPLEX_STEP, FingerLoads as FingerLoads
-from .compliant_hand import CompliantHand as CompliantHand
+from .compliant_hand import CompliantHand as CompliantHand, CompliantHands as CompliantHands
 from .compliant_wrist import (
     CompliantWrist as CompliantWrist,
     CompliantWrists as CompliantWrists,
@@ -16,6 +16,7 @@ from .floating_wrist import (
     FloatingWrist as FloatingWrist,
     PalmMode as PalmMode,
 )
+from .grasp import complex_steps as complex_steps, slopes as slopes
 from .grid_search import (
     PLANAR_COMPONENTS as PLANAR_COMPONENTS,
     WristSearch as WristSearch,

@@ -182,7 +182,12 @@ class MeasurementStudy:
                 asked = self.stances[job]
                 stance = replace(asked.stance, robot=robot)
                 wanted = replace(
-                    asked, stance=stance, want=frozenset(["spread"]), draws=None, explain=False
+                    asked,
+                    stance=stance,
+                    want=frozenset(["spread"]),
+                    draws=None,
+                    open_loop=None,
+                    explain=False,
                 )
                 spread = plan(wanted).spread
                 found = [] if spread is None else spread.load_factors

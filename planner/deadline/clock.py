@@ -49,6 +49,7 @@ Unfinished = Literal[
     "certificate",
     "explanation",
     "robust",
+    "open_loop",
     "spread",
     "advice",
 ]
@@ -63,6 +64,7 @@ UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
     "certificate": "it was found what keeps the hands from a plan within the limits",
     "explanation": "it was found which limits alone leave no balance",
     "robust": "the load factor was found at all places of the hands",
+    "open_loop": "the plan was executed on all displaced hands",
     "spread": "a plan was found in all draws of the numbers",
     "advice": "all changes were tried that might make it hold",
 }

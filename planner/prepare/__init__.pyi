@@ -12,6 +12,7 @@ from .hand_sets import (
     HandSets as HandSets,
     LinearisationPoint as LinearisationPoint,
     Sets as Sets,
+    wrists_at as wrists_at,
 )
 from .joint_posture import (
     Posture as Posture,
@@ -38,4 +39,5 @@ from .stance_constraints import (
     PASSIVE_JOINT as PASSIVE_JOINT,
     TENSION_CHANGE as TENSION_CHANGE,
     TOLERANCES as TOLERANCES,
+    StanceConstraints as StanceConstraints,
 )

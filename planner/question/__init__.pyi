@@ -9,6 +9,7 @@ from .limits import (
     LimbStiffness as LimbStiffness,
     Limits as Limits,
     Objective as Objective,
+    OpenLoopSettings as OpenLoopSettings,
     Want as Want,
 )
 from .load import Load as Load, Weights as Weights

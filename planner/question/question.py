@@ -14,6 +14,7 @@ from planner.question.limits import (
     BodyRange,
     Limits,
     Objective,
+    OpenLoopSettings,
     Want,
     no_torque,
 )
@@ -48,7 +49,8 @@ class Question:
         if the body wrench is given.
     limits : Limits
     want : frozenset of str
-        Extras: 'load_factor', 'prices', 'model', 'robust', 'spread', 'clearance' and 'advice'.
+        Extras: 'load_factor', 'prices', 'model', 'robust', 'open_loop', 'spread', 'clearance' and
+        'advice'.
     objective : {'max_margin', 'min_effort'} or planner.solving.Objective
         'max_margin': least utilisation. 'min_effort': least sum of squared relative tensions and
         joint torques, at a utilisation within the limits. Or an object with the caller's objective.
@@ -63,6 +65,9 @@ class Question:
         the least, and whether there is none, is checked in any case.
     body_range : BodyRange
         Range in which the ``advice`` may move the body.
+    open_loop : OpenLoopSettings, optional
+        Samples of ``open_loop``, which requires compliant or floating wrists on all hands and the
+        stance's limb stiffness; 64 samples by default.
     """
 
     stance: Stance
@@ -76,6 +81,7 @@ class Question:
     draws: tuple[ParameterSample, ...] | None = None
     explain: bool = True
     body_range: BodyRange = field(default_factory=BodyRange)
+    open_loop: OpenLoopSettings | None = None
 
     def __post_init__(self) -> None:
         if self.body_wrench is not None:
@@ -99,6 +105,7 @@ class Question:
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
         if "robust" in self.want and {*wrists.values()} != {"fixed"}:
             raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
+        self._check_open_loop()
         present = {}
         for limb, tensions in self.present.items():
             if wrists.get(limb) != "fixed":
@@ -131,6 +138,27 @@ class Question:
         with errors_under("draws"):
             drawn_hands(self.stance.robot.hand, self.draws)
 
+    def _check_open_loop(self) -> None:
+        if "open_loop" not in self.want:
+            if self.open_loop is not None:
+                raise InvalidInputError(
+                    "requires 'open_loop' in want; add it, or remove open_loop", field="open_loop"
+                )
+            return
+        fixed = [hand.limb for hand in self.stance.hands if hand.wrist == "fixed"]
+        if fixed:
+            raise InvalidInputError(
+                "'open_loop' requires wrist 'compliant' or 'floating' of every hand; fixed are "
+                f"{', '.join(fixed)}",
+                field="want",
+            )
+        if self.stance.limb_stiffness is None:
+            raise InvalidInputError(
+                "'open_loop' requires stance.limb_stiffness; give the position [N/m] and the "
+                "angle [N·m/rad] with which limbs hold wrists",
+                field="want",
+            )
+
     def _check_limits(self) -> None:
         robot, limits = self.stance.robot, self.limits
         known_limbs(limits.per_hand, robot, "limits.per_hand")
@@ -141,6 +169,7 @@ class Question:
                     + ", ".join(hand.limb for hand in self.stance.hands),
                     field=f"limits.per_hand.{limb}",
                 )
+        self._check_preloads()
         if limits.joint_torque is None:
             return
         if self.stance.joints is None:
@@ -160,10 +189,28 @@ class Question:
                 if isinstance(most, tuple) and not any(most):
                     raise no_torque(most, f"limits.joint_torque.{limb}")
 
+    def _check_preloads(self) -> None:
+        """Refuse a least tension above the preload of a floating hand, whose motors stand still."""
+        model, least = self.stance.robot.hand, self.limits.least_tension
+        for hand in self.stance.hands:
+            if hand.wrist != "floating":
+                continue
+            preload = hand.grasp.closing_tension or model.closing_tension
+            if hand.tendon_preload is not None:
+                preload = float(hand.tendon_preload.min())
+            if least > preload:
+                raise InvalidInputError(
+                    f"must be at most the tendon_preload of {hand.limb}, whose motors stand still "
+                    f"({preload:g} N), got {least:g} N; lower it, give more tendon_preload, or "
+                    "let the wrist be 'compliant'",
+                    field="limits.least_tension",
+                )
+
     def bare(self) -> Question:
         """Return the question for the least utilisation, without extras, samples and deadline."""
         least: Objective = "max_margin"
-        return replace(self, want=frozenset(), draws=None, deadline=None, objective=least)
+        plain = replace(self, want=frozenset(), draws=None, open_loop=None)
+        return replace(plain, deadline=None, objective=least)
 
     def needed_wrench(self, weights: Weights | None = None) -> Array:
         """Return the body wrench: what the rock must exert on the robot, in B, shape (6,) [N, N·m].

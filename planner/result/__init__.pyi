@@ -5,6 +5,7 @@ from .load_recovery import (
     LoadRecovery as LoadRecovery,
     recover_floating_hand as recover_floating_hand,
 )
+from .open_loop import OpenLoop as OpenLoop, OpenLoopSample as OpenLoopSample
 from .plain_parts import (
     Clearance as Clearance,
     Distance as Distance,

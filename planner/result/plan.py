@@ -14,6 +14,7 @@ from planner.deadline import Unfinished
 from planner.result.advice import Advice
 from planner.result.certificate import CertificateOf
 from planner.result.hand_plan import HandPlan
+from planner.result.open_loop import OpenLoop
 from planner.result.plain_parts import (
     Clearance,
     Finding,
@@ -103,6 +104,9 @@ class Plan:
     robust : RobustLoadFactor or None
         Load factor over random placements of the hands, if asked for; None if the body wrench is
         zero, as all its multiples are the same.
+    open_loop : OpenLoop or None
+        Utilisation over displaced hands if the plan is executed as it is, if asked for; None
+        without a plan.
     spread : Spread or None
         Utilisation and load factor over Monte Carlo samples of parameters, if asked for.
     clearance : Clearance or None
@@ -137,6 +141,7 @@ class Plan:
     findings: tuple[Finding, ...] = ()
     unfinished: tuple[Unfinished, ...] = ()
     robust: RobustLoadFactor | None = None
+    open_loop: OpenLoop | None = None
     spread: Spread | None = None
     clearance: Clearance | None = None
     advice: tuple[Advice, ...] | None = None

@@ -14,6 +14,7 @@ from hand_models.hand import FINGERS
 from planner import deadline
 from planner.advice import Attempt
 from planner.deadline import Unfinished, late, late_sentence
+from planner.execution import find_open_loop
 from planner.explanation import (
     ActiveLimits,
     LimitUse,
@@ -93,6 +94,10 @@ def explained_plan(
         # last: these take the longest
         parts["robust"] = find_robust_load_factor(prepared, overloaded=checks.overloaded)
         unfinished += late("robust") if parts["robust"] is None else ()
+    if "open_loop" in question.want and isinstance(answer, Verified):
+        idle = max([each.utilisation for each in checks.idle], default=0.0)
+        parts["open_loop"] = find_open_loop(prepared, answer.by_hand(), idle)
+        unfinished += late("open_loop") if parts["open_loop"] is None else ()
     if "spread" in question.want:
         parts["spread"] = find_spread(prepared, checks.idle, solution, attempt)
         unfinished += late("spread") if parts["spread"] is None else ()

@@ -151,6 +151,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         findings=list(answer.findings),
         unfinished=list(answer.unfinished),
         robust=answer.robust or UNSET,
+        open_loop=answer.open_loop or UNSET,
         spread=answer.spread or UNSET,
         clearance=answer.clearance or UNSET,
         advice=UNSET if answer.advice is None else list(answer.advice),

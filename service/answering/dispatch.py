@@ -104,7 +104,7 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
         # compute only what the reply contains
         included = ["load_factor"] if detail == "hands" else []
         wanted = [want for want in request.want if want in included]
-        request = replace(request, want=wanted, draws=[])
+        request = replace(request, want=wanted, draws=[], open_loop=None)
     asked = question(request, robots)
     answer = planner.plan(asked)
     return Planned.of(asked, answer, request.id, detail, model="model" in request.want)

@@ -63,6 +63,7 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
         draws=_draws(request.draws),
         explain=request.explain,
         body_range=request.body_range,
+        open_loop=request.open_loop,
     )
 
 

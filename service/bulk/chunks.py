@@ -195,6 +195,7 @@ def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanReque
         explain=explain,
         want=want,
         draws=[],
+        open_loop=None,
         detail="full" if explain else "hands",
         max_reply_bytes=None,
     )

@@ -104,11 +104,24 @@ def _columns(limbs: Sequence[str], explained: bool) -> Iterator[Column]:
             name = f"{limb}_{axis}_{unit.replace('·', '')}"
             meaning = f"{axis} of the hand's wrench on the rock, in its own frame"
             yield Column(name, "float", unit, meaning, (*hand, "wrench", i))
+        yield from _wrist(limb)
     yield Column("warnings", "text", "", "with '; ' between them")
     if explained:
         yield Column("irreducible", "text", "", "limits that together leave no plan")
         yield Column("sufficient", "text", "", "those of them of which one less would do")
     yield from _failed()
+
+
+def _wrist(limb: str) -> Iterator[Column]:
+    meanings = {
+        "twist": "of where its wrist goes, about the pose that was given; empty if fixed",
+        "pose_target": "of where the limb is to aim, likewise; empty without limb_stiffness",
+    }
+    for part, meaning in meanings.items():
+        for i, axis in enumerate(("vx", "vy", "vz", "wx", "wy", "wz")):
+            unit = "m" if axis.startswith("v") else "rad"
+            path = ("hands", limb, "wrist", part, i)
+            yield Column(f"{limb}_{part}_{axis}_{unit}", "float", unit, f"{axis} {meaning}", path)
 
 
 def route_columns() -> tuple[Column, ...]:
@@ -234,7 +247,9 @@ def _readable(reply: dict[str, Any]) -> dict[str, Any]:
     for hand in reply.get("hands") or ():
         fingers = hand.get("fingers") or ()
         tensions = hand.get("tensions") or [finger["tendon_tension"] for finger in fingers]
-        found["hands"][hand["limb"]] = hand | {"tensions": tensions}
+        # a brief reply has the twist and the target beside the tensions
+        read = {"tensions": tensions, "wrist": hand.get("wrist", hand)}
+        found["hands"][hand["limb"]] = hand | read
     crux, stages = reply.get("crux"), reply.get("stages")
     if crux is not None and stages:
         found |= {"stages": len(stages), "hardest": stages[crux]}

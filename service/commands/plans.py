@@ -25,6 +25,11 @@ __all__ = ["plan_command"]
     is_flag=True,
     help="And the least load factor where every hand is a little elsewhere.",
 )
+@click.option(
+    "--open-loop",
+    is_flag=True,
+    help="And the utilisation where hands are displaced and the plan is executed as it is.",
+)
 @options.spread_option
 @click.option(
     "--clearance", is_flag=True, help="And the least distances of body, hands, links and rock."
@@ -43,6 +48,7 @@ def plan_command(
     stance: str,
     picture: Path | None,
     robust: bool,
+    open_loop: bool,
     clearance: bool,
     advice_folder: Path | None,
     wanted: options.Wanted,
@@ -52,6 +58,7 @@ def plan_command(
     """Make one plan, without the network."""
     further: dict[planner.Want, bool] = {
         "robust": robust,
+        "open_loop": open_loop,
         "clearance": clearance,
         "advice": advice_folder is not None,
     }
@@ -167,7 +174,8 @@ def _without_palms(
     replace = msgspec.structs.replace
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
     stance = replace(request.stance, hands=hands)
-    alone = replace(request, stance=stance, want=["load_factor"], draws=[], explain=False)
+    plain = replace(request, want=["load_factor"], draws=[], open_loop=None)
+    alone = replace(plain, stance=stance, explain=False)
     try:
         reply = answering.answer_plan(alone, robots)
     except planner.DeadlineError:

@@ -12,6 +12,7 @@ from planner import (
     Finger,
     LimitName,
     LoadFactorStatus,
+    OpenLoop,
     Palm,
     Price,
     RobustLoadFactor,
@@ -143,9 +144,11 @@ class PlanReply(StanceReply, kw_only=True):
       measured value.
     - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
       proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
-      ``path``, ``certificate``, ``explanation``, ``robust``, ``spread``, ``advice``.
+      ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``.
     - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
       ["robust"]``, and not for a body wrench of zero.
+    - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;
+      only with ``"want": ["open_loop"]``, and with a plan.
     - ``spread``: Monte Carlo statistics over samples of uncertain parameters; only with ``"want":
       ["spread"]``.
     - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
@@ -181,6 +184,7 @@ class PlanReply(StanceReply, kw_only=True):
     findings: list[Finding] = []
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
+    open_loop: OpenLoop | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from hand_models.base import Coordinate, Name, Strict
-from planner import BodyRange, Limits, Load, Objective, Want
+from planner import BodyRange, Limits, Load, Objective, OpenLoopSettings, Want
 from service.requests.request import (
     Detail,
     Identifier,
@@ -108,6 +108,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
       samples.
     - ``explain``: false leaves out the certificate of a stance that is overloaded or infeasible.
     - ``body_range``: how far advice may move the body.
+    - ``open_loop``: samples of displaced hands for ``"want": ["open_loop"]``.
     """
 
     stance: Stance
@@ -127,6 +128,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         list[Want],
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
+            "open_loop: the utilisation over displaced hands if the plan is executed as it is. "
             "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
             "clearance: the least distances of body, hands, links and rock. "
             "advice: what would make it hold, or hold more: verified changes"
@@ -135,6 +137,10 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     draws: Draws = []
     explain: Explain = True
     body_range: Annotated[BodyRange, Meta(description="for the advice")] = BodyRange()
+    open_loop: Annotated[
+        OpenLoopSettings | None,
+        Meta(description="samples of displaced hands; only with open_loop in want"),
+    ] = None
 
 
 class WrenchSpaceRequest(Query, frozen=True, kw_only=True):

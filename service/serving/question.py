@@ -212,7 +212,8 @@ def _read(question: PendingQuestion) -> None:
     if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
     # these take many plans
-    many = isinstance(want, list) and any(each in want for each in ("robust", "spread", "advice"))
+    extras = {"robust", "open_loop", "spread", "advice"}
+    many = isinstance(want, list) and any(each in want for each in extras)
     unread = _is_long(head.want)
     question.dear = question.dear or many or unread
     most = _value(head.max_reply_bytes, question.form)

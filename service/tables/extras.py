@@ -9,11 +9,13 @@ from types import MappingProxyType
 
 from rich.console import Console
 
-from planner import Advice, Quantiles, RobustLoadFactor, Spread
+from planner import Advice, OpenLoop, Quantiles, RobustLoadFactor, Spread
 from service.replies import PlanReply
+from service.tables.layout import in_order, print_rows
 
 __all__ = [
     "print_advice",
+    "print_open_loop",
     "robust_sentence",
     "spread_sentence",
     "with_interval",
@@ -126,6 +128,38 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
         f"load factor with each hand up to {1e3 * robust.position:g} mm and "
         f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} samples:\n{said}"
     )
+
+
+def print_open_loop(found: OpenLoop, out: Console) -> None:
+    """Print how a plan fares that is executed as it is on displaced hands.
+
+    Parameters
+    ----------
+    found : OpenLoop
+        Outcomes of all samples.
+    out : Console
+        Console to print on.
+    """
+    along, across = 1e3 * found.position, 1e3 * found.height
+    about, around = 1e3 * found.tilt, 1e3 * found.yaw
+    out.print(
+        f"executed as planned with each hand displaced by up to {along:g} mm in x and y, "
+        f"{across:g} mm in z, {about:g} mrad about x and y, {around:g} mrad about z, "
+        f"{len(found.samples)} samples:"
+    )
+    said = f"everything holds in {found.holds:.0%}"
+    said += f"; tiles are dragged backwards in {found.dragged}" if found.dragged else ""
+    said += f"; no equilibrium in {found.without}" if found.without else ""
+    out.print(said + _refused(found.refused, found.reasons))
+    dragged = [sample.dragged for sample in found.samples if sample.dragged is not None]
+    quantiles = (found.tenth, found.median, found.ninetieth)
+    row = (
+        *("none" if used is None else f"{used:.3f}" for used in quantiles),
+        f"{max(dragged):.1f}" if dragged else "none",
+        found.worst_limb or "none",
+    )
+    heads = ("util 10 %", "50 %", "90 %", "dragged N")
+    print_rows([row], in_order(heads, texts=["worst hand"]), out)
 
 
 def _refused(limbs: Mapping[str, int], reasons: Mapping[str, str] = MappingProxyType({})) -> str:

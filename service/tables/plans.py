@@ -9,12 +9,18 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from msgspec import UNSET
 from rich.console import Console
 from rich.text import Text
 
 import planner
 from service import replies
-from service.tables.extras import robust_sentence, spread_sentence, with_interval
+from service.tables.extras import (
+    print_open_loop,
+    robust_sentence,
+    spread_sentence,
+    with_interval,
+)
 from service.tables.layout import (
     in_colour,
     in_order,
@@ -73,6 +79,8 @@ def print_plan(
         )
     if isinstance(reply.robust, planner.RobustLoadFactor):
         out.print(robust_sentence(reply.robust))
+    if isinstance(reply.open_loop, planner.OpenLoop):
+        print_open_loop(reply.open_loop, out)
     if isinstance(reply.clearance, planner.Clearance):
         _print_clearance(reply.clearance, out)
     if reply.hands is not None:
@@ -196,16 +204,25 @@ def _print_hands(hands: Sequence[replies.HandReply], out: Console) -> None:
         number("palm\npress", "palm.force.2", partial(short, digits=0)),
     )
     print_rows(hands, columns, out, "wrench on the rock, in H [N, N·m], and the palm's part")
+    turns = [*enumerate(("vx", "vy", "vz", "wx", "wy", "wz"))]
     floating = [hand for hand in hands if hand.wrist.twist is not None]
     if floating:
         title = "where wrists go (mm, mrad), and how their palms carry"
-        turns = enumerate(("vx", "vy", "vz", "wx", "wy", "wz"))
         columns = (
             name("hand", "limb"),
             *(number(axis, f"wrist.twist.{i}", "z.2f", scale=1e3) for i, axis in turns),
             text("palm", "wrist.palm", lambda palm: palm.replace("_", " ")),
         )
         print_rows(floating, columns, out, title)
+    aimed = [hand for hand in floating if hand.wrist.pose_target is not UNSET]
+    if aimed:
+        title = "where limbs are to aim (mm, mrad), and the least stiffness there"
+        columns = (
+            name("hand", "limb"),
+            *(number(axis, f"wrist.pose_target.{i}", "z.2f", scale=1e3) for i, axis in turns),
+            number("N/mm", "wrist.least_stiffness", ".1f", scale=1e-3),
+        )
+        print_rows(aimed, columns, out, title)
     fingers = [(hand.limb, finger, _worst(finger)) for hand in hands for finger in hand.fingers]
     title = "tendons and their motors, and each finger's most loaded tile"
     columns = (

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from hand_models.base import UnsupportedError
-from planner import KnownStance, Plan, Question, WrenchStream, plan
+from planner import KnownStance, OpenLoop, Plan, Question, WrenchStream, plan
 from service.answering import handle, question
 from service.commands.stances import read_request
 from service.processes import plan_many
@@ -54,6 +54,14 @@ LIMBS_GIVE = {"position": 5000.0, "angle": 100.0}
 TRAVEL = {"angle": 0.02}
 THERE = {"point": [0.0, -0.45, 0.6], "approach": [1.0, 0.0, 0.0]}
 
+EXECUTED = {
+    "want": ["open_loop"],
+    "stance.limb_stiffness": LIMBS_GIVE,
+    "stance.joints": None,
+    **{f"stance.hands.{i}.wrist": "compliant" for i in range(4)},
+}
+"""A plan that is executed as it is."""
+
 # of each field of each part of a request, what to write where
 VARIANTS: dict[str, list[dict[str, Any]]] = {
     "PlanRequest.v": [{}],
@@ -83,6 +91,22 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     ],
     "PlanRequest.explain": [{"explain": False, "load.mass": 200.0}],
     "PlanRequest.body_range": [{"body_range": {"shift": 0.1}}],
+    "PlanRequest.open_loop": [{**EXECUTED, "open_loop": {"samples": 2}}],
+    "OpenLoopSettings.samples": [{}],
+    "OpenLoopSettings.seed": [
+        {
+            **EXECUTED,
+            "open_loop": {
+                "samples": 2,
+                "seed": 7,
+                "position": 1e-3,
+                "height": 1e-4,
+                "tilt": 1e-3,
+                "yaw": 0.1,
+            },
+        }
+    ],
+    **{f"OpenLoopSettings.{part}": [{}] for part in ("position", "height", "tilt", "yaw")},
     "BodyRange.shift": [{"body_range": {"shift": 0.01}}],
     "BodyRange.tilt": [{"body_range": {"tilt": 0.01}}],
     "Load.mass": [{"load.mass": mass} for mass in (40.0, 150.0)],
@@ -255,7 +279,14 @@ def numbers(answer: Any) -> dict[str, Any]:
         "effort": answer.effort,
         "body_wrench": answer.body_wrench,
         "torque": None if most is None else most / 100.0,
+        "open_loop": _used_over_samples(answer),
     }
+
+
+def _used_over_samples(answer: Any) -> list[float] | None:
+    if not isinstance(answer.open_loop, OpenLoop):
+        return None
+    return [sample.utilisation for sample in answer.open_loop.samples]
 
 
 def test_every_field_of_a_question_has_a_variant():
@@ -282,6 +313,10 @@ def test_a_question_is_answered_alike_in_every_way(name: str, i: int):
     assert served["status"] == answer.status
     if answer.utilisation is not None:
         assert served["utilisation"] == pytest.approx(answer.utilisation, abs=UTILISATION)
+
+    if told["open_loop"] is not None:
+        there = [sample["utilisation"] for sample in served["open_loop"]["samples"]]
+        np.testing.assert_allclose(there, told["open_loop"], atol=UTILISATION)
 
     again = KnownStance(as_question).plan(answer.body_wrench)
     assert again.status == answer.status, again.reason

@@ -10,6 +10,7 @@ import signal
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from hand_models.base import InvalidInputError
@@ -20,10 +21,11 @@ from service.commands.cli import run_command_line
 from tests.service.commands.test_interruption import limited
 from tests.suite.helpers.commands import BAD_INPUT, FAILED, OVERLOADED, complaint
 from tests.suite.helpers.processes import begun, ended, until, watched
-from tests.suite.helpers.requests import HEAVY, plan_request, wall_request
+from tests.suite.helpers.requests import HEAVY, compliant_request, plan_request, wall_request
 
 LIMBS = ("front_right", "rear_right", "rear_left", "front_left")
 COUNT = 24
+TWIST = ("vx_m", "vy_m", "vz_m", "wx_rad", "wy_rad", "wz_rad")
 
 
 def needs(ending: str) -> None:
@@ -348,3 +350,27 @@ def test_the_values_of_a_limb_are_found_whatever_its_name():
     assert values["arm.1_inner_left_tension_N"] == 2
     assert values["arm.1_mz_Nm"] == 5.0
     assert values["limiting_limb"] is None
+    assert values["arm.1_twist_vx_m"] is None
+
+
+@pytest.mark.parametrize("detail", ["full", "hands"])
+def test_a_table_has_where_wrists_go_and_limbs_aim(detail):
+    answer = dispatch.planned(plan_request(compliant_request() | {"detail": detail}))
+    columns = columns_of(LIMBS)
+    row = row_of(msgspec.json.encode(answer.reply), columns)
+    values = dict(zip((column.name for column in columns[1:]), row.values, strict=True))
+    for hand in answer.plan.hands:
+        twist = [values[f"{hand.limb}_twist_{axis}"] for axis in TWIST]
+        assert twist == hand.wrist.twist.tolist()
+        aim = [values[f"{hand.limb}_pose_target_{axis}"] for axis in TWIST]
+        assert aim == hand.wrist.pose_target.tolist()
+
+
+def test_a_table_leaves_out_displaced_hands(tmp_path, capfd):
+    asked = compliant_request() | {"want": ["open_loop"], "open_loop": {"samples": 1}}
+    lines, path = tmp_path / "requests.jsonl", tmp_path / "table.csv"
+    lines.write_text(json.dumps(asked) + "\n", encoding="utf-8")
+    run_command_line(["batch", str(lines), "-o", str(path), "--json"])
+    (row,) = content(path)
+    assert row["status"] == "optimal"
+    assert float(row["front_left_pose_target_vx_m"]) != 0.0

@@ -33,6 +33,7 @@ from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.requests import (
     HEAVY,
     LIGHT,
+    compliant_request,
     flat_request,
     put,
     request_with_joints,
@@ -109,6 +110,29 @@ def test_a_plan_says_what_is_left_where_the_hands_are_a_little_elsewhere(stance_
     assert f"1 % quantile {robust['hundredth']:.3f}" in out.replace("\n", " ")
     run_command_line(["plan", path])
     assert "off its place" not in capfd.readouterr().out
+
+
+def test_a_plan_says_how_it_fares_on_displaced_hands(stance_file, capfd):
+    path = stance_file(compliant_request() | {"open_loop": {"samples": 8}, "want": ["open_loop"]})
+    run_command_line(["plan", path, "--open-loop", "--json"])
+    reply = result(capfd)
+    found = reply["open_loop"]
+    run_command_line(["plan", path, "--open-loop"])
+    out = capfd.readouterr().out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert "0.25 mm in z" in " ".join(out.split())
+    assert f"everything holds in {found['holds']:.0%}" in out
+    row = next(line.split() for line in out.splitlines() if f"{found['median']:.3f}" in line)
+    assert row[:3] == [f"{found[part]:.3f}" for part in ("tenth", "median", "ninetieth")]
+    assert row[-1] == found["worst_limb"]
+    target = 1e3 * reply["hands"][0]["wrist"]["pose_target"][0]
+    assert "where limbs are to aim" in out
+    assert f"{target:.2f}" in out
+
+
+def test_displaced_hands_require_wrists_that_comply(stance_file, capfd):
+    assert run_command_line(["plan", stance_file(wall_request()), "--open-loop"]) == BAD_INPUT
+    assert "want: 'open_loop' requires wrist 'compliant' or 'floating'" in complaint(capfd)
 
 
 DRAWS = """

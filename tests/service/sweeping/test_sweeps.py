@@ -18,7 +18,7 @@ from service.commands.stances import read_request
 from service.requests import PlanRequest
 from service.sweeping import Design, Held, Sweep, SweepRow, held, plot_sweep
 from tests.suite.helpers.checkout import ROOT
-from tests.suite.helpers.requests import wall_request
+from tests.suite.helpers.requests import compliant_request, wall_request
 
 SHEAR = "hands.front_left.surface.shear_limit"
 TENSION = "hands.front_left.grasp.closing_tension"
@@ -52,6 +52,13 @@ def test_rows_are_what_the_varied_requests_come_to_one_by_one() -> None:
         assert row.load_factor == pytest.approx(reply.load_factor, rel=1e-6)
         assert row.error is None
     assert {"optimal", "overloaded"} == {row.status for row in found.rows}
+
+
+def test_a_sweep_leaves_out_displaced_hands() -> None:
+    request = compliant_request() | {"want": ["open_loop"], "open_loop": {"samples": 1}}
+    (row,) = service.sweep(asked(request), ["load.mass=40"]).rows
+    assert row.error is None
+    assert row.utilisation > 0.0
 
 
 def test_a_preset_whose_shear_limit_varies_passes_through_the_preset() -> None:

@@ -59,6 +59,15 @@ def wall_request(mass: float | None = LIGHT, limbs: tuple[str, ...] = tuple(PLAC
     return request
 
 
+def compliant_request() -> dict[str, Any]:
+    """The wall's request with compliant wrists on limbs of known stiffness."""
+    request = wall_request()
+    for hand in request["stance"]["hands"]:
+        hand["wrist"] = "compliant"
+    request["stance"]["limb_stiffness"] = {"position": 5000.0, "angle": 100.0}
+    return request
+
+
 def plan_request(request: dict | None = None) -> PlanRequest:
     """A request, decoded; the wall's by default."""
     return decode_request(msgspec.json.encode(request or wall_request()), PlanRequest)

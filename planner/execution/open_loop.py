@@ -1,0 +1,215 @@
+"""Execute a plan as it is on displaced hands: tensions and pose targets stay as planned.
+
+A sample displaces each hand on its rock; its pose in the body frame B stays, and the rock moves
+instead. The hand closes there, its tensions go to the planned ones, and the limb pulls its wrist
+toward the planned pose target, a twist from where the hand has closed. Displacements are a
+scrambled Sobol sequence for each hand, by its limb's name, and combined at random.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+from zlib import crc32
+
+import numpy as np
+
+from hand_models.base import Array, InvalidInputError
+from hand_models.compliance import (
+    CompliantWrist,
+    CompliantWrists,
+    FloatingWrist,
+)
+from hand_models.fixed_wrist import closed_about, scattered_places
+from hand_models.hand import SettledHand
+from planner import deadline
+from planner.deadline import DeadlineError
+from planner.execution.equilibrium import NEWTON_SETTINGS, LimbPull, equilibria
+from planner.prepare import PreparedStance, StanceConstraints, wrists_at
+from planner.programs import CAP_SLACK
+from planner.question import OpenLoopSettings
+from planner.result import HandPlan, OpenLoop, OpenLoopSample
+
+__all__ = ["execute", "find_open_loop"]
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionSettings:
+    """Tolerance of hard rows, and size of the parts in which samples are computed."""
+
+    violation: float = 1e-3
+    """Largest violation of a hard row that counts as none [N]: plans keep to them to 1e-6 N, and
+    equilibria to 1e-6 N of all loads together."""
+    at_once: int = 16  # samples; the deadline is checked between
+
+
+EXECUTION_SETTINGS: Final = ExecutionSettings()
+
+
+def find_open_loop(
+    prepared: PreparedStance, hands: Sequence[HandPlan], idle: float
+) -> OpenLoop | None:
+    """Return the utilisation over displaced hands if a plan is executed as it is.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+        All wrists compliant or floating, with the stance's limb stiffness.
+    hands : sequence of HandPlan
+        Hands of the plan, in the order of the stance.
+    idle : float
+        Largest utilisation of joints of limbs without a hand, the same in every sample.
+
+    Returns
+    -------
+    OpenLoop or None
+        None if the deadline passed before all samples were in equilibrium.
+    """
+    settings = prepared.question.open_loop or OpenLoopSettings()
+    hand = prepared.question.stance.robot.hand
+    ranges = settings.ranges(hand.seat_scatter, hand.contact_scatter)
+    position, height, tilt, yaw = ranges
+    widths = np.array([position, position, height, tilt, tilt, yaw])
+    units = np.stack([_places(limb, settings) for limb in prepared.limbs], axis=1)
+    try:
+        found, refused, reasons = execute(prepared, hands, widths * units, idle)
+    except DeadlineError:
+        return None
+    return OpenLoop.of(found, settings.seed, ranges, refused, reasons)
+
+
+def _places(limb: str, settings: OpenLoopSettings) -> Array:
+    """Return a hand's displacements in the order of the samples, from −1 to 1, shape (s, 6)."""
+    own = np.random.default_rng([settings.seed, crc32(limb.encode()), settings.samples])
+    places = scattered_places(limb, settings.samples, settings.seed)
+    return np.asarray(own.permutation(places))
+
+
+def execute(
+    prepared: PreparedStance, hands: Sequence[HandPlan], displacements: Array, idle: float = 0.0
+) -> tuple[list[OpenLoopSample], Counter[str], dict[str, str]]:
+    """Execute a plan as it is on hands with given displacements.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+        All wrists compliant or floating, with the stance's limb stiffness.
+    hands : sequence of HandPlan
+        Hands of the plan, in the order of the stance.
+    displacements : ndarray, shape (s, n, 6)
+        Displacement of each of n hands on its rock in each of s samples: a twist in H [m, rad].
+    idle : float, optional
+        Largest utilisation of joints of limbs without a hand.
+
+    Returns
+    -------
+    samples : list of OpenLoopSample, length s
+    refused : Counter of str
+        Number of samples in which a hand cannot be closed, by limb.
+    reasons : dict of str to str
+        Why it cannot at the first such displacement, by limb.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes before all samples are in equilibrium.
+    """
+    hand, refused, reasons = prepared.question.stance.robot.hand, Counter[str](), dict[str, str]()
+    closed: list[list[SettledHand | InvalidInputError]] = []
+    for i, limb in enumerate(prepared.limbs):
+        closed.append([])
+        for outcomes in closed_about(
+            hand, prepared.batch.hands[i], displacements[:, i], (1.0, 1.0)
+        ):
+            closed[i] += outcomes
+            deadline.check(NEWTON_SETTINGS.late)
+        for each in closed[i]:
+            if isinstance(each, InvalidInputError):
+                refused[limb] += 1
+                reasons.setdefault(limb, each.message)
+    samples = [OpenLoopSample(False)] * len(displacements)
+    whole: list[tuple[int, list[SettledHand]]] = []
+    for k, outcomes in enumerate(zip(*closed, strict=True)):
+        there = [each for each in outcomes if isinstance(each, SettledHand)]
+        if len(there) == len(outcomes):
+            whole.append((k, there))
+    for first in range(0, len(whole), EXECUTION_SETTINGS.at_once):
+        part = whole[first : first + EXECUTION_SETTINGS.at_once]
+        found = _settled_on(prepared, hands, [there for _, there in part], idle)
+        for (k, _), sample in zip(part, found, strict=True):
+            samples[k] = sample
+    return samples, refused, reasons
+
+
+def _settled_on(
+    prepared: PreparedStance,
+    hands: Sequence[HandPlan],
+    closed: Sequence[Sequence[SettledHand]],
+    idle: float,
+) -> list[OpenLoopSample]:
+    """Return the outcomes of samples whose hands have closed."""
+    question, wrists, tensions = prepared.question, [], []
+    for there in closed:
+        models = wrists_at(question.stance, there, question.limits.tendon_tension)
+        wrists.append([model for model in models if model is not None])
+    plans = [hand.wrist for hand in hands if hand.wrist is not None]
+    for hand, wrist in zip(hands, wrists[0], strict=True):
+        tensions.append(hand.tensions if wrist.driven else wrist.hand.preload)
+    stiffness = question.stance.limb_stiffness
+    targets = [plan.pose_target for plan in plans if plan.pose_target is not None]
+    assert stiffness is not None  # as the question is checked
+    pull = LimbPull(
+        np.array(stiffness.each), np.array(targets), prepared.hands.transports, prepared.wrench
+    )
+    start = np.array([plan.twist for plan in plans])
+    found = equilibria(wrists, np.array(tensions), pull, start)
+    held = np.flatnonzero(found.found & (found.least_stiffness > 0.0)).tolist()
+    poses = {
+        k: [
+            np.concatenate([f, x]) if wrist.driven else x
+            for wrist, f, x in zip(wrists[k], tensions, found.twists[k], strict=True)
+        ]
+        for k in held
+    }
+    _prepare([pair for k in held for pair in zip(wrists[k], poses[k], strict=True)])
+    outcomes, cap = [OpenLoopSample(False)] * len(wrists), question.limits.utilisation + CAP_SLACK
+    for k in held:
+        uses = map(_use, wrists[k], poses[k], prepared.hands.added)
+        used, violations, drags = map(list, zip(*uses, strict=True))
+        whole, dragged = max(*used, idle, 0.0), max(drags)
+        outcomes[k] = OpenLoopSample(
+            True,
+            whole <= cap and max(violations) <= EXECUTION_SETTINGS.violation,
+            whole,
+            prepared.limbs[int(np.argmax(used))],
+            dragged if dragged > EXECUTION_SETTINGS.violation else 0.0,
+            found.body[k].tolist(),
+        )
+    return outcomes
+
+
+def _prepare(poses: Sequence[tuple[FloatingWrist, Array]]) -> None:
+    """Compute the loads of compliant wrists at their poses in one call, for `_use`."""
+    pairs = [(wrist, y) for wrist, y in poses if isinstance(wrist, CompliantWrist)]
+    if pairs:
+        wrists, there = zip(*pairs, strict=True)
+        CompliantWrists(wrists).prepare([y[None] for y in there])
+
+
+def _use(wrist: FloatingWrist, y: Array, added: StanceConstraints) -> tuple[float, float, float]:
+    """Return a hand's utilisation, its largest violation of fingers' hard rows, and its drag [N].
+
+    Without the margins that the plan was to keep.
+    """
+    space = wrist.linearised(y)
+    used = float(added.on(space).utilisations(y).max())
+    over, rows = space.H @ y - space.h, space.rows[len(space.s) :]
+    of_fingers = np.array([row.finger is not None for row in rows])
+    backwards = np.array([row.limit == "dragged_backwards" for row in rows])
+    return (
+        used,
+        float(over[of_fingers].max(initial=-np.inf)),
+        float(over[backwards].max(initial=-np.inf)),
+    )
