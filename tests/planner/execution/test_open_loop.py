@@ -9,7 +9,7 @@ import pytest
 import scipy
 
 from hand_models.base import Array, InvalidInputError, Pose, turns_about
-from hand_models.compliance import CompliantWrist, DrivenHand
+from hand_models.compliance import CompliantHand, CompliantWrist
 from hand_models.hand import SettledHand
 from planner.deadline import within
 from planner.execution import LimbPull, equilibria, execute, find_open_loop
@@ -111,7 +111,7 @@ def test_wrists_and_body_balance_by_an_independent_computation() -> None:
     force, moment, used = np.zeros(3), np.zeros(3), []
     for i, hand in enumerate(hands_of(answer)):
         settled = closed_at(question, i, displacements[0, i])
-        model = CompliantWrist(DrivenHand(settled))
+        model = CompliantWrist(CompliantHand(settled, scheme="tension"))
         here = question.stance.body.inverse() @ question.stance.hands[i].pose
         axes, place = here.rotation, here.position
         carried = np.concatenate([axes.T @ (v + np.cross(turn, place)), axes.T @ turn])
