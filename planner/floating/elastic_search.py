@@ -36,7 +36,7 @@ from planner.floating.wrist_iteration import (
 from planner.prepare import HandSets, LinearisationPoint, Sets
 from planner.programs import WRIST_RANGE
 
-__all__ = ["find_wrists", "first_plan", "pressing"]
+__all__ = ["find_wrists", "first_plan", "pressing", "without_hindrance"]
 
 
 def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
@@ -66,7 +66,8 @@ def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
         if budget.ended or (plans and not _palms_carry(hands, plans[0].point)):
             break
     if plans:
-        return min(plans, key=lambda found: found.measure.utilisation)
+        best = min(plans, key=lambda found: found.measure.utilisation)
+        return without_hindrance(hands, best, budget)
     return min(searches, key=lambda found: found.measure.missing)
 
 
@@ -134,15 +135,55 @@ def find_wrists(
     """
     if hands.together is None or goal is not LEAST_USE:
         return solve_wrists(hands, start, budget, most, goal)
-    point = start
+    return _relaxed(hands, start, budget, most)
+
+
+def without_hindrance(hands: HandSets, found: WristSolution, budget: Budget) -> WristSolution:
+    """Return a better plan where palms of compliant hands hold wrists back at a poor one.
+
+    A search without palms begins at the plan. If it ends lower, a search with palms begins there.
+
+    Parameters
+    ----------
+    hands : HandSets
+    found : WristSolution
+        Where a search has ended.
+    budget : Budget
+        Largest number of conic programs.
+    """
+    if not (found.exact and _palms_carry(hands, found.point)) or budget.ended:
+        return found
+    used, most = found.measure.utilisation, SETTINGS.rounds
+    bare = _relaxed(hands.without_palms(), found.point, budget, most)
+    if not bare.exact or bare.measure.utilisation >= used:
+        return found
+    again = _relaxed(hands, bare.point, budget, most)
+    return again if again.exact and again.measure.utilisation < used else found
+
+
+def _relaxed(
+    hands: HandSets, start: LinearisationPoint, budget: Budget, most: int
+) -> WristSolution:
+    """Search for the least utilisation by relaxed programs, at rising prices."""
+    point, goal = start, LEAST_USE
     # where the least utilisation is worth more than a missing wrench, the price is too low
     for price in (SETTINGS.price * rise for rise in (1.0, 10.0, 100.0, 1000.0)):
-        now, rounds = _descended(hands, goal, point, price, budget, most)
+        now, rounds, settled = _descended(hands, goal, point, price, budget, most)
         found, point = made_exact(hands, goal, now, rounds, budget), now.point
         if found.exact or budget.ended or not now.sets.finite:
             break
         if now.measure.missing + now.measure.excess > 0.1:  # no equilibrium near
             break
+    for _ in range(SETTINGS.restarts):
+        if settled or not found.exact or budget.ended:
+            break
+        # at kinks the trust region collapses: from there with a whole one
+        now, rounds, settled = _descended(hands, goal, found.point, price, budget, most)
+        again = made_exact(hands, goal, now, found.rounds + rounds, budget)
+        gained = found.measure.utilisation - again.measure.utilisation
+        if not again.exact or gained < 1e-3 * found.measure.utilisation:
+            break
+        found = again
     proven = found.exact and gap(goal, found, found.outcome) <= SETTINGS.closeness
     return replace(found, found="least") if proven else found
 
@@ -154,8 +195,11 @@ def _descended(
     price: float,
     budget: Budget,
     most: int,
-) -> tuple[WristSolution, int]:
-    """Lower the merit at a price from a start; return where that ends, and the rounds it took."""
+) -> tuple[WristSolution, int, bool]:
+    """Lower the merit at a price from a start.
+
+    Returns where that ends, the rounds it took, and whether the sets there promise nothing better.
+    """
     within = 1.0  # one `TWIST_UNIT` and 100 N, for which linearised sets are good
     now = searching(hands, goal, start, within)
     firm = _firm(now.sets)
@@ -171,7 +215,7 @@ def _descended(
             break
         promised = merit - outcome.value
         if promised < 1e-4:  # of the utilisation: nothing better about the point
-            break
+            return now, rounds, True
         point = replace(now.point, loads=outcome.loads)
         there = searching(hands, goal, point, within, now.sets)
         after = _merit(there, price)
@@ -195,7 +239,7 @@ def _descended(
         if resized != within:
             within = resized
             now = searching(hands, goal, now.point, within, error=now.error)
-    return now, rounds
+    return now, rounds, False
 
 
 def _merit(state: WristSolution, price: float) -> float:

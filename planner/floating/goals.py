@@ -35,6 +35,7 @@ class FloatingSettings:
     first_programs: int = 70  # for a search for a first plan, at most
     effort_programs: int = 110  # for the search for least effort, at most
     rounds: int = 40  # from one starting point, at most
+    restarts: int = 4  # of a search for compliant wrists that ends at a kink, at most
     rounds_nearby: int = 16  # from a plan, or where another search has failed, at most
     first_range: float = 4.0  # about a point, in `TWIST_UNIT`
     closeness: float = 4e-6  # of a point to the best of the sets about it, relative

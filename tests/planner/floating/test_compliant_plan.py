@@ -11,7 +11,7 @@ from hand_models.base import UnsupportedError, wrench_transport
 from hand_models.compliance import CompliantHand
 from hand_models.hand import WristTravel
 from planner.deadline import Budget
-from planner.floating.elastic_search import find_wrists
+from planner.floating.elastic_search import find_wrists, without_hindrance
 from planner.prepare import prepare_stance, settle_hand
 from planner.question import LimbStiffness, Question
 from planner.result import Plan
@@ -242,12 +242,12 @@ def test_random_starts_within_the_travel_end_alike(name: str) -> None:
             twist = least + (most - least) * rng.uniform(0.15, 0.85, 6)
             loads.append(np.concatenate([rng.uniform(10.0, 120.0, 4), twist]))
         start = replace(hands.at_rest(), loads=tuple(loads))
-        start = find_wrists(hands.without_palms(), start, Budget(320)).point
-        found = find_wrists(hands, start, Budget(320))
+        found = without_hindrance(hands, find_wrists(hands, start, Budget(320)), Budget(320))
         used.append(found.measure.utilisation if found.exact else np.inf)
-    # on rough and on flat rock some end at kinks some per cent away
-    within, most = {"wall-300": (0.01, 19), "overhang": (0.01, 18)}.get(name, (0.04, 17))
-    assert (np.array(used) <= (1.0 + within) * min(used)).sum() >= most
+    # some end at kinks some per cent away
+    within = np.array(used) / min(used) - 1.0
+    assert (within <= 0.01).sum() >= {"wall-300": 18, "overhang": 19, "boulders": 12}.get(name, 6)
+    assert (within <= 0.08).sum() >= 19
 
 
 @pytest.mark.slow
