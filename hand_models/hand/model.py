@@ -96,6 +96,10 @@ class HandModel:
             table.scalar("seat", "scatter_position"),
             table.scalar("seat", "scatter_angle"),
         )
+        self.contact_scatter = (
+            table.scalar("seat", "contact_position"),
+            table.scalar("seat", "contact_angle"),
+        )
         self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
         self.inner_place = x, _, _ = table.vector("fingers", "inner_joint")
         self.outer_axis = np.array(table.vector("fingers", "outer_axis"))
