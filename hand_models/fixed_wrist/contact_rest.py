@@ -12,7 +12,8 @@ stiffness and depth; they drag nothing, as nothing has moved along the rock.
 
 The search starts where f_z passes from pulling to pushing along z, nearest the start of the hand.
 The three equations are then solved by Broyden's method: damped Newton steps, whose derivatives are
-computed again where steps do too little. All hands take their steps together.
+computed again where steps do too little. Where they get caught between palm tiles that meet rock
+and others, the palm's law is rounded first, and less and less. All hands take their steps together.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose, go_on, turns_about
 from hand_models.hand import FINGERS, Placement, Seating, SettledHand, SpinyHand
@@ -50,8 +52,12 @@ class ContactSettings:
     """Longest step [m]: a contact moves over its tile by no more than a part of it."""
     steps: int = 25
     """Largest number of steps."""
+    patience: int = 8
+    """Steps in which the net wrench must halve: where there is a rest, most take five in all."""
     shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05, 0.01)
     """Shares of a step that are tried in turn until the net wrench falls."""
+    roundings: tuple[float, ...] = (1e-4, 2e-5, 4e-6, 0.0)
+    """Roundings of the palm's law, in turn, where steps get caught as its tiles meet rock [m]."""
     ways: tuple[float, ...] = tuple([1e-3 * k for k in range(-8, 6)])
     """Ways along z between which the net force is to pass from pulling to pushing [m]."""
 
@@ -65,7 +71,7 @@ FREE_COMPONENTS: Final = slice(2, 5)
 """The components f_z, m_x and m_y of a wrench."""
 
 
-def closed_wrench(settled: SettledHand) -> Array:
+def closed_wrench(settled: SettledHand, rounding: float = 0.0) -> Array:
     """Return the wrench on the rock of a hand that has closed and carries nothing.
 
     Every tendon has the closing tension; palm tiles press by the depth to which rock stands in
@@ -74,6 +80,8 @@ def closed_wrench(settled: SettledHand) -> Array:
     Parameters
     ----------
     settled : SettledHand
+    rounding : float, optional
+        δ of a palm tile's law at depth d, in which ½ (d + √(d² + δ²)) stands for max(d, 0) [m].
 
     Returns
     -------
@@ -87,7 +95,7 @@ def closed_wrench(settled: SettledHand) -> Array:
     engaged = list(settled.palm.engaged)
     if engaged:
         gaps, tiles = settled.palm.gaps[engaged], settled.hand.palm_tiles[engaged]
-        pressing = np.array(settled.palm.engagement) * np.maximum(-gaps, 0.0)
+        pressing = np.array(settled.palm.engagement) * 0.5 * (np.hypot(gaps, rounding) - gaps)
         pressing *= settled.hand.palm_pressing_stiffness
         wrench[FREE_COMPONENTS] += pressing.sum(), pressing @ tiles[:, 1], -(pressing @ tiles[:, 0])
     return wrench
@@ -178,15 +186,27 @@ def rests_on_rock(
     -------
     list of Pose or InvalidInputError
     """
-    search = _Search(hand, starts)
-    every = np.arange(len(starts))
-    if slopes is None:
-        which, ways = search.crossings(every)
-    else:
-        which, ways = every, np.zeros(len(starts))
-        slopes = slopes * MOVE_UNITS[0]
-    ends, rests = search.solve(which, ways, slopes)
-    found = {i: _move(end) for i, end, on in zip(which.tolist(), ends, rests, strict=True) if on}
+    search, found = _Search(hand, starts), dict[int, Pose]()
+
+    def kept(which: Indices, ends: Array, rested: NDArray[np.bool_]) -> Indices:
+        """Store where hands rest, and return the other hands."""
+        for i, x in zip(which[rested].tolist(), ends[rested], strict=True):
+            found[i] = _move(x)
+        return which[~rested]
+
+    left = np.arange(len(starts))
+    if slopes is not None:
+        left = kept(left, *search.solve(left, np.zeros((len(left), 3)), slopes * MOVE_UNITS[0]))
+    left, begin = search.crossings(left)
+    ends, rested = search.solve(left, begin)
+    caught = ~rested & search.on_palm(left, ends)
+    kept(left, ends, rested)
+    left, ends = left[caught], begin[caught]
+    for rounding in CONTACT_SETTINGS.roundings:
+        search.rounding = rounding
+        ends, rested = search.solve(left, ends)
+        left, ends = left[rested], ends[rested]
+    kept(left, ends, np.ones(len(left), dtype=bool))
     return [found.get(i) or search.error(i) for i in range(len(starts))]
 
 
@@ -200,7 +220,7 @@ class _Search:
     """
 
     def __init__(self, hand: SpinyHand, starts: Sequence[Placement]) -> None:
-        self._hand, self._starts = hand, starts
+        self._hand, self._starts, self.rounding = hand, starts, 0.0
         ends, tilt = np.array(CONTACT_SETTINGS.ways)[[0, -1]], hand.seat_tilt
         self._least = np.array([ends[0], -tilt, -tilt]) / MOVE_UNITS
         self._most = np.array([ends[1], tilt, tilt]) / MOVE_UNITS
@@ -219,11 +239,25 @@ class _Search:
         )
         for k, outcome in zip(within, outcomes, strict=True):
             if isinstance(outcome, SettledHand):
-                found[k] = (closed_wrench(outcome) * WRENCH_SCALE)[FREE_COMPONENTS]
+                wrench = closed_wrench(outcome, self.rounding)
+                found[k] = (wrench * WRENCH_SCALE)[FREE_COMPONENTS]
                 self._closed[which[k]] = True
             else:
                 self._refused.setdefault(int(which[k]), outcome)
         return found
+
+    def on_palm(self, which: Indices, x: Array) -> NDArray[np.bool_]:
+        """Return which hands have a palm tile within the largest rounding of rock, at moves x."""
+        there = self._hand.settle_each(
+            [_moved(self._starts[i], _move(at)) for i, at in zip(which, x, strict=True)]
+        )
+        least = [
+            each.palm.gaps[list(each.palm.engaged)].min(initial=np.inf)
+            if isinstance(each, SettledHand)
+            else np.inf
+            for each in there
+        ]
+        return np.array(least) < max(CONTACT_SETTINGS.roundings)
 
     def slopes(self, x: Array, which: Indices) -> Array:
         """Return the derivatives of the wrenches at m moves, (m, 3, 3), by central differences."""
@@ -236,9 +270,9 @@ class _Search:
         return np.asarray(slopes.swapaxes(1, 2))
 
     def crossings(self, which: Indices) -> tuple[Indices, Array]:
-        """Return hands whose net force passes from pulling to pushing, and each one's way to there.
+        """Return hands whose net force passes from pulling to pushing along z, and moves to there.
 
-        Of several such ways along z [m] it is the nearest; other hands are left out.
+        Of several such moves, shape (m, 3), the nearest of each hand; other hands are left out.
         """
         ways = np.array(CONTACT_SETTINGS.ways)
         x = np.zeros((len(which), len(ways), 3))
@@ -252,26 +286,30 @@ class _Search:
         at = np.where(crossed, at, np.inf)
         nearest = np.abs(at).argmin(axis=1)
         found = np.take_along_axis(at, nearest[:, None], axis=1)[:, 0]
-        return which[np.isfinite(found)], found[np.isfinite(found)]
+        some = np.isfinite(found)
+        return which[some], np.outer(found[some], [1.0, 0.0, 0.0]) / MOVE_UNITS
 
     def solve(
-        self, which: Indices, ways: Array, slopes: Array | None
-    ) -> tuple[Array, Sequence[bool]]:
+        self, which: Indices, begin: Array, slopes: Array | None = None
+    ) -> tuple[Array, NDArray[np.bool_]]:
         """Return moves (m, 3) to which steps lead, and whether the hands rest there.
 
-        ``which``: indices of the hands; ``ways``: where steps begin, along z [m]; ``slopes``:
+        ``which``: indices of the hands; ``begin``: moves (m, 3) where steps begin; ``slopes``:
         derivatives to begin with.
         """
-        settings, count = CONTACT_SETTINGS, len(which)
-        x = np.column_stack([ways / MOVE_UNITS[0], np.zeros((count, 2))])
+        settings, count, x = CONTACT_SETTINGS, len(which), begin.copy()
         left = self.wrenches(x, which)
         known = np.tile(np.eye(3) if slopes is None else slopes, (count, 1, 1))
         # of derivatives: not computed yet, or where steps have done too little
         stale, fresh = np.full(count, slopes is None), np.zeros(count, dtype=bool)
         going = np.isfinite(left).all(axis=1)
-        for _ in range(settings.steps):
+        mark = np.full(count, np.inf)
+        for number in range(settings.steps):
             size = np.abs(left).max(axis=1)
             going &= size > settings.force
+            if number % settings.patience == 0:
+                going &= size < 0.5 * mark
+                mark = size
             if not going.any():
                 break
             go_on()
@@ -302,7 +340,7 @@ class _Search:
             # steps along derivatives computed here lead nowhere
             going[active[fresh[active]]] = False
             stale[active] = True
-        return x, (np.abs(left).max(axis=1) <= settings.force).tolist()
+        return x, np.abs(left).max(axis=1) <= settings.force
 
     def error(self, i: int) -> InvalidInputError:
         """Return why a hand has no rest."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hand_models import Cylinder, Grasp, InvalidInputError, Plane, Pose, SettledHand, Sphere
+from hand_models import Cylinder, Edge, Grasp, InvalidInputError, Plane, Pose, SettledHand, Sphere
 from hand_models.base import turns_about
 from hand_models.compliance import CompliantHand
 from hand_models.fixed_wrist import (
@@ -100,6 +100,19 @@ def test_a_palm_that_meets_the_rock_holds_the_hand_off() -> None:
     # the fingers alone would draw it in and turn it over
     bare = HAND.settle(Sphere(0.22), ROCK, Grasp(closing_tension=15.0, palm=False))
     assert isinstance(placed_by_contact(HAND, [bare])[0], InvalidInputError)
+
+
+@pytest.mark.slow
+def test_a_palm_on_an_edge_rests_on_it_wherever_it_is() -> None:
+    """On a rounded edge some or all of four palm tiles meet the rock: each begins to press."""
+    seat = HAND.settle(Edge(0.1, math.pi / 2.0), ROCK, Grasp())
+    there = rest(seat)
+    places = np.array([[0.55, -0.13, 0, 0, 0, -0.71], [0.28, 0.12, 0, 0, 0, 0.51]])
+    (outcomes,) = closed_about(HAND, there, places, HAND.seat_scatter)
+    for each in (there, *outcomes):
+        assert isinstance(each, SettledHand)
+        assert -1e-4 < each.palm.gaps.min() < 0.0
+        assert np.abs(net(each)[UNLOADED]).max() <= CONTACT_SETTINGS.force
 
 
 def test_an_offset_is_taken_in_the_frame_of_the_rest() -> None:
