@@ -24,6 +24,7 @@ from .pictures import (
     write_report as write_report,
 )
 from .prepare import (
+    come_to_rest as come_to_rest,
     floating_wrist as floating_wrist,
     hand_space as hand_space,
     resting_hand as resting_hand,

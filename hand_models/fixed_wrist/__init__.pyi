@@ -1,3 +1,11 @@
+from .contact_rest import (
+    CONTACT_SETTINGS as CONTACT_SETTINGS,
+    ContactSettings as ContactSettings,
+    closed_wrench as closed_wrench,
+    contact_slopes as contact_slopes,
+    placed_by_contact as placed_by_contact,
+    rests_on_rock as rests_on_rock,
+)
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
     TRIAL_WAYS as TRIAL_WAYS,

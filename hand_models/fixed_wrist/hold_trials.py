@@ -18,6 +18,7 @@ from hand_models.base import (
     check_positive,
 )
 from hand_models.finger import CONTACT_KINDS
+from hand_models.fixed_wrist.contact_rest import placed_by_contact
 from hand_models.fixed_wrist.placing import ALONG_FINGERS, approach_frame
 from hand_models.fixed_wrist.seat_scatter import robustness
 from hand_models.fixed_wrist.seat_search import best_seats
@@ -198,6 +199,7 @@ def try_holds(
     trials: Sequence[HoldTrial],
     seat: str = "rest",
     *,
+    placing: str = "given",
     robust: bool = False,
 ) -> list[FoundHold | InvalidInputError]:
     """Close hands at places, all together, and return the forces that they can hold.
@@ -210,6 +212,8 @@ def try_holds(
     trials : sequence of HoldTrial
     seat : {'rest', 'best'}, optional
         Rule for the seat: 'rest' as the grasp seats the hand, 'best' by `best_seats`.
+    placing : {'given', 'contact'}, optional
+        'contact' to move each hand from its seat to where it rests on the rock.
     robust : bool, optional
         True to compute the forces over a scatter of each place, too.
 
@@ -231,6 +235,10 @@ def try_holds(
         for each in trials
     ]
     outcomes = best_seats(hand, placements) if seat == "best" else hand.settle_each(placements)
+    if placing == "contact":
+        seated = [each for each in outcomes if isinstance(each, SettledHand)]
+        rests = iter(placed_by_contact(hand, seated))
+        outcomes = [next(rests) if isinstance(each, SettledHand) else each for each in outcomes]
     spaces = iter(wrench_spaces([each for each in outcomes if isinstance(each, SettledHand)]))
     found: list[FoundHold | InvalidInputError] = []
     axes = np.eye(6)[list(TRIAL_WAYS.values())]

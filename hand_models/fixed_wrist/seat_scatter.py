@@ -3,11 +3,14 @@
 Places are a scrambled Sobol sequence, which covers the six dimensions of a place more evenly than
 random numbers. The hand's name and a seed scramble it: a hand's places depend neither on other
 hands, nor on their order, nor on the machine.
+
+A hand that was placed by contact (`contact_rest`) comes to rest anew at each place along x, y and
+turned about z. Only there it is moved along z and turned about x and y, by what contact leaves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 from zlib import crc32
@@ -16,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_on, turns_about
+from hand_models.fixed_wrist.contact_rest import contact_slopes, rests_on_rock
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
@@ -63,6 +67,8 @@ class Robustness(NamedTuple):
         Deprecated: the same as ``hundredth``. It was the least of the places.
     tenth, hundredth : ndarray, shape (k,)
         Value that is exceeded at nine in ten places, and at 99 in a hundred.
+    contact : tuple of float, optional
+        Half width along z [m], and about x and y [rad], of a hand that was placed by contact.
     """
 
     draws: int
@@ -73,6 +79,7 @@ class Robustness(NamedTuple):
     worst: Array
     tenth: Array
     hundredth: Array
+    contact: tuple[float, float] | None = None
 
 
 def robustness(
@@ -128,7 +135,8 @@ def robustness(
     hundredth, tenth = np.percentile(
         reaches, [SCATTER_SETTINGS.hundredth, SCATTER_SETTINGS.tenth], axis=0
     )
-    return Robustness(draws, without, position, angle, seed, hundredth, tenth, hundredth)
+    contact = None if settled.seating.offset is None else hand.contact_scatter
+    return Robustness(draws, without, position, angle, seed, hundredth, tenth, hundredth, contact)
 
 
 def scattered_places(name: str, count: int, seed: int) -> Array:
@@ -164,7 +172,8 @@ def closed_about(
         Model of the settled hand.
     settled : SettledHand
     places : ndarray, shape (n, 6)
-        Along and about each axis of H, in units of ``scatter``.
+        Along and about each axis of H, in units of ``scatter``; of a hand that was placed by
+        contact, those along z and about x and y in units of its ``contact_scatter``.
     scatter : tuple of float
         Unit along an axis [m], and about an axis [rad].
 
@@ -173,21 +182,59 @@ def closed_about(
     sequence of SettledHand or InvalidInputError
         The next 64 places, in order; an error in place of a hand that cannot be there.
     """
-    position, angle = scatter
     at_once = 64  # hands that are closed together
+    start = Placement(settled.hold, settled.surface, settled.grasp, settled.seating.pose)
+    frames_of: Callable[[Array, tuple[float, float]], Sequence[Pose | InvalidInputError]] = (
+        _posed if settled.seating.offset is None else _ContactFrames(hand, settled)
+    )
     for first in range(0, len(places), at_once):
-        frames = (
-            Pose(position * by[:3], turns_about(angle * by[3:]))
-            for by in places[first : first + at_once]
-        )
-        yield hand.settle_each(
-            [
-                Placement(
-                    settled.hold,
-                    settled.surface,
-                    settled.grasp,
-                    frame.inverse() @ settled.seating.pose,
-                )
-                for frame in frames
-            ]
-        )
+        frames = frames_of(places[first : first + at_once], scatter)
+        there = [
+            start._replace(hold_in_hand=frame.inverse() @ settled.seating.pose)
+            for frame in frames
+            if isinstance(frame, Pose)
+        ]
+        closed = iter(hand.settle_each(there))
+        yield [next(closed) if isinstance(frame, Pose) else frame for frame in frames]
+
+
+def _posed(places: Array, scatter: tuple[float, float]) -> Sequence[Pose]:
+    """Return the frames of a hand at its places, in that where it was put."""
+    position, angle = scatter
+    return [Pose(position * by[:3], turns_about(angle * by[3:])) for by in places]
+
+
+class _ContactFrames:
+    """Frames of a hand that comes to rest anew at its places, in that where it was put.
+
+    Parameters
+    ----------
+    hand : SpinyHand
+    settled : SettledHand
+        Placed by contact.
+    """
+
+    def __init__(self, hand: SpinyHand, settled: SettledHand) -> None:
+        assert settled.seating.offset is not None
+        self._hand, self._offset = hand, settled.seating.offset
+        at_rest = self._offset @ settled.seating.pose
+        self._rest = Placement(settled.hold, settled.surface, settled.grasp, at_rest)
+        self._slopes = contact_slopes(hand, self._rest)
+
+    def __call__(
+        self, places: Array, scatter: tuple[float, float]
+    ) -> list[Pose | InvalidInputError]:
+        wrist = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+        moved = _posed(places * wrist, scatter)
+        left = _posed(places * (1.0 - wrist), self._hand.contact_scatter)
+        assert self._rest.hold_in_hand is not None
+        starts = [
+            self._rest._replace(hold_in_hand=each.inverse() @ self._rest.hold_in_hand)
+            for each in moved
+        ]
+        rests = rests_on_rock(self._hand, starts, self._slopes)
+        back = self._offset.inverse()
+        return [
+            back @ each @ rest @ more @ self._offset if isinstance(rest, Pose) else rest
+            for each, rest, more in zip(moved, rests, left, strict=True)
+        ]

@@ -1,5 +1,5 @@
 from .finger_frames import FingerFrame as FingerFrame
-from .grasp import Grasp as Grasp, WristTravel as WristTravel
+from .grasp import Grasp as Grasp, Placing as Placing, WristTravel as WristTravel
 from .model import HandModel as HandModel
 from .names import (
     FINGERS as FINGERS,

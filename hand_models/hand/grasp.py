@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 from msgspec.structs import force_setattr
 
 from hand_models.base import InvalidFieldError, Strict, Tension, check_positive
 
-__all__ = ["Grasp", "WristTravel"]
+__all__ = ["Grasp", "Placing", "WristTravel"]
+
+Placing = Literal["given", "contact"]
+"""How a hand comes to its pose: as it is given or seated, or by contact with its rock."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,8 +97,8 @@ class HandModel:
             table.scalar("seat", "scatter_angle"),
         )
         self.contact_scatter = (
-            table.scalar("seat", "contact_height"),
-            table.scalar("seat", "contact_tilt"),
+            table.scalar("seat", "contact_position"),
+            table.scalar("seat", "contact_angle"),
         )
         self.inner_joint = np.array(table.vector("fingers", "inner_joint"))
         self.inner_place = x, _, _ = table.vector("fingers", "inner_joint")

@@ -48,16 +48,19 @@ class Seating:
     ----------
     pose : Pose
         The hold's frame in the hand frame H.
-    rule : {'given', 'pinch', 'palm_on_rock', 'palm_on_rock_centred', 'flat'}
+    rule : {'given', 'pinch', 'palm_on_rock', 'palm_on_rock_centred', 'flat', 'best', 'contact'}
         How the pose was found.
     backed_off : float
         Distance along −z of H by which the hand then backed off, so that its open fingers are
         clear of the rock [m].
+    offset : Pose, optional
+        With the rule 'contact', H in the frame where it has come to rest.
     """
 
     pose: Pose
     rule: str
     backed_off: float = 0.0
+    offset: Pose | None = None
 
     def off(self, distance: float) -> Seating:
         """Return the seating after the hand has backed off from the rock.

@@ -260,6 +260,8 @@ HAND_FIELD_READERS: Final[Mapping[str, tuple[str, Callable[[Any], Any]]]] = {
     "surface": ("surface", Surface.from_values),
     "seat": ("seat", str),
     "seat_direction": ("seat_direction", np.array),
+    "placing": ("contact_offset", _pose),
+    "contact_offset": ("contact_offset", _pose),
     "wrench": ("wrench", tuple),
 }
 """Fields of a hand's message, what they are called in `HandOnHold`, and how they are read."""

@@ -108,8 +108,13 @@ def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
 
 
 def closings(prepared: PreparedStance) -> Iterator[Change]:
-    """Yield changes that close all hands with a closing tension of 20 N, and of 50 N."""
+    """Yield changes that close all hands with a closing tension of 20 N, and of 50 N.
+
+    Yields nothing where a hand was placed by contact: it would come to rest elsewhere.
+    """
     stance = prepared.question.stance
+    if any(hand.contact_offset is not None for hand in stance.hands):
+        return
     known = [hand.closing_tension for hand in prepared.batch.hands]
     for tension in (20.0, 50.0):  # [N] of all hands
         changes = {hand_path(i, "grasp.closing_tension"): tension for i in range(len(known))}
@@ -147,6 +152,11 @@ def _grasped(prepared: PreparedStance, index: int, turn: float) -> list[Change]:
             words += f", moved by {1e3 * way:.0f} mm"
         size += way / SETTINGS.way_unit
         moved = _moved(prepared, index, pose, seated=hand.at is None)
+        if moved is None:
+            return []
+        changes |= moved
+    elif hand.contact_offset is not None:
+        moved = _moved(prepared, index, hand.pose)
         if moved is None:
             return []
         changes |= moved
@@ -195,7 +205,7 @@ def _moved(
     hand = stance.hands[index]
     changes: dict[str, Any] = {hand_path(index, "pose"): pose_message(pose)}
     if not seated:
-        if hand.at is not None:
+        if hand.at is not None or hand.contact_offset is not None:
             try:
                 hand.hold.check_place()
             except InvalidInputError:
@@ -241,6 +251,9 @@ def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:
         Paths of the fields that are removed; see `planner.result.Advice`.
     """
     said = {"seat": hand.seat != "rest", "seat_direction": hand.seat_direction is not None}
+    if hand.contact_offset is not None:
+        # how such a hand was seated before it came to rest is not known here
+        said = dict.fromkeys(("place", "seat", "seat_direction", "placing", "contact_offset"), True)
     return {hand_path(index, name): None for name, given in said.items() if given}
 
 

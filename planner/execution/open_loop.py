@@ -1,7 +1,8 @@
 """Execute a plan as it is on displaced hands: tensions and pose targets stay as planned.
 
 A sample displaces each hand on its rock; its pose in the body frame B stays, and the rock moves
-instead. The hand closes there, its tensions go to the planned ones, and the limb pulls its wrist
+instead. A hand that was placed by contact comes to rest anew there, and is displaced from that rest
+along z and about x and y. The hand closes there, its tensions go to the planned ones, and the limb pulls its wrist
 toward the planned pose target, a twist from where the hand has closed. Displacements are a
 scrambled Sobol sequence for each hand, by its limb's name, and combined at random.
 """
@@ -120,9 +121,12 @@ def execute(
     closed: list[list[SettledHand | InvalidInputError]] = []
     for i, limb in enumerate(prepared.limbs):
         closed.append([])
-        for outcomes in closed_about(
-            hand, prepared.batch.hands[i], displacements[:, i], (1.0, 1.0)
-        ):
+        settled, units = prepared.batch.hands[i], np.ones(6)
+        if settled.seating.offset is not None:
+            # one placed by contact comes to rest anew, displaced from there by units of its own
+            height, tilt = hand.contact_scatter
+            units[2:5] = height, tilt, tilt
+        for outcomes in closed_about(hand, settled, displacements[:, i] / units, (1.0, 1.0)):
             closed[i] += outcomes
             deadline.check(NEWTON_SETTINGS.late)
         for each in closed[i]:

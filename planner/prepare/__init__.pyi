@@ -27,6 +27,7 @@ from .prepared_stance import (
     prepare_stance as prepare_stance,
 )
 from .settled_stance import (
+    come_to_rest as come_to_rest,
     floating_wrist as floating_wrist,
     hand_space as hand_space,
     resting_hand as resting_hand,

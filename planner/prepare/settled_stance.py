@@ -1,13 +1,14 @@
-"""Close the hands of a stance on their holds, and compute the wrench space of one hand at rest."""
+"""Close the hands of a stance on their holds, let them come to rest there, and find one's set."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
-from hand_models.base import InvalidInputError, UnsupportedError
+from hand_models.base import InvalidInputError, Pose, UnsupportedError
 from hand_models.compliance import FloatingWrist, PalmMode
-from hand_models.fixed_wrist import PULL_OFF, best_seats, wrench_space
+from hand_models.fixed_wrist import PULL_OFF, best_seats, placed_by_contact, wrench_space
 from hand_models.hand import Placement, SettledHand, SpinyHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare.hand_sets import error_at_rest, wrist_at
@@ -15,6 +16,7 @@ from planner.question import HandOnHold, Stance
 
 __all__ = [
     "RestingHand",
+    "come_to_rest",
     "floating_wrist",
     "hand_space",
     "resting_hand",
@@ -84,7 +86,8 @@ def settle_each(
         for hand in hands
     ]
     if all(hand.seat == "rest" for hand in hands):
-        return kind.settle_each(placements)
+        outcomes = kind.settle_each(placements)
+        return [_as_placed(*each) for each in zip(hands, outcomes, strict=True)]
     # those that look in the same direction search together
     given = [PULL_OFF if each.seat_direction is None else each.seat_direction for each in hands]
     ways = [
@@ -97,6 +100,66 @@ def settle_each(
         group = [placements[i] for i in own]
         seated = kind.settle_each(group) if way is None else best_seats(kind, group, way)
         found.update(zip(own, seated, strict=True))
+    return [_as_placed(hand, found[i]) for i, hand in enumerate(hands)]
+
+
+def _as_placed(
+    hand: HandOnHold, outcome: SettledHand | InvalidInputError
+) -> SettledHand | InvalidInputError:
+    """Return a settled hand whose seating says that it was placed by contact, if it was."""
+    if hand.contact_offset is None or isinstance(outcome, InvalidInputError):
+        return outcome
+    seating = replace(outcome.seating, rule="contact", offset=hand.contact_offset)
+    return replace(outcome, seating=seating)
+
+
+def come_to_rest(
+    kind: SpinyHand, hands: Sequence[HandOnHold], offsets: Sequence[Pose] | None = None
+) -> list[HandOnHold | InvalidInputError]:
+    """Place hands by contact: where each, closed and unloaded, rests on its rock.
+
+    Only its z, and its turns about x and y, are found (`hand_models.fixed_wrist.contact_rest`).
+    Its rock stays where it is under the given hand.
+
+    Parameters
+    ----------
+    kind : SpinyHand
+        Model of all the hands.
+    hands : sequence of HandOnHold, length n
+        Hands where they start.
+    offsets : sequence of Pose, length n, optional
+        Final H in the frame where the hand rests; by default hands stay at rest.
+
+    Returns
+    -------
+    list of HandOnHold or InvalidInputError
+        The same hands with new poses in W, and with the poses of their holds in H; an error in
+        place of each hand that has no rest.
+    """
+    offsets = [Pose.identity()] * len(hands) if offsets is None else offsets
+    found: dict[int, HandOnHold | InvalidInputError] = {}
+    starts: dict[int, SettledHand] = {}
+    for i, start in enumerate(settle_each(kind, hands)):
+        if isinstance(start, SettledHand):
+            starts[i] = start
+        else:
+            found[i] = start
+    rests = placed_by_contact(kind, list(starts.values()), [offsets[i] for i in starts])
+    for (i, start), rest in zip(starts.items(), rests, strict=True):
+        if isinstance(rest, InvalidInputError):
+            found[i] = rest
+            continue
+        rock = hands[i].pose @ start.seating.pose
+        found[i] = replace(
+            hands[i],
+            pose=rock @ rest.seating.pose.inverse(),
+            hold_pose=None,
+            hold_in_hand=rest.seating.pose,
+            seat="rest",
+            seat_direction=None,
+            at=None,
+            contact_offset=offsets[i],
+        )
     return [found[i] for i in range(len(hands))]
 
 

@@ -159,6 +159,9 @@ class HandOnHold:
     at : Pose, optional
         Where on the hold the hand is seated: a frame in the hold's frame, used in place of that
         frame.
+    contact_offset : Pose, optional
+        Of a hand that was placed by contact (`planner.come_to_rest`): H in the frame where the
+        unloaded hand rests. None for a hand that is where it was put or seated.
     """
 
     limb: str
@@ -175,6 +178,7 @@ class HandOnHold:
     seat: SeatRule = "rest"
     seat_direction: Array | None = None
     at: Pose | None = None
+    contact_offset: Pose | None = None
 
     def __post_init__(self) -> None:
         known_choice(self.wrist, get_args(WristMode), "wrist")
@@ -220,6 +224,13 @@ class HandOnHold:
                 )
         if self.at is not None:
             _possible(self.at, "at")
+        if self.contact_offset is not None:
+            _possible(self.contact_offset, "contact_offset")
+            if not posed:
+                raise InvalidInputError(
+                    "requires the pose of the hold, as planner.come_to_rest gives it",
+                    field="contact_offset",
+                )
         if self.seat_direction is not None:
             if self.seat != "best":
                 raise InvalidInputError("requires the seat 'best'", field="seat_direction")

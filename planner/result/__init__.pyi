@@ -16,7 +16,6 @@ from .plain_parts import (
     LoadFactorStatus as LoadFactorStatus,
     Palm as Palm,
     Price as Price,
-    RobustLoadFactor as RobustLoadFactor,
     Solver as Solver,
     TensionPath as TensionPath,
     Tile as Tile,
@@ -28,6 +27,10 @@ from .plan import (
     SetPoints as SetPoints,
     SetPointSource as SetPointSource,
     Status as Status,
+)
+from .robust_load_factor import (
+    RobustLoadFactor as RobustLoadFactor,
+    RobustQuantiles as RobustQuantiles,
 )
 from .spread import (
     SPREAD_SETTINGS as SPREAD_SETTINGS,

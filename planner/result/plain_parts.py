@@ -22,7 +22,6 @@ __all__ = [
     "LoadFactorStatus",
     "Palm",
     "Price",
-    "RobustLoadFactor",
     "Solver",
     "TensionPath",
     "Tile",
@@ -246,58 +245,6 @@ class Clearance(Struct, frozen=True, kw_only=True):
     hand_body: Distance | None = None
     body_rock: Distance | None = None
     unchecked: list[str] = []
-
-
-class RobustLoadFactor(Struct, frozen=True):
-    """Load factor for hands placed inaccurately: statistics over random placements of the rock.
-
-    Each hand is closed again at ``places`` poses near its given one, from a scrambled Sobol
-    sequence seeded by the limb's name. Poses of all hands are combined at random; each combination
-    is a draw. The hand frame H stays in the world frame W, with body and joints; the rock moves
-    instead. Quantiles are over all draws. In a draw where a hand cannot be closed, or nothing can
-    be held, the load factor is zero.
-
-    Attributes
-    ----------
-    draws, without : int
-        Number of draws, and of draws with a load factor of zero.
-    refused : dict of str to int
-        Number of draws in which a hand cannot be closed, by limb; limbs without such draws are left
-        out.
-    position, angle : float
-        Half width of the scatter: along each axis of H [m], and about each axis [rad].
-    seed : int
-        Seed of the random combinations.
-    worst : float
-        Deprecated: the same as ``hundredth``. In old versions, the least load factor of the draws
-        that have one, which depends on their number.
-    tenth : float
-        10 % quantile: the load factor is larger in nine of ten draws.
-    tenth_interval : list of float, length 2
-        95 % confidence interval of ``tenth``, for this number of draws.
-    hundredth : float
-        1 % quantile: the load factor is larger in 99 of a hundred draws.
-    hundredth_interval : list of float, length 2
-        95 % confidence interval of ``hundredth``.
-    places : int
-        Number of poses of each hand.
-    reasons : dict of str to str
-        Why a hand cannot be closed at the first pose where it cannot, by limb.
-    """
-
-    draws: int
-    without: int
-    refused: dict[str, int]
-    position: float
-    angle: float
-    seed: int
-    worst: float
-    tenth: float
-    tenth_interval: list[float]
-    hundredth: float
-    hundredth_interval: list[float]
-    places: int
-    reasons: dict[str, str] = {}
 
 
 class Palm(Struct, Generic[AnyVector], frozen=True, kw_only=True, eq=False):

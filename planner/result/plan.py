@@ -21,11 +21,11 @@ from planner.result.plain_parts import (
     LimitName,
     LoadFactorStatus,
     Price,
-    RobustLoadFactor,
     Solver,
     TensionPath,
     Time,
 )
+from planner.result.robust_load_factor import RobustLoadFactor
 from planner.result.spread import Spread
 
 __all__ = ["Certificate", "Plan", "SetPointSource", "SetPoints", "Status"]

@@ -1,6 +1,7 @@
 """Robust load factor: quantiles over places of the hands near the given ones (Monte Carlo).
 
-Every hand is closed at 128 places about the given one, independent of the other hands. A sample
+Every hand is closed at 128 places about the given one, independent of the other hands; a hand that
+was placed by contact comes to rest anew there (`hand_models.fixed_wrist.seat_scatter`). A sample
 puts each hand at one of its places; over all samples each place is used equally often, and the
 places of the hands are combined at random: closing a hand is costly, and the hands' combinations
 need more samples than there are places. A sample in which a hand cannot close, or which has no load
@@ -38,7 +39,7 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner import deadline
 from planner.deadline import DeadlineError
 from planner.prepare import PreparedStance
-from planner.result import RobustLoadFactor
+from planner.result import RobustLoadFactor, RobustQuantiles
 from planner.solving.fixed_wrists import most_of_fixed
 
 __all__ = ["find_robust_load_factor"]
@@ -90,9 +91,18 @@ def find_robust_load_factor(
         for limb, own in zip(prepared.limbs, places, strict=True)
         if None in own
     }
-    position, angle = prepared.question.stance.robot.hand.seat_scatter
     quantiles = [SCATTER_SETTINGS.hundredth, SCATTER_SETTINGS.tenth]
     hundredth, tenth = np.percentile(factors, quantiles).tolist()
+    replanned = RobustQuantiles(
+        tenth=tenth,
+        tenth_interval=_interval(factors, taken, SCATTER_SETTINGS.tenth),
+        hundredth=hundredth,
+        hundredth_interval=_interval(factors, taken, SCATTER_SETTINGS.hundredth),
+    )
+    stance = prepared.question.stance
+    position, angle = stance.robot.hand.seat_scatter
+    by_contact = any(hand.contact_offset is not None for hand in stance.hands)
+    contact = stance.robot.hand.contact_scatter if by_contact else (None, None)
     return RobustLoadFactor(
         draws=len(factors),
         without=int((factors <= 0.0).sum()),
@@ -101,12 +111,15 @@ def find_robust_load_factor(
         angle=angle,
         seed=SETTINGS.seed,
         worst=hundredth,
-        tenth=tenth,
-        tenth_interval=_interval(factors, taken, SCATTER_SETTINGS.tenth),
-        hundredth=hundredth,
-        hundredth_interval=_interval(factors, taken, SCATTER_SETTINGS.hundredth),
+        tenth=replanned.tenth,
+        tenth_interval=replanned.tenth_interval,
+        hundredth=replanned.hundredth,
+        hundredth_interval=replanned.hundredth_interval,
         places=SCATTER_SETTINGS.places,
+        replanned=replanned,
         reasons=reasons,
+        contact_position=contact[0],
+        contact_angle=contact[1],
     )
 
 

@@ -310,7 +310,7 @@ def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
 
 
 def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
-    """Return the poses of the hands that the request places by a point on the rock.
+    """Return the poses of the hands that the request places by a point on the rock, or by contact.
 
     Parameters
     ----------
@@ -323,7 +323,11 @@ def placed_poses(stance: Stance) -> dict[str, replies.PlacedFrame] | UnsetType:
         Pose of H in W by limb: position [m] and unit quaternion (x, y, z, w). `msgspec.UNSET` if
         the request gives all hands by poses.
     """
-    poses = {hand.limb: _frame(hand.pose) for hand in stance.hands if hand.at is not None}
+    poses = {
+        hand.limb: _frame(hand.pose)
+        for hand in stance.hands
+        if hand.at is not None or hand.contact_offset is not None
+    }
     return poses or UNSET
 
 

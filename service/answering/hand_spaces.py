@@ -151,6 +151,8 @@ def _robust(found: Robustness) -> replies.RobustCapability:
         without=found.without,
         position=found.position,
         angle=found.angle,
+        contact_position=found.contact[0] if found.contact else None,
+        contact_angle=found.contact[1] if found.contact else None,
         seed=found.seed,
         worst=_by_side(found.worst),
         tenth=_by_side(found.tenth),

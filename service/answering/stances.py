@@ -12,15 +12,16 @@ import msgspec
 import numpy as np
 
 from hand_models import rock
-from hand_models.base import Array, BoundedStore, InvalidInputError, LimitError, Pose, errors_under
+from hand_models.base import Array, BoundedStore, InvalidInputError, Pose, errors_under, turns_about
 from hand_models.fixed_wrist import ALONG_FINGERS, approach_frame
 from hand_models.hand import SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
 from hand_models.rock import Mesh, Profile
 from hand_models.tile import Surface
-from planner import EARTH_GRAVITY, HandOnHold, Stance, settle_each
+from planner import EARTH_GRAVITY, HandOnHold, Stance, come_to_rest, settle_each
 from service import requests
 from service.answering.own_models import BUNDLED_ROBOTS, Robots, builder_of
+from service.answering.stance_costs import check_costs
 
 __all__ = ["Rocks", "array_of", "hands_on_rocks", "joints_of", "poses_of", "stance", "with_rocks"]
 
@@ -69,7 +70,7 @@ def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tup
         As `stance` raises.
     """
     with errors_under("stance"):
-        _check_costs(message)
+        check_costs(message)
         build = builder_of(message.robot, robots)
         if message.hand is None:
             robot = build(None)
@@ -91,7 +92,7 @@ def with_rocks(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> tup
 def hands_on_rocks(
     messages: Sequence[requests.Hand], kind: SpinyHand, rocks: Rocks, path: str
 ) -> list[HandOnHold]:
-    """Convert the hands of a request; compute the poses of hands that are placed on a rock.
+    """Convert the hands of a request; compute poses of those on a rock, and placed by contact.
 
     Parameters
     ----------
@@ -130,7 +131,20 @@ def hands_on_rocks(
         if isinstance(outcome, InvalidInputError):
             raise outcome.within(paths[i])
         hands[i] = replace(hands[i], pose=hands[i].pose @ outcome.seating.pose.inverse())
+    by_contact = [i for i, each in enumerate(messages) if each.placing == "contact"]
+    offsets = [_offset(messages[i]) for i in by_contact]
+    rests = come_to_rest(kind, [hands[i] for i in by_contact], offsets)
+    for i, rest in zip(by_contact, rests, strict=True):
+        if isinstance(rest, InvalidInputError):
+            raise rest.within(paths[i])
+        hands[i] = rest
     return hands
+
+
+def _offset(message: requests.Hand) -> Pose:
+    """Return H in the frame where a hand that is placed by contact rests."""
+    twist = np.array(message.contact_offset or (0.0,) * 6)
+    return Pose(twist[:3], turns_about(twist[3:]))
 
 
 def _hand(
@@ -161,6 +175,12 @@ def _hand(
         hold.check_place(seat)
     if pose is None:
         raise InvalidInputError("missing", field="pose")
+    if message.contact_offset is not None and message.placing != "contact":
+        raise InvalidInputError(
+            "only a hand placed by contact has an offset from its rest; valid is none, or placing "
+            "contact",
+            field="contact_offset",
+        )
     return HandOnHold(
         limb=message.limb,
         pose=pose,
@@ -347,46 +367,3 @@ def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Me
     vertices, faces = message.vertices, message.faces
     key = blake2b(msgspec.msgpack.encode((vertices, faces))).digest(), numbers, anywhere
     return MESHES_OF_REQUESTS.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))
-
-
-# Costs --------------------------------------------------------------------------------------------
-
-
-def _check_costs(stance: requests.Stance) -> None:
-    """Raise `LimitError`, with a field relative to the stance, for hands that cost too much."""
-    # a plan of wrists that give way is found in several rounds
-    rounds = 4
-    # four hands with 64 half-planes have some 7500 rows in a program
-    most_planes = 256
-    planes = sum(
-        (1 if hand.wrist == "fixed" else rounds) * _half_planes(hand) for hand in stance.hands
-    )
-    if planes > most_planes:
-        raise LimitError(
-            f"half_planes of all hands are {planes} together, those of a floating hand counted "
-            f"{rounds} times; the maximum is {most_planes}",
-            field="hands",
-        )
-    points = sum(_points(hand.hold, stance.rocks) for hand in stance.hands)
-    # some 0.1 ms for each point of an outline
-    most_points = 40_000
-    if points > most_points:
-        raise LimitError(
-            f"profiles of all hands have {points} points together; the maximum is {most_points}",
-            field="hands",
-        )
-
-
-def _half_planes(hand: requests.Hand) -> int:
-    given = hand.surface.half_planes if isinstance(hand.surface, requests.Surface) else None
-    return given or 1
-
-
-def _points(hold: requests.Hold, rocks: dict[str, requests.Rock]) -> int:
-    """Return how many points the outlines of a hold have, those of a shared rock as its own."""
-    if isinstance(hold, requests.RockReference):
-        return _points(rocks[hold.rock], {}) if hold.rock in rocks else 0
-    if not isinstance(hold, requests.Profile):
-        return 0
-    strips = () if hold.profiles is None else msgspec.structs.astuple(hold.profiles)
-    return sum(map(len, strips)) + len(hold.points or ())

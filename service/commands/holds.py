@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from hand_models import fixed_wrist
+    from hand_models.hand import Placing
     from hand_models.parameters import ParameterTable
 
     Outcome = fixed_wrist.FoundHold | InvalidInputError
@@ -73,6 +74,14 @@ __all__ = ["holds_command"]
     help="How a hand is seated at a point; best takes some forty times as long.",
 )
 @click.option(
+    "--placing",
+    type=click.Choice(["given", "contact"]),
+    default="given",
+    show_default=True,
+    help="contact moves a hand from its seat to where, closed, it rests on the rock; takes some "
+    "forty times as long.",
+)
+@click.option(
     "--robust",
     type=click.IntRange(0),
     default=10,
@@ -92,6 +101,7 @@ def holds_command(
     rotations: tuple[float, ...],
     surface: str,
     seat: Literal["rest", "best"],
+    placing: Placing,
     robust: int,
     parallel: options.WorkersOption,
     hand: ParameterTable | None,
@@ -113,7 +123,7 @@ def holds_command(
     numbers = parameters.hand_table() if hand is None else parameters.own_hand(hand)
     mesh = Mesh(*read_mesh(rock), numbers, anywhere=True)
     radius = 0.5 * numbers.scalar("palm", "length")
-    # some four hours of one core, forty times that with seat best
+    # some four hours of one core, forty times that with seat best or placing contact
     most = 100_000
     with tables.progress("laying the grid") as report:
         trials = fixed_wrist.grid_of_trials(
@@ -139,10 +149,13 @@ def holds_command(
     scattered: dict[int, Outcome] = {}
     best: list[int] = []
     broken: processes.Interrupted | CruxError | None = None
-    # a trial takes as long as 15 plans, and with a search for the seat 40 times that
-    on, count = parallel.place(15 * (40 if seat == "best" else 1) * len(trials))
+    # a trial takes as long as 15 plans, and with a search for the seat or the rest 40 times that
+    searches = (seat == "best") + (placing == "contact")
+    on, count = parallel.place(15 * (40 * searches or 1) * len(trials))
     try:
-        with processes.HoldTrials(mesh, surface, numbers, seat=seat, on=on, workers=count) as tried:
+        with processes.HoldTrials(
+            mesh, surface, numbers, seat=seat, placing=placing, on=on, workers=count
+        ) as tried:
             _keep(f"trying {len(trials):,} places", trials, tried.each(trials), outcomes)
             best = [i for i, _ in _sorted(outcomes)[:robust]]
             again = [trials[i] for i in best]
@@ -169,7 +182,7 @@ def holds_command(
         "reasons": dict(refused.most_common()),
         "refusals": _refusals(trials, outcomes),
         "warnings": list(mesh.oddities),
-        "holds": [_entry(trial, each) for trial, each in found],
+        "holds": [_entry(trial, each, placing) for trial, each in found],
     }
     with tables.writing(output, "--output"), whole_file(output) as part:
         part.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
@@ -235,7 +248,9 @@ def _refusals(
     return [{"point": point, "reasons": dict(reasons)} for point, reasons in found.items()]
 
 
-def _entry(trial: fixed_wrist.HoldTrial, found: fixed_wrist.FoundHold) -> dict[str, Any]:
+def _entry(
+    trial: fixed_wrist.HoldTrial, found: fixed_wrist.FoundHold, placing: Placing
+) -> dict[str, Any]:
     """Return a hold as JSON values."""
     from hand_models import fixed_wrist
 
@@ -254,6 +269,7 @@ def _entry(trial: fixed_wrist.HoldTrial, found: fixed_wrist.FoundHold) -> dict[s
             "wrist_angle": trial.wrist_angle,
             "frame": "rock",
         },
+        "placing": placing,
         "grasp": {"outer_rotation": trial.outer_rotation},
         "pose": {
             "position": found.pose.position.tolist(),

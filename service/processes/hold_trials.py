@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
     from hand_models.fixed_wrist import FoundHold, HoldTrial
+    from hand_models.hand import Placing
     from hand_models.rock import Mesh
 
 __all__ = ["HoldTrials"]
@@ -42,6 +43,8 @@ class HoldTrials:
     seat : {'rest', 'best'}, optional
         How a hand is seated at a place: as its grasp has it, or at the nearby pose with the
         strongest grip.
+    placing : {'given', 'contact'}, optional
+        Whether a hand stays where it is seated, or is moved to where it rests on the rock.
     on : str or distributed.Client, optional
         Where trials run: ``processes`` of this machine, ``here`` for this process alone,
         ``tcp://HOST:PORT`` of a Dask scheduler or its client, ``dask:local`` for a Dask cluster on
@@ -62,11 +65,12 @@ class HoldTrials:
         hand: ParameterTable,
         *,
         seat: Literal["rest", "best"] = "rest",
+        placing: Placing = "given",
         on: str | Client = "processes",
         workers: int | None = None,
     ) -> None:
-        self._seat = seat
-        make = partial(_trying, rock, surface, hand, seat)
+        self._quick = seat == "rest" and placing == "given"
+        make = partial(_trying, rock, surface, hand, seat, placing)
         self._pool = pool_on(on, workers, Setting(make=make))
 
     def __enter__(self) -> Self:
@@ -97,7 +101,7 @@ class HoldTrials:
         """
         # one that is searched for, or scattered, is many already; some fingers take ten times as
         # long as most, and so do the batches that they are in
-        most = 128 if self._seat == "rest" and not robust else 1
+        most = 128 if self._quick and not robust else 1
         batches = _batches(trials, most, self._pool.width)
         payloads = (pickle.dumps(([trials[i] for i in batch], robust)) for batch in batches)
         for batch, answer in zip(
@@ -127,7 +131,11 @@ def _outcomes(answer: Answer, count: int) -> list[Any]:
 
 
 def _trying(
-    rock: Mesh, surface: str, numbers: ParameterTable, seat: Literal["rest", "best"]
+    rock: Mesh,
+    surface: str,
+    numbers: ParameterTable,
+    seat: Literal["rest", "best"],
+    placing: Placing,
 ) -> Callable[[bytes], Answer]:
     """Return the function that tries a batch of places; called once in each process."""
     from hand_models.fixed_wrist import try_holds
@@ -139,7 +147,9 @@ def _trying(
     def answer(payload: bytes) -> Answer:
         start = time.perf_counter()
         trials, robust = pickle.loads(payload)
-        found = try_holds(hand, rock, surface_there, trials, seat=seat, robust=robust)
+        found = try_holds(
+            hand, rock, surface_there, trials, seat=seat, placing=placing, robust=robust
+        )
         encoding = "application/python-serialized-object"
         return Answer(pickle.dumps(found), encoding, seconds=time.perf_counter() - start)
 

@@ -61,8 +61,8 @@ class PlacedFrame(Struct):
 class StanceReply(Reply, kw_only=True):
     """The fields of every reply about a stance.
 
-    - ``poses``: pose of H in W by limb, of hands that the request gives by a ``place`` on a rock;
-      left out where there are none.
+    - ``poses``: pose of H in W by limb, of hands that the request gives by a ``place`` on a rock or
+      places by ``contact`` (with their offset); left out where there are none.
     """
 
     poses: dict[str, PlacedFrame] | UnsetType = UNSET
@@ -71,7 +71,8 @@ class StanceReply(Reply, kw_only=True):
 class SeatingReply(Struct):
     """Pose of the hold in H, and the rule by which the pose was found.
 
-    - ``rule``: ``given``, ``pinch``, ``palm_on_rock``, ``palm_on_rock_centred`` or ``flat``.
+    - ``rule``: ``given``, ``pinch``, ``palm_on_rock``, ``palm_on_rock_centred``, ``flat``, ``best``
+      or ``contact``.
     - ``pose``: pose of the hold's frame in H.
     - ``backed_off``: distance by which the hand moved off the rock along -z of H, so that its open
       fingers are clear of the rock [m].

@@ -145,6 +145,9 @@ class RobustCapability(Struct, kw_only=True):
     - ``without``: number of these places where the hand cannot be, or holds nothing.
     - ``position``: largest shift to either side along each axis of H [m].
     - ``angle``: largest turn to either side about each axis of H [rad].
+    - ``contact_position``, ``contact_angle``: of a hand that was placed by contact, what contact
+      leaves along z [m] and about x and y of H [rad], in place of the two above; else null. The
+      hand comes to rest anew at each place.
     - ``seed``: seed of the samples.
     - ``worst``: deprecated, the same as ``hundredth``.
     - ``tenth``: ``extent`` that the hand exceeds at nine in ten places; null where it is not
@@ -161,6 +164,8 @@ class RobustCapability(Struct, kw_only=True):
     worst: dict[str, float | None]
     tenth: dict[str, float | None]
     hundredth: dict[str, float | None]
+    contact_position: float | None = None
+    contact_angle: float | None = None
 
 
 class WrenchSpaceReply(StanceReply, kw_only=True):

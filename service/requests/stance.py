@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from hand_models.base import Acceleration, Coordinate, Name, Position, Strict
-from hand_models.hand import Grasp, WristTravel
+from hand_models.hand import Grasp, Placing, WristTravel
 from planner import LimbStiffness
 from service.requests.holds import Hold, Rock, Surface
 from service.requests.request import FourTensions, Pose, WrenchEntries, WrenchEntry
@@ -28,6 +28,8 @@ Preload = Annotated[
 ]
 Planned = WrenchEntry | None
 Angle = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Displacement = Annotated[float, Meta(ge=-0.05, le=0.05)]
+Rotation = Annotated[float, Meta(ge=-0.3, le=0.3)]
 Direction = Annotated[tuple[Coordinate, Coordinate, Coordinate], Meta(description="not zero")]
 Angles = Annotated[
     list[Angle],
@@ -107,6 +109,11 @@ class Hand(Strict, frozen=True, kw_only=True):
       nearby pose with the strongest grip.
     - ``seat_direction``: wrench on the rock, in H, in which the ``best`` seat is strongest; by
       default the pull-off.
+    - ``placing``: ``given``, the hand is where it is put or seated; ``contact``, it is moved along
+      z and turned about x and y of H to where the closed, unloaded hand rests on its rock. The
+      reply then contains the pose.
+    - ``contact_offset``: small displacement and rotation of H from that rest, in H at rest [m,
+      rad].
     """
 
     limb: Name
@@ -152,6 +159,17 @@ class Hand(Strict, frozen=True, kw_only=True):
             description="in which wrench on the rock, in H, the best seat is to hold most; by "
             "default the pull-off"
         ),
+    ] = None
+    placing: Annotated[
+        Placing,
+        Meta(
+            description="contact: by its z and its turns about x and y the hand is moved to where, "
+            "closed and unloaded, it rests on its rock; the reply has its pose"
+        ),
+    ] = "given"
+    contact_offset: Annotated[
+        tuple[Displacement, Displacement, Displacement, Rotation, Rotation, Rotation] | None,
+        Meta(description="of H from where it rests, in H at rest; of placing contact [m, rad]"),
     ] = None
 
 

@@ -124,9 +124,15 @@ def robust_sentence(robust: RobustLoadFactor) -> str:
     said += f"1 % quantile {robust.hundredth:.3f}"
     said += f"; {robust.without} with a load factor of 0" if robust.without else ""
     said += _refused(robust.refused, robust.reasons)
+    left = ""
+    if robust.contact_position is not None and robust.contact_angle is not None:
+        left = (
+            f" (of hands placed by contact {1e3 * robust.contact_position:g} mm and "
+            f"{1e3 * robust.contact_angle:g} mrad along z and about x and y)"
+        )
     return (
-        f"load factor with each hand up to {1e3 * robust.position:g} mm and "
-        f"{1e3 * robust.angle:g} mrad off its place, {robust.draws} samples:\n{said}"
+        f"load factor, planned anew with each hand up to {1e3 * robust.position:g} mm and "
+        f"{1e3 * robust.angle:g} mrad off its place{left}, {robust.draws} samples:\n{said}"
     )
 
 

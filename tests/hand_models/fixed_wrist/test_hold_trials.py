@@ -19,7 +19,7 @@ from hand_models.fixed_wrist import (
 )
 from hand_models.rock import Mesh
 from tests.suite.helpers.hands import HAND, ROCK
-from tests.suite.helpers.rocks import fractal_wall
+from tests.suite.helpers.rocks import cylinder_mesh, fractal_wall
 
 RADIUS = 0.055
 PLACED = 4
@@ -124,3 +124,16 @@ def test_grids_that_cannot_be_are_refused(wall, spacing, angles, field):
     with pytest.raises(InvalidInputError) as caught:
         grid_of_trials(wall, spacing, angles, radius=RADIUS)
     assert caught.value.field == field
+
+
+def test_a_hand_placed_by_contact_is_tried_where_it_rests():
+    """On a log it is deeper than its seat, and holds less pull-off."""
+    log = Mesh(*cylinder_mesh(0.3, length=0.5), anywhere=True)
+    trial = HoldTrial((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, math.pi)
+    (seated,) = try_holds(HAND, log, ROCK, [trial])
+    (resting,) = try_holds(HAND, log, ROCK, [trial], placing="contact")
+    assert resting.rule == "contact"
+    moved = (seated.pose.inverse() @ resting.pose).position
+    # as on a log that is given by its diameter, but for its facets
+    assert moved == pytest.approx([0.0, 0.0, 0.72e-3], abs=1e-4)
+    assert 0.0 < resting.support[0] < seated.support[0]

@@ -179,6 +179,17 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     "Hand.wrench": [{HAND + "wrench": [None, None, -60.0, None, None, None]}],
     "Hand.seat": [{HAND + "seat": "best"}],
     "Hand.seat_direction": [{HAND + "seat": "best", HAND + "seat_direction": [1, 0, -1, 0, 0, 0]}],
+    "Hand.placing": [
+        {"stance.joints": "solve", HAND + "placing": "contact"},
+        {"stance.joints": "solve", HAND + "placing": "contact", HAND + "wrist": "compliant"},
+    ],
+    "Hand.contact_offset": [
+        {
+            "stance.joints": "solve",
+            HAND + "placing": "contact",
+            HAND + "contact_offset": [0.0, 0.0, -5e-4, 0.0, 0.0, 0.0],
+        }
+    ],
     "Grasp.outer_rotation": [{HAND + "grasp.outer_rotation": 3.0}],
     "Grasp.closing_tension": [{HAND + "grasp.closing_tension": 30.0}],
     "Grasp.palm": [{HAND + "grasp.palm": False}],

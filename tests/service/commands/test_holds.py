@@ -22,8 +22,8 @@ from service.commands.cli import run_command_line
 from service.processes import Interrupted
 from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, complaint, result
 from tests.suite.helpers.processes import begun, ended, until, watched, workers
-from tests.suite.helpers.requests import wall_request
-from tests.suite.helpers.rocks import fractal_wall
+from tests.suite.helpers.requests import pose_of, wall_request
+from tests.suite.helpers.rocks import cylinder_mesh, fractal_wall
 
 COARSE = ["--spacing", "0.15", "--angles", "1", "--outer-rotation", "0"]
 
@@ -121,6 +121,41 @@ def test_a_plan_is_made_with_a_hold_that_was_proposed(rock, tmp_path, capfd):
     seating = reply["hands"][0]["seating"]
     assert seating["rule"] == best["seating"]["rule"]
     assert list(reply["poses"]) == [hand["limb"]]
+
+
+@pytest.mark.slow
+def test_a_hold_by_contact_is_where_a_plan_places_the_hand_by_contact(tmp_path, capfd):
+    """On a log of 300 mm, across z of its frame: at its crest a pinch has a rest."""
+    vertices, faces = cylinder_mesh(0.3, length=0.3)
+    log, output = tmp_path / "log.ply", tmp_path / "holds.json"
+    trimesh.Trimesh(vertices, faces, process=False).export(log)
+    grid = ["--spacing", "0.31", "--angles", "1", "--outer-rotation", "3.14159265"]
+    options = ["-o", str(output), *grid, "--robust", "0", "--workers", "1"]
+    found = {}
+    for placing in ("given", "contact"):
+        assert run_command_line(["holds", str(log), *options, "--placing", placing]) == DONE
+        holds = json.loads(output.read_text(encoding="utf-8"))["holds"]
+        assert all(hold["placing"] == placing for hold in holds)
+        found |= {(placing, tuple(hold["place"]["point"])): hold for hold in holds}
+    best = holds[0]
+    assert best["seating"]["rule"] == "contact"
+    seat = found["given", tuple(best["place"]["point"])]
+    assert best["pose"]["position"][2] > seat["pose"]["position"][2] + 5e-4
+    request = wall_request()
+    hand = request["stance"]["hands"][0]
+    pose = {"position": hand["pose"]["position"], "orientation": [0.0, 0.70710678, 0.0, 0.70710678]}
+    request["stance"]["rocks"] = {"log": {"shape": "mesh", "file": str(log), "pose": pose}}
+    hand |= {"hold": {"shape": "rock", "rock": "log"}, "grasp": best["grasp"]}
+    hand |= {"place": best["place"], "placing": best["placing"]}
+    del hand["pose"]
+    stance = tmp_path / "stance.json"
+    stance.write_text(json.dumps(request), encoding="utf-8")
+    capfd.readouterr()
+    run_command_line(["plan", str(stance), "--json"])
+    reply = result(capfd)
+    assert reply["hands"][0]["seating"]["rule"] == "contact"
+    there = pose_of(pose).inverse() @ pose_of(reply["poses"][hand["limb"]])
+    assert there.position == pytest.approx(best["pose"]["position"], abs=1e-6)
 
 
 def test_what_was_tried_is_kept_when_the_rest_is_broken_off(rock, tmp_path, monkeypatch):
