@@ -2,9 +2,10 @@
 
 A sample displaces each hand on its rock; its pose in the body frame B stays, and the rock moves
 instead. A hand that was placed by contact comes to rest anew there, and is displaced from that rest
-along z and about x and y. The hand closes there, its tensions go to the planned ones, and the limb pulls its wrist
-toward the planned pose target, a twist from where the hand has closed. Displacements are a
-scrambled Sobol sequence for each hand, by its limb's name, and combined at random.
+along z and about x and y. The hand closes there, its tensions go to the planned ones, and the limb
+pulls its wrist toward the planned pose target, a twist from where the hand has closed.
+Displacements are a scrambled Sobol sequence for each hand, by its limb's name, and combined at
+random.
 """
 
 from __future__ import annotations
