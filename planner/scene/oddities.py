@@ -156,8 +156,9 @@ def _depths(scene: Scene, hands: Sequence[int]) -> list[float]:
             # an edge's rock has no end
             if origin > deepest and shape is not None and not shape.sine:
                 raise InvalidInputError(
-                    f"the body's origin is {origin:.2g} m deep in the rock of {hand.limb}; "
-                    f"up to {deepest:g} m is taken for a rough shape",
+                    f"the body's origin is {origin:.2g} m deep in the rock of {hand.limb}; at most "
+                    f"{deepest:g} m is allowed, as rock's shape is rough: is the position in W, "
+                    "in metres, on the right side of the rock?",
                     field="stance.body.position",
                 )
         found = dict(zip(smooth, (deep + radii).max(axis=1).tolist(), strict=True))

@@ -141,7 +141,7 @@ def rock_command(
     if neighbours is not None and std_ratio is None:
         raise InvalidInputError("requires --std-ratio", field="neighbours")
     if output.exists() and file.exists() and output.samefile(file):
-        raise InvalidInputError(f"{output} is the scan itself", field="--output")
+        raise InvalidInputError(f"{output} is the scan itself; name another", field="--output")
     with tables.progress(f"meshing {file.name}") as report:
         scan = scans.read_scan(file, **reading)
         if std_ratio is not None:
