@@ -317,7 +317,7 @@ def size_of(direction: Array) -> float:
 
 
 def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
-    """Return where wrists that give way are in a plan; without one, at rest as they can do most."""
+    """Return the point of a plan's wrists; without hands in the plan, rest with the widest sets."""
     if planned.hands is None:
         palms = [None if wrist is None else widest_at_rest(wrist)[0] for wrist in hands.wrists]
         return hands.at_rest(palms)

@@ -354,7 +354,7 @@ def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Me
 
 def _check_costs(stance: requests.Stance) -> None:
     """Raise `LimitError`, with a field relative to the stance, for hands that cost too much."""
-    # a plan of wrists that give way is found in several rounds
+    # a plan of floating wrists is found in several rounds
     rounds = 4
     # four hands with 64 half-planes have some 7500 rows in a program
     most_planes = 256

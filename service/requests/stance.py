@@ -124,8 +124,8 @@ class Hand(Strict, frozen=True, kw_only=True):
     wrist: Annotated[
         Literal["fixed", "floating", "compliant"],
         Meta(
-            description="floating: the motors stand still, and the wrist gives way; compliant: the "
-            "tendons are driven, and the wrist gives way"
+            description="floating: the motors stand still, and the wrist moves; compliant: the "
+            "tendons are driven, and the wrist moves"
         ),
     ] = "fixed"
     wrist_travel: Annotated[
@@ -190,7 +190,7 @@ class Stance(Strict, frozen=True, kw_only=True):
     ] = None
     limb_stiffness: Annotated[
         LimbStiffness | None,
-        Meta(description="with which limbs hold wrists that give way: replies have pose targets"),
+        Meta(description="with which limbs hold wrists that move: replies then have pose targets"),
     ] = None
     rocks: Annotated[
         dict[Name, Rock],

@@ -107,7 +107,7 @@ def test_a_grasp_that_cannot_be_is_a_cell_of_its_own(table):
     slope = Axis.parse("gripper.pull_off_slope=3:4:2", table, FINE)
     found = sweep_map(table, bases, slope, CONDITIONS, ["normal"], quiet)
     assert found["state"].tolist() == [["holds", "no grasp"]] * 2
-    with pytest.raises(InvalidInputError, match="must be below .* got 0.4 m"):
+    with pytest.raises(InvalidInputError, match=r"must be below .* got 0.4 m"):
         GripperSweep("gripper.base_half_spacing=0.4:0.5:2", "gripper.pull_off_slope=3:4:2").run(
             quiet, hand_table()
         )
