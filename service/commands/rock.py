@@ -134,7 +134,7 @@ def rock_command(
     """Make a mesh hold of a scan: points, a grid of heights, or triangles.
 
     The triangles are in a frame on the rock, z into it along the view and x up, which is a hold's
-    own; the table tells its pose in the file's axes, turned so that z is up, in metres.
+    own; the table has its pose in the file's axes, turned so that z is up, in metres.
     """
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")

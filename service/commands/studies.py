@@ -118,7 +118,7 @@ def _measurements() -> studies.Study:
 def study_command(
     name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **wanted: Any
 ) -> None:
-    """Run an experiment of the paper again, and hold its claims against the model.
+    """Run an experiment of the paper again, and compare its claims with the model.
 
     The study sweep has no claims: it draws what the test gripper holds over any two of its numbers.
     The exit status is 0 whatever the claims say.

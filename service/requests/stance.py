@@ -60,7 +60,8 @@ HandEntries = Annotated[
 class Place(Strict, frozen=True, kw_only=True):
     """Point on a rock at which a hand is seated, with the direction of its approach.
 
-    - ``point``: point on the rock where the hold's crest would be [m].
+    - ``point``: point near the rock; the hand goes to where its line along ``approach`` meets the
+      rock [m].
     - ``approach``: direction into the rock, of any length: z of the hand.
     - ``wrist_angle``: angle by which the hand is turned about its approach, from where its x is
       nearest to ``up`` [rad].
@@ -115,7 +116,7 @@ class Hand(Strict, frozen=True, kw_only=True):
         Place | None,
         Meta(
             description="in place of a pose: where on the rock, whose frame is `hold.pose`, or W, "
-            "the hand is seated; the reply tells its pose"
+            "the hand is seated; the reply has its pose"
         ),
     ] = None
     hold: Hold
