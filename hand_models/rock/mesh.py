@@ -82,7 +82,9 @@ class Mesh(OutlinedHold):
         given, self._left_out = _checked(vertices, faces, table)
         welded = weld(given)
         if not len(welded.faces):
-            raise InvalidInputError("no triangle has an area", field="faces")
+            raise InvalidInputError(
+                "no triangle has an area; its three vertices must not be on a line", field="faces"
+            )
         wound = wound_alike(welded)
         go_on()
         self.triangles = without_spikes(wound, table.scalar("scan", "spike_ratio"))

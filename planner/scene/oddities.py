@@ -194,7 +194,9 @@ def _overlapping(scene: Scene) -> Iterator[Finding]:
             turned = np.abs(scene.axes[i] - scene.axes[j]).max()
             # [m], and the largest difference of entries of the axes
             if off <= 1e-3 and turned <= 1e-3:
-                raise InvalidInputError(f"{names} are at the same position", field=field)
+                raise InvalidInputError(
+                    f"{names} are at the same position; each hand needs its own", field=field
+                )
             message = (
                 f"{names} overlap, their palms are {-gap:.2g} m in each other: is the same hold "
                 "given twice?"

@@ -52,7 +52,8 @@ def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
     """
     given = {key: value for key, value in wanted.items() if value not in (None, ())}
     if name not in STUDY_NAMES:
-        raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDY_NAMES)}", field="NAME")
+        known = ", ".join(STUDY_NAMES)
+        raise InvalidInputError(f"unknown study {name!r}; known are {known}", field="NAME")
     if name != "sweep" or not given:
         if given:
             option = "--measure" if "measures" in given else f"--{min(given)}"
