@@ -86,7 +86,10 @@ class UnsupportedError(InvalidInputError):
 
 
 class LimitError(InvalidInputError):
-    """A valid question whose cost exceeds a limit of the program; the message names the limit."""
+    """A valid question that would take more time, memory or bytes than crux allows.
+
+    The message has the largest amount that is allowed.
+    """
 
     kind = "limit"
 
@@ -115,8 +118,9 @@ def check_positive(value: float, unit: str, field: str, most: float = sys.float_
         Upper bound; by default the largest finite number, so that infinity and NaN are refused.
     """
     if not 0.0 < value <= most:
+        needed = "finite and above 0" if value > sys.float_info.max else "above 0"
         bound = "" if most >= sys.float_info.max else f" and at most {most:g}"
-        raise InvalidInputError(f"must be above 0{bound} {unit}, got {value:g}", field=field)
+        raise InvalidInputError(f"must be {needed}{bound} {unit}, got {value:g}", field=field)
 
 
 @contextmanager

@@ -84,7 +84,6 @@ class Pose:
         Columns are the child's axes in the parent.
     proper : bool
         Whether the pose was checked: finite, axes orthonormal and right-handed, arrays read-only.
-        False for a pose that has not been checked.
     """
 
     position: Array

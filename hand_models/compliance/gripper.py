@@ -109,7 +109,8 @@ class Gripper(CompliantGrasp):
         square = seated**2 + away**2 - spread**2
         if square <= 0.0:
             raise InvalidInputError(
-                f"the bases are {2e3 * spread:g} mm apart, too far to reach this surface",
+                f"must be below {math.hypot(seated, away):.4g} m for fingers to reach a surface "
+                f"{diameter:g} m in diameter, got {spread:g} m",
                 field="gripper.base_half_spacing",
             )
         self.section = Disc(complex(-spread, math.sqrt(square)), radius)

@@ -252,8 +252,8 @@ def rest_state(grasp: Gripper) -> State:
     -------
     {'holds', 'contact fails', 'ejects'}
         ``ejects``: the fingers push the wrist off the rock, and `unloaded_pose` finds no pose with
-        every tile holding. ``contact fails``, otherwise: with the wrist as placed (Section 5.5.1),
-        or where it would rest unloaded, a tile exceeds its limit or is dragged backwards.
+        every tile holding. ``contact fails``: they do not, but a tile exceeds its limit or is
+        dragged backwards, with the wrist as placed (Section 5.5.1) or where it would rest unloaded.
         ``holds``: neither.
     """
     at_rest = grasp.evaluate(np.zeros((1, 3)))

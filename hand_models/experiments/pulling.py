@@ -213,6 +213,11 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     progress : callable, optional
         Called with (directions done, directions in all) after each increment.
 
+    Returns
+    -------
+    Pulled
+        Of each direction the last wrench and pose that hold, and the limit that follows.
+
     Raises
     ------
     EmptySetError

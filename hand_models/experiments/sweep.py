@@ -186,7 +186,8 @@ class GripperSweep:
         for measure in self.measures:
             if measure not in MEASURE_UNITS:
                 raise InvalidInputError(
-                    f"{measure!r}: valid are {', '.join(MEASURE_UNITS)}", field="--measure"
+                    f"unknown measure {measure!r}; known are {', '.join(MEASURE_UNITS)}",
+                    field="--measure",
                 )
         table = gripper_table(hand)
         conditions = self.conditions or Conditions.of_fig16()[0]

@@ -144,7 +144,10 @@ class Axis:
         axis = known[entry]
         bundled = table.quantity(axis.section, axis.name).value
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise InvalidInputError(f"LOW must be below HIGH, got {low:g}:{high:g}", field=entry)
+            raise InvalidInputError(
+                f"LOW and HIGH must be finite, and LOW below HIGH, got {low:g}:{high:g}",
+                field=entry,
+            )
         if low < 0.0 <= np.min(bundled):
             raise InvalidInputError(f"LOW must not be negative, got {low:g}", field=entry)
         if high > (most := LARGEST_BY_UNIT.get(axis.unit, math.inf)):

@@ -98,7 +98,7 @@ class FingerModel:
         """
         contact = np.array(table.vector("tile", "contact_stiffness"))
         spring = table.scalar("tile", "spring_stiffness")
-        pulleys = table.scalar("tile", "pulley_ratio")
+        pulleys = table.positive("tile", "pulley_ratio")
         model = cls(
             joint_spacing=table.positive("finger", "joint_spacing"),
             tile_height=table.scalar("finger", "tile_height"),
@@ -117,23 +117,28 @@ class FingerModel:
             bed_stiffness=table.positive("tile", "bed_stiffness"),
             friction=table.scalar("tendon", "friction"),
         )
-        for name in (
-            "pulley_radii",
-            "joint_stiffness",
-            "joint_preload",
-            "joint_lower",
-            "joint_upper",
-            "engagement",
-            "shear_gain",
+        for section, name in (
+            ("finger", "pulley_radii"),
+            ("finger", "joint_stiffness"),
+            ("finger", "joint_preload"),
+            ("finger", "joint_lower"),
+            ("finger", "joint_upper"),
+            ("tile", "engagement"),
+            ("tile", "contact_stiffness"),
         ):
-            if len(getattr(model, name)) != len(PHALANGES):
-                raise InvalidInputError(f"one number for each of {PHALANGES}", field=name)
+            count, size = len(PHALANGES), len(table.vector(section, name))
+            if size != count:
+                raise InvalidInputError(
+                    f"{count} numbers are needed, got {size}", field=f"{section}.{name}"
+                )
         if not 0.0 <= model.friction < 1.0:
             raise InvalidInputError(
                 f"must be in [0, 1), got {model.friction:g}", field="tendon.friction"
             )
-        if not min(model.shear_gain) > 0.0:
-            raise InvalidInputError("stiffnesses must be above 0", field="tile.contact_stiffness")
+        if not contact.min() > 0.0:
+            raise InvalidInputError(
+                f"must be above 0 N/m, got {contact.tolist()}", field="tile.contact_stiffness"
+            )
         if not min(model.pulley_radii) > 0.0:
             raise InvalidInputError(
                 f"must be above 0 m, got {list(model.pulley_radii)}", field="finger.pulley_radii"
@@ -142,7 +147,7 @@ class FingerModel:
         if not 0.0 <= begin < end <= model.joint_spacing:
             raise InvalidInputError(
                 f"a tile must lie on its phalanx, from 0 to {model.joint_spacing:g} m, "
-                f"got {begin:g} to {end:g}",
+                f"got {begin:g} to {end:g} m (tile_centre ± tile_length / 2)",
                 field="finger.tile_centre",
             )
         for lower, upper in zip(model.joint_lower, model.joint_upper, strict=True):

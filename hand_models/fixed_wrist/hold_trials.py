@@ -132,7 +132,9 @@ def grid_of_trials(
         If the grid has more than ``most`` places; the field is ``spacing``.
     """
     if not 1e-3 <= spacing < math.inf:
-        raise InvalidInputError(f"must be at least 0.001 m, got {spacing:g}", field="spacing")
+        raise InvalidInputError(
+            f"must be finite and at least 0.001 m, got {spacing:g}", field="spacing"
+        )
     check_positive(radius, "m", "radius")
     if angles < 1:
         raise InvalidInputError(f"at least one is needed, got {angles}", field="angles")

@@ -116,7 +116,8 @@ def robustness(
         raise InvalidInputError(f"at least one is needed, got {draws}", field="draws")
     if not (0.0 <= position < np.inf and 0.0 <= angle <= np.pi):
         raise InvalidInputError(
-            f"must be from 0 m, and from 0 to π rad, got {position:g} and {angle:g}",
+            "must be a finite length of at least 0 m, and an angle from 0 to π rad, "
+            f"got {position:g} m and {angle:g} rad",
             field="scatter",
         )
     there: list[SettledHand] = []

@@ -124,7 +124,8 @@ class HandModel:
         self.palm_pressing_stiffness = table.positive("palm", "pressing_stiffness")
         if len(self.palm_contact) != len(self.palm_tiles):
             raise InvalidInputError(
-                f"one number for each of the {len(self.palm_tiles)} tiles",
+                f"one number for each of the {len(self.palm_tiles)} tiles is needed, "
+                f"got {len(self.palm_contact)}",
                 field="palm.contact_stiffness",
             )
         try:

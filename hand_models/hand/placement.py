@@ -21,7 +21,7 @@ __all__ = ["PlacedHands", "Placement", "PlacementKey"]
 
 
 class Placement(NamedTuple):
-    """Question to the closing of one hand: hold, surface, grasp and pose.
+    """Hold, surface, grasp and pose with which one hand is to close.
 
     Attributes
     ----------

@@ -80,7 +80,9 @@ def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
     for name in ParameterSample._fields:
         entries = {} if raw.get(name) is None else raw[name]
         if not isinstance(entries, Mapping):
-            raise InvalidInputError("sections of entries are needed", field=name)
+            raise InvalidInputError(
+                f"sections of entries are needed, got {type(entries).__name__}", field=name
+            )
         with errors_under(name):
             tables[name] = ParameterTable.of(entries)
     draw = ParameterSample(**tables)
@@ -203,11 +205,11 @@ def _checked_count(sets: ParameterTable) -> int:
     for k, misfit in enumerate(sets.vector("fit", "misfit")):
         if not 0.0 <= misfit <= 1.0:
             raise InvalidInputError(
-                f"must be from 0 to 1, the tolerances of the data, got {misfit:g}",
+                f"must be from 0 to 1 (1: off the data by their whole tolerance), got {misfit:g}",
                 field=f"fit.misfit.value[{k}]",
             )
-    if len(sets.vector("ranges", "rock_ratio")) != 2:
-        raise InvalidInputError("two numbers are needed", field="ranges.rock_ratio")
+    if (size := len(sets.vector("ranges", "rock_ratio"))) != 2:
+        raise InvalidInputError(f"two numbers are needed, got {size}", field="ranges.rock_ratio")
     return count
 
 
@@ -219,14 +221,15 @@ def _check_entry(section: str, name: str, quantity: Quantity) -> None:
     found = ENTRY_PATH.fullmatch(name)
     entry, index = (name, None) if found is None else (found[1], found[2])
     if entry not in entries:
-        raise InvalidInputError(
-            "unknown; valid are the numbers of hand.toml and of a tile's law", field=field
-        )
+        where, known = f"entry; known in [{section}]", list(entries)
+        if not known:
+            where, known = "section; known", ["defaults", FITTED_SURFACE, *hand]
+        raise InvalidInputError(f"unknown {where} are {', '.join(known)}", field=field)
     usual = entries[entry]
     size = len(usual.value) if isinstance(usual.value, list) else 0
     if (index is None) != (size == 0) or int(index or 0) > max(size - 1, 0):
         form = f"one of {entry}[0] to {entry}[{size - 1}]" if size else entry
-        raise InvalidInputError(f"must be {form}", field=field)
+        raise InvalidInputError(f"must be {form}, got {name}", field=field)
     if quantity.unit != usual.unit:
         raise InvalidInputError(f"must be in {usual.unit!r}, got {quantity.unit!r}", field=field)
 

@@ -159,6 +159,7 @@ def _check(own: Quantity, bundled: Quantity, field: str) -> None:
     largest = LARGEST_BY_UNIT.get(own.unit, beyond)
     least = 0.0 if usual.min() >= 0.0 and not coordinate else -largest
     if not (least <= got.min() and got.max() <= largest):
+        unit = "" if own.unit == "1" else f" {own.unit}"
         raise InvalidInputError(
-            f"must be from {least:.4g} to {largest:.4g} {own.unit}, got {own.value}", field=field
+            f"must be from {least:.4g} to {largest:.4g}{unit}, got {own.value}", field=field
         )

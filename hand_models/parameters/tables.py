@@ -132,7 +132,9 @@ class ParameterTable:
         sections: dict[str, dict[str, Quantity]] = {}
         for section, entries in raw.items():
             if not isinstance(entries, Mapping):
-                raise InvalidInputError("a section of entries is needed", field=section)
+                raise InvalidInputError(
+                    f"a section of entries is needed, got {type(entries).__name__}", field=section
+                )
             sections[section] = {
                 name: _quantity(entry, f"{section}.{name}", _unit(units, section, name))
                 for name, entry in entries.items()
@@ -178,7 +180,7 @@ class ParameterTable:
         try:
             return self.sections[section][name]
         except KeyError:
-            raise InvalidInputError("missing parameter", field=f"{section}.{name}") from None
+            raise InvalidInputError("missing; must be given", field=f"{section}.{name}") from None
 
     def scalar(self, section: str, name: str) -> float:
         """Return the value of an entry that is a single number, in SI units.
@@ -195,7 +197,7 @@ class ParameterTable:
         """
         value = self.quantity(section, name).value
         if isinstance(value, list):
-            raise InvalidInputError("one number is needed, not a list", field=f"{section}.{name}")
+            raise InvalidInputError(f"one number is needed, got {value}", field=f"{section}.{name}")
         return float(value)
 
     def positive(self, section: str, name: str) -> float:
@@ -231,7 +233,9 @@ class ParameterTable:
         """
         value = self.quantity(section, name).value
         if not isinstance(value, list):
-            raise InvalidInputError("a list of numbers is needed", field=f"{section}.{name}")
+            raise InvalidInputError(
+                f"a list of numbers is needed, got {value:g}", field=f"{section}.{name}"
+            )
         return tuple(float(v) for v in value)
 
     def __iter__(self) -> Iterator[tuple[str, str, Quantity]]:

@@ -82,7 +82,9 @@ class Mesh(OutlinedHold):
         given, self._left_out = _checked(vertices, faces, table)
         welded = weld(given)
         if not len(welded.faces):
-            raise InvalidInputError("no triangle has an area", field="faces")
+            raise InvalidInputError(
+                "no triangle has an area; its three vertices must not be on a line", field="faces"
+            )
         wound = wound_alike(welded)
         go_on()
         self.triangles = without_spikes(wound, table.scalar("scan", "spike_ratio"))
@@ -219,7 +221,9 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tu
     try:
         points, corners = np.asarray(vertices, dtype=float), np.asarray(faces)
     except (TypeError, ValueError):
-        raise InvalidInputError("three numbers each are needed", field="vertices") from None
+        raise InvalidInputError(
+            "vertices must be three numbers each, and faces three indices", field="vertices"
+        ) from None
     if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 3:
         raise InvalidInputError(
             f"at least three points [x, y, z] are needed, got shape {points.shape}",
@@ -250,15 +254,15 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tu
     farthest = table.scalar("scan", "farthest")
     if np.abs(points).max() > farthest:
         raise InvalidInputError(
-            f"must be within {farthest:g} m of the frame's origin; map coordinates are to have an "
-            "offset subtracted, as `crux rock` does",
+            f"must be within {farthest:g} m of the frame's origin, got {np.abs(points).max():g} m; "
+            "subtract an offset from map coordinates, as `crux rock` does",
             field="vertices",
         )
     largest, size = table.scalar("scan", "largest"), float(np.ptp(points, axis=0).max())
     if size > largest:
         raise InvalidInputError(
-            f"{size:.4g} m across; at most {largest:g} m is possible: vertices are in metres, so "
-            "divide millimetres by 1000, or cut it to what hands reach",
+            f"must be at most {largest:g} m across, got {size:.4g} m: vertices are in metres, so "
+            "divide millimetres by 1000, or cut the mesh to what hands reach",
             field="vertices",
         )
     return Triangles(points, corners.astype(np.intp)), left_out

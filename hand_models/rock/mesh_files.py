@@ -104,8 +104,7 @@ def _corners(faces: Array, count: int, path: Path) -> Indices:
     wrong = faces[(faces < 0) | (faces >= count)]
     if len(wrong):
         raise InvalidInputError(
-            f"a triangle's corner is vertex {wrong[0]:.0f}, counted from 0, of {count:,} vertices "
-            f"of {path}",
+            f"a triangle's corner is vertex {wrong[0]:.0f}; valid are 0 to {count - 1} in {path}",
             field="file",
         )
     return faces.astype(np.intp).reshape(-1, 3)
@@ -128,10 +127,12 @@ def _absolute(content: bytes) -> bytes:
         elif kind == b"f":
             corners = [int(entry.split(b"/")[0]) for entry in entries]
             if 0 in corners:
-                raise ValueError("a face has vertex 0, and an OBJ counts from 1")
+                raise ValueError(f"line {i + 1}: a face has vertex 0, and an OBJ counts from 1")
             named = [corner if corner > 0 else count + 1 + corner for corner in corners]
             if min(named, default=1) < 1:
-                raise ValueError(f"a face has vertex {min(corners)} of {count} so far")
+                raise ValueError(
+                    f"line {i + 1}: a face has vertex {min(corners)}, with {count} vertices so far"
+                )
             lines[i] = b"f " + b" ".join(b"%d" % corner for corner in named)
     return b"\n".join(lines)
 

@@ -146,7 +146,7 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
     try:
         outline = np.asarray(points, dtype=float)
     except (TypeError, ValueError):
-        raise InvalidInputError("two numbers each are needed", field=field) from None
+        raise InvalidInputError("points must be two numbers each, [x, z]", field=field) from None
     most = 5000
     if outline.ndim != 2 or outline.shape[1:] != (2,) or not 2 <= len(outline) <= most:
         raise InvalidInputError(

@@ -37,7 +37,7 @@ __all__ = ["OutlinedHold", "Scale", "smooth"]
 
 @dataclass(frozen=True)
 class Scale:
-    """Lengths to which a hold's cuts are smoothed and limited for a hand [m].
+    """Lengths that say how rock in a finger's plane is smoothed and trimmed for a hand [m].
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Scale:
     reach : float
         Half the side of the square about a finger's base outside which rock is left out.
     longest : float
-        Largest length of the rock's outline within that square.
+        Length of the rock's outline within that square above which the rock is refused.
     """
 
     tile: float

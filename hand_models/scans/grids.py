@@ -140,7 +140,8 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
         tags = {tag: image.getexif().get(tag) for tag in GeoTag}
         heights = np.asarray(image)
     if heights.ndim != 2:
-        raise InvalidInputError(f"one band of heights is needed: {path}")
+        bands = math.prod(heights.shape[2:])
+        raise InvalidInputError(f"one band of heights is needed, got {bands}: {path}")
     if (missing := tags[GeoTag.NO_DATA]) is not None:
         heights = _without(heights, float(str(missing).strip("\0 ")))
     return _grid(heights, _sides(cell, _geo_cell(tags)))
@@ -218,7 +219,8 @@ def _sides(cell: float | None, own: Cell | None) -> Cell:
             field="cell",
         )
     if not all(math.isfinite(side) and side > 0.0 for side in sides):
-        raise InvalidInputError(f"must be finite and above zero, got {min(sides):g}", field="cell")
+        got = f"{sides[0]:g} by {sides[1]:g} from the file" if cell is None else f"{cell:g}"
+        raise InvalidInputError(f"must be finite and above zero, got {got}", field="cell")
     return sides
 
 

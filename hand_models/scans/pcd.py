@@ -42,7 +42,7 @@ def read_pcd(path: Path) -> RawScan:
     cloud = PointCloud.from_path(path)
     absent = [axis for axis in AXIS_NAMES if axis not in cloud.fields]
     if absent:
-        raise InvalidInputError(f"no field {absent[0]} in {path}")
+        raise InvalidInputError(f"fields x, y and z are needed, {absent[0]} is missing: {path}")
     points = np.column_stack([np.atleast_1d(cloud.pc_data[axis]) for axis in AXIS_NAMES]).astype(
         float
     )
@@ -71,7 +71,7 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     # pypcd4 looks no farther than ten lines, comments apart
     if len(found) < len(named) or len(named) > 10:
         raise InvalidInputError(
-            f"the header has {len(named)} lines; the maximum is 10, each once: {path}"
+            f"the header must have at most 10 lines, each key once, got {len(named)}: {path}"
         )
     try:
         sizes, counts = ([int(each) for each in found[name]] for name in (b"SIZE", b"COUNT"))
@@ -95,7 +95,10 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
             field="file",
         )
     if min(sizes + counts + rows) < 0:
-        raise InvalidInputError(f"the header has a negative number: {path}")
+        raise InvalidInputError(
+            "SIZE, COUNT, WIDTH, HEIGHT and POINTS of the header must not be negative, got "
+            f"{min(sizes + counts + rows)}: {path}"
+        )
     # the longest descriptors in use have some 2,000 numbers
     if not 0 < sum(counts) <= 10_000:
         raise InvalidInputError(

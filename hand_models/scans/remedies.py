@@ -129,13 +129,13 @@ def drop_outliers(scan: Scan, std_ratio: float, *, neighbours: int | None = None
         )
     if not 0 < neighbours < len(scan.points):
         raise InvalidInputError(
-            f"must be from 1 to {len(scan.points) - 1}, one less than there are points, got "
+            f"must be at least 1 and fewer than the scan's {len(scan.points)} points, got "
             f"{neighbours}",
             field="neighbours",
         )
     if scan.faces is not None:
         raise InvalidInputError(
-            "is for points, and the file has triangles: remove it", field="std_ratio"
+            "is for points, and the file has triangles: leave std_ratio out", field="std_ratio"
         )
     away = scipy.spatial.cKDTree(scan.points).query(scan.points, k=neighbours + 1)[0]
     mean = np.asarray(away)[:, 1:].mean(axis=1)

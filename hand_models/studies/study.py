@@ -70,7 +70,8 @@ def load_study(name: str) -> Study:
         If there is no study of that name; the field is ``NAME``.
     """
     if name not in STUDY_MODULES:
-        raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDY_MODULES)}", field="NAME")
+        known = ", ".join(STUDY_MODULES)
+        raise InvalidInputError(f"unknown study {name!r}; known are {known}", field="NAME")
     return cast("Study", import_module(STUDY_MODULES[name]))
 
 

@@ -107,7 +107,7 @@ def _ratio_test(tableau: Array, basis: list[int], entering: int) -> int | None:
 
 
 def stick_slip(travel: tuple[Array, Array], before: tuple[Array, Array]) -> Array:
-    """Return a for each pulley, its place between the two directions of slip.
+    """Return a of each pulley, which says whether the tendon slips there, and which way.
 
     The tension after a pulley is λ s + ω a, with s the tension before it (see the module).
 

@@ -87,7 +87,8 @@ def check_palm(
         )
     if not (math.isfinite(spring_stiffness) and spring_stiffness >= 0.0):
         raise InvalidInputError(
-            f"must not be negative, got {spring_stiffness:g}", field="spring_stiffness"
+            f"must be finite and at least 0 N/m, got {spring_stiffness:g}",
+            field="spring_stiffness",
         )
     for field, mu in (("friction", friction), ("own_friction", own_friction)):
         if not 0.0 <= mu < 2.0:

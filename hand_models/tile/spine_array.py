@@ -177,7 +177,9 @@ class SpineArray:
         own = table.sections.get(surface, {})
         known = [name for name, entries in table.sections.items() if "strength_mean" in entries]
         if surface not in known:
-            raise InvalidInputError(f"unknown surface {surface!r}; known are {', '.join(known)}")
+            raise InvalidInputError(
+                f"unknown surface {surface!r}; known are {', '.join(known)}", field="surface"
+            )
         values = {
             field.name: table.scalar(surface if field.name in own else "array", field.name)
             for field in fields(cls)

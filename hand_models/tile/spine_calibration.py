@@ -109,7 +109,7 @@ def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
     """
     table, section = spine_table(), f"fig07-{concrete}"
     if section not in table.sections:
-        raise InvalidInputError(f"fine or coarse, got {concrete!r}", field="concrete")
+        raise InvalidInputError(f"must be fine or coarse, got {concrete!r}", field="concrete")
     backlashes = dict(zip(("tight", "loose"), table.vector(section, "backlash"), strict=True))
     return tuple(
         TileShear(int(spines), backlash, mean, error)

@@ -196,7 +196,9 @@ class Surface:
             if key not in known:
                 raise InvalidInputError(f"unknown; known are {', '.join(known)}", field=key)
         if "shear_limit" not in values:
-            raise InvalidInputError("missing; the tile's strength in N", field="shear_limit")
+            raise InvalidInputError(
+                "missing; give a tile's shear strength [N]", field="shear_limit"
+            )
         if not (math.isfinite(values["shear_limit"]) and values["shear_limit"] > 0.0):
             raise InvalidInputError(
                 f"must be a force above 0 N, got {values['shear_limit']:g}", field="shear_limit"

@@ -113,11 +113,16 @@ class WrenchSpace:
                     f"shape {shape} is needed, got {getattr(self, name).shape}", field=name
                 )
         if len(self.D) > len(self.s):
-            raise InvalidInputError("a limit row for each wrench row is needed", field="D")
+            raise InvalidInputError(
+                f"must have at most as many rows as s, {len(self.s)}, got {len(self.D)}", field="D"
+            )
         if len(self.rows) != len(self.s) + len(self.h):
-            raise InvalidInputError("one name for each row is needed", field="rows")
+            count = len(self.s) + len(self.h)
+            raise InvalidInputError(f"must name {count} rows, got {len(self.rows)}", field="rows")
         if not (self.s > 0.0).all():
-            raise InvalidInputError("every capacity must be above zero", field="s")
+            raise InvalidInputError(
+                f"every capacity must be above zero, got {self.s.min():g}", field="s"
+            )
 
     @property
     def A(self) -> Array:

@@ -195,7 +195,10 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
         elif named is not None and value is None:
             _drop(question, whole, *named.groups())
         else:
-            raise InvalidInputError("advice cannot change this field", field=path)
+            raise InvalidInputError(
+                "no advice changes this field; apply the changes that a plan's advice has",
+                field=path,
+            )
     there = _hands(question.stance.hands, hands)
     return replace(question, stance=replace(question.stance, hands=there, **stance), **whole)
 
@@ -240,7 +243,10 @@ def _field(hand: HandOnHold, updates: Mapping[str, Any], field: str, value: Any)
         grasp = updates.get("grasp", hand.grasp)
         return "grasp", structs.replace(grasp, **{field.removeprefix("grasp."): value})
     if field not in HAND_FIELD_READERS:
-        raise InvalidInputError("advice cannot change this field", field=f"stance.hands.{field}")
+        known = ", ".join(("grasp.*", *HAND_FIELD_READERS))
+        raise InvalidInputError(
+            f"no advice changes this field; known are {known}", field=f"stance.hands.{field}"
+        )
     name, read = HAND_FIELD_READERS[field]
     if value is None:
         return name, "rest" if name == "seat" else None

@@ -89,9 +89,9 @@ class Choice(NamedTuple):
 class CombinationSearch:
     """Search for changes of several hands and the body that together make a stance feasible.
 
-    There are k directions of body wrenches in which some plan lacked most, v variants of all limbs,
-    and s shifts of the body. Directions are scaled so that 1 is needed along each. Floating wrists
-    count as fixed where variants are chosen; plans treat them exactly.
+    There are k directions along which some plan fell shortest of the body wrench, v variants of all
+    limbs, and s shifts of the body. Directions are scaled so that 1 is needed along each. Floating
+    wrists count as fixed where variants are chosen; plans treat them exactly.
 
     Parameters
     ----------
@@ -236,12 +236,12 @@ class CombinationSearch:
         return slot[np.argsort(-worth, kind="stable")[:few]]
 
     def learn(self, trial: StanceTrial, shift: int) -> None:
-        """Add the direction of body wrenches in which an infeasible plan lacks most, if any.
+        """Add the direction along which a plan falls shortest of the body wrench, if it has one.
 
         Parameters
         ----------
         trial : StanceTrial
-            Plan that is not feasible.
+            Plan that is overloaded or infeasible.
         shift : int
             Index of the shift with which it was planned.
         """

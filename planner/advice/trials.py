@@ -268,11 +268,11 @@ class Trials:
 
 
 def direction(trial: StanceTrial) -> Array | None:
-    """Return the direction of body wrenches along which a stance's hands lack most.
+    """Return the direction along which a stance's hands fall shortest of the body wrench.
 
     If the least utilisation was found: the gradient of that utilisation with respect to the body
     wrench, from the multipliers of the balance. Otherwise the part of the body wrench that the
-    hands cannot exert, each component divided twice by its unit.
+    hands cannot exert, each component divided by the square of its `WRENCH_UNIT`.
 
     Parameters
     ----------

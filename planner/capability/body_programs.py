@@ -316,7 +316,7 @@ def size_of(direction: Array) -> float:
 
 
 def _where_planned(hands: HandSets, planned: Plan) -> LinearisationPoint:
-    """Return where wrists that give way are in a plan; without one, at rest."""
+    """Return the point of a plan's wrists; without hands in the plan, rest."""
     if planned.hands is None:
         return hands.at_rest()
     loads = list(hands.at_rest().loads)

@@ -182,7 +182,7 @@ def shortfall_sentence(
     constraints = blocking_sentence(_blamed(certificate))
     note = ""
     if _floats(certificate, floating):
-        note = "; floating hands as they give way where the search for a plan ended"
+        note = "; floating wrists are where the search for a plan ended"
     if not certificate.direction.any():
         return f"no loads at any utilisation, whatever the body needs: {constraints}{note}"
     sentence = "no loads balance the body at any utilisation"
@@ -219,7 +219,7 @@ def overload_sentence(certificate: Certificate | None, *, floating: Collection[s
         within = "within the limits" if cap == 1.0 else f"up to a utilisation of {cap:g}"
         sentence = f"; {within} {_missing(certificate.shortfall)} (in B) would be missing"
     if _floats(certificate, floating):
-        sentence += ", with floating hands as they give way at this plan"
+        sentence += ", with floating wrists where this plan puts them"
     return sentence
 
 

@@ -54,11 +54,11 @@ class LeastEffort(Goal):
         self.farthest = farthest
 
     def value(self, measure: ExactMeasure) -> float:
-        """Return the effort of a point."""
+        """Return the effort of a measured point."""
         return measure.effort
 
     def excess(self, measure: ExactMeasure) -> float:
-        """Return by how much the utilisation of a point exceeds the cap; at least 0."""
+        """Return by how much a measured point's utilisation exceeds the cap; at least 0."""
         return max(measure.utilisation - self.cap, 0.0)
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:

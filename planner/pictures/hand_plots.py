@@ -262,7 +262,7 @@ def _draw_force(axes: Axes, place: Array, angle: float, load: Array, largest: fl
 
 
 def direction_in_words(along: Array) -> str:
-    """Return words for a horizontal direction, such as ``along x of H``.
+    """Return words for a direction in the plane of the palm, such as ``along x of H``.
 
     Parameters
     ----------

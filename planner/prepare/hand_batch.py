@@ -64,7 +64,7 @@ class TileIndex:
     bases, base_fingers : ndarray of int, shape (2 H,)
         Tiles on the rotating bases of outer fingers, and the fingers of these tiles.
     nails : ndarray of int
-        Nails among the tiles, whether they hook or not.
+        Indices of the tiles' entries that stand for nails, whether they hook or not.
     """
 
     hand: Indices

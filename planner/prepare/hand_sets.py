@@ -103,7 +103,7 @@ class Sets(NamedTuple):
     data: StanceData
 
     def measure(self, loads: Sequence[Array]) -> ExactMeasure:
-        """Return utilisation, violations and effort of loads y; exact for the point's loads."""
+        """Return utilisation, violations, effort of loads y; exact at the linearisation point."""
         used, broken, excess, effort = -math.inf, 0.0, 0.0, 0.0
         for hand, y in zip(self.data.hands, loads, strict=True):
             z = y / hand.unit

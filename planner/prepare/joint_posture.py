@@ -173,8 +173,8 @@ def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
     for limb, (off, turned) in _off(stance, joints, known).items():
         if off > TOLERANCES.hand_offset or turned > TOLERANCES.hand_turn:
             raise InvalidInputError(
-                f"{limb} is {off:.3g} m and {turned:.3g} rad from the pose of its joint angles; "
-                f"the tolerance is {TOLERANCES.hand_offset:g} m and {TOLERANCES.hand_turn:g} rad",
+                f"must be within {TOLERANCES.hand_offset:g} m and {TOLERANCES.hand_turn:g} rad of "
+                f"the pose of {limb}'s joint angles, got {off:.3g} m and {turned:.3g} rad",
                 field=f"stance.hands[{index[limb]}].pose",
             )
     return joints

@@ -167,7 +167,7 @@ def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
 def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
     """Solve for the least utilisation plus a quadratic term ½ ‖R (z − z₀)‖² around given loads.
 
-    The term stands for the curvature of the rows of floating hands, and keeps near the loads.
+    The term stands for the curvature of floating hands' rows, and keeps the solution near z₀.
 
     Parameters
     ----------

@@ -93,15 +93,19 @@ class ForceCap(Strict, frozen=True):
         if isinstance(most, float):
             if not (math.isfinite(most) and most >= LEAST_LIMIT):
                 raise InvalidFieldError(
-                    f"must be at least {LEAST_LIMIT:g} N, got {most:g}", field="largest_force"
+                    f"must be finite and at least {LEAST_LIMIT:g} N, got {most:g}",
+                    field="largest_force",
                 )
             return
         if len(most) != 3:
-            raise InvalidFieldError(f"3 axes are needed, got {len(most)}", field="largest_force")
+            raise InvalidFieldError(
+                f"one number, or an entry for each of 3 axes, is needed, got {len(most)} entries",
+                field="largest_force",
+            )
         for i, (low, high) in enumerate(most):
             if not low <= 0.0 <= high or low == high:
                 raise InvalidFieldError(
-                    f"must be a range that contains 0, got {low:g} to {high:g} N",
+                    f"must be least ≤ 0 ≤ largest, not both 0, got {low:g} to {high:g} N",
                     field=f"largest_force[{i}]",
                 )
             if any(0.0 < abs(end) < LEAST_LIMIT for end in (low, high)):
@@ -349,4 +353,6 @@ class BodyRange(Strict, frozen=True):
         for name, unit in (("shift", "m"), ("tilt", "rad")):
             most = getattr(self, name)
             if not (math.isfinite(most) and most >= 0.0):
-                raise InvalidFieldError(f"must be 0 {unit} or more, got {most:g}", field=name)
+                raise InvalidFieldError(
+                    f"must be finite and at least 0 {unit}, got {most:g}", field=name
+                )

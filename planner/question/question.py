@@ -111,7 +111,7 @@ class Question:
             if wrists.get(limb) != "fixed":
                 valid = ", ".join(name for name, wrist in wrists.items() if wrist == "fixed")
                 raise InvalidInputError(
-                    f"requires a hand of the stance with a fixed wrist; valid: {valid or 'none'}",
+                    f"must be a hand of the stance with a fixed wrist; valid: {valid or 'none'}",
                     field=f"present.{limb}",
                 )
             present[limb] = finite_vector(tensions, len(FINGERS), f"present.{limb}")

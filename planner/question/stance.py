@@ -94,7 +94,7 @@ def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     most = 1e12  # [N, N·m] larger, the unit is wrong
     if not np.abs(wrench).max() <= most:
         raise InvalidInputError(
-            f"must be at most {most:g} N or N·m, got {np.abs(wrench).max():g}", field=field
+            f"must be within ±{most:g} N or N·m, got {wrench.tolist()}", field=field
         )
     return wrench
 
@@ -108,7 +108,7 @@ def _possible(pose: Pose, field: str) -> None:
     farthest = 1e9  # [m]; farther its digits are all lost
     if max(map(abs, position)) > farthest:
         raise InvalidInputError(
-            f"must be within {farthest:g} m, got {position}", field=f"{field}.position"
+            f"must be within ±{farthest:g} m, got {position}", field=f"{field}.position"
         )
     if pose.proper:
         return
@@ -116,7 +116,9 @@ def _possible(pose: Pose, field: str) -> None:
     off = np.append(axes.T @ axes - np.eye(3), np.linalg.det(axes) - 1.0)
     if not np.abs(off).max() <= 1e-6:  # rounding of the axes' products
         raise InvalidInputError(
-            "orthonormal right-handed axes are needed", field=f"{field}.orientation"
+            "must be orthonormal right-handed axes, to 1e-6; the largest error is "
+            f"{np.abs(off).max():.2g}",
+            field=f"{field}.orientation",
         )
 
 
@@ -184,13 +186,13 @@ class HandOnHold:
         known_choice(self.wrist, get_args(WristMode), "wrist")
         if self.wrist_travel is not None and self.wrist != "compliant":
             raise InvalidInputError(
-                "only a compliant wrist has a travel; valid is none, or wrist compliant",
+                f"requires wrist 'compliant', got {self.wrist!r}; remove it for any other",
                 field="wrist_travel",
             )
         if self.tendon_preload is not None:
             if self.wrist != "floating":
                 raise InvalidInputError(
-                    "requires wrist 'floating'; remove it for any other",
+                    f"requires wrist 'floating', got {self.wrist!r}; remove it for any other",
                     field="tendon_preload",
                 )
             preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
@@ -233,7 +235,9 @@ class HandOnHold:
                 )
         if self.seat_direction is not None:
             if self.seat != "best":
-                raise InvalidInputError("requires the seat 'best'", field="seat_direction")
+                raise InvalidInputError(
+                    f"requires the seat 'best', got {self.seat!r}", field="seat_direction"
+                )
             direction = finite_vector(self.seat_direction, 6, "seat_direction")
             if not direction.any():
                 raise InvalidInputError("must not be zero", field="seat_direction")

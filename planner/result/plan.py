@@ -91,7 +91,7 @@ class Plan:
     verified : bool
         Whether the independent check passed.
     reason : str
-        One sentence that explains the status to a climber.
+        One sentence that explains the status.
     warnings : tuple of str
         Messages of ``findings``, hands that touch nothing, and what a deadline left unfinished.
     solver : Solver

@@ -41,7 +41,7 @@ def locked_joints(tree: Urdf, described: RobotDescription) -> dict[str, float]:
     for section, name, quantity in section_table(described.locked, "locked", units):
         field = f"{section}.{name}"
         if isinstance(quantity.value, list):
-            raise InvalidInputError("one number is needed, not a list", field=field)
+            raise InvalidInputError(f"one number is needed, got {quantity.value}", field=field)
         value, joint = float(quantity.value), joints[name]
         low, high = max(joint.lower, -farthest), min(joint.upper, farthest)
         if not low <= value <= high:

@@ -216,7 +216,8 @@ def _named(name: str, field: str) -> None:
 
 def _mapping(value: Any, field: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise InvalidInputError("a section of entries is needed", field=field)
+        got = type(value).__name__
+        raise InvalidInputError(f"a section of entries is needed, got {got}", field=field)
     return value
 
 

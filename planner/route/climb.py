@@ -196,7 +196,7 @@ class RouteResult:
 
     @property
     def load_factor_status(self) -> LoadFactorStatus:
-        """Status of the route's load factor: of its stages' statuses the least."""
+        """Status of the route's load factor: that of the stage with the least load factor."""
         found = {p.load_factor_status for p in self.plans}
         # that of the least is the first of these that any stage has
         order: tuple[LoadFactorStatus, ...]

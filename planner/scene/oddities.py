@@ -156,8 +156,9 @@ def _depths(scene: Scene, hands: Sequence[int]) -> list[float]:
             # an edge's rock has no end
             if origin > deepest and shape is not None and not shape.sine:
                 raise InvalidInputError(
-                    f"the body's origin is {origin:.2g} m deep in the rock of {hand.limb}; "
-                    f"up to {deepest:g} m is taken for a rough shape",
+                    f"the body's origin is {origin:.2g} m deep in the rock of {hand.limb}; at most "
+                    f"{deepest:g} m is allowed, as rock's shape is rough: is the position in W, "
+                    "in metres, on the right side of the rock?",
                     field="stance.body.position",
                 )
         found = dict(zip(smooth, (deep + radii).max(axis=1).tolist(), strict=True))
@@ -193,7 +194,9 @@ def _overlapping(scene: Scene) -> Iterator[Finding]:
             turned = np.abs(scene.axes[i] - scene.axes[j]).max()
             # [m], and the largest difference of entries of the axes
             if off <= 1e-3 and turned <= 1e-3:
-                raise InvalidInputError(f"{names} are at the same position", field=field)
+                raise InvalidInputError(
+                    f"{names} are at the same position; each hand needs its own", field=field
+                )
             message = (
                 f"{names} overlap, their palms are {-gap:.2g} m in each other: is the same hold "
                 "given twice?"

@@ -45,7 +45,7 @@ class Solved(NamedTuple):
 
 
 class LoadEffects(NamedTuple):
-    """Effects of loads on a stance.
+    """Wrenches and utilisation that a stance's loads give.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class StreamStance:
         return LoadEffects(rows[:, :6], float(np.maximum.reduce(rows[:, 6:], axis=None)))
 
     def solve(self, body_wrench: Array) -> Solved | None:
-        """Solve for the plan of a body wrench: least utilisation, traded a little for less tension.
+        """Solve for the plan of a body wrench: a little above the least utilisation, less tension.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ class StreamStance:
         Returns
         -------
         Solved or None
-            None without a plan that is proven to have the least utilisation.
+            None if the least utilisation is not proven.
         """
         data = self._data.turned(self._scaled(body_wrench))
         found = least_utilisation(data, self.cap, self._closing)

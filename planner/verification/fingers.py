@@ -90,7 +90,7 @@ class DriveLimits(ResidualLimits):
         self._hand_of_drive = np.tile(self._hand, _Row.TENDON)
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return the use of tendons, motors and fingers, and the errors of reported drives.
+        """Return the utilisations of tendons, motors and fingers, and errors of reported drives.
 
         Drives are motor torques [N·m], motor currents [A] and winch angles [rad].
         """
@@ -133,8 +133,11 @@ class NailLimits:
 
     Attributes
     ----------
-    tiles, fingers : ndarray of int, shape (k,)
-        Index of each nail among the tiles, and of its finger, counted through all hands.
+    tiles : ndarray of int, shape (k,)
+        For each nail in contact, the index in the list of all hands' tiles of the entry that
+        stands for the nail.
+    fingers : ndarray of int, shape (k,)
+        Index of its finger in the list of all hands' fingers.
     """
 
     def __init__(self, names: PartNames) -> None:

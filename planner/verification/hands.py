@@ -46,7 +46,7 @@ class HandLimits(ResidualLimits):
         self._hand_load = known.hands[0].hand.structure.hand_load
 
     def recompute(self, again: Recomputed) -> list[Residual]:
-        """Return the residuals of force sums and palms, and the use of palms and hands."""
+        """Return the residuals of force sums and palms, and utilisations of palms and hands."""
         planned, names, own = again.arrays, self._names, self._each
         tiles, palms = len(planned.loads), planned.palms
         off = planned.forces[:tiles] - (planned.loads[:, None] @ planned.axes)[:, 0]

@@ -114,7 +114,7 @@ def read_draws(path: Path) -> list[Draw]:
         for i, draw in enumerate(given):
             with errors_under(f"draws[{i}]"):
                 if not isinstance(draw, Mapping):
-                    raise InvalidInputError("hand or surfaces is needed")
+                    raise InvalidInputError(f"must be a table of hand or surfaces, got {draw!r}")
                 own_draw(draw)
             found.append(Draw(**draw))
     return found

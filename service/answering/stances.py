@@ -174,7 +174,7 @@ def _hand(
         seat = _frame(message.place, pose)
         hold.check_place(seat)
     if pose is None:
-        raise InvalidInputError("missing", field="pose")
+        raise InvalidInputError("missing; give a pose, or a place on the rock", field="pose")
     if message.contact_offset is not None and message.placing != "contact":
         raise InvalidInputError(
             "only a hand placed by contact has an offset from its rest; valid is none, or placing "
@@ -266,7 +266,7 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
     largest = 4.0 * math.pi
     if abs(place.wrist_angle) > largest:
         raise InvalidInputError(
-            f"must be within ±{largest:.4g} rad, two turns, got {place.wrist_angle:g}: is it "
+            f"must be within ±{largest:.4g} rad (two turns), got {place.wrist_angle:g}: is it "
             "in rad?",
             field="place.wrist_angle",
         )
@@ -363,7 +363,7 @@ def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Me
         )
     if message.vertices is None or message.faces is None:
         missing = "vertices" if message.vertices is None else "faces"
-        raise InvalidInputError("missing", field=missing)
+        raise InvalidInputError("missing; give vertices and faces", field=missing)
     vertices, faces = message.vertices, message.faces
     key = blake2b(msgspec.msgpack.encode((vertices, faces))).digest(), numbers, anywhere
     return MESHES_OF_REQUESTS.get(key, lambda: Mesh(vertices, faces, numbers, anywhere=anywhere))

@@ -102,7 +102,7 @@ class Run(ABC):
             yield
 
     def write(self, question: bytes, payload: bytes, seconds: float) -> None:
-        """Append the answer to the next request to the file, and count the answer.
+        """Append the reply to the first request without one to the file, and count it.
 
         Parameters
         ----------
@@ -316,7 +316,7 @@ class TableLines(Run):
             )
 
     def row(self, payload: bytes) -> TableRow:
-        """Convert the encoded answer to the next request into a row of the table."""
+        """Return a row of the table from the reply to a request, in JSON."""
         return row_of(payload, self._described)
 
     @contextmanager

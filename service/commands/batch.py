@@ -70,10 +70,9 @@ def batch_command(
     """Answer many plan requests: one a line in, one reply, row or error out, in order.
 
     REQUESTS is the path of a file of JSON lines, or - for standard input; blank lines are skipped.
-    Lines are as the service takes them: extras are those that a request wants itself, and the
-    numbers of --hand are those that it leaves open. Only meshes may be in files, relative to that
-    of the lines; one that many lines name is read once. With --json the replies are
-    written on standard output, or with -o a summary is.
+    Lines are requests as the service takes them. Each has its own extras, and the numbers of --hand
+    where its stance gives none. Meshes may be in files, by paths relative to the file of lines;
+    each is read once. With --json the replies are written on standard output, or with -o a summary.
 
     Exit status: the worst of what the requests alone would have: 1 where one failed or was lost, or
     else 2 where one is bad input, or else 3 where one is overloaded or infeasible.
@@ -256,9 +255,9 @@ def _check_output(file: Path, requests: str, resume: bool, is_table: bool) -> No
     try:
         if not is_table and file.is_dir():
             field = "--resume" if resume else "-o"
-            raise InvalidInputError(f"{file}: not an output of crux batch", field=field)
+            raise InvalidInputError(f"{file}: is a folder; give a file", field=field)
         if resume and not is_table and file.exists() and not file.is_file():
-            raise InvalidInputError(f"{file}: not an output of crux batch", field="--resume")
+            raise InvalidInputError(f"{file}: not a file; nothing to resume", field="--resume")
         given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
         if file.is_file() and os.path.samestat(file.stat(), given):
             raise InvalidInputError(

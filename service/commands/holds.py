@@ -111,8 +111,8 @@ def holds_command(
     """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
 
     A hand is closed at every point of a grid, at several angles of its wrist; it approaches against
-    the mean normal of the rock under its palm. Holds are sorted by how far they reach in the
-    pull-off. Each has a `place` for a request's hand whose hold is this rock.
+    the mean normal of the rock under its palm. Holds are sorted by their largest pull-off. Each has
+    a `place` for a request's hand whose hold is this rock.
     """
     from hand_models import fixed_wrist, parameters
     from hand_models.rock import Mesh, read_mesh

@@ -169,7 +169,7 @@ class WorkersOption(NamedTuple):
     dask: str | None
 
     def place(self, plans: int) -> tuple[str, int | None]:
-        """Return where an amount of work is done that takes as long as a number of ``plans``.
+        """Return where to do work that takes as long as a number of ``plans``.
 
         Returns
         -------
@@ -343,7 +343,7 @@ draws_option = click.option(
     "--draws",
     type=InputFile("read_draws"),
     metavar="FILE",
-    help="TOML with draws of your own, over which the spread is told; --spread is then meant.",
+    help="TOML with samples of your own for the spread; with it, --spread need not be given.",
 )
 wanted_options = asked_for(Wanted, "wanted", draws_option, explain_option)
 """Options of `Wanted` but `spread_option`, which a command adds itself."""

@@ -134,14 +134,14 @@ def rock_command(
     """Make a mesh hold of a scan: points, a grid of heights, or triangles.
 
     The triangles are in a frame on the rock, z into it along the view and x up, which is a hold's
-    own; the table tells its pose in the file's axes, turned so that z is up, in metres.
+    own; the table has its pose in the file's axes, turned so that z is up, in metres.
     """
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
     if neighbours is not None and std_ratio is None:
         raise InvalidInputError("requires --std-ratio", field="neighbours")
     if output.exists() and file.exists() and output.samefile(file):
-        raise InvalidInputError(f"{output} is the scan itself", field="--output")
+        raise InvalidInputError(f"{output} is the scan itself; name another", field="--output")
     with tables.progress(f"meshing {file.name}") as report:
         scan = scans.read_scan(file, **reading)
         if std_ratio is not None:

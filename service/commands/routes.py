@@ -76,7 +76,9 @@ def route_command(
         if given:
             raise InvalidInputError(f"requires -o FILE that ends in {LISTED_ENDINGS}", field=option)
     if output.exists() and not output.is_dir():
-        raise InvalidInputError(f"{output}: is not a folder", field="-o")
+        raise InvalidInputError(
+            f"{output}: must be a folder, or end in {LISTED_ENDINGS}", field="-o"
+        )
     request = wanted.of(own.asked(stances.read_route(routes[0])))
     return _one(request, output, parallel.workers, own, as_json)
 
@@ -153,7 +155,9 @@ class _Routes:
 def _files(source: str) -> list[str]:
     """Return the routes of a folder in the order of their names, or the one that is meant."""
     if source == "-":
-        raise InvalidInputError("standard input is one route: give it alone, -o DIR", field="ROUTE")
+        raise InvalidInputError(
+            "standard input is one route: give it alone, with -o DIR", field="ROUTE"
+        )
     if not Path(source).is_dir():
         return [source]
     found = sorted(str(path) for path in Path(source).glob("*.json"))
@@ -179,7 +183,7 @@ def _many(
     tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
-        raise InvalidInputError(f"{file}: is not a file", field="-o")
+        raise InvalidInputError(f"{file}: must be a file", field="-o")
     sink = new_run(
         file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )

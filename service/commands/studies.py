@@ -52,7 +52,8 @@ def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
     """
     given = {key: value for key, value in wanted.items() if value not in (None, ())}
     if name not in STUDY_NAMES:
-        raise InvalidInputError(f"{name!r}: valid are {', '.join(STUDY_NAMES)}", field="NAME")
+        known = ", ".join(STUDY_NAMES)
+        raise InvalidInputError(f"unknown study {name!r}; known are {known}", field="NAME")
     if name != "sweep" or not given:
         if given:
             option = "--measure" if "measures" in given else f"--{min(given)}"
@@ -118,7 +119,7 @@ def _measurements() -> studies.Study:
 def study_command(
     name: str, folder: Path, hand: ParameterTable | None, as_json: bool, **wanted: Any
 ) -> None:
-    """Run an experiment of the paper again, and hold its claims against the model.
+    """Run an experiment of the paper again, and compare its claims with the model.
 
     The study sweep has no claims: it draws what the test gripper holds over any two of its numbers.
     The exit status is 0 whatever the claims say.

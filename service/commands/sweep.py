@@ -70,8 +70,8 @@ def sweep_command(
 
     A PATH has the names of the request with dots between them, as load.mass, gravity.2 or
     hands.front_left.surface.shear_limit; hands are named by their limbs, entries of lists by their
-    index, and * is all of them. Nothing is explained, and what else a request wants is left out.
-    The table grows as points are answered; one that is broken off goes on with --resume.
+    index, and * is all of them. Certificates and all extras but the load factor are left out.
+    The table grows as points are answered; a sweep that is broken off goes on with --resume.
 
     Exit status: 0 whatever holds, 2 bad input, also where no point can be answered for it, 1 where
     a point failed or was lost.
@@ -107,7 +107,7 @@ def sweep_command(
         result = sweeping.with_borders(design, sink.points, own.robot, tolerance)
     except processes.Interrupted:
         raise processes.Interrupted(
-            f"all points are answered in {table}; --resume goes on"
+            f"all points are answered in {table}, not all borders; --resume goes on"
         ) from None
     with tables.filling_folder():
         sweeping.plot_sweep(result, picture, Path(stance).stem, pair)

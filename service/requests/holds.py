@@ -199,7 +199,7 @@ class Surface(Strict, frozen=True, kw_only=True):
     - ``compression_gain``: shear strength gained per newton of pressing [N/N].
     - ``half_planes``: number of half-planes that approximate the limit curve from pure shear to
       ``pull_off_angle``.
-    - ``lateral_pull_off_ratio``: share of the lateral strength, relative to shear, that is left at
+    - ``lateral_pull_off_ratio``: factor by which lateral strength over shear strength is smaller at
       ``pull_off_angle``, above 0 and at most 1.
     - ``shear_scatter``: standard deviation of ``shear_limit`` from place to place, of one tile [N].
     - ``friction``: Coulomb friction coefficient of a tile that is dragged backwards, away from the

@@ -82,7 +82,7 @@ Draws = Annotated[
     Meta(
         min_length=1,
         max_length=100,
-        description="over which the spread is told; by default those of draws.toml",
+        description="samples for the spread; by default those of draws.toml",
     ),
 ]
 
@@ -157,8 +157,8 @@ class WrenchSpaceRequest(Query, frozen=True, kw_only=True):
     want: Annotated[
         list[SpaceWant] | None,
         Meta(
-            description="what is told beside rows and capability, each at most once; an error of "
-            "kind limit where it would cost too much, as many half_planes may. By default "
+            description="results beside rows and capability, each at most once; an error of kind "
+            "limit where it would cost too much, as many half_planes may. By default "
             "half_spaces and vertices where they are cheap. robust: the least that it can carry "
             "over a scatter of its place",
             extra_json_schema={"uniqueItems": True},

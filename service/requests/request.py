@@ -57,9 +57,8 @@ Duration = Annotated[float, Meta(gt=0.0, le=LONGEST_DEADLINE, description="[s]")
 Detail = Annotated[
     Literal["set_points", "hands", "full"],
     Meta(
-        description="how much the reply tells: what tendons are to do, in little room; also what "
-        "the hands carry; or all that is known. By default all; where max_reply_bytes is given, as "
-        "much as fits"
+        description="how much the reply has: set-points of tendons; the hands' loads, too; or the "
+        "whole plan. By default the whole; where max_reply_bytes is given, as much as fits"
     ),
 ]
 Later = Annotated[Any, Meta(description="not supported in this version; leave it out")]

@@ -62,7 +62,8 @@ HandEntries = Annotated[
 class Place(Strict, frozen=True, kw_only=True):
     """Point on a rock at which a hand is seated, with the direction of its approach.
 
-    - ``point``: point on the rock where the hold's crest would be [m].
+    - ``point``: point near the rock; the hand goes to where its line along ``approach`` meets the
+      rock [m].
     - ``approach``: direction into the rock, of any length: z of the hand.
     - ``wrist_angle``: angle by which the hand is turned about its approach, from where its x is
       nearest to ``up`` [rad].
@@ -122,7 +123,7 @@ class Hand(Strict, frozen=True, kw_only=True):
         Place | None,
         Meta(
             description="in place of a pose: where on the rock, whose frame is `hold.pose`, or W, "
-            "the hand is seated; the reply tells its pose"
+            "the hand is seated; the reply has its pose"
         ),
     ] = None
     hold: Hold
@@ -131,8 +132,8 @@ class Hand(Strict, frozen=True, kw_only=True):
     wrist: Annotated[
         Literal["fixed", "floating", "compliant"],
         Meta(
-            description="floating: the motors stand still, and the wrist gives way; compliant: the "
-            "tendons are driven, and the wrist gives way"
+            description="floating: the motors stand still, and the wrist moves; compliant: the "
+            "tendons are driven, and the wrist moves"
         ),
     ] = "fixed"
     wrist_travel: Annotated[
@@ -208,7 +209,7 @@ class Stance(Strict, frozen=True, kw_only=True):
     ] = None
     limb_stiffness: Annotated[
         LimbStiffness | None,
-        Meta(description="with which limbs hold wrists that give way: replies have pose targets"),
+        Meta(description="with which limbs hold wrists that move: replies then have pose targets"),
     ] = None
     rocks: Annotated[
         dict[Name, Rock],

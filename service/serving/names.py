@@ -43,7 +43,7 @@ class ClientNames:
         self._asked: TTLCache[str, bool] = TTLCache(most, ttl=1.0, timer=time.perf_counter)
 
     def place(self, name: str, secret: bytes) -> str:
-        """Return the place that a query counts for when workers' time is shared.
+        """Return the place (client) that a query counts for when workers' time is shared.
 
         Parameters
         ----------

@@ -74,7 +74,7 @@ class PendingQuestion:
     dear : bool
         True if the question may take long.
     rehearsed : bool
-        True for the declaration of a stream that another worker has already found to be possible.
+        True for the declaration of a stream that another worker has already planned successfully.
     fault : LimitError or None
         Error for a payload or an attachment with too many bytes, whose bytes are then not kept.
     replied : bool

@@ -44,7 +44,7 @@ class _Place:
 
 
 class Shares:
-    """Record of the workers' time that each place has used.
+    """Record of the workers' time that each place (client) has used.
 
     Attributes
     ----------
@@ -89,8 +89,8 @@ class Shares:
     def ended_process(self, place: str, seconds: float) -> None:
         """Charge a place for a question that ended its worker: for the work, and for a new worker.
 
-        Questions of the place then wait for four times the start of a worker, while other clients
-        ask.
+        While other clients ask, questions of the place then wait four times as long as a worker
+        takes to start.
 
         Parameters
         ----------

@@ -32,7 +32,7 @@ class Kind(Enum):
     SET_POINTS = "set_points"
     """Questions for set-points of streams."""
     DECLARED = "declared"
-    """Declarations of streams that a worker has already found to be possible."""
+    """Declarations of streams that a worker has already planned successfully."""
     SHORT = "short"
     """Questions about known stances, which are answered soon."""
     OTHER = "other"

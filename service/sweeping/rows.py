@@ -278,7 +278,7 @@ class PointRows(TableLines):
         super().__init__(path, columns, header, resume, design)
 
     def row(self, payload: bytes) -> bulk.TableRow:
-        """Convert the encoded answer to the next point into a row of the file."""
+        """Return the row of the first point without one, from its reply in MessagePack."""
         row = sweep_row(self._design, self._design.points[self.tally.count], payload)
         return bulk.TableRow(row.cells, None if row.error else row.status, row.error)
 

@@ -45,7 +45,7 @@ class Variation:
 
     def __post_init__(self) -> None:
         if not self.values:
-            raise InvalidInputError("needs a value", field=self.path)
+            raise InvalidInputError("at least one value is needed, got none", field=self.path)
         for i, value in enumerate(self.values):
             if isinstance(value, float) and not math.isfinite(value):
                 raise InvalidInputError(f"must be finite numbers, got {value}", field=self.path)
@@ -53,7 +53,7 @@ class Variation:
                 raise InvalidInputError(f"has the value {value} twice", field=self.path)
         low, high = self.values[0], self.values[-1]
         if self.ranged and not (self.numbers and low < high):  # type: ignore[operator]
-            raise InvalidInputError("LOW must be below HIGH", field=self.path)
+            raise InvalidInputError(f"LOW must be below HIGH, got {low}:{high}", field=self.path)
 
     @property
     def numbers(self) -> bool:

@@ -244,8 +244,8 @@ def print_failures(limiting: Sequence[Row | None], out: Console) -> None:
     Parameters
     ----------
     limiting : sequence of Row or None
-        Limit that is reached first at each wrench; None for a hard row, nearly always of a tile
-        that would be dragged backwards.
+        Limit that is reached first at each wrench; None for a hard row (nearly always: a tile
+        would be dragged backwards).
     out : Console
         Console to print on.
     """

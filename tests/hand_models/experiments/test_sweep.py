@@ -107,7 +107,7 @@ def test_a_grasp_that_cannot_be_is_a_cell_of_its_own(table):
     slope = Axis.parse("gripper.pull_off_slope=3:4:2", table, FINE)
     found = sweep_map(table, bases, slope, CONDITIONS, ["normal"], quiet)
     assert found["state"].tolist() == [["holds", "no grasp"]] * 2
-    with pytest.raises(InvalidInputError, match="too far"):
+    with pytest.raises(InvalidInputError, match=r"must be below .* got 0.4 m"):
         GripperSweep("gripper.base_half_spacing=0.4:0.5:2", "gripper.pull_off_slope=3:4:2").run(
             quiet, hand_table()
         )
@@ -175,15 +175,27 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
         (["--x", "finger.pulley_radii[1]"], "--x: must be SECTION.NAME"),
         (["--x", "finger.pulley_radii[1]=0.001:0.005:2.5"], "--x: must be SECTION.NAME"),
         (["--x", "finger.pulley_radii[1]=0.001:0.002:0.003:3"], "--x: must be SECTION.NAME"),
-        (["--x", "finger.pulley_radii[1]=0.005:0.001:3"], "LOW must be below HIGH"),
-        (["--x", "finger.pulley_radii[1]=nan:0.001:3"], "LOW must be below HIGH"),
-        (["--x", "finger.pulley_radii[1]=0:inf:3"], "LOW must be below HIGH"),
+        (
+            ["--x", "finger.pulley_radii[1]=0.005:0.001:3"],
+            "LOW and HIGH must be finite, and LOW below HIGH",
+        ),
+        (
+            ["--x", "finger.pulley_radii[1]=nan:0.001:3"],
+            "LOW and HIGH must be finite, and LOW below HIGH",
+        ),
+        (
+            ["--x", "finger.pulley_radii[1]=0:inf:3"],
+            "LOW and HIGH must be finite, and LOW below HIGH",
+        ),
         (["--x", "gripper.added_radius=-0.01:0.01:3"], "LOW must not be negative"),
         (["--x", "gripper.added_radius=0:10:3"], "HIGH must not exceed 1 m"),
         (["--x", "finger.pulley_radii[1]=1:5:3"], "HIGH must not exceed 1 m"),
         (["--x", "finger.pulley_radii[1]=0.001:0.005:1"], "N must be from 2"),
         (["--x", "finger.pulley_radii[2]=0.001:0.005:3"], "--y: must differ from --x"),
-        (["--measure", "weight"], "--measure: 'weight': valid are shear, normal, moment, volume"),
+        (
+            ["--measure", "weight"],
+            "--measure: unknown measure 'weight'; known are shear, normal, moment, volume",
+        ),
         (["--surface", "moon"], "surface: unknown surface 'moon'; known are"),
         (["--diameter", "-0.3"], "--diameter: must be from 0.02 to 10 m, got -0.3"),
         (["--diameter", "300"], "--diameter: must be from 0.02 to 10 m, got 300"),

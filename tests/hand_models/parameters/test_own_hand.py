@@ -209,6 +209,18 @@ def test_a_file_with_the_bundled_numbers_gives_the_same_plan(
 
 
 BAD = {
+    "no ratio of pulleys": (
+        "[tile]\npulley_ratio = 0",
+        "tile.pulley_ratio: must be above 0, got 0",
+    ),
+    "no stiffness": (
+        "[tile]\ncontact_stiffness = 0",
+        "tile.contact_stiffness: must be above 0 N/m, got [0.0, 0.0, 0.0]",
+    ),
+    "a negative number without a unit": (
+        "[tile]\npulley_ratio = -1",
+        "tile.pulley_ratio: must be from 0 to 2e+04, got -1",
+    ),
     "an unknown section": (
         '[fingr]\nlength = { value = 1, unit = "m", source = "assumed" }',
         "fingr: unknown section; known are finger, fingers, hand,",

@@ -182,8 +182,8 @@ def test_a_file_is_read_as_its_text(tmp_path):
         ("tendon", "friction", "1.0", "tendon.friction"),
         ("tendon", "friction", "-0.1", "tendon.friction"),
         ("tile", "contact_stiffness", "[1e4, 0.0, 1e4]", "tile.contact_stiffness"),
-        ("finger", "pulley_radii", "[0.005, 0.003]", "pulley_radii"),
-        ("finger", "joint_upper", "[1.0, 1.0, 1.0, 1.0]", "joint_upper"),
+        ("finger", "pulley_radii", "[0.005, 0.003]", "finger.pulley_radii"),
+        ("finger", "joint_upper", "[1.0, 1.0, 1.0, 1.0]", "finger.joint_upper"),
         ("palm", "contact_stiffness", "[1e4, 1e4]", "palm.contact_stiffness"),
     ],
 )

@@ -131,6 +131,13 @@ def test_a_grid_without_a_cell_in_a_unit_of_length_is_refused(name, tmp_path):
         read_scan(path)
 
 
+def test_a_cell_that_is_no_length_is_refused_with_the_sides_of_the_file(tmp_path):
+    path = tmp_path / "a.asc"
+    path.write_text("ncols 2\nnrows 2\ndx inf\ndy 30\n1 2\n3 4\n", encoding="utf-8")
+    with pytest.raises(InvalidInputError, match=r"^cell: .*got inf by 30 from the file$"):
+        read_scan(path)
+
+
 # Units, up, width ---------------------------------------------------------------------------------
 
 

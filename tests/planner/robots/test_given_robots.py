@@ -209,7 +209,7 @@ def test_a_joint_that_no_limb_can_have_is_told_with_what_locks_it(old, new, word
         ),
         ('0.15, unit = "m"', '0.15, unit = "mm"', "locked.lift.unit: must be in 'm', got 'mm'"),
         ("0.7", "0.05", "locked.waist-yaw: must be from 0.1 to 1.5 rad, got 0.05"),
-        ("0.7", "[0.7]", "locked.waist-yaw: one number is needed, not a list"),
+        ("0.7", "[0.7]", "locked.waist-yaw: one number is needed, got [0.7]"),
         ("-0.4", "1e9", "locked.waist.pitch: must be from -100 to 100 rad, got 1e+09"),
         ("-0.4", '"zero"', "locked.waist.pitch: expected `object`"),
         ("-0.4", "nan", "locked.waist.pitch.value: must be finite"),

@@ -225,7 +225,7 @@ def test_what_is_wrong_with_a_file(old, new, message):
 @pytest.mark.parametrize("missing", ["position", "orientation"])
 def test_what_no_limb_can_do_without(missing):
     lines = [line for line in TOML.splitlines() if not line.startswith(missing)]
-    assert refused("\n".join(lines)) == f"limbs.leg.{missing}: missing parameter"
+    assert refused("\n".join(lines)) == f"limbs.leg.{missing}: missing; must be given"
 
 
 @pytest.mark.parametrize(

@@ -237,7 +237,10 @@ def test_what_cannot_be_is_told_in_a_line(rock, tmp_path, capfd):
         ([str(tmp_path / "none.ply"), "-o", output], "no such file"),
         ([str(rock), "-o", output, "--surface", "cheese"], "cheese"),
         ([str(rock), "-o", output, "--spacing", "0"], "spacing"),
-        ([str(rock), "-o", output, "--spacing", "nan"], "spacing: must be at least 0.001 m"),
+        (
+            [str(rock), "-o", output, "--spacing", "nan"],
+            "spacing: must be finite and at least 0.001 m",
+        ),
         (
             [str(rock), "-o", output, "--spacing", "0.001"],
             "up to 2,008,008 places to try (a grid of 501 by 501 points, 8 at each); the "
