@@ -31,7 +31,7 @@ from hand_models.compliance.grasp import complex_steps, slopes
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
-from hand_models.tendon import FingerTendon, MotorScheme, share_load
+from hand_models.tendon import FingerTendon, MotorScheme
 
 __all__ = ["CompliantHand", "CompliantHands", "HandLoads"]
 
@@ -109,13 +109,7 @@ class CompliantHand:
         self.fingers = [self._finger(i, name) for i, name in enumerate(FINGERS)]
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
-        self.palm_stiffness = np.zeros(2)
-        rubs = hand.palm_friction, hand.palm_own_friction
-        for share, tiles in settled.palm.layers:
-            contacts = tuple(hand.palm_contact[i] for i in tiles)
-            sharing = share_load(contacts, hand.palm_spring, *rubs)
-            each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
-            self.palm_stiffness += share * np.array(each)
+        self.palm_stiffness = settled.palm_stiffness
 
     @cached_property
     def _together(self) -> CompliantFingers:

@@ -29,3 +29,7 @@ from .stance_warnings import (
     strained_preloads as strained_preloads,
     warnings as warnings,
 )
+from .wrist_findings import (
+    PALM_WITHOUT_TRAVEL as PALM_WITHOUT_TRAVEL,
+    palm_findings as palm_findings,
+)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 from hand_models.base import CruxError, InvalidInputError, errors_under
+from planner.explanation import PALM_WITHOUT_TRAVEL
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
-from planner.result import Plan
+from planner.result import Finding, Plan
 from planner.robots import UnreachableError
 from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_route, stages
 from planner.solving import plan
@@ -36,7 +38,8 @@ def evaluate(
     Returns
     -------
     RouteResult
-        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles.
+        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. What
+        palms of fixed wrists carry without travel is a finding of one stage, where they lack most.
 
     Raises
     ------
@@ -54,7 +57,34 @@ def evaluate(
         plans[i] = answer
         if progress is not None:
             progress(len(plans), len(todo))
-    return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
+    return RouteResult(route, todo, _palms_once([plans[i] for i in range(len(todo))]))
+
+
+def _palms_once(plans: Sequence[Plan | OutOfReach]) -> tuple[Plan | OutOfReach, ...]:
+    """Return plans of which only the one whose palms lack most travel has a finding about them."""
+    lacking = {
+        i: finding
+        for i, answer in enumerate(plans)
+        for finding in answer.findings
+        if finding.kind == PALM_WITHOUT_TRAVEL
+    }
+    # of stages alike but for rounding, to a micrometre, the first
+    worst = max(lacking, key=lambda i: round(lacking[i].value, 6), default=None)
+    return tuple(
+        _without(answer, lacking[i])
+        if isinstance(answer, Plan) and i in lacking and i != worst
+        else answer
+        for i, answer in enumerate(plans)
+    )
+
+
+def _without(answer: Plan, finding: Finding) -> Plan:
+    """Return a plan without a finding and its warning."""
+    return replace(
+        answer,
+        findings=tuple(each for each in answer.findings if each != finding),
+        warnings=tuple(text for text in answer.warnings if text != finding.message),
+    )
 
 
 Answer = Plan | OutOfReach | InvalidInputError

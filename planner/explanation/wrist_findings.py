@@ -1,0 +1,59 @@
+"""Findings about a plan's wrists: what the palms of fixed wrists carry without travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from planner.explanation.active_limits import TOLERANCES
+from planner.prepare import PreparedStance
+from planner.result import Finding, HandPlan
+
+__all__ = ["PALM_WITHOUT_TRAVEL", "palm_findings"]
+
+PALM_WITHOUT_TRAVEL = "palm_without_travel"
+"""Kind of the finding about a fixed hand's palm, of which a plan has at most one."""
+
+
+def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[Finding]:
+    """Yield at most one finding: the fixed hand whose palm lacks most travel for its loads.
+
+    A palm shears by its springs and presses past the gap of its nearest tile. A fixed wrist moves
+    by neither, and its plan takes the palm's loads as free reactions.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    hands : sequence of HandPlan
+        A plan's hands, in the order of the stance.
+    """
+    lacking = []
+    for i, (hand, settled) in enumerate(zip(hands, prepared.batch.hands, strict=True)):
+        if hand.wrist is not None or not settled.palm.engaged:
+            continue
+        shear, pressing = -float(hand.palm.force[0]), float(hand.palm.force[2])
+        travel = shear / float(settled.palm_stiffness[0])
+        gap = max(float(settled.palm.gaps[list(settled.palm.engaged)].min()), 0.0)
+        if pressing < TOLERANCES.palm_pressing:
+            gap = 0.0
+        lacks = max(travel, gap)
+        if lacks > TOLERANCES.palm_travel:
+            # alike but for rounding, to a micrometre, the first hand comes first
+            order = round(lacks, 6), round(min(travel, gap), 6), -i
+            lacking.append((order, lacks, i, shear, travel, pressing, gap))
+    if not lacking:
+        return
+    _, lacks, i, shear, travel, pressing, gap = max(lacking)
+    words = []
+    if travel > TOLERANCES.palm_travel:
+        words.append(f"{shear:.0f} N of shear, which needs {1e3 * travel:.1f} mm of travel")
+    if gap > TOLERANCES.palm_travel:
+        words.append(f"{pressing:.0f} N of pressing across a gap of {1e3 * gap:.1f} mm")
+    others = len(lacking) - 1
+    alike = f" (and {others} other hand{'s' * (others > 1)} alike)" if others else ""
+    message = (
+        f"{prepared.limbs[i]}: a fixed wrist does not move, but its palm carries "
+        f"{', and '.join(words)}{alike}"
+    )
+    if not prepared.question.stance.hands[i].grasp.fingernail:
+        message += "; 'wrist': 'compliant' plans with wrists that move"
+    yield Finding(PALM_WITHOUT_TRAVEL, f"stance.hands[{i}].wrist", message, lacks, "m")
