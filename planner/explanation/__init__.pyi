@@ -30,6 +30,7 @@ from .stance_warnings import (
     warnings as warnings,
 )
 from .wrist_findings import (
-    PALM_WITHOUT_TRAVEL as PALM_WITHOUT_TRAVEL,
+    ONE_OF_A_PLAN as ONE_OF_A_PLAN,
     palm_findings as palm_findings,
+    stretch_findings as stretch_findings,
 )

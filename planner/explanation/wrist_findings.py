@@ -1,17 +1,26 @@
-"""Findings about a plan's wrists: what the palms of fixed wrists carry without travel."""
+"""Findings about a plan's wrists: fixed palms without travel, tiles that are stretched far."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
 
 from planner.explanation.active_limits import TOLERANCES
 from planner.prepare import PreparedStance
 from planner.result import Finding, HandPlan
 
-__all__ = ["PALM_WITHOUT_TRAVEL", "palm_findings"]
+__all__ = ["ONE_OF_A_PLAN", "palm_findings", "stretch_findings"]
 
-PALM_WITHOUT_TRAVEL = "palm_without_travel"
-"""Kind of the finding about a fixed hand's palm, of which a plan has at most one."""
+PALM_WITHOUT_TRAVEL: Final = "palm_without_travel"
+"""Kind of the finding about a fixed hand's palm."""
+
+TILE_STRETCHED_FAR: Final = "tile_stretched_far"
+"""Kind of the finding about a tile of a hand whose wrist moves."""
+
+ONE_OF_A_PLAN: Final = (PALM_WITHOUT_TRAVEL, TILE_STRETCHED_FAR)
+"""Kinds of findings of which a plan has at most one, with its largest value; a route, too."""
 
 
 def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[Finding]:
@@ -57,3 +66,39 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
     if not prepared.question.stance.hands[i].grasp.fingernail:
         message += "; 'wrist': 'compliant' plans with wrists that move"
     yield Finding(PALM_WITHOUT_TRAVEL, f"stance.hands[{i}].wrist", message, lacks, "m")
+
+
+def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[Finding]:
+    """Yield at most one finding: the tile that is stretched most, if that is too far.
+
+    Tiles of hands with compliant or floating wrists are compared with the largest stretch of their
+    hand's parameters.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    hands : sequence of HandPlan
+        A plan's hands, in the order of the stance.
+    """
+    beyond = []
+    for i, (hand, settled) in enumerate(zip(hands, prepared.batch.hands, strict=True)):
+        if hand.wrist is None or hand.wrist.stretches is None:
+            continue
+        far = np.flatnonzero(hand.wrist.stretches > settled.hand.largest_tile_stretch)
+        beyond += [(float(hand.wrist.stretches[tile]), i, tile) for tile in far.tolist()]
+    if not beyond:
+        return
+    # of tiles alike but for rounding, to a micrometre, the first
+    stretch, i, tile = max(beyond, key=lambda each: (round(each[0], 6), -each[1], -each[2]))
+    hand, most = hands[i], prepared.batch.hands[i].hand.largest_tile_stretch
+    others = len(beyond) - 1
+    alike = f" (and {others} other tile{'s' * (others > 1)} alike)" if others else ""
+    driven = prepared.question.stance.hands[i].wrist == "compliant"
+    less = "a shorter wrist_travel or less load" if driven else "less load"
+    message = (
+        f"{hand.limb}: {hand.tiles[tile].phalanx} tile of {hand.tiles[tile].finger} is stretched "
+        f"by {1e3 * stretch:.1f} mm with {abs(hand.loads[tile, 0]):.0f} N of shear, beyond the "
+        f"hand's largest_tile_stretch of {1e3 * most:.3g} mm{alike}; its stiffness is not known so "
+        f"far; {less} stretches it less"
+    )
+    yield Finding(TILE_STRETCHED_FAR, f"stance.hands[{i}].wrist", message, stretch, "m")

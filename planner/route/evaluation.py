@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from hand_models.base import CruxError, InvalidInputError, errors_under
-from planner.explanation import PALM_WITHOUT_TRAVEL
+from planner.explanation import ONE_OF_A_PLAN
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
 from planner.result import Finding, Plan
@@ -38,8 +38,8 @@ def evaluate(
     Returns
     -------
     RouteResult
-        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. What
-        palms of fixed wrists carry without travel is a finding of one stage, where they lack most.
+        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. Of
+        a finding of which a plan has at most one, the largest of all stages is left.
 
     Raises
     ------
@@ -57,25 +57,27 @@ def evaluate(
         plans[i] = answer
         if progress is not None:
             progress(len(plans), len(todo))
-    return RouteResult(route, todo, _palms_once([plans[i] for i in range(len(todo))]))
+    found = [plans[i] for i in range(len(todo))]
+    for kind in ONE_OF_A_PLAN:
+        found = _said_once(found, kind)
+    return RouteResult(route, todo, tuple(found))
 
 
-def _palms_once(plans: Sequence[Plan | OutOfReach]) -> tuple[Plan | OutOfReach, ...]:
-    """Return plans of which only the one whose palms lack most travel has a finding about them."""
-    lacking = {
+def _said_once(plans: Sequence[Plan | OutOfReach], kind: str) -> list[Plan | OutOfReach]:
+    """Return plans of which only the one with the largest value has a finding of a kind."""
+    said = {
         i: finding
         for i, answer in enumerate(plans)
         for finding in answer.findings
-        if finding.kind == PALM_WITHOUT_TRAVEL
+        if finding.kind == kind
     }
     # of stages alike but for rounding, to a micrometre, the first
-    worst = max(lacking, key=lambda i: round(lacking[i].value, 6), default=None)
-    return tuple(
-        _without(answer, lacking[i])
-        if isinstance(answer, Plan) and i in lacking and i != worst
-        else answer
+    worst = max(said, key=lambda i: round(said[i].value, 6), default=-1)
+    said.pop(worst, None)
+    return [
+        _without(answer, said[i]) if isinstance(answer, Plan) and i in said else answer
         for i, answer in enumerate(plans)
-    )
+    ]
 
 
 def _without(answer: Plan, finding: Finding) -> Plan:

@@ -28,6 +28,7 @@ from planner.explanation import (
     palm_findings,
     shortfall_sentence,
     strained_preloads,
+    stretch_findings,
     tension_path,
     unsafe_sentence,
 )
@@ -91,6 +92,7 @@ def explained_plan(
             *odd,
             *_spare_findings(prepared, answer),
             *palm_findings(prepared, parts["hands"]),
+            *stretch_findings(prepared, parts["hands"]),
         )
     else:
         parts = _of_none(prepared, answer)

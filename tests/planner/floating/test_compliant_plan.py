@@ -102,7 +102,7 @@ def test_a_known_stance_answers_as_a_plan_does() -> None:
     assert answer.utilisation == pytest.approx(answered().utilisation, rel=1e-6)
 
 
-@pytest.mark.parametrize("what", ["twist", "tension", "shear", "palm", "mode"])
+@pytest.mark.parametrize("what", ["twist", "tension", "shear", "palm", "mode", "stretch"])
 def test_the_check_finds_what_is_wrong(what: str) -> None:
     question, answer = asked(), answered()
     assert not problems(question, answer)
@@ -119,6 +119,10 @@ def test_the_check_finds_what_is_wrong(what: str) -> None:
     elif what == "palm":
         force = hand.palm.force + np.array([0.0, 0.0, 0.1])
         hand = replace(hand, palm=msgspec.structs.replace(hand.palm, force=force))
+    elif what == "stretch":
+        stretches = hand.wrist.stretches.copy()
+        stretches[4] += 1e-6
+        hand = replace(hand, wrist=replace(hand.wrist, stretches=stretches))
     else:
         hand = replace(hand, wrist=replace(hand.wrist, driven=False))
     hands = (answer.hands[0], hand, *answer.hands[2:])

@@ -14,7 +14,6 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from hand_models.base import InvalidInputError, Pose
-from planner.explanation import PALM_WITHOUT_TRAVEL
 from planner.pictures import summary, write_report
 from planner.pictures.report import draw_route
 from planner.question import ForceCap, Limits, Load
@@ -479,7 +478,7 @@ def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: 
     far = replace(route.moves[0], hand=replace(first, pose=high))
     climbed = evaluate(replace(route, moves=(far, *route.moves[1:2])))
     found = [
-        [each for each in answer.findings if each.kind != PALM_WITHOUT_TRAVEL]
+        [each for each in answer.findings if each.kind != "palm_without_travel"]
         for answer in climbed.plans
     ]
     odd = [bool(each) for each in found]
@@ -493,7 +492,7 @@ def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: 
     told = summary(climbed)
     reached = [each[0] for each in found if each]
     assert {each.kind for each in reached} == {"out_of_reach"}
-    reported = [each for each in told["findings"] if each["kind"] != PALM_WITHOUT_TRAVEL]
+    reported = [each for each in told["findings"] if each["kind"] != "palm_without_travel"]
     assert [each["message"] for each in reported] == [each.message for each in reached]
     assert {each["move"] for each in reported} == {1, 2}
     odd_ones = [text for text in told["warnings"] if "out of reach" in text]
@@ -510,7 +509,7 @@ def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: 
 
 def test_a_sound_route_has_nothing_odd_but_unknown_joints(result):
     (finding,) = summary(result)["findings"]
-    assert finding["kind"] == PALM_WITHOUT_TRAVEL
+    assert finding["kind"] == "palm_without_travel"
     no_joints, palms = summary(result)["warnings"]
     assert no_joints.endswith(NO_JOINTS)
     assert palms.endswith(finding["message"])
@@ -521,7 +520,7 @@ def test_what_palms_lack_is_said_once_for_a_route_where_it_is_most(result):
         finding
         for stage in result.stages
         for finding in plan(stage.question).findings
-        if finding.kind == PALM_WITHOUT_TRAVEL
+        if finding.kind == "palm_without_travel"
     ]
     assert len(alone) > 1
     (said,) = [each for answer in result.plans for each in answer.findings]
