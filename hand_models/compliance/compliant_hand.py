@@ -123,7 +123,7 @@ class CompliantHand:
         settled, hand = self.settled, self.settled.hand
         base_tile = name.startswith("outer")
         own = settled.finger_of == i
-        tendon = FingerTendon.from_table(hand.table, base_tile)
+        tendon = FingerTendon.from_table(hand.table, base_tile, settled.stiffness_ratio)
         return FingerAtRest(
             settled.fingers[i],
             hand.section(name, settled.hold, settled.grasp, settled.seating.pose),

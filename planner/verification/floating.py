@@ -191,10 +191,16 @@ def _tendon(
 
 def _contact_stiffness(hand: SettledHand, own: Indices, known: FingerTendon) -> Array:
     """Return the contact stiffness of a finger's tiles, by their spines on rock, shape (n,)."""
+    springs, strands, of_each = (
+        known.spring_stiffness,
+        known.pulley_ratio,
+        hand.hand.finger.shear_gain,
+    )
+    gains = np.array((*of_each[: len(own) - len(PHALANGES)], *of_each))
+    whole = hand.stiffness_ratio * springs * gains / (strands - gains)
     # a tile whose spines alone gave as these and its spring do would have φ g of shear per newton
-    of_each = hand.hand.finger.shear_gain
-    gains = hand.engagement[own] * (*of_each[: len(own) - len(PHALANGES)], *of_each)
-    return np.asarray(known.spring_stiffness * gains / (known.pulley_ratio - gains))
+    some = hand.engagement[own] * strands * whole / (whole + springs)
+    return np.asarray(springs * some / (strands - some))
 
 
 def _check_stretches(

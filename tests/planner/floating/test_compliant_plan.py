@@ -10,11 +10,14 @@ import pytest
 from hand_models.base import UnsupportedError, wrench_transport
 from hand_models.compliance import DrivenHand
 from hand_models.hand import WristTravel
+from hand_models.parameters import own_draw, own_hand
+from hand_models.tile import Surface
 from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists
 from planner.prepare import prepare_stance, settle_hand
 from planner.question import LimbStiffness, Question
 from planner.result import Plan
+from planner.robots import robosimian
 from planner.solving import KnownStance, plan
 from service.answering import questions
 from service.commands.stances import read_request
@@ -239,3 +242,46 @@ def test_hands_a_hair_aside_give_much_the_same_plan() -> None:
     off = np.abs(np.array(used) / answered().utilisation - 1.0)
     assert np.median(off) <= 0.01
     assert off.max() <= 0.05
+
+
+def on_stiffer_rock(question: Question, ratio: float) -> Question:
+    """Ask the same of hands whose tiles are so many times as stiff on rock."""
+    entry = {"value": ratio, "unit": "1", "source": "assumed"}
+    own = own_draw({"hand": {"tile": {"rock_stiffness_ratio": entry}}})
+    robot = robosimian(own_hand(own.hand))
+    return replace(question, stance=replace(question.stance, robot=robot))
+
+
+def test_the_stiffness_on_rock_counts_where_a_wrist_has_moved() -> None:
+    soft, usual = (on_stiffer_rock(asked(), ratio) for ratio in (0.5, 1.0))
+    at = answered().hands[0]
+    hands = [DrivenHand(settle_hand(q.stance.hands[0], q.stance)) for q in (soft, usual)]
+    tensions = at.tensions[None]
+    half, whole = (hand.loads(at.wrist.twist[None], tensions).shears[0] for hand in hands)
+    (rest, same) = (hand.loads(np.zeros((1, 6)), tensions).shears[0] for hand in hands)
+    np.testing.assert_allclose(rest, same, atol=1e-9)
+    np.testing.assert_allclose(whole, at.loads[:, 0], atol=1e-9)
+    # what travel adds or takes is less on softer rock, though more than half: springs give, too
+    moved = np.abs(whole - rest) > 1.0
+    assert moved.any()
+    share = (half - rest)[moved] / (whole - rest)[moved]
+    assert (share < 1.0).all()
+    assert share.min() > 0.45
+
+
+def test_the_check_knows_the_stiffness_on_rock() -> None:
+    soft = on_stiffer_rock(asked(), 0.5)
+    answer = plan(soft)
+    assert answer.verified
+    assert not problems(soft, answer)
+    assert problems(asked(), answer)
+    assert problems(soft, answered())
+
+
+def test_on_the_sandpaper_of_the_calibration_it_counts_nothing() -> None:
+    place = replace(asked().stance.hands[0], surface=Surface.named("sandpaper-36"))
+    twist, loads = np.array([[2e-3, 0.0, -1e-3, 0.0, 1e-2, 0.0]]), []
+    for ratio in (0.5, 1.0):
+        stance = on_stiffer_rock(asked(), ratio).stance
+        loads.append(DrivenHand(settle_hand(place, stance)).loads(twist).shears)
+    np.testing.assert_array_equal(*loads)
