@@ -94,6 +94,8 @@ from .route import (
 )
 from .solving import (
     KnownStance as KnownStance,
+    PalmLoadFactors as PalmLoadFactors,
+    load_factors_without_palm_loads as load_factors_without_palm_loads,
     plan as plan,
     with_advice as with_advice,
 )

@@ -32,7 +32,7 @@ from hand_models.compliance.grasp import complex_steps, slopes
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
-from hand_models.tendon import FingerTendon, MotorScheme, share_load
+from hand_models.tendon import FingerTendon, MotorScheme
 
 __all__ = ["CompliantHand", "CompliantHands", "HandLoads"]
 
@@ -110,12 +110,7 @@ class CompliantHand:
         self.fingers = [self._finger(i, name) for i, name in enumerate(FINGERS)]
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
         self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
-        self.palm_shear_stiffness = 0.0
-        rubs = hand.palm_friction, hand.palm_own_friction
-        for share, tiles in settled.palm.layers:
-            contacts = tuple(hand.palm_contact[i] for i in tiles)
-            sharing = share_load(contacts, hand.palm_spring, *rubs)
-            self.palm_shear_stiffness += share * float(sharing.tile_stiffness.sum())
+        self.palm_shear_stiffness = float(settled.palm_stiffness[0])
 
     @cached_property
     def _together(self) -> CompliantFingers:
@@ -129,7 +124,7 @@ class CompliantHand:
         settled, hand = self.settled, self.settled.hand
         base_tile = name.startswith("outer")
         own = settled.finger_of == i
-        tendon = FingerTendon.from_table(hand.table, base_tile)
+        tendon = FingerTendon.from_table(hand.table, base_tile, settled.stiffness_ratio)
         return FingerAtRest(
             settled.fingers[i],
             hand.section(name, settled.hold, settled.grasp, settled.seating.pose),

@@ -178,6 +178,26 @@ class FloatingWrist(CompliantGrasp):
         """
         return self.hand.loads(y)
 
+    def stretches(self, shears: Array) -> Array:
+        """Return how far tiles are stretched along the rock: shear over contact stiffness [m].
+
+        Parameters
+        ----------
+        shears : ndarray, shape (n,)
+            Shear of each tile [N].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Zero for tiles off the rock.
+        """
+        stiffness = np.concatenate(
+            [finger.anchored.contact_stiffness for finger in self.hand.fingers]
+        )
+        held, found = stiffness > 0.0, np.zeros(len(stiffness))
+        found[held] = np.abs(shears[held]) / stiffness[held]
+        return found
+
     def _grasp_loads(self, loads: HandLoads) -> GraspLoads:
         elements = [loads.shears, loads.normals, loads.laterals, loads.tensions, loads.palm]
         return GraspLoads(

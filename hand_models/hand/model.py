@@ -85,6 +85,8 @@ class HandModel:
             raise InvalidInputError(
                 f"must be in (0, 1], got {self.least_share:g}", field="tile.least_share"
             )
+        self.rock_stiffness_ratio = table.positive("tile", "rock_stiffness_ratio")
+        self.largest_tile_stretch = table.positive("tile", "largest_tile_stretch")
         self.lateral_stiffness = table.positive("tile", "lateral_stiffness")
         self.bending_stiffness = table.positive("beam", "bending_stiffness")
         self.torsional_stiffness = table.positive("beam", "torsional_stiffness")

@@ -17,7 +17,9 @@ from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.names import CONTACT_NAMES, FINGERS, FINGERTIP_FORCE, NAIL, NAIL_SHEAR
 from hand_models.hand.seating import Seating
+from hand_models.parameters import FITTED_SURFACE
 from hand_models.rock import Hold
+from hand_models.tendon import share_load
 from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
@@ -288,6 +290,29 @@ class SettledHand:
         """Number of whole tiles that each finger's spines on rock make, Σ φ, shape (4,)."""
         sums = np.bincount(self.finger_of, weights=self.engagement, minlength=len(FINGERS))
         return np.asarray(sums, dtype=float)
+
+    @property
+    def stiffness_ratio(self) -> float:
+        """Contact stiffness of tiles on this surface over that of the calibration.
+
+        It counts where the wrist moves; on closing tiles are dragged as calibrated.
+        """
+        return 1.0 if self.surface.name == FITTED_SURFACE else self.hand.rock_stiffness_ratio
+
+    @cached_property
+    def palm_stiffness(self) -> Array:
+        """Stiffness of the palm in shear and in pressing, shape (2,) [N/m].
+
+        Load sharing of whole tiles, averaged over the palm's layers; zero if no tile is engaged.
+        """
+        hand, found = self.hand, np.zeros(2)
+        for share, tiles in self.palm.layers:
+            contacts = tuple(hand.palm_contact[i] for i in tiles)
+            rubs = hand.palm_friction, hand.palm_own_friction
+            sharing = share_load(contacts, hand.palm_spring, *rubs)
+            each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
+            found += share * np.array(each)
+        return found
 
     @cached_property
     def nails(self) -> Array:

@@ -1,4 +1,5 @@
 from .draws import (
+    FITTED_SURFACE as FITTED_SURFACE,
     ParameterSample as ParameterSample,
     bundled_draws as bundled_draws,
     draws_of as draws_of,

@@ -8,8 +8,10 @@ r = 0 … n − 1 the rank of the sample's term in an additive recurrence of low
 
     x_kj = k φ⁻ʲ mod 1,    φ^(d+1) = φ + 1,    k = 1 … n samples,  j = 1 … d ranges,
 
-so that the same sets make the same samples everywhere. A caller's samples are entries in the form
-of ``hand.toml`` and ``surfaces.toml`` (`own_draw`).
+so that the same sets make the same samples everywhere. Samples for wrists that move also have a
+contact stiffness on rock, log-uniform by a recurrence of its own, so that all else in them is as
+without it. A caller's samples are entries in the form of ``hand.toml`` and ``surfaces.toml``
+(`own_draw`).
 """
 
 from __future__ import annotations
@@ -32,10 +34,20 @@ from hand_models.parameters.tables import (
     surface_table,
 )
 
-__all__ = ["ParameterSample", "bundled_draws", "draws_of", "even_quantiles", "own_draw"]
+__all__ = [
+    "FITTED_SURFACE",
+    "ParameterSample",
+    "bundled_draws",
+    "draws_of",
+    "even_quantiles",
+    "own_draw",
+]
 
 FITTED_SURFACE: Final = "sandpaper-36"
 """The surface on which a set's tile was fitted; the set has the strength on this surface."""
+
+STIFFNESS_RATIO: Final = "rock_stiffness_ratio"
+"""Entry of a tile: contact stiffness on rock over that of the fitted surface."""
 
 ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
 """Pattern of an entry's name, or of one number of an entry that is a list, such as ``radii[1]``."""
@@ -101,7 +113,9 @@ def _check(draw: ParameterSample, hand: ParameterTable | None) -> None:
 
 
 @stored("draws", 8)
-def bundled_draws(hand: ParameterTable | None = None) -> tuple[ParameterSample, ...]:
+def bundled_draws(
+    hand: ParameterTable | None = None, *, wrists_move: bool = False
+) -> tuple[ParameterSample, ...]:
     """Return the bundled samples, one for each set of ``draws.toml``; a cache keeps 8 results.
 
     Parameters
@@ -109,12 +123,14 @@ def bundled_draws(hand: ParameterTable | None = None) -> tuple[ParameterSample, 
     hand : ParameterTable, optional
         All parameters of the hand; the bundled ones by default. Entries that differ from the
         bundled hand are taken as known: no sample changes them.
+    wrists_move : bool, optional
+        Whether the samples are for compliant or floating wrists; see `draws_of`.
     """
-    return draws_of(draw_table(), hand)
+    return draws_of(draw_table(), hand, wrists_move=wrists_move)
 
 
 def draws_of(
-    sets: ParameterTable, hand: ParameterTable | None = None
+    sets: ParameterTable, hand: ParameterTable | None = None, *, wrists_move: bool = False
 ) -> tuple[ParameterSample, ...]:
     """Make the samples of a table of fitted sets and ranges.
 
@@ -125,6 +141,10 @@ def draws_of(
     hand : ParameterTable, optional
         All parameters of the hand; the bundled ones by default. Entries that differ from the
         bundled hand are taken as known: no sample changes them.
+    wrists_move : bool, optional
+        Whether the samples are for compliant or floating wrists, and so have a contact stiffness on
+        rock; everything else in them is the same. A caller's ``contact_stiffness`` is taken as that
+        on rock.
 
     Returns
     -------
@@ -141,10 +161,14 @@ def draws_of(
     count = _checked_count(sets)
     known = hand.difference(hand_table())
     quantiles = even_quantiles(count, len(_ranged()) + 1)
+    ratios = _stiffness_ratios(sets, known, count) if wrists_move else None
     draws = []
     for k in range(count):
         strengths = _strengths(sets, k, quantiles[k, :-1])
-        draw = ParameterSample(_hand_of(sets, k, hand, known, float(quantiles[k, -1])), strengths)
+        of_hand = _hand_of(sets, k, hand, known, float(quantiles[k, -1]))
+        if ratios is not None:
+            of_hand = of_hand.replaced(ParameterTable({"tile": {STIFFNESS_RATIO: ratios[k]}}))
+        draw = ParameterSample(of_hand, strengths)
         with errors_under(f"[{k}]"):
             _check(draw, hand)
         draws.append(draw)
@@ -208,8 +232,9 @@ def _checked_count(sets: ParameterTable) -> int:
                 f"must be from 0 to 1 (1: off the data by their whole tolerance), got {misfit:g}",
                 field=f"fit.misfit.value[{k}]",
             )
-    if (size := len(sets.vector("ranges", "rock_ratio"))) != 2:
-        raise InvalidInputError(f"two numbers are needed, got {size}", field="ranges.rock_ratio")
+    for name in ("rock_ratio", "rock_stiffness"):
+        if (size := len(sets.vector("ranges", name))) != 2:
+            raise InvalidInputError(f"two numbers are needed, got {size}", field=f"ranges.{name}")
     return count
 
 
@@ -261,6 +286,20 @@ def _hand_of(
     middle, half = hand.scalar("finger", "seated_contact"), sets.scalar("ranges", "seated_contact")
     change("finger", "seated_contact", middle + half * (2.0 * quantile - 1.0), aside, 0)
     return ParameterTable(found)
+
+
+def _stiffness_ratios(
+    sets: ParameterTable, known: ParameterTable, count: int
+) -> list[Quantity] | None:
+    """Return each sample's contact stiffness on rock over that of the fit; None where known."""
+    if {STIFFNESS_RATIO, "contact_stiffness"} & known.sections.get("tile", {}).keys():
+        return None
+    least, most = sets.vector("ranges", "rock_stiffness")
+    # the first range of a longer recurrence than that of all other ranges
+    own = even_quantiles(count, len(_ranged()) + 3)[:, 0]
+    entry = sets.quantity("ranges", "rock_stiffness")
+    values: list[float] = (least * (most / least) ** own).tolist()
+    return [structs.replace(entry, value=value) for value in values]
 
 
 def _strengths(sets: ParameterTable, k: int, quantiles: Array) -> ParameterTable:

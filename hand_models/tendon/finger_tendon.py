@@ -95,7 +95,9 @@ class FingerTendon:
     entry_friction: float = 0.0
 
     @classmethod
-    def from_table(cls, table: ParameterTable, base_tile: bool = False) -> FingerTendon:
+    def from_table(
+        cls, table: ParameterTable, base_tile: bool = False, stiffness_ratio: float = 1.0
+    ) -> FingerTendon:
         """Return the tendon with the numbers of a ``hand.toml`` table, all its tiles on the rock.
 
         Parameters
@@ -103,9 +105,11 @@ class FingerTendon:
         table : ParameterTable
         base_tile : bool, optional
             Whether a tile on the finger's base comes first.
+        stiffness_ratio : float, optional
+            Contact stiffness over that of the table.
         """
         radii = table.vector("finger", "pulley_radii")
-        stiffness = table.vector("tile", "contact_stiffness")
+        stiffness = tuple(stiffness_ratio * k for k in table.vector("tile", "contact_stiffness"))
         if base_tile:
             radii, stiffness = (0.0, *radii), (stiffness[0], *stiffness)
         return cls(

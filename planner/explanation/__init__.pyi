@@ -29,3 +29,8 @@ from .stance_warnings import (
     strained_preloads as strained_preloads,
     warnings as warnings,
 )
+from .wrist_findings import (
+    ONE_OF_A_PLAN as ONE_OF_A_PLAN,
+    palm_findings as palm_findings,
+    stretch_findings as stretch_findings,
+)

@@ -45,6 +45,12 @@ class ExplanationTolerances:
     """Distance of the centre of mass from its assumed place that gives no warning [m]: on a
     vertical wall 0.12 m changed the load factor of four hands by a sixth.
     """
+    palm_travel: float = 1e-3
+    """Travel that the palm of a fixed hand may lack without a finding [m]: a hand on a cylinder of
+    300 mm that is 1 mm farther off the rock holds less than half.
+    """
+    palm_pressing: float = 1.0
+    """Pressing of a palm that counts as none [N]: below 1 % of what a hand carries."""
 
 
 TOLERANCES: Final = ExplanationTolerances()

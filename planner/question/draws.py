@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -56,7 +57,10 @@ class DrawnHand(NamedTuple):
 
 @stored("hands of draws", 8)  # those used last
 def drawn_hands(
-    hand: HandModel, draws: tuple[ParameterSample, ...] | None = None
+    hand: HandModel,
+    draws: tuple[ParameterSample, ...] | None = None,
+    *,
+    wrists_move: bool = False,
 ) -> tuple[DrawnHand, ...]:
     """Return the hand model and the surfaces of each Monte Carlo sample. Cached.
 
@@ -66,6 +70,9 @@ def drawn_hands(
         Hand of the stance. Parameters that a sample does not contain have the values of this hand.
     draws : tuple of ParameterSample, optional
         Samples; the bundled ones by default.
+    wrists_move : bool, optional
+        Whether the bundled samples are for compliant or floating wrists, and so have a contact
+        stiffness on rock.
 
     Returns
     -------
@@ -78,7 +85,7 @@ def drawn_hands(
         If a sample's values make no possible hand or surface; the field begins with its index.
     """
     if draws is None:
-        draws = bundled_draws(hand.table)
+        draws = bundled_draws(hand.table, wrists_move=wrists_move)
     found = []
     for i, draw in enumerate(draws):
         with errors_under(f"[{i}]"):
@@ -94,16 +101,14 @@ def drawn_hands(
 
 
 def drawn_quantities(
-    hand: HandModel, draws: tuple[ParameterSample, ...] | None, surfaces: frozenset[str | None]
+    drawn: Sequence[DrawnHand], surfaces: frozenset[str | None]
 ) -> dict[str, Array]:
     """Return the values of each uncertain parameter over all samples, by name.
 
     Parameters
     ----------
-    hand : HandModel
-        Hand of the stance.
-    draws : tuple of ParameterSample or None
-        Samples; None: the bundled ones.
+    drawn : sequence of DrawnHand
+        Hand model and surfaces of each sample.
     surfaces : frozenset of str or None
         Names of the surfaces that the hands are on. Parameters of other surfaces are left out, and
         so are parameters with the same value in all samples.
@@ -115,7 +120,7 @@ def drawn_quantities(
     """
     named = {name for name in surfaces if name is not None}
     on_presets = named | {"defaults"} if named else named
-    drawn, presets = drawn_hands(hand, draws), surface_table().sections
+    presets = surface_table().sections
     found = {}
     for tables in ([each.model.table for each in drawn], [each.surfaces for each in drawn]):
         entries = dict.fromkeys((section, name) for table in tables for section, name, _ in table)

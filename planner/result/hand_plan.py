@@ -48,6 +48,9 @@ class WristPlan:
         Least eigenvalue of the symmetric part of K_g + K: stiffness of the hand on its rock, K_g,
         plus that of the limb, K; rotations over 0.1 m [N/m]. The wrist is stable only if it is
         positive.
+    stretches : ndarray, shape (n,), or None
+        Stretch of each tile along the rock: its shear over its contact stiffness [m]. None in what
+        is no plan.
     """
 
     twist: Array
@@ -57,6 +60,7 @@ class WristPlan:
     driven: bool = False
     pose_target: Array | None = None
     least_stiffness: float | None = None
+    stretches: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

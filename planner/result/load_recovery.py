@@ -330,7 +330,8 @@ def recover_floating_hand(
     y : ndarray, shape (m,)
         Pose in the set's columns: twist from rest [m, rad], of a compliant hand tensions [N] first.
     pose : WristPlan
-        Planned wrist pose; whether the wrist is driven, pose target and stiffness are filled in.
+        Planned wrist pose; whether the wrist is driven, the tiles' stretches, pose target and
+        stiffness are filled in.
     stiffness : LimbStiffness, optional
         Stiffness of the limb.
 
@@ -341,8 +342,9 @@ def recover_floating_hand(
     hand, closed = wrist.hand, wrist.closed_at(y)
     found = wrist.hand_loads(y[None])
     wrench = hand.wrenches(found)[0]
-    pose = replace(pose, palm=wrist.palm_mode(y), driven=wrist.driven)
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]
+    mode, stretches = wrist.palm_mode(y), wrist.stretches(loads[:, 0])
+    pose = replace(pose, palm=mode, driven=wrist.driven, stretches=stretches)
     tensions = found.tensions[0]
     rows, of_tiles = space.utilisations(y), layout_of(settled, sticking=False).plane_tiles
     used = np.zeros(len(loads))

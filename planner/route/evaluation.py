@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 from hand_models.base import CruxError, InvalidInputError, errors_under
+from planner.explanation import ONE_OF_A_PLAN
 from planner.prepare import settle_hand
 from planner.processes import Lost, Workers, cores
-from planner.result import Plan
+from planner.result import Finding, Plan
 from planner.robots import UnreachableError
 from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_route, stages
 from planner.solving import plan
@@ -36,7 +38,8 @@ def evaluate(
     Returns
     -------
     RouteResult
-        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles.
+        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. Of
+        a finding of which a plan has at most one, the largest of all stages is left.
 
     Raises
     ------
@@ -54,7 +57,36 @@ def evaluate(
         plans[i] = answer
         if progress is not None:
             progress(len(plans), len(todo))
-    return RouteResult(route, todo, tuple(plans[i] for i in range(len(todo))))
+    found = [plans[i] for i in range(len(todo))]
+    for kind in ONE_OF_A_PLAN:
+        found = _said_once(found, kind)
+    return RouteResult(route, todo, tuple(found))
+
+
+def _said_once(plans: Sequence[Plan | OutOfReach], kind: str) -> list[Plan | OutOfReach]:
+    """Return plans of which only the one with the largest value has a finding of a kind."""
+    said = {
+        i: finding
+        for i, answer in enumerate(plans)
+        for finding in answer.findings
+        if finding.kind == kind
+    }
+    # of stages alike but for rounding, to a micrometre, the first
+    worst = max(said, key=lambda i: round(said[i].value, 6), default=-1)
+    said.pop(worst, None)
+    return [
+        _without(answer, said[i]) if isinstance(answer, Plan) and i in said else answer
+        for i, answer in enumerate(plans)
+    ]
+
+
+def _without(answer: Plan, finding: Finding) -> Plan:
+    """Return a plan without a finding and its warning."""
+    return replace(
+        answer,
+        findings=tuple(each for each in answer.findings if each != finding),
+        warnings=tuple(text for text in answer.warnings if text != finding.message),
+    )
 
 
 Answer = Plan | OutOfReach | InvalidInputError

@@ -6,6 +6,10 @@ from .objectives import (
     Objective as Objective,
     objective_of as objective_of,
 )
+from .palm_parts import (
+    PalmLoadFactors as PalmLoadFactors,
+    load_factors_without_palm_loads as load_factors_without_palm_loads,
+)
 from .solve import (
     KnownStance as KnownStance,
     plan as plan,

@@ -26,8 +26,10 @@ from planner.explanation import (
     limit_sentence,
     limit_unit,
     overload_sentence,
+    palm_findings,
     shortfall_sentence,
     strained_preloads,
+    stretch_findings,
     tension_path,
     unsafe_sentence,
 )
@@ -87,7 +89,12 @@ def explained_plan(
     if isinstance(answer, Verified):
         parts, late_parts, further = _of_plan(prepared, checks, answer)
         unfinished += late_parts
-        odd = (*odd, *_spare_findings(prepared, answer))
+        odd = (
+            *odd,
+            *_spare_findings(prepared, answer),
+            *palm_findings(prepared, parts["hands"]),
+            *stretch_findings(prepared, parts["hands"]),
+        )
     else:
         parts = _of_none(prepared, answer)
     if "robust" in question.want and prepared.needs_hands:

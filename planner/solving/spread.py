@@ -5,6 +5,9 @@ body wrench stay the same. A hand with a seat is closed at the seat of the sampl
 where it is, and the rock is elsewhere. A hand whose best seat was searched for keeps that seat. The
 search for floating wrists starts from the solution for the question's hands. A sample's plan has no
 certificate, no prices and no explanation.
+
+The contact stiffness on rock is uncertain, too, but counts only where wrists move: samples have it
+if a wrist that is compliant or floating is on another surface than that of the calibration.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from collections.abc import Sequence
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
+from hand_models.parameters import FITTED_SURFACE
 from planner import deadline
 from planner.advice import Attempt
 from planner.deadline import DeadlineError
@@ -49,10 +53,15 @@ def find_spread(
         None if the deadline passed before all samples were planned.
     """
     question, plans = prepared.question, []
-    drawn = question.stance.robot.hand, question.draws
+    surfaces = frozenset(hand.surface.name for hand in question.stance.hands)
+    moving = any(
+        hand.wrist != "fixed" and hand.surface.name != FITTED_SURFACE
+        for hand in question.stance.hands
+    )
+    drawn = drawn_hands(question.stance.robot.hand, question.draws, wrists_move=moving)
     refused: Counter[str] = Counter()
     try:
-        for each in drawn_hands(*drawn):
+        for each in drawn:
             deadline.check("all samples were planned")
             outcomes = _settled(prepared, each)
             there = [hand for hand in outcomes if isinstance(hand, SettledHand)]
@@ -63,9 +72,8 @@ def find_spread(
         deadline.check("all samples were planned")
     except DeadlineError:
         return None
-    surfaces = frozenset(hand.surface.name for hand in question.stance.hands)
     cap = question.limits.utilisation
-    return Spread.of(plans, cap, refused, drawn_quantities(*drawn, surfaces))
+    return Spread.of(plans, cap, refused, drawn_quantities(drawn, surfaces))
 
 
 def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | InvalidInputError]:

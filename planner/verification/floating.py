@@ -148,6 +148,7 @@ def _move(
     change = np.array(angles) - rest
     change = change - math.tau * np.round(change / math.tau)
     turns = np.diff(change, prepend=-float(wrist.twist[3:] @ frame.across))
+    _check_stretches(found, name, hand, own, wrist, arrays.loads[rows, 0])
     off = np.abs(_laterals(hand, frame, own, wrist) - arrays.loads[rows, 2]).max()
     if exact:
         tendon, state = _tendon(hand, own, float(wound[finger]), fingers.shear[rows])
@@ -174,10 +175,7 @@ def _tendon(
 ) -> tuple[FingerTendon, TendonState]:
     table = hand.hand.table
     known = FingerTendon.from_table(table, base_tile=len(own) > len(PHALANGES))
-    # a tile whose spines alone gave as these and its spring do would have φ g of shear per newton
-    of_each = hand.hand.finger.shear_gain
-    gains = hand.engagement[own] * (*of_each[: len(own) - len(PHALANGES)], *of_each)
-    stiffness = known.spring_stiffness * gains / (known.pulley_ratio - gains)
+    stiffness = _contact_stiffness(hand, own, known)
     friction = max(known.friction, hand.hand.tendon_friction)
     tendon = FingerTendon(
         known.pulley_ratio,
@@ -189,6 +187,42 @@ def _tendon(
     )
     losses = np.asarray((1.0 - hand.hand.finger.friction) ** np.arange(len(own), dtype=float))
     return tendon, TendonState(preload, np.asarray(preload * losses), at_rest)
+
+
+def _contact_stiffness(hand: SettledHand, own: Indices, known: FingerTendon) -> Array:
+    """Return the contact stiffness of a finger's tiles, by their spines on rock, shape (n,)."""
+    springs, strands, of_each = (
+        known.spring_stiffness,
+        known.pulley_ratio,
+        hand.hand.finger.shear_gain,
+    )
+    gains = np.array((*of_each[: len(own) - len(PHALANGES)], *of_each))
+    whole = hand.stiffness_ratio * springs * gains / (strands - gains)
+    # a tile whose spines alone gave as these and its spring do would have φ g of shear per newton
+    some = hand.engagement[own] * strands * whole / (whole + springs)
+    return np.asarray(springs * some / (strands - some))
+
+
+def _check_stretches(
+    found: list[str],
+    name: str,
+    hand: SettledHand,
+    own: Indices,
+    wrist: WristPlan,
+    shears: Array,
+) -> None:
+    """Check how far a plan stretches a finger's tiles, by their returned shears (n,) [N]."""
+    known = FingerTendon.from_table(hand.hand.table, base_tile=len(own) > len(PHALANGES))
+    # the force that would stretch each tile as far as the plan says
+    stiffness = _contact_stiffness(hand, own, known)
+    held = stiffness > 0.0
+    if wrist.stretches is None or wrist.stretches.shape != hand.finger_of.shape:
+        found.append(f"{name}: the plan does not say how far its tiles are stretched")
+        return
+    said = wrist.stretches[own]
+    off = np.abs(np.where(held, stiffness * said - np.abs(shears), said)).max()
+    if not off <= 1e-9 * max(1.0, float(np.abs(shears).max())):  # [N], of idle tiles [m]: rounding
+        found.append(f"{name}: tiles are not stretched by what the plan says")
 
 
 def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristPlan) -> Array:

@@ -306,6 +306,7 @@ def wrist_reply(wrist: WristPlan | None) -> replies.Wrist:
         error=finite(wrist.error),
         pose_target=UNSET if wrist.pose_target is None else wrist.pose_target.tolist(),
         least_stiffness=UNSET if wrist.least_stiffness is None else wrist.least_stiffness,
+        largest_stretch=UNSET if wrist.stretches is None else float(wrist.stretches.max()),
     )
 
 

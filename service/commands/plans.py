@@ -80,10 +80,11 @@ def plan_command(
             answer = answering.planned(request, robots)
             full = request.detail in (None, "full") and not brief
             bare = _without_palms(request, robots) if full else None
+            parts = _without_palm_loads(answer) if full else None
         if picture is not None:
             tables.write_plan_picture(answer, picture)
     if not as_json:
-        _print(answer, bare, brief)
+        _print(answer, bare, parts, brief)
         if advised or (not brief and not _holds(answer)):
             # [s] with --advice the search has no timeout of its own
             seconds = None if advised else 30.0
@@ -97,17 +98,32 @@ def plan_command(
     if isinstance(answer.reply, replies.BriefPlanReply):
         tables.say(answer.reply)
     elif as_json:
-        without = {"load_factor_without_palm": None if bare is None else bare.load_factor}
+        without = {
+            "load_factor_without_palm": None if bare is None else bare.load_factor,
+            "load_factor_without_palm_shear": None if parts is None else parts.without_shear,
+            "load_factor_without_palm_pressing": None if parts is None else parts.without_pressing,
+        }
         tables.say(msgspec.to_builtins(answer.reply) | without)
     else:
         _print_files(written, answer.reply)
     return tables.ExitStatus.of(answer.reply.status)
 
 
-def _print(answer: answering.Planned, without_palm: replies.PlanReply | None, brief: bool) -> None:
+def _print(
+    answer: answering.Planned,
+    without_palm: replies.PlanReply | None,
+    palm_parts: planner.PalmLoadFactors | None,
+    brief: bool,
+) -> None:
     """Print a plan for a person at once, before any advice."""
     assert isinstance(answer.reply, replies.PlanReply)  # as a person is given
-    tables.print_plan(answer.reply, tables.console(), without_palm=without_palm, brief=brief)
+    tables.print_plan(
+        answer.reply,
+        tables.console(),
+        without_palm=without_palm,
+        palm_parts=palm_parts,
+        brief=brief,
+    )
     tables.tell_solver(answer.reply)
     sys.stdout.flush()
 
@@ -182,3 +198,11 @@ def _without_palms(
         return None
     assert isinstance(reply, replies.PlanReply)  # of a whole request
     return reply
+
+
+def _without_palm_loads(answer: answering.Planned) -> planner.PalmLoadFactors | None:
+    """Return the load factors without one of the palms' loads; None if the deadline ends before."""
+    try:
+        return planner.load_factors_without_palm_loads(answer.question)
+    except planner.DeadlineError:
+        return None

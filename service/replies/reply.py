@@ -101,6 +101,8 @@ class Wrist(Struct, kw_only=True):
     - ``least_stiffness``: least stiffness of hand, rock and limb together, turns counted over 0.1 m
       [N/m]; the wrist is unstable where the value is not positive. Left out without
       ``limb_stiffness``.
+    - ``largest_stretch``: in a plan, how far the tile that is stretched most is stretched along the
+      rock: its shear over its contact stiffness [m]. Left out where the wrist is fixed.
     """
 
     mode: str
@@ -110,6 +112,7 @@ class Wrist(Struct, kw_only=True):
     error: float | None = None
     pose_target: Vector | UnsetType = UNSET
     least_stiffness: float | UnsetType = UNSET
+    largest_stretch: float | UnsetType = UNSET
 
 
 class Generator(Struct):

@@ -40,6 +40,7 @@ def print_plan(
     out: Console,
     *,
     without_palm: replies.PlanReply | None = None,
+    palm_parts: planner.PalmLoadFactors | None = None,
     brief: bool = False,
 ) -> None:
     """Print a plan: status, loads of hands, tendons, joint torques, and the extras of the reply.
@@ -55,6 +56,8 @@ def print_plan(
         Console to print on.
     without_palm : PlanReply, optional
         Plan of the same question without palms, whose load factor is printed, too.
+    palm_parts : PalmLoadFactors, optional
+        Load factors without the palms' shear, and without their pressing, which are printed, too.
     brief : bool, optional
         True to print only the status, the reason and the sentence about samples.
     """
@@ -77,6 +80,11 @@ def print_plan(
         out.print(
             f"load factor without the palms' shear and pressing: {_load_factor(without_palm)}"
         )
+        if palm_parts is not None:
+            shear, pressing = ("none" if each is None else f"{each:.3f}" for each in palm_parts)
+            out.print(
+                f"without their shear alone: {shear}; without their pressing alone: {pressing}"
+            )
     if isinstance(reply.robust, planner.RobustLoadFactor):
         out.print(robust_sentence(reply.robust))
     if isinstance(reply.open_loop, planner.OpenLoop):

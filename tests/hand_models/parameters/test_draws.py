@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import qmc, truncnorm
+from scipy.stats import qmc, spearmanr, truncnorm
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import HandModel
@@ -98,6 +98,43 @@ def test_quantiles_fill_their_cube_as_evenly_as_a_known_sequence(count):
     np.testing.assert_array_equal(quantiles, even_quantiles(count, 4))
 
 
+def test_where_wrists_move_only_the_stiffness_on_rock_is_drawn_besides():
+    usual, moving = bundled_draws(), bundled_draws(wrists_move=True)
+    ratios = []
+    for without, draw in zip(usual, moving, strict=True):
+        assert draw.surfaces == without.surfaces
+        added = draw.hand.difference(without.hand)
+        assert {name: set(entries) for name, entries in added.sections.items()} == {
+            "tile": {"rock_stiffness_ratio"}
+        }
+        ratios.append(added.scalar("tile", "rock_stiffness_ratio"))
+    # 0.5 to 2, of which the logarithm is even
+    even = (np.arange(len(usual)) + 0.5) / len(usual)
+    np.testing.assert_allclose(np.sort(np.log2(ratios)), 2.0 * even - 1.0)
+    # it goes up or down with no other quantity that is drawn by a range
+    others = [
+        *(
+            [draw.surfaces.scalar(name, "shear_limit") for draw in usual]
+            for name in ("rock", "concrete-fine", "concrete-coarse")
+        ),
+        [draw.hand.scalar("finger", "seated_contact") for draw in usual],
+    ]
+    for other in others:
+        assert abs(spearmanr(ratios, other).statistic) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "unit"),
+    [
+        ("rock_stiffness_ratio", 1.2, "1"),
+        ("contact_stiffness", [4e3, 6e3, 9e3], "N/m"),
+    ],
+)
+def test_a_stiffness_that_the_caller_knows_is_not_drawn_on_rock(name, value, unit):
+    mine = own_hand(ParameterTable.of({"tile": {name: own(value, unit)}}))
+    assert bundled_draws(mine, wrists_move=True) == bundled_draws(mine)
+
+
 def test_numbers_that_the_caller_knows_are_not_drawn():
     mine = {"finger": {"pulley_radii": {"value": [0.0055, 0.003, 0.002], "unit": "m"}}}
     mine["finger"]["seated_contact"] = own(0.022, "m")
@@ -134,6 +171,7 @@ def test_where_engagement_is_known_so_is_that_of_base_tiles():
         (changed("concrete-fine", "shear_limit", value=[30.0] * 30), "concrete-fine.shear_limit"),
         (changed("finger", "pulley_radii[1]", value=[3.0] * 30), "[0].hand.finger.pulley_radii"),
         (changed("ranges", "seated_contact"), "ranges.seated_contact"),
+        (changed("ranges", "rock_stiffness", value=[0.5]), "ranges.rock_stiffness"),
     ],
 )
 def test_a_table_that_makes_no_draws_is_refused_by_its_entry(table, field):

@@ -10,11 +10,14 @@ import pytest
 from hand_models.base import UnsupportedError, wrench_transport
 from hand_models.compliance import CompliantHand
 from hand_models.hand import WristTravel
+from hand_models.parameters import own_draw, own_hand
+from hand_models.tile import Surface
 from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists, without_hindrance
 from planner.prepare import prepare_stance, settle_hand
 from planner.question import LimbStiffness, Question
 from planner.result import Plan
+from planner.robots import robosimian
 from planner.solving import KnownStance, plan
 from service.answering import questions
 from service.commands.stances import read_request
@@ -129,7 +132,7 @@ def test_a_known_stance_that_begins_at_its_last_wrists_ends_as_a_plan_does() -> 
         assert found.utilisation == pytest.approx(expected.utilisation, rel=5e-3)
 
 
-@pytest.mark.parametrize("what", ["twist", "tension", "shear", "palm", "mode"])
+@pytest.mark.parametrize("what", ["twist", "tension", "shear", "palm", "mode", "stretch"])
 def test_the_check_finds_what_is_wrong(what: str) -> None:
     question, answer = asked(), answered()
     assert not problems(question, answer)
@@ -146,6 +149,10 @@ def test_the_check_finds_what_is_wrong(what: str) -> None:
     elif what == "palm":
         force = hand.palm.force + np.array([0.0, 0.0, 0.1])
         hand = replace(hand, palm=msgspec.structs.replace(hand.palm, force=force))
+    elif what == "stretch":
+        stretches = hand.wrist.stretches.copy()
+        stretches[4] += 1e-6
+        hand = replace(hand, wrist=replace(hand.wrist, stretches=stretches))
     else:
         hand = replace(hand, wrist=replace(hand.wrist, driven=False))
     hands = (answer.hands[0], hand, *answer.hands[2:])
@@ -263,3 +270,46 @@ def test_hands_a_hair_aside_give_much_the_same_plan() -> None:
     off = np.abs(np.array(used) / answered().utilisation - 1.0)
     assert np.median(off) <= 0.01
     assert off.max() <= 0.05
+
+
+def on_stiffer_rock(question: Question, ratio: float) -> Question:
+    """Ask the same of hands whose tiles are so many times as stiff on rock."""
+    entry = {"value": ratio, "unit": "1", "source": "assumed"}
+    own = own_draw({"hand": {"tile": {"rock_stiffness_ratio": entry}}})
+    robot = robosimian(own_hand(own.hand))
+    return replace(question, stance=replace(question.stance, robot=robot))
+
+
+def test_the_stiffness_on_rock_counts_where_a_wrist_has_moved() -> None:
+    soft, usual = (on_stiffer_rock(asked(), ratio) for ratio in (0.5, 1.0))
+    at = answered().hands[0]
+    hands = [DrivenHand(settle_hand(q.stance.hands[0], q.stance)) for q in (soft, usual)]
+    tensions = at.tensions[None]
+    half, whole = (hand.loads(at.wrist.twist[None], tensions).shears[0] for hand in hands)
+    (rest, same) = (hand.loads(np.zeros((1, 6)), tensions).shears[0] for hand in hands)
+    np.testing.assert_allclose(rest, same, atol=1e-9)
+    np.testing.assert_allclose(whole, at.loads[:, 0], atol=1e-9)
+    # what travel adds or takes is less on softer rock, though more than half: springs give, too
+    moved = np.abs(whole - rest) > 1.0
+    assert moved.any()
+    share = (half - rest)[moved] / (whole - rest)[moved]
+    assert (share < 1.0).all()
+    assert share.min() > 0.45
+
+
+def test_the_check_knows_the_stiffness_on_rock() -> None:
+    soft = on_stiffer_rock(asked(), 0.5)
+    answer = plan(soft)
+    assert answer.verified
+    assert not problems(soft, answer)
+    assert problems(asked(), answer)
+    assert problems(soft, answered())
+
+
+def test_on_the_sandpaper_of_the_calibration_it_counts_nothing() -> None:
+    place = replace(asked().stance.hands[0], surface=Surface.named("sandpaper-36"))
+    twist, loads = np.array([[2e-3, 0.0, -1e-3, 0.0, 1e-2, 0.0]]), []
+    for ratio in (0.5, 1.0):
+        stance = on_stiffer_rock(asked(), ratio).stance
+        loads.append(DrivenHand(settle_hand(place, stance)).loads(twist).shears)
+    np.testing.assert_array_equal(*loads)

@@ -288,4 +288,5 @@ def test_a_load_that_does_not_fit_the_posture_is_told():
         assert all(each.message in answer.warnings for each in found)
     # without joints, and beside a body wrench, nothing is known of it, or asked
     bare = replace(asked, stance=replace(asked.stance, joints=None))
-    assert plan(replace(bare, load=Load(mass=60.0))).findings == ()
+    found = plan(replace(bare, load=Load(mass=60.0))).findings
+    assert not [each for each in found if each.field.startswith("load")]

@@ -477,7 +477,11 @@ def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: 
     high = Pose(np.array([*first.pose.position[:2], 3.0]), first.pose.rotation)
     far = replace(route.moves[0], hand=replace(first, pose=high))
     climbed = evaluate(replace(route, moves=(far, *route.moves[1:2])))
-    odd = [bool(answer.findings) for answer in climbed.plans]
+    found = [
+        [each for each in answer.findings if each.kind != "palm_without_travel"]
+        for answer in climbed.plans
+    ]
+    odd = [bool(each) for each in found]
     holds = [
         any(hand.limb == first.limb and hand.pose is high for hand in stage.question.stance.hands)
         for stage in climbed.stages
@@ -486,12 +490,13 @@ def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: 
     assert odd == holds
     assert any(odd)
     told = summary(climbed)
-    reached = [answer.findings[0] for answer in climbed.plans if answer.findings]
-    assert {found.kind for found in reached} == {"out_of_reach"}
-    assert [each["message"] for each in told["findings"]] == [each.message for each in reached]
-    assert {each["move"] for each in told["findings"]} == {1, 2}
-    odd_ones = [each for each in told["warnings"] if not each.endswith(NO_JOINTS)]
-    assert len(odd_ones) == len({found.message for found in reached})
+    reached = [each[0] for each in found if each]
+    assert {each.kind for each in reached} == {"out_of_reach"}
+    reported = [each for each in told["findings"] if each["kind"] != "palm_without_travel"]
+    assert [each["message"] for each in reported] == [each.message for each in reached]
+    assert {each["move"] for each in reported} == {1, 2}
+    odd_ones = [text for text in told["warnings"] if "out of reach" in text]
+    assert len(odd_ones) == len({each.message for each in reached})
     assert odd_ones[0].endswith(reached[0].message)
     assert odd_ones[0].startswith("move")
     files = write_report(climbed, tmp_path)
@@ -503,6 +508,23 @@ def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: 
 
 
 def test_a_sound_route_has_nothing_odd_but_unknown_joints(result):
-    assert summary(result)["findings"] == []
-    (warning,) = summary(result)["warnings"]
-    assert warning.endswith(NO_JOINTS)
+    (finding,) = summary(result)["findings"]
+    assert finding["kind"] == "palm_without_travel"
+    no_joints, palms = summary(result)["warnings"]
+    assert no_joints.endswith(NO_JOINTS)
+    assert palms.endswith(finding["message"])
+
+
+def test_what_palms_lack_is_said_once_for_a_route_where_it_is_most(result):
+    alone = [
+        finding
+        for stage in result.stages
+        for finding in plan(stage.question).findings
+        if finding.kind == "palm_without_travel"
+    ]
+    assert len(alone) > 1
+    (said,) = [each for answer in result.plans for each in answer.findings]
+    assert said.value == max(each.value for each in alone)
+    assert sum(said.message in answer.warnings for answer in result.plans) == 1
+    every = [text for answer in result.plans for text in answer.warnings]
+    assert sum("a fixed wrist does not move" in text for text in every) == 1

@@ -38,15 +38,17 @@ def test_findings_have_a_field_of_the_request_and_warnings_their_words(sound):
     asked = exchanged(sound)
     reply = answered(asked)
     assert departures("PlanReply", reply) == []
-    (found,) = reply["findings"]
+    found, palms = reply["findings"]
     assert reply["warnings"][0] == found["message"]
+    assert palms["kind"] == "palm_without_travel"
+    assert palms["message"] in reply["warnings"]
     assert set(found) == {"kind", "field", "message", "value", "unit"}
     assert (found["kind"], found["unit"]) == ("limbs_crossed", "m")
     # the field leads to what it is about
     index = int(found["field"].split("[")[1].split("]")[0])
     assert found["field"] == f"stance.hands[{index}].limb"
     assert asked["stance"]["hands"][index]["limb"] in found["message"]
-    assert answered(sound)["findings"] == []
+    assert [each["kind"] for each in answered(sound)["findings"]] == ["palm_without_travel"]
 
 
 def test_less_detail_and_body_spaces_tell_findings_as_they_tell_warnings(sound):

@@ -90,6 +90,12 @@ def test_a_plan_says_how_much_hangs_on_the_palms(stance_file, capfd):
     assert f"load factor {reply['load_factor']:.3f}" in out
     without = f"{reply['load_factor_without_palm']:.3f}"
     assert f"load factor without the palms' shear and pressing: {without}" in out
+    shear, pressing = (reply[f"load_factor_without_palm_{load}"] for load in ("shear", "pressing"))
+    assert 0.0 < pressing < shear < reply["load_factor"]
+    assert (
+        f"without their shear alone: {shear:.3f}; without their pressing alone: {pressing:.3f}"
+        in out
+    )
     assert reply["reason"] in out.replace("\n", " ")
     for hand in reply["hands"]:
         assert hand["limb"] in out
