@@ -283,7 +283,10 @@ def on_stiffer_rock(question: Question, ratio: float) -> Question:
 def test_the_stiffness_on_rock_counts_where_a_wrist_has_moved() -> None:
     soft, usual = (on_stiffer_rock(asked(), ratio) for ratio in (0.5, 1.0))
     at = answered().hands[0]
-    hands = [DrivenHand(settle_hand(q.stance.hands[0], q.stance)) for q in (soft, usual)]
+    hands = [
+        CompliantHand(settle_hand(q.stance.hands[0], q.stance), scheme="tension")
+        for q in (soft, usual)
+    ]
     tensions = at.tensions[None]
     half, whole = (hand.loads(at.wrist.twist[None], tensions).shears[0] for hand in hands)
     (rest, same) = (hand.loads(np.zeros((1, 6)), tensions).shears[0] for hand in hands)
@@ -311,5 +314,6 @@ def test_on_the_sandpaper_of_the_calibration_it_counts_nothing() -> None:
     twist, loads = np.array([[2e-3, 0.0, -1e-3, 0.0, 1e-2, 0.0]]), []
     for ratio in (0.5, 1.0):
         stance = on_stiffer_rock(asked(), ratio).stance
-        loads.append(DrivenHand(settle_hand(place, stance)).loads(twist).shears)
+        model = CompliantHand(settle_hand(place, stance), scheme="tension")
+        loads.append(model.loads(twist).shears)
     np.testing.assert_array_equal(*loads)
