@@ -198,7 +198,7 @@ class Question:
             preload = hand.grasp.closing_tension or model.closing_tension
             if hand.tendon_preload is not None:
                 preload = float(hand.tendon_preload.min())
-            if least > preload:
+            if least > max(preload, 0.0):  # no preload is below zero
                 raise InvalidInputError(
                     f"must be at most the tendon_preload of {hand.limb}, whose motors stand still "
                     f"({preload:g} N), got {least:g} N; lower it, give more tendon_preload, or "

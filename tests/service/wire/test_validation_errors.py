@@ -167,7 +167,7 @@ INVALID = [
         ("stance", "joints"),
         JOINTS | {"rear_right": [0.0] * 7},
         "stance.hands[1].pose",
-        "rear_right is ",
+        "pose of rear_right's joint angles",
     ),
     ((*FRONT, "wrench"), [1.0, 2.0, 3.0], f"{HAND}.wrench", "length 6"),
     ((*FRONT, "wrench"), [None, None, "x", 0, 0, 0], f"{HAND}.wrench[2]", "a number or null"),
