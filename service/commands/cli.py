@@ -77,7 +77,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "study": Entry(
         "studies",
-        "Run an experiment of the paper again, and hold its claims against the model.",
+        "Run an experiment of the paper again, and compare its claims with the model.",
     ),
     "sweep": Entry(
         "sweep",

@@ -128,9 +128,9 @@ def test_a_limb_may_be_given_and_the_others_found(climbed, solved):
         (0, "nobody", lambda _: "solve", "moves[0].joints.nobody", "unknown limb"),
         (1, "", lambda _: "solve", "moves[1].joints.", "unknown limb"),
         (1, "rear_left", lambda _: "guess", "moves[1].joints.rear_left", "'solve'"),
-        (0, "front_left", lambda q: 0.5 * q, "moves[0].pose", "from the pose of its joint angles"),
-        (1, "rear_right", lambda q: 0.5 * q, "stance.hands[", "from the pose of its joint angles"),
-        (1, "front_right", lambda q: 0.9 * q, "moves[1].pose", "from the pose of its joint angles"),
+        (0, "front_left", lambda q: 0.5 * q, "moves[0].pose", "of the pose of"),
+        (1, "rear_right", lambda q: 0.5 * q, "stance.hands[", "of the pose of"),
+        (1, "front_right", lambda q: 0.9 * q, "moves[1].pose", "of the pose of"),
     ],
 )
 def test_angles_that_cannot_be_are_told_with_their_move(
