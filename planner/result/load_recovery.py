@@ -339,7 +339,7 @@ def recover_floating_hand(
     HandPlan
     """
     hand, closed = wrist.hand, wrist.closed_at(y)
-    found = wrist.hand_loads(y[None])
+    found = wrist.loads_of(y)
     wrench = hand.wrenches(found)[0]
     pose = replace(pose, palm=wrist.palm_mode(y), driven=wrist.driven)
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]

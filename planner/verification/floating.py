@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -221,15 +222,7 @@ def _check_palm(
     """Check the force of the palm of a floating hand."""
     if not hand.palm.engaged:
         return
-    body, stiffness = hand.hand, 0.0
-    for share, engaged in hand.palm.layers:
-        sharing = share_load(
-            tuple(body.palm_contact[i] for i in engaged),
-            body.palm_spring,
-            body.palm_friction,
-            body.palm_own_friction,
-        )
-        stiffness += share * float(sharing.tile_stiffness.sum())
+    body, stiffness = hand.hand, _palm_stiffness(hand)
     step = moved(hand.palm.centre, wrist)
 
     # the integral of a stiffness that rises from zero to its whole over the onset [m]
@@ -249,3 +242,18 @@ def _check_palm(
         found.append(
             f"{limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"
         )
+
+
+@lru_cache(maxsize=64)  # as many hands as `SETTLED_LIMITS` keeps stances
+def _palm_stiffness(hand: SettledHand) -> float:
+    """Return the stiffness of a palm's springs in shear, by the sharing of their load [N/m]."""
+    body, stiffness = hand.hand, 0.0
+    for share, engaged in hand.palm.layers:
+        sharing = share_load(
+            tuple(body.palm_contact[i] for i in engaged),
+            body.palm_spring,
+            body.palm_friction,
+            body.palm_own_friction,
+        )
+        stiffness += share * float(sharing.tile_stiffness.sum())
+    return stiffness

@@ -18,6 +18,9 @@ from hand_models.sections import Section
 
 __all__ = ["TileFace", "slip_of"]
 
+PRESSURE_NODES, PRESSURE_WEIGHTS = np.polynomial.legendre.leggauss(3)
+"""Gauss-Legendre quadrature that integrates a tile's parabolic pressure exactly."""
+
 
 class TileFace(NamedTuple):
     """A tile's face in the axes of its phalanx, turned by the contact's tilt.
@@ -69,9 +72,8 @@ class TileFace(NamedTuple):
         start, end = max(self.near, touches - widest), min(self.far, touches + widest)
         if not start < end:
             return touches
-        nodes, weights = np.polynomial.legendre.leggauss(3)
-        places = (start + end) / 2.0 + (end - start) / 2.0 * nodes
-        pressures = weights * (self.depth - (places - touches) ** 2 / (2.0 * radius))
+        places = (start + end) / 2.0 + (end - start) / 2.0 * PRESSURE_NODES
+        pressures = PRESSURE_WEIGHTS * (self.depth - (places - touches) ** 2 / (2.0 * radius))
         return float(pressures @ places / pressures.sum())
 
 
