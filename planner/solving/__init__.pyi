@@ -6,8 +6,10 @@ from .objectives import (
     Objective as Objective,
     objective_of as objective_of,
 )
+from .solution import Infeasible as Infeasible, Verified as Verified
 from .solve import (
     KnownStance as KnownStance,
+    StanceAnswer as StanceAnswer,
     plan as plan,
     try_stance as try_stance,
     with_advice as with_advice,
