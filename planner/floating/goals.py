@@ -42,6 +42,10 @@ class FloatingSettings:
     """Gap of a plan for the next body wrench to the best of the sets about it, at most, relative.
 
     Less is not worth another round: the model itself is no better."""
+    next_nearness: float = 0.1
+    """Weight of half the squared step to the next body wrench's plan, in the units of z.
+
+    Where a step saves little, as where fewer limits bind than there are loads, the point stays."""
     next_rounds: int = 5  # from the last plan to the next, at most
     next_error: float = 0.01
     """Missing wrench and violations, in their units, that are left to Newton steps.

@@ -48,8 +48,8 @@ def next_plan(hands: HandSets, near: WristSolution, budget: Budget) -> WristSolu
     for rounds in range(1, SETTINGS.next_rounds + 1):
         if budget.ended:
             break
-        price, loads = SETTINGS.price, now.point.loads
-        step = programs.elastic(now.sets.data, price, loads, firm_rows(now.sets))
+        price, loads, firm = SETTINGS.price, now.point.loads, firm_rows(now.sets)
+        step = programs.elastic(now.sets.data, price, loads, firm, SETTINGS.next_nearness)
         budget.spend()
         if not step.solved:
             break

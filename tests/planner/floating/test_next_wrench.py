@@ -45,6 +45,20 @@ def test_the_next_plan_is_exact_and_as_good_as_a_new_search(name):
         assert measure.utilisation == pytest.approx(whole.utilisation, rel=0.01)
 
 
+@pytest.mark.slow
+def test_where_few_limits_bind_the_next_plan_is_found_all_the_same():
+    question = complying(questions.question(read_request("boulders")))
+    stance = KnownStance(question)
+    base = 0.9 * stance.prepared.wrench
+    now = stance.answer(base, 0.0).answer.solution.search
+    for i in range(8):
+        hands = stance.prepared.hands.turned(base + (1.0 + i) * np.eye(6)[0])
+        found = next_plan(hands, now, Budget(50))
+        assert found is not None
+        assert hands.step(now.point, found.point.loads) < 0.1  # mm
+        now = found
+
+
 def test_a_wrench_far_away_has_no_plan_close_by():
     stance, _ = known("wall-300")
     now = stance.answer(stance.prepared.wrench, 0.0).answer.solution.search
