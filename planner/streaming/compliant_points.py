@@ -50,15 +50,13 @@ class CompliantPoints:
     def close(self) -> None:
         """Do nothing: there is no thread to end."""
 
-    def find(self, wrench: Array, last: SetPoints | None) -> SetPoints:
+    def find(self, wrench: Array) -> SetPoints:
         """Return the set-points for a body wrench.
 
         Parameters
         ----------
         wrench : ndarray, shape (6,)
             Wrench that the rock must exert on the robot, in B [N, N·m].
-        last : SetPoints or None
-            The set-points before; the known stance has them, too.
         """
         found = self._known.answer(wrench, time.perf_counter())
         answer = found.answer

@@ -44,6 +44,8 @@ class InterpolatedPoints:
         self._stance = StreamStance(question)
         self._following = Prefetch(self._stance, radius)
         self._proofs: list[SupportBound] = []
+        self._last: Array | None = None
+        """Body wrench of the last set-points."""
 
     @property
     def limbs(self) -> tuple[str, ...]:
@@ -74,20 +76,18 @@ class InterpolatedPoints:
         """Stop solving interpolations; return the thread pool, for the caller to shut down."""
         return self._following.close()
 
-    def find(self, wrench: Array, last: SetPoints | None) -> SetPoints:
+    def find(self, wrench: Array) -> SetPoints:
         """Return the set-points for a body wrench.
 
         Parameters
         ----------
         wrench : ndarray, shape (6,)
             Wrench that the rock must exert on the robot, in B [N, N·m].
-        last : SetPoints or None
-            The set-points before.
         """
-        if last is not None:
-            self._following.go(last.body_wrench, wrench)
+        if self._last is not None:
+            self._following.go(self._last, wrench)
         mixture = self._following.mixture(wrench)
-        points = self._found(wrench, mixture)
+        points, self._last = self._found(wrench, mixture), wrench
         self._following.look_ahead(wrench, mixture.distance)
         return points
 

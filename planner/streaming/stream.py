@@ -158,7 +158,7 @@ class WrenchStream:
             last = self._last
             if last is not None and last.verified and self._key == key:
                 return last
-            self._last, self._key = self._source.find(wrench, last), key
+            self._last, self._key = self._source.find(wrench), key
             return self._last
 
 
