@@ -18,7 +18,7 @@ from service.replies import SetPointsReply, StreamReply
 from service.requests import SetPointsRequest
 from service.wire import ServiceName
 from tests.suite.helpers.requests import stream_request
-from tests.suite.helpers.stances import ask, on_wall
+from tests.suite.helpers.stances import ask, complying, on_wall
 
 pytestmark = pytest.mark.slow
 
@@ -91,3 +91,12 @@ def test_thirteen_plans_and_their_proofs(benchmark):
     stance = StreamStance(QUESTION)
     found = benchmark(Interpolation.about, stance, CENTRE, 30.0)
     assert len(found.constants) == 13
+
+
+@pytest.mark.benchmark(group="another wrench on a known stance of four hands")
+def test_set_points_of_compliant_wrists(benchmark):
+    wrenches = cycle(WRENCHES)
+    with WrenchStream(complying(QUESTION)) as stream:
+        stream.set_points(CENTRE)
+        points = benchmark(lambda: stream.set_points(next(wrenches)))
+    assert (points.status, points.verified) == ("optimal", True)

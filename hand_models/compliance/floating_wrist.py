@@ -301,6 +301,22 @@ class FloatingWrist(CompliantGrasp):
             known.update(self.keep(np.array(new), self.hand_loads(steps)))
         return [loads for key in keys if (loads := known[key]) is not None]
 
+    def loads_of(self, y: Array) -> HandLoads:
+        """Return the loads at one pose of the wrist, from the cache where its set was linearised.
+
+        Parameters
+        ----------
+        y : ndarray, shape (d,)
+            The pose.
+
+        Returns
+        -------
+        HandLoads
+            Of this pose alone (m = 1).
+        """
+        (steps,) = self._stepped(y[None])
+        return HandLoads(*[part[:1].real for part in steps])
+
     def knows(self, poses: Array) -> bool:
         """Return True if the loads about all of k poses, shape (k, d), are in the cache."""
         return None not in self._kept.find([at.tobytes() for at in poses])

@@ -9,4 +9,5 @@ from .effort import (
     with_room as with_room,
 )
 from .goals import SETTINGS as SETTINGS, Goal as Goal
+from .next_wrench import next_plan as next_plan
 from .wrist_iteration import WristSolution as WristSolution, disagreements as disagreements

@@ -36,7 +36,7 @@ from planner.floating.wrist_iteration import (
 from planner.prepare import HandSets, LinearisationPoint, Sets
 from planner.programs import WRIST_RANGE
 
-__all__ = ["find_wrists", "first_plan", "pressing", "without_hindrance"]
+__all__ = ["find_wrists", "firm_rows", "first_plan", "pressing", "without_hindrance"]
 
 
 def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
@@ -202,7 +202,7 @@ def _descended(
     """
     within = 1.0  # one `TWIST_UNIT` and 100 N, for which linearised sets are good
     now = searching(hands, goal, start, within)
-    firm = _firm(now.sets)
+    firm = firm_rows(now.sets)
     merit, rounds, past = _merit(now, price), 0, [math.inf] * 6
     while rounds < most and not budget.ended:
         rounds += 1
@@ -249,8 +249,14 @@ def _merit(state: WristSolution, price: float) -> float:
     return state.measure.utilisation + price * (state.measure.missing + state.measure.excess)
 
 
-def _firm(sets: Sets) -> NDArray[np.bool_]:
-    """Return which hard rows of all hands only say how far a round goes."""
+def firm_rows(sets: Sets) -> NDArray[np.bool_]:
+    """Return which hard rows of all hands only say how far a round goes, shape (Σ nh,).
+
+    Parameters
+    ----------
+    sets : Sets
+        Sets linearised within a range.
+    """
     return np.array(
         [row.limit == WRIST_RANGE for space in sets.spaces for row in space.rows[len(space.s) :]]
     )

@@ -39,6 +39,20 @@ class FloatingSettings:
     rounds_nearby: int = 16  # from a plan, or where another search has failed, at most
     first_range: float = 4.0  # about a point, in `TWIST_UNIT`
     closeness: float = 4e-6  # of a point to the best of the sets about it, relative
+    next_gap: float = 5e-3
+    """Gap of a plan for the next body wrench to the best of the sets about it, at most, relative.
+
+    Less is not worth another round: the model itself is no better."""
+    next_nearness: float = 0.1
+    """Weight of half the squared step to the next body wrench's plan, in the units of z.
+
+    Where a step saves little, as where fewer limits bind than there are loads, the point stays."""
+    next_rounds: int = 5  # from the last plan to the next, at most
+    next_error: float = 0.01
+    """Missing wrench and violations, in their units, that are left to Newton steps.
+
+    With more, these steps would leave the other limits behind."""
+    next_corrections: int = 3  # Newton steps of a round, at most; each squares the error
     price: float = 2.0
     """Price, as utilisation, of a `WRENCH_UNIT` of missing wrench or a `LOAD_UNIT` of violation."""
     small_factors: tuple[float, ...] = (0.5, 0.1)

@@ -237,7 +237,11 @@ def effort(data: StanceData, cap: float) -> Outcome:
 
 
 def elastic(
-    data: StanceData, penalty: float, near: Sequence[Array], firm: NDArray[np.bool_]
+    data: StanceData,
+    penalty: float,
+    near: Sequence[Array],
+    firm: NDArray[np.bool_],
+    nearness: float = 1e-3,
 ) -> Outcome:
     """Solve the relaxed program `Elastic` around given loads.
 
@@ -250,13 +254,15 @@ def elastic(
         Loads of each hand [N], or wrist pose [m, rad], near which the solution is kept.
     firm : ndarray of bool, shape (Σ nh,)
         True for each hard row that must not be exceeded.
+    nearness : float, optional
+        Weight of half the squared distance from these loads, in the units of z.
 
     Returns
     -------
     Outcome
         ``value`` is the utilisation plus ρ times all violations.
     """
-    return Elastic(data, penalty, np.concatenate(near) / data.rows.unit, firm).solve()
+    return Elastic(data, penalty, np.concatenate(near) / data.rows.unit, firm, nearness).solve()
 
 
 def load_factor(data: StanceData) -> Outcome:

@@ -13,7 +13,7 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
 from planner.result.advice import Advice
 from planner.result.certificate import CertificateOf
-from planner.result.hand_plan import HandPlan
+from planner.result.hand_plan import HandPlan, WristPlan
 from planner.result.open_loop import OpenLoop
 from planner.result.plain_parts import (
     Clearance,
@@ -170,7 +170,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SetPoints:
-    """Tension set-points of all tendons for one body wrench; hands in the stance's order.
+    """Set-points of all tendons and wrists for one body wrench; hands in the stance's order.
 
     Attributes
     ----------
@@ -183,13 +183,15 @@ class SetPoints:
     utilisation : float or None
         Largest utilisation of all limits.
     gap : float or None
-        Proven bound: no plan has a utilisation that is less by more than this.
+        Proven bound: no plan has a utilisation that is less by more than this. With compliant
+        wrists a bound of plans nearby, in the sets linearised at the wrists' poses.
     tensions : ndarray, shape (hands, 4), or None
         Tendon tensions [N].
     wrenches : ndarray, shape (hands, 6), or None
         Wrench of each hand on the rock, in H [N, N·m].
     loads : ndarray, shape (hands, m), or None
-        Loads y of each hand, in the order of `WrenchStream.columns`, then zeros [N].
+        Loads y of each hand, in the order of `WrenchStream.columns`, then zeros [N]; of a compliant
+        wrist the twist, too [m, rad].
     source : {'interpolated', 'blended', 'solved'}
         ``interpolated``: from known plans; ``solved``: for this wrench alone; ``blended``: a
         mixture of both.
@@ -199,6 +201,8 @@ class SetPoints:
         Torque [N·m] and current [A] of each motor while it tightens its tendon to the tension.
     reason : str or None
         Why there is no plan.
+    wrists : tuple of WristPlan or None, or None
+        Planned pose of each compliant wrist, None of a fixed one; None where all are fixed.
     """
 
     status: Status
@@ -214,3 +218,4 @@ class SetPoints:
     motor_torque: Array | None = None
     motor_current: Array | None = None
     reason: str | None = None
+    wrists: tuple[WristPlan | None, ...] | None = None

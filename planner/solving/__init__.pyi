@@ -10,8 +10,10 @@ from .palm_parts import (
     PalmLoadFactors as PalmLoadFactors,
     load_factors_without_palm_loads as load_factors_without_palm_loads,
 )
+from .solution import Infeasible as Infeasible, Verified as Verified
 from .solve import (
     KnownStance as KnownStance,
+    StanceAnswer as StanceAnswer,
     plan as plan,
     try_stance as try_stance,
     with_advice as with_advice,

@@ -54,7 +54,7 @@ from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
 
-__all__ = ["explained_plan", "unexplained"]
+__all__ = ["explained_plan", "reason_of_none", "unexplained"]
 
 
 def explained_plan(
@@ -138,14 +138,25 @@ def explained_plan(
 
 def _of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> dict[str, Any]:
     """Return what is to be said of no plan, by fields of `Plan`."""
+    reason = reason_of_none(prepared, answer)
     if isinstance(answer, Failed):
-        return {"status": "failed", "verified": False, "reason": answer.reason}
+        return {"status": "failed", "verified": False, "reason": reason}
+    proof = answer.proof if prepared.question.explain else None
+    return {"status": "infeasible", "reason": reason, "certificate": proof}
+
+
+def reason_of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> str:
+    """Return a sentence that says why there is no plan.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    answer : Infeasible or Failed
+    """
+    if isinstance(answer, Failed):
+        return answer.reason
     touching = any(h.holding.any() or h.palm.engaged for h in prepared.batch.hands)
-    return {
-        "status": "infeasible",
-        "reason": shortfall_sentence(answer.proof, touching, floating=prepared.floating),
-        "certificate": answer.proof if prepared.question.explain else None,
-    }
+    return shortfall_sentence(answer.proof, touching, floating=prepared.floating)
 
 
 def _of_plan(

@@ -16,6 +16,7 @@ from planner.floating import (
     best_within,
     least_use,
     most_load,
+    next_plan,
     with_room,
 )
 from planner.prepare import HandSets, PreparedStance
@@ -25,7 +26,7 @@ from planner.solving.dual_bounds import least_bound, unproven_sentences
 from planner.solving.objectives import MAX_MARGIN, CappedObjective
 from planner.solving.solution import Solution
 
-__all__ = ["FloatingSolution", "floating_solution", "wrench_is_given"]
+__all__ = ["FloatingSolution", "floating_solution", "next_solution", "wrench_is_given"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -133,6 +134,36 @@ def floating_solution(
     """
     begin = near.usual if isinstance(near, FloatingSolution) and near.usual.exact else None
     search, factor = least_use(prepared.hands, budget, begin)
+    return _of_search(prepared, search, factor)
+
+
+def next_solution(
+    prepared: PreparedStance, budget: Budget, near: FloatingSolution
+) -> FloatingSolution | None:
+    """Return the solution close to that of another body wrench, within the cap; None without one.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    budget : Budget
+        Number of programs that may be solved.
+    near : FloatingSolution
+        Solution of the same hands for another body wrench.
+    """
+    hands = prepared.hands
+    if hands.together is None or not near.usual.exact:
+        return None
+    search = next_plan(hands, near.usual, budget)
+    cap = prepared.question.limits.utilisation
+    if search is None or search.measure.utilisation > cap + CAP_SLACK:
+        return None
+    return _of_search(prepared, search, None)
+
+
+def _of_search(
+    prepared: PreparedStance, search: WristSolution, factor: LargestFactor | None
+) -> FloatingSolution:
+    """Return what a search for the least utilisation has found, as a solution."""
     cap = prepared.question.limits.utilisation
     found = FloatingSolution(
         sets=search.sets,

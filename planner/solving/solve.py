@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,17 +17,29 @@ from planner.deadline import Budget, late_sentence
 from planner.explanation import LimitUse, certify
 from planner.floating import SETTINGS
 from planner.prepare import PreparedStance, checked_question, prepare_stance
-from planner.programs import LOAD_BOX, LOAD_UNIT
+from planner.programs import CAP_SLACK, LOAD_BOX, LOAD_UNIT
 from planner.question import Question, checked_body_wrench
 from planner.result import LoadFactor, Plan, Time
-from planner.solving.explained import explained_plan, unexplained
+from planner.solving.explained import explained_plan, reason_of_none, unexplained
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
-from planner.solving.floating_wrists import FloatingSolution, floating_solution, wrench_is_given
+from planner.solving.floating_wrists import (
+    FloatingSolution,
+    floating_solution,
+    next_solution,
+    wrench_is_given,
+)
 from planner.solving.objectives import CappedObjective, objective_of
-from planner.solving.solution import Answer, Failed, Infeasible, Solution, load_factor_of
+from planner.solving.solution import (
+    Answer,
+    Failed,
+    Infeasible,
+    Solution,
+    Verified,
+    load_factor_of,
+)
 from planner.solving.verified import Checks, prepare_checks, recover, verify
 
-__all__ = ["KnownStance", "plan", "plan_on", "try_stance", "with_advice"]
+__all__ = ["KnownStance", "StanceAnswer", "plan", "plan_on", "try_stance", "with_advice"]
 
 
 def plan(question: Question) -> Plan:
@@ -78,20 +91,67 @@ def plan_on(
     DeadlineError
         If the deadline passes before a plan passes the checks or is proven infeasible.
     """
-    question, modelled, budget = prepared.question, time.perf_counter(), Budget(SETTINGS.programs)
+    found = _answer_on(prepared, start, known, near)
+    return found.plan(), found.answer.solution
+
+
+class StanceAnswer(NamedTuple):
+    """Answer to the question of a prepared stance, before its explanation.
+
+    Attributes
+    ----------
+    prepared : PreparedStance
+    checks : Checks
+    answer : Answer
+        Verified loads, a proof of infeasibility, or a failure.
+    budget : Budget
+        Number of programs that may still be solved.
+    moments : tuple of (float, float)
+        Times at which the answer was begun and prepared, on the clock of `time.perf_counter` [s].
+    """
+
+    prepared: PreparedStance
+    checks: Checks
+    answer: Answer
+    budget: Budget
+    moments: tuple[float, float]
+
+    @property
+    def optimal(self) -> bool:
+        """True if there is a plan within the cap on the utilisation."""
+        return self.answer.whole <= self.prepared.question.limits.utilisation + CAP_SLACK
+
+    @property
+    def reason(self) -> str | None:
+        """Why there is no plan; None if there is one."""
+        answer = self.answer
+        return None if isinstance(answer, Verified) else reason_of_none(self.prepared, answer)
+
+    def plan(self) -> Plan:
+        """Return the plan, with its explanation and the extras that the question wants."""
+        prepared, checks, answer, budget, moments = self
+        factor = LoadFactor()
+        if "load_factor" in prepared.question.want:
+            factor = load_factor_of(prepared, answer, budget, overloaded=checks.overloaded)
+        solved = *moments, time.perf_counter()
+        return explained_plan(prepared, checks, answer, factor, try_stance, solved)
+
+
+def _answer_on(
+    prepared: PreparedStance, start: float, known: Checks | None, near: Solution | None
+) -> StanceAnswer:
+    """Answer the question of a prepared stance; parameters as of `plan_on`."""
+    modelled, budget = time.perf_counter(), Budget(SETTINGS.programs)
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
     checks = prepare_checks(prepared) if known is None else known
-    answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
+    answer: Answer | None = _next_verified(prepared, checks, budget, near)
+    if answer is None:
+        answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
     if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
         answer = _second_look(prepared, checks, answer, budget)
     if isinstance(answer, Failed):
         deadline.check("a plan was found or proven infeasible")
-    factor = LoadFactor()
-    if "load_factor" in question.want:
-        factor = load_factor_of(prepared, answer, budget, overloaded=checks.overloaded)
-    moments = start, modelled, time.perf_counter()
-    found = explained_plan(prepared, checks, answer, factor, try_stance, moments)
-    return found, answer.solution
+    return StanceAnswer(prepared, checks, answer, budget, (start, modelled))
 
 
 def _solutions(
@@ -124,6 +184,23 @@ def _first_verified(prepared: PreparedStance, checks: Checks, found: Iterable[So
         if not isinstance(answer, Failed):
             break
     return answer
+
+
+def _next_verified(
+    prepared: PreparedStance, checks: Checks, budget: Budget, near: Solution | None
+) -> Verified | None:
+    """Return the verified plan close to that of another body wrench; None without one.
+
+    Only with compliant wrists: other solutions near a known one are tried by `fixed_solutions`.
+    """
+    if not isinstance(near, FloatingSolution):
+        return None
+    found = next_solution(prepared, budget, near)
+    if found is None:
+        return None
+    answer = _first_verified(prepared, checks, _best_in(prepared, [found], budget))
+    within = prepared.question.limits.utilisation + CAP_SLACK
+    return answer if isinstance(answer, Verified) and answer.whole <= within else None
 
 
 def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
@@ -213,8 +290,8 @@ class KnownStance:
 
     Hands, joints and wrench spaces are computed once. Each further query costs the check of its
     plan, and a call of the solver unless the limits that bound the previous plan still bind. With
-    compliant wrists the search begins where the previous plan has put them; it is local, so that
-    its utilisation may differ from that of `plan` by some thousandths.
+    compliant wrists the plan is sought close to the previous one; that is local, so that its
+    utilisation may differ from that of `plan` by some thousandths.
 
     Parameters
     ----------
@@ -256,19 +333,31 @@ class KnownStance:
             If the deadline passes before a plan passes the checks or is proven infeasible.
         """
         start = time.perf_counter()
-        wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
-        near = self._near
         with deadline.within(self.prepared.question.deadline, started=start):
-            prepared = self.prepared.turned(wrench)
-            answer, solution = plan_on(prepared, start, self._checks, near)
-            if isinstance(near, FloatingSolution) and answer.status != "optimal":
-                # the search from the wrists of another wrench is local
-                answer, solution = plan_on(prepared, start, self._checks)
+            return self.answer(body_wrench, start).plan()
+
+    def answer(self, body_wrench: Array, start: float) -> StanceAnswer:
+        """Answer for another body wrench, without an explanation.
+
+        Parameters
+        ----------
+        body_wrench : ndarray, shape (6,)
+            As of `plan`, which also says when an error is raised.
+        start : float
+            Time at which the answer was begun, on the clock of `time.perf_counter` [s].
+        """
+        wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
+        near, prepared = self._near, self.prepared.turned(wrench)
+        found = _answer_on(prepared, start, self._checks, near)
+        if isinstance(near, FloatingSolution) and not found.optimal:
+            # the search from the wrists of another wrench is local
+            found = _answer_on(prepared, start, self._checks, None)
+        solution = found.answer.solution
         if isinstance(solution, FixedSolution):
             self._near = near if solution.start is None else solution
         elif isinstance(solution, FloatingSolution) and prepared.hands.together is not None:
-            self._near = solution if answer.status == "optimal" else near
-        return answer
+            self._near = solution if found.optimal else near
+        return found
 
 
 def with_advice(question: Question, answer: Plan) -> Plan:

@@ -7,19 +7,18 @@ m, the largest number of loads of a hand. So recovery and checks are products of
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array, UnsupportedError
+from hand_models.base import Array
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
 from planner import programs, solving
 from planner.programs import LOAD_UNIT, WRENCH_UNIT, Outcome, tension_trade
 from planner.question import Question
 from planner.result import LoadRecovery, Plan, PlanArrays
-from planner.solving import KnownStance, MaxMargin, is_least, least_utilisation, objective_of
+from planner.solving import KnownStance, is_least, least_utilisation
 from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import Check, LoadsCheck
 
@@ -80,7 +79,8 @@ class StreamStance:
     Parameters
     ----------
     question : Question
-        The stance and its limits. Its body wrench, or its load, is only the first.
+        The stance and its limits, as of `WrenchStream`. Its body wrench, or its load, is only the
+        first.
 
     Attributes
     ----------
@@ -106,13 +106,10 @@ class StreamStance:
     Raises
     ------
     InvalidInputError
-        If the question is not valid; an `UnsupportedError` if it has a wrist that is not fixed, an
-        objective other than ``max_margin``, or a limit on the change of tensions.
+        If the question is not valid.
     """
 
     def __init__(self, question: Question) -> None:
-        _refuse(question)
-        question = replace(question, want=frozenset(), draws=None, present={}, deadline=None)
         known = KnownStance(question)
         self.known, prepared = known, known.prepared
         self.first = prepared.wrench
@@ -225,25 +222,3 @@ def _winches(reader: LoadRecovery, spaces: Sequence[WrenchSpace]) -> Array:
         y[:tendons] = 1.0
     per_newton = reader.read(loads)[0].drives[-1] - at_zero
     return np.array([at_zero, per_newton]).reshape(2, -1, tendons)
-
-
-def _refuse(question: Question) -> None:
-    """Refuse what a stream does not do."""
-    for i, hand in enumerate(question.stance.hands):
-        if hand.wrist != "fixed":
-            raise UnsupportedError(
-                f"{hand.wrist} is not available for streams, which interpolate plans; valid is "
-                "fixed",
-                field=f"stance.hands[{i}].wrist",
-            )
-    objective = objective_of(question)
-    if not isinstance(objective, MaxMargin):
-        raise UnsupportedError(
-            f"{objective.name} is not available for streams; valid is {MaxMargin.name}",
-            field="objective",
-        )
-    if question.limits.tension_change is not None:
-        raise UnsupportedError(
-            "not available for streams, whose tensions change with the wrench: remove it",
-            field="limits.tension_change",
-        )

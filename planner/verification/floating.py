@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import cmath
 import math
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from planner.prepare import HandBatch
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
 from planner.verification.residuals import FINGER_COUNT, PartNames, allowed_errors
-from planner.verification.rolling_contacts import TileFace, slip_of
+from planner.verification.rolling_contacts import RestingContact, TileFace
 
 __all__ = ["recompute_floating"]
 
@@ -108,33 +110,29 @@ def _move(
     """
     h, index = divmod(finger, FINGER_COUNT)
     hand = known.hands[h]
-    settled, model = hand.fingers[index], hand.fingers[index].model
-    frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
-    own, tiles = np.flatnonzero(hand.finger_of == index), known.places.phalanges[finger]
+    model, rest = hand.fingers[index].model, _resting(hand, index)
+    frame, own, tiles = rest.frame, rest.own, known.places.phalanges[finger]
     rows = np.flatnonzero(known.places.finger == finger)
     fingers.points[rows], fingers.axes[rows] = arrays.points[rows], arrays.axes[rows]
     outer = len(own) > len(PHALANGES)
     step = moved(frame.joint, wrist)
     joint = np.array([step @ frame.along, step[2]])
-    section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
     angles, slips, exact = [], [], True
-    depths = model.depths(outer) * hand.closing_tension
-    for j, (tile, contact) in enumerate(zip(tiles, settled.contacts, strict=True)):
+    parts = zip(tiles, rest.faces, rest.contacts, strict=True)
+    for j, (tile, face, contact) in enumerate(parts):
         drag, place = arrays.axes[tile, 0], arrays.points[tile] - frame.joint
         way = np.array([-drag @ frame.along, -drag[2]])
         point = np.array([place @ frame.along, place[2]])
-        face = TileFace.of(contact, model, float(depths[j]))
         arm = point - joint
         rise = way[0] * arm[1] - way[1] * arm[0]
         if not abs(rise - face.height) <= 1e-9:  # [m] rounding
             found.append(f"{name}: {PHALANGES[j]} contact is {rise:.6g} m above its joint")
-        dragged = complex(way[0], way[1]) * cmath.rect(1.0, -contact.tilt)
+        dragged = complex(way[0], way[1]) * cmath.rect(1.0, -rest.tilts[j])
         angles.append(cmath.phase(dragged))
         fingers.joints[finger, j] = joint
         slip: float | None = 0.0
-        if contact.kind in ("face", "edge") and section is not None:
-            before = np.array(contact.point(model.tile_height))
-            slip, off = slip_of(section, face, (before, point), (float(arm @ way), way))
+        if contact is not None:
+            slip, off = contact.slip(point, float(arm @ way), way)
             exact &= slip is not None
             # [m] along the phalanx: the rock's radius is only known to some 1e-5 of itself, which
             # rolling by millimetres shows
@@ -144,14 +142,14 @@ def _move(
                 )
         slips.append(slip or 0.0)
         joint = joint + model.joint_spacing * np.array([dragged.real, dragged.imag])
-    rest = np.array([contact.angle for contact in settled.contacts])
-    change = np.array(angles) - rest
+    change = np.array(angles) - rest.angles
     change = change - math.tau * np.round(change / math.tau)
     turns = np.diff(change, prepend=-float(wrist.twist[3:] @ frame.across))
-    _check_stretches(found, name, hand, own, wrist, arrays.loads[rows, 0])
-    off = np.abs(_laterals(hand, frame, own, wrist) - arrays.loads[rows, 2]).max()
+    _check_stretches(found, name, rest, wrist, arrays.loads[rows, 0])
+    off = np.abs(_laterals(rest, wrist) - arrays.loads[rows, 2]).max()
     if exact:
-        tendon, state = _tendon(hand, own, float(wound[finger]), fingers.shear[rows])
+        tension, tendon = float(wound[finger]), rest.tendon
+        state = TendonState(tension, tension * rest.losses, fingers.shear[rows])
         base = -float(moved(hand.positions[own[0]], wrist) @ frame.along)
         held = (tendon.kept if wrist.driven else tendon.held)(
             state,
@@ -159,7 +157,7 @@ def _move(
             [0.0, *turns] if outer else turns,
         )
         fingers.shear[rows] = held.shears
-        springs = np.array(model.joint_stiffness) * (np.diff(rest, prepend=0.0) + turns)
+        springs = np.array(model.joint_stiffness) * (np.diff(rest.angles, prepend=0.0) + turns)
         torques = held.tensions[-len(PHALANGES) :] * model.pulley_radii
         fingers.torques[finger] = torques - (np.array(model.joint_preload) + springs)
         off = max(off, abs(held.tensions[0] - arrays.tensions[finger]))
@@ -170,23 +168,90 @@ def _move(
     return exact
 
 
-def _tendon(
-    hand: SettledHand, own: Indices, preload: float, at_rest: Array
-) -> tuple[FingerTendon, TendonState]:
+class _RestingFinger(NamedTuple):
+    """A finger of a settled hand at rest: what does not change where its wrist goes.
+
+    Attributes
+    ----------
+    frame : FingerFrame
+    own : ndarray of int, shape (n,)
+        Its tiles among those of the hand.
+    faces : tuple of TileFace
+        Face of the tile of each phalanx.
+    contacts : tuple of RestingContact or None
+        Contact of each tile with the rock; None of one that touches none.
+    angles, tilts : ndarray, shape (3,)
+        Angle of each phalanx, and of its tile's contact to it [rad].
+    tendon : FingerTendon
+    losses : ndarray, shape (n,)
+        Tension at each tile over that at the motor.
+    laterals : ndarray of int
+        Which of its tiles resist sideways.
+    places : ndarray, shape (len(laterals), 3)
+        Positions of these in H [m].
+    compliance : ndarray, shape (len(laterals), len(laterals))
+        Displacement of these sideways by their loads [m/N].
+    """
+
+    frame: FingerFrame
+    own: Indices
+    faces: tuple[TileFace, ...]
+    contacts: tuple[RestingContact | None, ...]
+    angles: Array
+    tilts: tuple[float, ...]
+    tendon: FingerTendon
+    losses: Array
+    laterals: Indices
+    places: Array
+    compliance: Array
+
+
+@lru_cache(maxsize=256)  # the fingers of as many hands as `_palm_stiffness` has
+def _resting(hand: SettledHand, index: int) -> _RestingFinger:
+    """Return a finger of a settled hand at rest, by its index among `FINGERS`."""
+    settled, model = hand.fingers[index], hand.fingers[index].model
+    frame = hand.hand.frames(hand.grasp.outer_rotation)[index]
+    own = np.flatnonzero(hand.finger_of == index)
+    section = hand.hand.section(FINGERS[index], hand.hold, hand.grasp, hand.seating.pose)
+    depths = model.depths(len(own) > len(PHALANGES)) * hand.closing_tension
+    faces, contacts = [], list[RestingContact | None]()
+    for contact, depth in zip(settled.contacts, depths, strict=True):
+        faces.append(face := TileFace.of(contact, model, float(depth)))
+        at = np.array(contact.point(model.tile_height))
+        if section is None or contact.kind not in ("face", "edge"):
+            contacts.append(None)
+        else:
+            contacts.append(RestingContact.of(section, face, at))
+    held = np.flatnonzero(hand.engagement[own])
+    held = held if hand.grasp.lateral else held[:0]
+    places = hand.positions[own[held]]
+    return _RestingFinger(
+        frame=frame,
+        own=own,
+        faces=tuple(faces),
+        contacts=tuple(contacts),
+        angles=np.array([contact.angle for contact in settled.contacts]),
+        tilts=tuple([contact.tilt for contact in settled.contacts]),
+        tendon=_tendon(hand, own),
+        losses=np.asarray((1.0 - hand.hand.finger.friction) ** np.arange(len(own), dtype=float)),
+        laterals=held,
+        places=places,
+        compliance=_lateral_compliance(hand, frame, own[held], places),
+    )
+
+
+def _tendon(hand: SettledHand, own: Indices) -> FingerTendon:
     table = hand.hand.table
     known = FingerTendon.from_table(table, base_tile=len(own) > len(PHALANGES))
     stiffness = _contact_stiffness(hand, own, known)
-    friction = max(known.friction, hand.hand.tendon_friction)
-    tendon = FingerTendon(
+    return FingerTendon(
         known.pulley_ratio,
         tuple(stiffness.tolist()),
         known.spring_stiffness,
         known.pulley_radii,
-        friction,
+        max(known.friction, hand.hand.tendon_friction),
         known.entry_friction,
     )
-    losses = np.asarray((1.0 - hand.hand.finger.friction) ** np.arange(len(own), dtype=float))
-    return tendon, TendonState(preload, np.asarray(preload * losses), at_rest)
 
 
 def _contact_stiffness(hand: SettledHand, own: Indices, known: FingerTendon) -> Array:
@@ -206,41 +271,43 @@ def _contact_stiffness(hand: SettledHand, own: Indices, known: FingerTendon) -> 
 def _check_stretches(
     found: list[str],
     name: str,
-    hand: SettledHand,
-    own: Indices,
+    rest: _RestingFinger,
     wrist: WristPlan,
     shears: Array,
 ) -> None:
     """Check how far a plan stretches a finger's tiles, by their returned shears (n,) [N]."""
-    known = FingerTendon.from_table(hand.hand.table, base_tile=len(own) > len(PHALANGES))
     # the force that would stretch each tile as far as the plan says
-    stiffness = _contact_stiffness(hand, own, known)
+    stiffness = np.array(rest.tendon.contact_stiffness)
     held = stiffness > 0.0
-    if wrist.stretches is None or wrist.stretches.shape != hand.finger_of.shape:
+    if wrist.stretches is None or not rest.own.max() < len(wrist.stretches):
         found.append(f"{name}: the plan does not say how far its tiles are stretched")
         return
-    said = wrist.stretches[own]
+    said = wrist.stretches[rest.own]
     off = np.abs(np.where(held, stiffness * said - np.abs(shears), said)).max()
     if not off <= 1e-9 * max(1.0, float(np.abs(shears).max())):  # [N], of idle tiles [m]: rounding
         found.append(f"{name}: tiles are not stretched by what the plan says")
 
 
-def _laterals(hand: SettledHand, frame: FingerFrame, own: Indices, wrist: WristPlan) -> Array:
-    """Return the lateral loads for which spines and beam give what the wrist asks, shape (n,)."""
-    found = np.zeros(len(own))
-    those = np.flatnonzero(hand.engagement[own])
-    if not (hand.grasp.lateral and len(those)):
-        return found
+def _lateral_compliance(
+    hand: SettledHand, frame: FingerFrame, tiles: Indices, places: Array
+) -> Array:
+    """Return how far spines and beam give sideways at each tile's place by the loads of all."""
     body = hand.hand
-    places = hand.positions[own[those]]
-    away = [float(moved(place, wrist) @ frame.across) for place in places]
     out = np.maximum((places - frame.joint) @ frame.along, 0.0)
     high = places[:, 2] - frame.joint[2]
     near, far = np.minimum.outer(out, out), np.maximum.outer(out, out)
-    give = np.diag(1.0 / (hand.engagement[own[those]] * body.lateral_stiffness))
+    give = np.diag(1.0 / (hand.engagement[tiles] * body.lateral_stiffness))
     give += near**2 * (3.0 * far - near) / (6.0 * body.bending_stiffness)
     give += np.outer(high, high) * near / body.torsional_stiffness
-    found[those] = np.linalg.solve(give, away)
+    return np.asarray(give)
+
+
+def _laterals(rest: _RestingFinger, wrist: WristPlan) -> Array:
+    """Return the lateral loads for which spines and beam give what the wrist asks, shape (n,)."""
+    found = np.zeros(len(rest.own))
+    if len(rest.laterals):
+        away = [float(moved(place, wrist) @ rest.frame.across) for place in rest.places]
+        found[rest.laterals] = np.linalg.solve(rest.compliance, away)
     return found
 
 
@@ -255,15 +322,7 @@ def _check_palm(
     """Check the force of the palm of a floating hand."""
     if not hand.palm.engaged:
         return
-    body, stiffness = hand.hand, 0.0
-    for share, engaged in hand.palm.layers:
-        sharing = share_load(
-            tuple(body.palm_contact[i] for i in engaged),
-            body.palm_spring,
-            body.palm_friction,
-            body.palm_own_friction,
-        )
-        stiffness += share * float(sharing.tile_stiffness.sum())
+    body, stiffness = hand.hand, _palm_stiffness(hand)
     step = moved(hand.palm.centre, wrist)
 
     # the integral of a stiffness that rises from zero to its whole over the onset [m]
@@ -283,3 +342,18 @@ def _check_palm(
         found.append(
             f"{limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"
         )
+
+
+@lru_cache(maxsize=64)  # as many hands as `SETTLED_LIMITS` keeps stances
+def _palm_stiffness(hand: SettledHand) -> float:
+    """Return the stiffness of a palm's springs in shear, by the sharing of their load [N/m]."""
+    body, stiffness = hand.hand, 0.0
+    for share, engaged in hand.palm.layers:
+        sharing = share_load(
+            tuple(body.palm_contact[i] for i in engaged),
+            body.palm_spring,
+            body.palm_friction,
+            body.palm_own_friction,
+        )
+        stiffness += share * float(sharing.tile_stiffness.sum())
+    return stiffness

@@ -16,7 +16,10 @@ from hand_models.base import Array
 from hand_models.finger import Contact, FingerModel
 from hand_models.sections import Section
 
-__all__ = ["TileFace", "slip_of"]
+__all__ = ["RestingContact", "TileFace"]
+
+PRESSURE_NODES, PRESSURE_WEIGHTS = np.polynomial.legendre.leggauss(3)
+"""Gauss-Legendre quadrature that integrates a tile's parabolic pressure exactly."""
 
 
 class TileFace(NamedTuple):
@@ -69,84 +72,118 @@ class TileFace(NamedTuple):
         start, end = max(self.near, touches - widest), min(self.far, touches + widest)
         if not start < end:
             return touches
-        nodes, weights = np.polynomial.legendre.leggauss(3)
-        places = (start + end) / 2.0 + (end - start) / 2.0 * nodes
-        pressures = weights * (self.depth - (places - touches) ** 2 / (2.0 * radius))
+        places = (start + end) / 2.0 + (end - start) / 2.0 * PRESSURE_NODES
+        pressures = PRESSURE_WEIGHTS * (self.depth - (places - touches) ** 2 / (2.0 * radius))
         return float(pressures @ places / pressures.sum())
 
 
-def slip_of(
-    section: Section, face: TileFace, points: tuple[Array, Array], after: tuple[float, Array]
-) -> tuple[float | None, float]:
-    """Return the slip of a tile on the rock, and the error of its reported contact point [m].
+class RestingContact(NamedTuple):
+    """A tile's contact with the rock at rest, from which `slip` measures.
 
-    A rolling face slips by the travel of the contact along the face minus its travel along the
-    rock.
-
-    Parameters
+    Attributes
     ----------
     section : Section
         Rock in the finger's plane.
     face : TileFace
-        The tile's face at rest.
-    points : tuple of ndarray, shape (2,)
-        Contact points before and after, in the finger's plane (x, z) [m].
-    after : tuple of float, ndarray of shape (2,)
-        Position of the contact along the phalanx after the motion [m], and the unit vector along
-        the face then.
-
-    Returns
-    -------
-    slip : float or None
-        None where the rock is neither a circle nor a line near the contact.
-    off : float
-        Distance along the phalanx from the reported contact to the recomputed one.
+        The tile's face.
+    radius : float or None
+        Radius of the rock at the contact [m]; infinite where it is flat, None where it is neither a
+        circle nor a line.
+    point : ndarray, shape (2,)
+        Point from which the way along the rock counts, in the finger's plane (x, z) [m].
+    normal : ndarray, shape (2,)
+        Outward normal of the rock there.
+    gap : float
+        Distance of the point from the rock [m].
+    touches : float
+        Position along the face at which it touches the rock [m].
+    bears : float or None
+        Centre of pressure along the face, of one that rolls [m]; None of one that slides.
     """
-    before, there = points
-    along, way = after
-    radius = _radius(section, before)
-    if radius is None:
-        return None, 0.0
-    # from a radius of 10 m on the model lets faces slide as on a flat
-    rolls, touches = face.lies and radius < 10.0, [face.along, along]
-    if rolls:
-        touches[0] += _beside(section, radius, before, face.way)
-        touches[1] += _beside(section, radius, there, way)
-    if not (rolls and face.near <= touches[0] <= face.far):
+
+    section: Section
+    face: TileFace
+    radius: float | None
+    point: Array
+    normal: Array
+    gap: float
+    touches: float
+    bears: float | None
+
+    @classmethod
+    def of(cls, section: Section, face: TileFace, point: Array) -> RestingContact:
+        """Return the contact of a face that touches at a point (2,) of the finger's plane [m]."""
+        radius, touches, bears = _radius(section, point), face.along, None
+        # from a radius of 10 m on the model lets faces slide as on a flat
+        if radius is not None and face.lies and radius < 10.0:
+            beside = face.along + _beside(section, radius, point, face.way)
+            if face.near <= beside <= face.far:
+                touches, bears = beside, face.bears(beside, radius)
+        start = point + (touches - face.along) * face.way
+        gap = _clearance(section, start)
+        return cls(section, face, radius, start, _normal(section, start), gap, touches, bears)
+
+    def slip(self, point: Array, along: float, way: Array) -> tuple[float | None, float]:
+        """Return the slip of the tile on the rock, and the error of its reported contact [m].
+
+        A rolling face slips by the travel of the contact along the face minus its travel along the
+        rock.
+
+        Parameters
+        ----------
+        point : ndarray, shape (2,)
+            Contact point after the motion, in the finger's plane (x, z) [m].
+        along : float
+            Its position along the phalanx [m].
+        way : ndarray, shape (2,)
+            Unit vector along the face after the motion.
+
+        Returns
+        -------
+        slip : float or None
+            None where the rock is neither a circle nor a line near the contact.
+        off : float
+            Distance along the phalanx from the reported contact to the recomputed one.
+        """
+        face, radius = self.face, self.radius
+        if radius is None:
+            return None, 0.0
         off = along - face.along
-        return off - _arc(section, before, there, way, face.way if face.lies else None), off
-    touches[1] = min(max(touches[1], face.near), face.far)
-    went = face.bears(touches[1], radius) - face.bears(touches[0], radius)
-    first = before + (touches[0] - face.along) * face.way
-    last = there + (touches[1] - along) * way
-    arc = _arc(section, first, last, way, face.way)
-    return touches[1] - touches[0] - arc, along - face.along - went
+        if self.bears is None:
+            return off - self._arc(point, way, face.way if face.lies else None), off
+        touches = along + _beside(self.section, radius, point, way)
+        touches = min(max(touches, face.near), face.far)
+        went = face.bears(touches, radius) - self.bears
+        arc = self._arc(point + (touches - along) * way, way, face.way)
+        return touches - self.touches - arc, off - went
+
+    def _arc(self, after: Array, u: Array, lies: Array | None) -> float:
+        """Return how far the contact went along the rock, positive away from the base [m].
+
+        From the chord and the turn of the rock's normal, as on a circle. ``lies``: along a face
+        that touches at rest, which on a flat is the rock's own way but for the search's tolerance.
+        """
+        first, last = self.normal, _normal(self.section, after)
+        turn = math.atan2(first[0] * last[1] - first[1] * last[0], float(first @ last))
+        middle = first + last
+        tangent = np.array([-middle[1], middle[0]]) / math.hypot(*middle)
+        straight = 1e-12  # [rad] turn of the normal of flat rock
+        if lies is not None and abs(turn) < straight:
+            tangent = lies
+        sign = math.copysign(1.0, float(tangent @ u))
+        chord = float((after - self.point) @ tangent)
+        path = chord if abs(turn) < straight else chord * (turn / 2.0) / math.sin(turn / 2.0)
+        return sign * (path - self.gap * turn)
+
+
+def _normal(section: Section, point: Array) -> Array:
+    return np.array(section.normal((float(point[0]), float(point[1]))))
 
 
 def _beside(section: Section, radius: float, point: Array, way: Array) -> float:
     """Return how far along a line through a point it is nearest to a circle [m]."""
-    out = np.array(section.normal((float(point[0]), float(point[1]))))
+    out = _normal(section, point)
     return -(radius + _clearance(section, point)) * float(out @ way)
-
-
-def _arc(section: Section, before: Array, after: Array, u: Array, lies: Array | None) -> float:
-    """Return how far the contact went along the rock, positive away from the base [m].
-
-    From the chord and the turn of the rock's normal, as on a circle. ``lies``: along a face that
-    touches at rest, which on a flat is the rock's own way but for the search's tolerance.
-    """
-    first, last = (np.array(section.normal((float(p[0]), float(p[1])))) for p in (before, after))
-    gap = _clearance(section, before)
-    turn = math.atan2(first[0] * last[1] - first[1] * last[0], float(first @ last))
-    middle = first + last
-    tangent = np.array([-middle[1], middle[0]]) / float(np.linalg.norm(middle))
-    straight = 1e-12  # [rad] turn of the normal of flat rock
-    if lies is not None and abs(turn) < straight:
-        tangent = lies
-    sign = math.copysign(1.0, float(tangent @ u))
-    chord = float((after - before) @ tangent)
-    path = chord if abs(turn) < straight else chord * (turn / 2.0) / math.sin(turn / 2.0)
-    return sign * (path - gap * turn)
 
 
 def _clearance(section: Section, point: Array) -> float:
@@ -159,7 +196,7 @@ def _radius(section: Section, point: Array) -> float | None:
     Beside a circle of radius R a point at e along its tangent is √(R² + e²) − R away from it. None
     where the rock is neither: the model takes it as one, which only the model knows.
     """
-    out = np.array(section.normal((float(point[0]), float(point[1]))))
+    out = _normal(section, point)
     foot, aside = point - _clearance(section, point) * out, np.array([-out[1], out[0]])
     beside = 4e-3  # [m] from the contact, and twice that, the rock is looked at
     near = [_clearance(section, foot + side * beside * aside) for side in (1.0, -1.0)]

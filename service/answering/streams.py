@@ -8,6 +8,7 @@ import uuid
 from collections import Counter, OrderedDict
 from typing import Final, NamedTuple
 
+from msgspec import UNSET
 from msgspec.structs import replace
 
 from hand_models.base import InvalidInputError, UnsupportedError
@@ -35,7 +36,8 @@ def opened(request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchStr
     Parameters
     ----------
     request : StreamRequest
-        Stance with fixed wrists, first body wrench or load, limits, and interpolation radius.
+        Stance with fixed or compliant wrists, first body wrench or load, limits, and interpolation
+        radius.
     robots : Robots, optional
         Robots that a request may name, with the functions that build them; bundled robots by
         default.
@@ -234,18 +236,18 @@ def set_points_reply(
     stream : WrenchStream
         Stream that the set-points come from.
     points : SetPoints
-        Tensions, winch angles and wrenches of all hands.
+        Tensions, winch angles, wrenches and wrists of all hands.
     start : float
         Time when the request arrived, on the clock of `time.perf_counter` [s].
     detail : {'set_points', 'hands', 'full'}, optional
-        With ``set_points``, hands have only tensions and winch angles; the other two values give
-        the same whole reply.
+        With ``set_points``, hands have only tensions, winch angles and a pose of each compliant
+        wrist; the other two values give the same whole reply.
 
     Returns
     -------
     SetPointsReply
-        Tensions [N], winch angles [rad], motor torques [N·m], motor currents [A] and wrenches
-        [N, N·m] by hand; ``took`` is the time since ``start`` [s].
+        Tensions [N], winch angles [rad], motor torques [N·m], motor currents [A], wrenches [N, N·m]
+        and twists of compliant wrists [m, rad] by hand; ``took`` is the time since ``start`` [s].
     """
     reply = SetPointsReply(
         stream=identifier,
@@ -268,6 +270,7 @@ def _hands(stream: WrenchStream, points: SetPoints) -> list[HandSetPoints] | Non
     angle, torque, current = points.winch_angle, points.motor_torque, points.motor_current
     if tensions is None or wrenches is None or angle is None or torque is None or current is None:
         return None
+    wrists = points.wrists or (None,) * len(stream.limbs)
     return [
         HandSetPoints(
             limb=limb,
@@ -276,19 +279,32 @@ def _hands(stream: WrenchStream, points: SetPoints) -> list[HandSetPoints] | Non
             motor_torque=torque[h].tolist(),
             motor_current=current[h].tolist(),
             wrench=wrenches[h].tolist(),
+            twist=UNSET if wrist is None else wrist.twist.tolist(),
+            pose_target=UNSET
+            if wrist is None or wrist.pose_target is None
+            else wrist.pose_target.tolist(),
         )
-        for h, limb in enumerate(stream.limbs)
+        for h, (limb, wrist) in enumerate(zip(stream.limbs, wrists, strict=True))
     ]
 
 
 def brief_set_points(whole: SetPointsReply) -> SetPointsReply:
-    """Return set-points with only tensions and winch angles, and with a reason cut to 120 bytes."""
+    """Return set-points with only what a controller sends, and with a reason cut to 120 bytes."""
     return replace(
         whole,
         reason=cut_reason(whole.reason) if whole.reason else whole.reason,
-        hands=None
-        if whole.hands is None
-        else [HandSetPoints(h.limb, h.tensions, h.winch_angle) for h in whole.hands],
+        hands=None if whole.hands is None else [_brief(hand) for hand in whole.hands],
+    )
+
+
+def _brief(hand: HandSetPoints) -> HandSetPoints:
+    """Return a hand's tensions, winch angles, and pose target or else twist."""
+    return HandSetPoints(
+        hand.limb,
+        hand.tensions,
+        hand.winch_angle,
+        twist=hand.twist if hand.pose_target is UNSET else UNSET,
+        pose_target=hand.pose_target,
     )
 
 

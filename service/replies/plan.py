@@ -289,8 +289,8 @@ class StreamReply(StanceReply, kw_only=True):
     - ``reason``: why there is no plan at ``body_wrench``; null where there is one.
     - ``body_wrench``: centre of the first interpolation, in B [N, N·m].
     - ``utilisation``: utilisation of the plan at ``body_wrench``; null without a plan.
-    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``;
-      null without a plan.
+    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
+      compliant wrists, no plan nearby. Null without a plan.
     - ``hands``: the hands in order, with the names of their loads.
     - ``took``: time that the declaration took [s].
     """
@@ -314,8 +314,8 @@ class SetPointsReply(Reply, kw_only=True):
     - ``reason``: why there is no plan; null where there is one.
     - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
     - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
-    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``;
-      null without a plan.
+    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
+      compliant wrists, no plan nearby, by the sets linearised there. Null without a plan.
     - ``hands``: set-points of each hand; null without a plan.
     - ``verified``: true where the independent check of the set-points, or of the proof that there
       is no plan, passed.

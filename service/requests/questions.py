@@ -213,7 +213,7 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
 class StreamRequest(Query, frozen=True, kw_only=True):
     """Request that declares a stance as a stream, for set-points of many body wrenches.
 
-    All wrists of the stance must be fixed.
+    All wrists of the stance must be fixed or compliant.
 
     - ``stance``: poses of body and hands, and their holds.
     - ``body_wrench``: centre of the first interpolation, in B [N, N·m]; give it or ``load``, not
@@ -222,7 +222,8 @@ class StreamRequest(Query, frozen=True, kw_only=True):
       robot's weight at rest.
     - ``limits``: the cap on the utilisation, and the caller's own limits.
     - ``radius``: distance from the centre within which set-points are interpolated between plans
-      [N]; along a moment a tenth of it per metre [N·m].
+      [N]; along a moment a tenth of it per metre [N·m]. Without meaning for compliant wrists, whose
+      set-points are solved one by one.
     """
 
     stance: Stance

@@ -20,7 +20,13 @@ from service.commands.stances import bundled, read_request
 from service.replies import BriefPlanReply, PlanReply, SetPointsReply
 from service.wire import Format
 from tests.suite.helpers.replies import PLAN, departures
-from tests.suite.helpers.requests import HEAVY, plan_request, stream_request, wall_request
+from tests.suite.helpers.requests import (
+    HEAVY,
+    compliant_request,
+    plan_request,
+    stream_request,
+    wall_request,
+)
 from tests.suite.problems import problem, problems
 
 MOST = {Format.JSON: 2000, Format.MSGPACK: 1000}
@@ -155,6 +161,31 @@ def test_streams_tell_as_much_as_is_asked_for(form: Format) -> None:
     assert hands["hands"] == full["hands"]
     for less, more in zip(few["hands"], full["hands"], strict=True):
         assert less.items() <= more.items()
+
+
+@pytest.mark.parametrize("form", Format)
+@pytest.mark.parametrize("known", [True, False])
+def test_a_stream_of_compliant_wrists_says_where_limbs_aim(form: Format, known: bool) -> None:
+    request = compliant_request()
+    if not known:
+        del request["stance"]["limb_stiffness"]
+    payload = form.encode(stream_request(request))
+    answer = dispatch.handle("crux/robosimian/stream", payload, form.value)
+    declared = form.decode(answer.payload, dict)
+    assert declared["radius"] is None
+    asked = {"v": 1, "stream": declared["stream"], "body_wrench": declared["body_wrench"]}
+    key, aims = "crux/robosimian/set_points", "pose_target" if known else "twist"
+    payloads = {detail: answered(asked, detail, form, key) for detail in DETAILS}
+    few, _, full = (form.decode(payloads[detail], dict) for detail in DETAILS)
+    assert len(payloads["set_points"]) < MOST[form]
+    assert [set(h) for h in few["hands"]] == [{"limb", "tensions", "winch_angle", aims}] * 4
+    for less, more in zip(few["hands"], full["hands"], strict=True):
+        assert less.items() <= more.items()
+        assert ("pose_target" in more) == known
+    plan = form.decode(answered({"v": 1} | stream_request(request), "hands", form), dict)
+    for ours, theirs in zip(full["hands"], plan["hands"], strict=True):
+        for name in ("tensions", "winch_angle", "twist", *(["pose_target"] if known else [])):
+            assert ours[name] == pytest.approx(theirs[name], rel=1e-6, abs=1e-9)
 
 
 def test_a_streams_winches_stand_where_a_plans_do() -> None:

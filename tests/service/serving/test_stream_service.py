@@ -28,6 +28,7 @@ from tests.suite.helpers.requests import (
     JSON,
     LIGHT,
     MSGPACK,
+    compliant_request,
     put,
     stream_request,
     wall_request,
@@ -37,8 +38,8 @@ from tests.suite.helpers.served import free_endpoint
 WRENCH = [1050.0, 10.0, -5.0, 2.0, 1.0, 0.0]
 
 
-def declaration(**more: object) -> StreamRequest:
-    return decode_request(msgspec.json.encode(stream_request(**more)), StreamRequest)
+def declaration(request: dict | None = None, **more: object) -> StreamRequest:
+    return decode_request(msgspec.json.encode(stream_request(request, **more)), StreamRequest)
 
 
 def answered(key: str, request: dict, known: Streams) -> dict:
@@ -94,6 +95,24 @@ def test_a_stance_is_declared_and_asked_for_set_points(client: CruxClient) -> No
         assert mine.tensions == pytest.approx(tensions, rel=0.1, abs=3.0)
         per_newton = hand.fingers[0].motor_torque / tensions[0]
         assert mine.motor_torque == pytest.approx([per_newton * f for f in mine.tensions])
+
+
+def test_a_stance_of_compliant_wrists_is_asked_for_set_points(client: CruxClient) -> None:
+    request = compliant_request()
+    declared = client.stream(declaration(request))
+    assert (declared.status, declared.radius) == ("optimal", None)
+    assert all(each.columns[4].startswith("wrist/") for each in declared.hands)
+    wrench = tuple(np.add(declared.body_wrench, [5.0, -4.0, 3.0, 0.5, 0.0, 0.2]).tolist())
+    reply = client.set_points(SetPointsRequest(v=1, stream=declared.stream, body_wrench=wrench))
+    assert (reply.status, reply.source, reply.verified) == ("optimal", "solved", True)
+    asked = request | {"body_wrench": list(wrench)}
+    asked.pop("load", None)
+    whole = client.plan(decode_request(msgspec.json.encode(asked), PlanRequest))
+    assert reply.utilisation == pytest.approx(whole.utilisation, rel=0.01)
+    stiffness = [5000.0] * 3 + [100.0] * 3
+    for hand in reply.hands:
+        pull = np.multiply(stiffness, np.subtract(hand.pose_target, hand.twist))
+        assert pull == pytest.approx(hand.wrench, abs=1e-6)
 
 
 @pytest.mark.parametrize("form", Format)

@@ -83,6 +83,16 @@ def ask(stance: Stance, *want: str, **kwargs) -> Question:
     return Question(stance, want=frozenset(want), **kwargs)
 
 
+def complying(question: Question, limbs: tuple[str, ...] = tuple(PLACES)) -> Question:
+    """The same question with compliant wrists on some limbs, without extras."""
+    hands = [
+        replace(hand, wrist="compliant" if hand.limb in limbs else "fixed")
+        for hand in question.stance.hands
+    ]
+    stance = replace(question.stance, hands=tuple(hands))
+    return replace(question, stance=stance, want=frozenset())
+
+
 def moved(stance: Stance, by: Pose) -> Stance:
     """The same stance elsewhere in the world, gravity turned with it."""
     hands = tuple(replace(hand, pose=by @ hand.pose) for hand in stance.hands)
