@@ -338,9 +338,9 @@ def recover_floating_hand(
     -------
     HandPlan
     """
-    hand, closed = wrist.hand, wrist.closed_at(y)
+    closed = wrist.closed_at(y)
     found = wrist.hand_loads(y[None])
-    wrench = hand.wrenches(found)[0]
+    wrench = found.wrenches[0]
     pose = replace(pose, palm=wrist.palm_mode(y), driven=wrist.driven)
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]
     tensions = found.tensions[0]
