@@ -278,6 +278,16 @@ class FloatingWrist(CompliantGrasp):
             known.update(self.keep(np.array(new), self.hand_loads(steps)))
         return [loads for key in keys if (loads := known[key]) is not None]
 
+    def linearised_loads(self, at: Array) -> HandLoads:
+        """Return the loads at one pose, shapes (1, …): those about which its set is linearised.
+
+        Parameters
+        ----------
+        at : ndarray, shape (d,)
+            Pose of the wrist.
+        """
+        return HandLoads(*(part[:1].real for part in self._stepped(at[None])[0]))
+
     def knows(self, poses: Array) -> bool:
         """Return True if the loads about all of k poses, shape (k, d), are in the cache."""
         return None not in self._kept.find([at.tobytes() for at in poses])

@@ -21,7 +21,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.compliance.rolling import Numbers
 from hand_models.hand import SettledHand
-from hand_models.tendon import share_load
+from hand_models.tendon import shear_stiffness
 
 __all__ = ["PalmSprings", "lateral_stiffness"]
 
@@ -48,8 +48,7 @@ class PalmSprings:
             rubs = hand.palm_friction, hand.palm_own_friction
             for share, those in palm.layers:
                 contacts = tuple(hand.palm_contact[i] for i in those)
-                sharing = share_load(contacts, hand.palm_spring, *rubs)
-                springs[0, 0] += share * float(sharing.tile_stiffness.sum())
+                springs[0, 0] += share * shear_stiffness(contacts, hand.palm_spring, *rubs)
             pressing = np.array(palm.engagement) * hand.palm_pressing_stiffness
             springs[1, [1 + i for i in palm.engaged]] = pressing
         nearest = np.where(self.stiffness[:, 1, 1:] > 0.0, np.maximum(gaps, 0.0), 0.0)

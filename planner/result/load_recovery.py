@@ -339,7 +339,7 @@ def recover_floating_hand(
     HandPlan
     """
     closed = wrist.closed_at(y)
-    found = wrist.hand_loads(y[None])
+    found = wrist.linearised_loads(y)
     wrench = found.wrenches[0]
     pose = replace(pose, palm=wrist.palm_mode(y), driven=wrist.driven)
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]

@@ -19,7 +19,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, FingerFrame, SettledHand
-from hand_models.tendon import FingerTendon, TendonState, share_load
+from hand_models.tendon import FingerTendon, TendonState, shear_stiffness
 from planner.prepare import HandBatch
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
@@ -223,13 +223,12 @@ def _check_palm(
         return
     body, stiffness = hand.hand, 0.0
     for share, engaged in hand.palm.layers:
-        sharing = share_load(
+        stiffness += share * shear_stiffness(
             tuple(body.palm_contact[i] for i in engaged),
             body.palm_spring,
             body.palm_friction,
             body.palm_own_friction,
         )
-        stiffness += share * float(sharing.tile_stiffness.sum())
     step = moved(hand.palm.centre, wrist)
 
     # the integral of a stiffness that rises from zero to its whole over the onset [m]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from hand_models.finger import Contact, FingerModel
 from hand_models.sections import Section
 
 __all__ = ["TileFace", "slip_of"]
+
+GAUSS_RULE: Final = np.polynomial.legendre.leggauss(3)
+"""Places on [−1, 1] and weights, by which polynomials to the fifth degree are integrated."""
 
 
 class TileFace(NamedTuple):
@@ -69,7 +72,7 @@ class TileFace(NamedTuple):
         start, end = max(self.near, touches - widest), min(self.far, touches + widest)
         if not start < end:
             return touches
-        nodes, weights = np.polynomial.legendre.leggauss(3)
+        nodes, weights = GAUSS_RULE
         places = (start + end) / 2.0 + (end - start) / 2.0 * nodes
         pressures = weights * (self.depth - (places - touches) ** 2 / (2.0 * radius))
         return float(pressures @ places / pressures.sum())
