@@ -23,7 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.base import Array
-from hand_models.compliance.rolling import Numbers, RollingContact
+from hand_models.compliance.rolling import (
+    MovedPosture,
+    Numbers,
+    RollingContact,
+    across,
+    dot,
+)
 from hand_models.finger import PHALANGES, SettledFinger
 from hand_models.sections import Section
 from hand_models.tendon import FingerTendon, MotorScheme, TendonRegimes, pad_tiles
@@ -86,8 +92,8 @@ class FingerLoads(NamedTuple):
     ----------
     shears : ndarray, shape (F, m, 3)
         T, shear of each phalanx's tile [N].
-    base_shears : ndarray, shape (F, m)
-        Shear of each base tile; zero for fingers without one [N].
+    tile_shears : ndarray, shape (F, m, n)
+        Shear of each tile, base tiles first; zero at the end for fingers of fewer than n [N].
     normals : ndarray, shape (F, m, 3)
         N, normal load of each phalanx [N].
     tensions : ndarray, shape (F, m, 3)
@@ -106,7 +112,7 @@ class FingerLoads(NamedTuple):
     """
 
     shears: Numbers
-    base_shears: Numbers
+    tile_shears: Numbers
     normals: Numbers
     tensions: Numbers
     motor_tensions: Numbers
@@ -115,8 +121,8 @@ class FingerLoads(NamedTuple):
     directions: Numbers
     reached: NDArray[np.bool_]
 
-    def of(self, finger: int | slice) -> FingerLoads:
-        """Return the loads of one finger, shapes (m, …), or of a slice of them, (F, m, …)."""
+    def of(self, finger: int) -> FingerLoads:
+        """Return the loads of one finger, shapes (m, …)."""
         return FingerLoads(*(part[finger] for part in self))
 
     @property
@@ -160,17 +166,21 @@ class CompliantFingers:
         )
         losses = pad_tiles([each.losses for each in fingers], 0.0)
         self._regimes = TendonRegimes([each.anchored for each in fingers], losses, scheme)
-        self._at_rest = [pad_tiles([each.shears[:, k] for each in fingers], 0.0) for k in (0, 1)]
-        self._base = np.array([each.base_tile for each in fingers])
-        self._stiffness = np.array([model.joint_stiffness for model in models])[:, None]
-        self._preload = np.array([model.joint_preload for model in models])[:, None]
-        self._radii = np.array([model.pulley_radii for model in models])[:, None]
-        self._angles = np.array([each.finger.joint_angles for each in fingers])[:, None]
-        count = len(PHALANGES)
-        # each free joint begins a link with one phalanx that bears
-        self._held_by = np.zeros((len(fingers), count, count))
-        for pairs, each in zip(self._held_by, fingers, strict=True):
-            pairs[list(each.finger.bearing), list(each.finger.free)] = 1.0
+        self._zero, self._per_newton = (
+            pad_tiles([each.shears[:, k] for each in fingers], 0.0)[..., None] for k in (0, 1)
+        )
+        # where each phalanx is among its finger's tiles
+        own, tiles = np.arange(len(fingers))[:, None], np.arange(len(PHALANGES))
+        self._phalanges = own, np.array([each.base_tile for each in fingers])[:, None] + tiles
+        self._stiffness = np.array([model.joint_stiffness for model in models])[..., None]
+        preload = np.array([model.joint_preload for model in models])[..., None]
+        angles = np.array([each.finger.joint_angles for each in fingers])[..., None]
+        self._springs = preload + self._stiffness * angles
+        self._radii = np.array([model.pulley_radii for model in models])[..., None]
+        # the phalanx that bears for each free joint, which begins a link; −1 where none does
+        self._bearing = np.full((len(fingers), len(PHALANGES)), -1)
+        for bearing, each in zip(self._bearing, fingers, strict=True):
+            bearing[list(each.finger.free)] = each.finger.bearing
 
     def loads(
         self,
@@ -178,7 +188,7 @@ class CompliantFingers:
         z: Numbers,
         turn: Numbers,
         tension: Numbers,
-        base_slip: Numbers | None = None,
+        base_slip: Numbers | float = 0.0,
     ) -> FingerLoads:
         """Return the loads of the fingers after displacements of their bases.
 
@@ -194,75 +204,51 @@ class CompliantFingers:
             Displacement of base tiles along the rock, toward the base [m]; zero by default.
         """
         posture = self._rolling.move(x, z, turn)
-        first = 0.0 * posture.slips[..., 0] if base_slip is None else base_slip
-        slips = self._of_tiles(posture.slips, first)
-        turns = self._of_tiles(posture.turns, 0.0 * first)
-        zero, per_newton = self._at_rest
-        at_rest = zero[:, None] + tension[..., None] * per_newton[:, None]
-        with np.errstate(invalid="ignore"):
+        shape, kind = (*self._zero.shape[:2], x.shape[1]), np.result_type(posture.slips, base_slip)
+        slips, turns = np.zeros(shape, dtype=kind), np.zeros(shape, dtype=kind)
+        slips[:, 0] = base_slip
+        slips[self._phalanges], turns[self._phalanges] = posture.slips, posture.turns
+        at_rest = self._zero + tension[:, None] * self._per_newton
+        with np.errstate(invalid="ignore", divide="ignore"):
             response = self._regimes.respond(slips, turns, tension, at_rest)
-        shears, tensions = (
-            self._of_phalanges(part) for part in (response.shears, response.tensions)
-        )
-        angles = posture.angles + self._rolling.tilts
-        u = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        normals, torques = self._balance(
-            shears, tensions, posture.turns, u, posture.joints, posture.points
-        )
+            tensions, shears = (part[self._phalanges] for part in response[:2])
+            normals, torques = self._balance(posture, shears, tensions)
         return FingerLoads(
-            shears=shears,
-            base_shears=np.where(self._base[:, None], response.shears[..., 0], 0.0),
-            normals=normals,
-            tensions=tensions,
-            motor_tensions=response.tensions[..., 0],
-            stop_torques=torques,
-            points=posture.points,
-            directions=u,
+            shears=shears.swapaxes(1, 2),
+            tile_shears=response.shears.swapaxes(1, 2),
+            normals=normals.swapaxes(1, 2),
+            tensions=tensions.swapaxes(1, 2),
+            motor_tensions=response.tensions[:, 0],
+            stop_torques=torques.swapaxes(1, 2),
+            points=posture.points.transpose(0, 3, 1, 2),
+            directions=posture.directions.transpose(0, 3, 1, 2),
             reached=posture.reached,
         )
 
-    def _of_tiles(self, of_phalanges: Numbers, first: Numbers) -> Numbers:
-        """Return numbers of phalanges as those of tiles, base tiles' first, padded at the end."""
-        if not self._base.any():
-            return of_phalanges
-        after = np.concatenate([first[..., None], of_phalanges], axis=-1)
-        padded = np.concatenate([of_phalanges, 0.0 * first[..., None]], axis=-1)
-        return np.where(self._base[:, None, None], after, padded)
-
-    def _of_phalanges(self, of_tiles: Numbers) -> Numbers:
-        """Return numbers of tiles without base tiles, shape (F, m, 3)."""
-        if not self._base.any():
-            return of_tiles
-        return np.where(self._base[:, None, None], of_tiles[..., 1:], of_tiles[..., :-1])
-
     def _balance(
-        self,
-        shears: Numbers,
-        tensions: Numbers,
-        turns: Numbers,
-        u: Numbers,
-        joints: Numbers,
-        points: Numbers,
+        self, posture: MovedPosture, shears: Numbers, tensions: Numbers
     ) -> tuple[Numbers, Numbers]:
-        """Return the normals that balance the free joints, and what is left at the others."""
-        d = points[..., None, :, :] - joints[..., :, None, :]
-        later = np.triu(np.ones((len(PHALANGES),) * 2))
-        u = u[..., None, :, :]
-        across = (d[..., 0] * u[..., 1] - d[..., 1] * u[..., 0]) * later
-        arms = (d[..., 0] * u[..., 0] + d[..., 1] * u[..., 1]) * later
-        springs = self._stiffness * (self._angles + turns) + self._preload
-        rest = tensions * self._radii - springs + (across * shears[..., None, :]).sum(axis=-1)
-        held_by = self._held_by[:, None]
-        free, bears = held_by.sum(axis=-2) > 0.0, held_by.sum(axis=-1) > 0.0
-        # one equation for each phalanx: of its joint, or that it presses nothing
-        rows = np.where(
-            bears[..., None], held_by @ (arms * bears[..., None, :]), np.eye(len(later))
-        )
-        own = np.diagonal(rows, axis1=-2, axis2=-1)
-        lost = ~(np.isfinite(rows.real).all(axis=(-1, -2)) & (own != 0.0).all(axis=-1))
-        rows[lost] = np.eye(len(later))
-        aims = held_by @ rest[..., None]
-        normals = np.linalg.solve(rows, aims)[..., 0]
-        normals[lost] = np.nan
-        left = rest - (arms * normals[..., None, :]).sum(axis=-1)
-        return normals, np.where(free, 0.0, left)
+        """Return the normals that balance the free joints, and what is left at the others.
+
+        Each of shape (F, 3, m). Joint after joint from the last: what is beyond it is known but for
+        the normal load of one phalanx.
+        """
+        u, points = posture.directions, posture.points
+        # of shears and, per newton, of normals: force on the finger, moment from x toward z
+        drags, drag_moments = shears[:, :, None] * u, shears * dot(across(points), u)
+        presses, press_moments = across(u), dot(points, u)
+        left = tensions * self._radii - self._springs - self._stiffness * posture.turns
+        normals, force, moment = (np.zeros_like(part) for part in (left, u[:, 0], left[:, 0]))
+        for i in reversed(range(len(PHALANGES))):
+            joint, force = posture.joints[:, i], force + drags[:, i]
+            moment = moment + drag_moments[:, i]
+            left[:, i] += moment - dot(across(joint), force)
+            free = (self._bearing[:, i] >= 0).nonzero()[0]
+            if len(free):
+                bears = free, self._bearing[free, i]
+                arm = press_moments[bears] - dot(joint[free], u[bears])
+                normals[bears] = load = left[free, i] / arm
+                force[free] -= load[:, None] * presses[bears]
+                moment[free] -= load * press_moments[bears]
+                left[free, i] = 0.0
+        return normals, left

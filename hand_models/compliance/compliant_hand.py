@@ -2,23 +2,14 @@
 
 The hand is settled and its tendons hold a preload. Then the wrist moves by a small twist
 ξ = (v, ω), of the hand frame about its origin at rest. In its plane each finger settles anew
-(`compliant_finger`); across its plane the tiles are springs on a beam that leaves the base along
-the finger (Section 5.3: linear elasticity),
-
-    Y = (F + diag(1 / k))⁻¹ y,    F_ij = ℓ_i² (3 ℓ_j − ℓ_i) / (6 EI) + h_i h_j ℓ_i / GJ,  ℓ_i ≤ ℓ_j,
-
-with Y the lateral load of each tile, y its displacement across the finger's plane, k the stiffness
-of its spines on the rock, ℓ its distance along the finger from the joint and h its distance from
-the finger's axis. The engaged palm tiles drag the rock by the palm's travel toward −x and share
-that load on their tendon; each presses by its travel past its gap to the rock. A spring of
-stiffness k carries k d²/(2 δ) at a travel d up to its onset δ, and k (d − δ/2) beyond.
+(`compliant_finger`); across its plane, and under the palm, springs carry (`hand_springs`).
 
 Forces and places are in H *at rest*: the tiles are anchored in the rock, which does not move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -26,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError, skew
+from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError
 from hand_models.compliance.compliant_finger import CompliantFingers, FingerAtRest, FingerLoads
 from hand_models.compliance.grasp import complex_steps, slopes
-from hand_models.compliance.rolling import Numbers
+from hand_models.compliance.hand_springs import PalmSprings, lateral_stiffness
+from hand_models.compliance.rolling import Numbers, across
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.tendon import FingerTendon, MotorScheme
@@ -54,6 +46,8 @@ class HandLoads(NamedTuple):
         Contacts in H at rest [m].
     axes : ndarray, shape (m, n, 3, 3)
         Rows: the unit force on the rock of shear, normal and lateral load, in H at rest.
+    wrenches : ndarray, shape (m, 6)
+        Wrench of all tiles and the palm on the rock, in H at rest [N, N·m].
     reached : ndarray of bool, shape (m,)
         Whether every phalanx with a contact still meets rock.
     """
@@ -66,6 +60,7 @@ class HandLoads(NamedTuple):
     palm: Numbers
     positions: Numbers
     axes: Numbers
+    wrenches: Numbers
     reached: NDArray[np.bool_]
 
     @property
@@ -109,12 +104,10 @@ class CompliantHand:
         self.scheme: MotorScheme = scheme
         self.fingers = [self._finger(i, name) for i, name in enumerate(FINGERS)]
         self._own = [np.flatnonzero(settled.finger_of == i) for i in range(len(FINGERS))]
-        self._across = [self._lateral_stiffness(i) for i in range(len(FINGERS))]
-        self.palm_shear_stiffness = float(settled.palm_stiffness[0])
 
     @cached_property
-    def _together(self) -> CompliantFingers:
-        return CompliantFingers(self.fingers, self.scheme)
+    def _batch(self) -> CompliantHands:
+        return CompliantHands([self])
 
     @cached_property
     def _alone(self) -> list[CompliantFingers]:
@@ -138,21 +131,6 @@ class CompliantHand:
             [each * settled.closing_tension for each in hand.depths[base_tile]],
         )
 
-    def _lateral_stiffness(self, i: int) -> Array:
-        """Return the stiffness of a finger's tiles across its plane, shape (n_i, n_i) [N/m]."""
-        settled, hand = self.settled, self.settled.hand
-        own = self._own[i]
-        if not settled.grasp.lateral:
-            return np.zeros((len(own), len(own)))
-        arms = settled.positions[own] - self.frames[i].joint
-        out = np.maximum(arms @ self.frames[i].along, 0.0)
-        shorter, longer = np.minimum(out[:, None], out), np.maximum(out[:, None], out)
-        flexibility = shorter**2 * (3.0 * longer - shorter) / (6.0 * hand.bending_stiffness)
-        flexibility += np.outer(arms[:, 2], arms[:, 2]) * shorter / hand.torsional_stiffness
-        # as (F + 1/K)⁻¹, also where tiles have no spines on the rock
-        springs = np.diag(settled.engagement[own] * hand.lateral_stiffness)
-        return np.asarray(np.linalg.solve(np.eye(len(own)) + springs @ flexibility, springs))
-
     def loads(self, twists: Numbers, tensions: Numbers | None = None) -> HandLoads:
         """Return every load of the hand at m twists of its wrist.
 
@@ -164,41 +142,9 @@ class CompliantHand:
             Tension at which each finger has closed before the wrist moves [N]; the preload by
             default.
         """
-        bases = self._bases(range(len(FINGERS)), twists, tensions)
-        return self._loads(twists, self._together.loads(*bases))
-
-    def _loads(self, twists: Numbers, found: FingerLoads) -> HandLoads:
-        """Return the hand's loads of those of its four fingers in their planes."""
-        m, settled = len(twists), self.settled
-        n = len(settled.tiles)
-        kind = twists.dtype
-        shears, normals, laterals = (np.zeros((m, n), dtype=kind) for _ in range(3))
-        positions = np.broadcast_to(settled.positions, (m, n, 3)).astype(kind)
-        axes = np.broadcast_to(settled.axes, (m, n, 3, 3)).astype(kind)
-        tensions = found.motor_tensions.T
-        reached = np.asarray(found.reached.all(axis=0))
-        up = np.array([0.0, 0.0, 1.0])
-        for i, (frame, own) in enumerate(zip(self.frames, self._own, strict=True)):
-            shears[:, own] = own_shears(found.of(i), len(own))
-            laterals[:, own] = self.lateral_loads(i, twists)
-            phalanges = own[-len(PHALANGES) :]
-            normals[:, phalanges] = found.normals[i]
-            place, u = found.points[i], found.directions[i]
-            positions[:, phalanges] = frame.joint + place[..., :1] * frame.along
-            positions[:, phalanges] += place[..., 1:] * up
-            axes[:, phalanges, 0] = -(u[..., :1] * frame.along + u[..., 1:] * up)
-            axes[:, phalanges, 1] = u[..., :1] * up - u[..., 1:] * frame.along
-        return HandLoads(
-            shears=shears,
-            normals=normals,
-            laterals=laterals,
-            tensions=tensions,
-            stop_torques=self._pushing(found.stop_torques),
-            palm=self.palm_loads(twists),
-            positions=positions,
-            axes=axes,
-            reached=reached,
-        )
+        if tensions is None:
+            tensions = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
+        return self._batch.loads([twists], [tensions])[0]
 
     def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
         """Return the loads of one finger in its plane at twists of the wrist.
@@ -210,7 +156,9 @@ class CompliantHand:
         twists : ndarray, shape (m, 6)
             [m, rad]
         """
-        return self._alone[i].loads(*self._bases([i], twists)).of(0)
+        x, z, turned, slip = (self._batch.bases[0, :, i] @ _terms(twists))[:, None]
+        tension = np.full((1, len(twists)), self.preload[i])
+        return self._alone[i].loads(x, z, turned, tension, slip).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
         """Return the lateral loads of one finger's tiles at twists of the wrist.
@@ -227,77 +175,37 @@ class CompliantHand:
         ndarray, shape (m, n_i)
             For the n_i tiles of the finger, from the base outward [N].
         """
-        v, turn, across = twists[:, :3], twists[:, 3:], self.frames[i].across
-        places = self.settled.positions[self.tiles_of(i)]
-        # b · (v + ω × p + ω × (ω × p) / 2) for all places p at once
-        first = (v @ across)[:, None] + turn @ np.cross(places, across).T
-        square = (turn * turn).sum(axis=1)[:, None]
-        second = (turn @ across)[:, None] * (turn @ places.T) - square * (places @ across)
-        return np.asarray((first + 0.5 * second) @ self._across[i].T)
+        own = self._own[i]
+        moved = self._batch.aside[0, own] @ _terms(twists)
+        return np.asarray((self._batch.lateral_stiffness[0][np.ix_(own, own)] @ moved).T)
 
     def tiles_of(self, i: int) -> Indices:
         """Return the indices of finger ``i``'s tiles in `SettledHand.tiles`."""
         return self._own[i]
 
-    def _bases(
-        self, fingers: Iterable[int], twists: Numbers, tensions: Numbers | None = None
-    ) -> tuple[Numbers, Numbers, Numbers, Numbers, Numbers]:
-        """Return how bases of fingers move in their planes, (F, m), as `CompliantFingers.loads`."""
-        v, turn, each = twists[:, :3], twists[:, 3:], []
-        if tensions is None:
-            tensions = np.broadcast_to(self.preload, (len(twists), len(FINGERS)))
-        for i in fingers:
-            frame = self.frames[i]
-            moved = _moved(frame.joint, v, turn)
-            base = self.settled.positions[self._own[i][0]]
-            slip = -(_moved(base, v, turn) @ frame.along)
-            # from x toward z is against the sense of the axis across, z × x
-            turned = -(turn @ frame.across)
-            each.append((moved @ frame.along, moved[:, 2], turned, tensions[:, i], slip))
-        x, z, turned, tension, slip = map(np.array, zip(*each, strict=True))
-        return x, z, turned, tension, slip
+    def pushing(self, torques: Numbers) -> Numbers:
+        """Return the torques on stops, (m, k), of those on all joints, (m, 12) [N·m].
 
-    def _pushing(self, torques: Numbers) -> Numbers:
-        """Return the torques on stops, positive where they are pushed."""
-        pushing = [
-            torques[i, :, j]
-            * (1.0 if self.settled.fingers[i].contacts[j].stop == "upper" else -1.0)
-            for i, j, _ in self.settled.stops
-        ]
-        nothing = np.zeros((torques.shape[1], 0), dtype=torques.dtype)
-        return np.stack(pushing, axis=-1) if pushing else nothing
+        Positive where they are pushed.
+        """
+        stops = [(i, j) for i, j, _ in self.settled.stops]
+        upper = [self.settled.fingers[i].contacts[j].stop == "upper" for i, j in stops]
+        own = [len(PHALANGES) * i + j for i, j in stops]
+        return np.asarray(torques[:, own] * np.where(upper, 1.0, -1.0))
 
-    def palm_loads(self, twists: Numbers) -> Numbers:
-        """Return the palm's shear toward −x and its pressing, (m, 2) [N], at twists (m, 6)."""
-        travel, palm = self.palm_travel(twists), self.settled.palm
-        if not palm.engaged:
-            return 0.0 * travel
-        # [m] 0.1 mm of shear and 0.02 mm of pressing, over which a search sees the springs begin
-        shear = self.palm_shear_stiffness * _compressed(travel[:, 0], 1e-4)
-        beyond = travel[:, 1:] - np.maximum(palm.gaps[list(palm.engaged)], 0.0)
-        stiffness = self.settled.hand.palm_pressing_stiffness * np.array(palm.engagement)
-        return np.stack([shear, _compressed(beyond, 2e-5) @ stiffness], axis=-1)
+    @property
+    def palm_shear_stiffness(self) -> float:
+        """Stiffness of the palm's shear toward −x [N/m]."""
+        return float(self._batch.palm_springs.stiffness[0, 0, 0])
+
+    @property
+    def palm_wrenches(self) -> Array:
+        """Wrench on the rock per newton of the palm's shear, and of its pressing, shape (2, 6)."""
+        return np.asarray(self._batch.palm_wrenches[0].T)
 
     def palm_travel(self, twists: Numbers) -> Numbers:
         """Return the palm's travel toward −x and into the rock, (m, 2) [m], at twists (m, 6)."""
-        moved = _moved(self.settled.palm.centre, twists[:, :3], twists[:, 3:])
-        return np.asarray(moved[:, ::2] * (-1.0, 1.0))
-
-    def wrenches(self, loads: HandLoads) -> Numbers:
-        """Return the wrenches of the hand on the rock for given loads.
-
-        Returns
-        -------
-        ndarray, shape (m, 6)
-            Force and moment in the hand frame H at rest [N, N·m].
-        """
-        forces = np.einsum("mtk,mtkx->mtx", loads.tile_loads, loads.axes)
-        moments = np.cross(loads.positions, forces).sum(axis=1)
-        shear, pressing = loads.palm[:, 0], loads.palm[:, 1]
-        palm = np.stack([-shear, 0.0 * shear, pressing], axis=-1)
-        return np.concatenate(
-            [forces.sum(axis=1) + palm, moments + np.cross(self.settled.palm.centre, palm)], axis=1
-        )
+        return np.asarray((self._batch.palm[0] @ _terms(twists)).T)
 
     def stiffness(self, twist: ArrayLike | None = None) -> Array:
         """Return the stiffness K_g = ∂w_g/∂x_g (Eq. 11) of the hand at a twist of the wrist.
@@ -315,22 +223,74 @@ class CompliantHand:
             Derivative of the wrench on the rock by the twist [N/m, N/rad, N, N·m/rad].
         """
         at = np.zeros(6) if twist is None else np.asarray(twist, dtype=float)
-        return slopes(self.wrenches(self.loads(complex_steps(at))))
+        return slopes(self.loads(complex_steps(at)).wrenches)
 
 
 class CompliantHands:
-    """Several compliant hands whose loads are computed in one call, each at its own twists.
+    """H compliant hands whose loads are computed in one call, each at its own twists.
 
     Parameters
     ----------
-    hands : sequence of CompliantHand
+    hands : sequence of CompliantHand, length H
         All of one scheme.
+
+    Attributes
+    ----------
+    bases : ndarray, shape (H, 4, 4, 15)
+        Moves x, z, turn from x toward z, and slip of its tile, of each finger's base in its plane,
+        per term of a twist (`_terms`).
+    aside, palm : ndarray, shapes (H, n, 15), (H, 2, 15)
+        Moves, likewise, of each tile across its finger's plane, and of the palm toward −x and into
+        the rock.
+    lateral_stiffness : ndarray, shape (H, n, n)
+        Of the tiles across their fingers' planes [N/m].
+    palm_springs : PalmSprings
+    palm_wrenches : ndarray, shape (H, 6, 2)
+        Wrench on the rock of each newton of the palm's shear and of its pressing.
     """
 
     def __init__(self, hands: Sequence[CompliantHand]) -> None:
         self.hands = hands
-        fingers = [finger for hand in hands for finger in hand.fingers]
-        self._together = CompliantFingers(fingers, hands[0].scheme)
+        settled = [hand.settled for hand in hands]
+        up, of = np.array([0.0, 0.0, 1.0]), settled[0].finger_of
+        joints, along, sideways = (
+            np.array([[getattr(frame, name) for frame in hand.frames] for hand in hands])
+            for name in ("joint", "along", "across")
+        )
+        positions = np.array([each.positions for each in settled])
+        first = np.searchsorted(of, range(len(FINGERS)))
+        none = np.zeros((*joints.shape[:-1], 9))
+        moves = (
+            _moves(joints, along),
+            _moves(joints, 0.0 * along + up),
+            # from x toward z is against the sense of the axis across, z × x
+            np.concatenate([0.0 * sideways, -sideways, none], axis=-1),
+            _moves(positions[:, first], -along),
+        )
+        self.bases = np.stack(moves, axis=1)
+        self.aside = _moves(positions, sideways[:, of])
+        toward = np.array([-1.0, 0.0, 0.0]), up
+        centres = np.array([[each.palm.centre] * len(toward) for each in settled])
+        ways = np.broadcast_to(toward, centres.shape)
+        self.palm = _moves(centres, ways)
+        self.palm_wrenches = np.concatenate([ways, np.cross(centres, ways)], axis=-1).swapaxes(1, 2)
+        self.palm_springs = PalmSprings(settled)
+        arms = positions - joints[:, of]
+        out = np.maximum((arms * along[:, of]).sum(axis=-1), 0.0)
+        self.lateral_stiffness = lateral_stiffness(settled, out, arms[..., 2])
+        self._positions = positions[..., None]
+        self._axes = np.array([each.axes for each in settled])[..., None]
+        self._joints = np.repeat(joints, len(PHALANGES), axis=1)[..., None]
+        self._along = along[:, :, None, :, None]
+        # where each tile is among those of all fingers, and which tiles are of phalanges
+        counts, place = np.bincount(of), np.arange(len(of)) - first[of]
+        self._tiles = of * counts.max() + place
+        self._phalanges = np.flatnonzero(place >= counts[of] - len(PHALANGES))
+
+    @cached_property
+    def _fingers(self) -> CompliantFingers:
+        fingers = [finger for hand in self.hands for finger in hand.fingers]
+        return CompliantFingers(fingers, self.hands[0].scheme)
 
     def loads(self, twists: Sequence[Numbers], tensions: Sequence[Numbers]) -> list[HandLoads]:
         """Return the loads of each hand at m twists of its wrist.
@@ -342,41 +302,76 @@ class CompliantHands:
         tensions : sequence of ndarray, shape (m, 4)
             Tensions at which each hand's fingers have closed [N].
         """
-        count = len(FINGERS)
-        each = [
-            hand._bases(range(count), own, closed)
-            for hand, own, closed in zip(self.hands, twists, tensions, strict=True)
-        ]
-        bases = [np.concatenate(parts) for parts in zip(*each, strict=True)]
-        found = self._together.loads(*bases)
+        terms = _terms(np.array(twists))
+        (hands, _, m), fingers, phalanges = terms.shape, len(FINGERS), len(PHALANGES)
+        bases = np.moveaxis(self.bases @ terms[:, None], 1, 0)
+        x, z, turned, slip = bases.reshape(len(bases), hands * fingers, m)
+        closed = np.array(tensions).swapaxes(1, 2).reshape(hands * fingers, m)
+        found = self._fingers.loads(x, z, turned, closed, slip)
+
+        def of_hands(part: Numbers) -> Numbers:
+            each = fingers * part.shape[-1]
+            return np.asarray(part.swapaxes(1, 2).reshape(hands, each, m))
+
+        def in_hands(part: Numbers) -> Numbers:
+            flat = part.reshape(hands, fingers, phalanges, 2, m)
+            risen = flat[..., :1, :] * self._along
+            risen[..., 2, :] += flat[..., 1, :]
+            return np.asarray(risen.reshape(hands, fingers * phalanges, 3, m))
+
+        shears, those = of_hands(found.tile_shears)[:, self._tiles], self._phalanges
+        normals = np.zeros_like(shears)
+        normals[:, those] = of_hands(found.normals)
+        laterals = self.lateral_stiffness @ (self.aside @ terms)
+        palm = self.palm_springs.loads(self.palm @ terms)
+        positions, axes = (
+            np.broadcast_to(part, (*part.shape[:-1], m)).astype(terms.dtype)
+            for part in (self._positions, self._axes)
+        )
+        points, u = (part.transpose(0, 2, 3, 1) for part in (found.points, found.directions))
+        positions[:, those] = self._joints + in_hands(points)
+        axes[:, those, 0], axes[:, those, 1] = -in_hands(u), in_hands(across(u))
+        loads = np.stack([shears, normals, laterals], axis=2)
+        forces = (loads[:, :, :, None] * axes).sum(axis=2)
+        y, w = [1, 2, 0], [2, 0, 1]
+        moments = positions[:, :, y] * forces[:, :, w] - positions[:, :, w] * forces[:, :, y]
+        of_tiles = np.concatenate([forces.sum(axis=1), moments.sum(axis=1)], axis=1)
+        all_hands = HandLoads(
+            shears=shears.swapaxes(1, 2),
+            normals=normals.swapaxes(1, 2),
+            laterals=laterals.swapaxes(1, 2),
+            tensions=found.motor_tensions.reshape(hands, fingers, m).swapaxes(1, 2),
+            stop_torques=of_hands(found.stop_torques).swapaxes(1, 2),
+            palm=palm.swapaxes(1, 2),
+            positions=positions.transpose(0, 3, 1, 2),
+            axes=axes.transpose(0, 4, 1, 2, 3),
+            wrenches=(of_tiles + self.palm_wrenches @ palm).swapaxes(1, 2),
+            reached=np.logical_and.reduce(found.reached.reshape(hands, fingers, m), axis=1),
+        )
+        each = [HandLoads(*parts) for parts in zip(*all_hands, strict=True)]
         return [
-            hand._loads(own, found.of(slice(count * h, count * (h + 1))))
-            for h, (hand, own) in enumerate(zip(self.hands, twists, strict=True))
+            own._replace(stop_torques=hand.pushing(own.stop_torques))
+            for own, hand in zip(each, self.hands, strict=True)
         ]
 
 
-def own_shears(found: FingerLoads, count: int) -> Numbers:
-    """Return the shears of a finger's tiles at m poses, shape (m, count) [N].
+def _moves(places: Array, ways: Array) -> Array:
+    """Return how far places move along unit vectors per term of a twist (`_terms`).
 
-    ``count``: 3, or 4 with a base tile, whose shear then comes first.
+    Shapes (..., 3), (..., 3), (..., 15). To second order: a · (v + ω × p + ω × (ω × p) / 2).
     """
-    if count == len(PHALANGES):
-        return found.shears
-    return np.concatenate([found.base_shears[:, None], found.shears], axis=1)
+    # a · (ω × (ω × p)) = (ω · a) (ω · p) − (a · p) (ω · ω)
+    along = (ways * places).sum(axis=-1)[..., None, None]
+    second = 0.5 * (ways[..., None] * places[..., None, :] - along * np.eye(3))
+    flat = second.reshape(*places.shape[:-1], -1)
+    return np.concatenate([ways, np.cross(places, ways), flat], axis=-1)
 
 
-def _compressed(travel: Numbers, onset: float) -> Numbers:
-    """Return how far one-sided springs are compressed that grow stiff over ``onset`` [m]."""
-    part = np.where(travel.real < onset, np.where(travel.real > 0.0, travel, 0.0), onset)
-    return np.asarray(part / onset * (travel - 0.5 * part))
-
-
-def _moved(place: Array, v: Numbers, turn: Numbers) -> Numbers:
-    """Return how far a place moves with the wrist, to second order in its turn, shape (m, 3)."""
-    # ω × p, and ω × (ω × p) = ω (ω · p) − p (ω · ω)
-    first = turn @ skew(place)
-    square = (turn * turn).sum(axis=1)[:, None]
-    return np.asarray(v + first + 0.5 * ((turn @ place)[:, None] * turn - square * place))
+def _terms(twists: Numbers) -> Numbers:
+    """Return the numbers of twists (..., m, 6) and the products of their turns, (..., 15, m)."""
+    turns = twists[..., 3:]
+    products = (turns[..., :, None] * turns[..., None, :]).reshape(*turns.shape[:-1], 9)
+    return np.concatenate([twists, products], axis=-1).swapaxes(-1, -2)
 
 
 def _preload(preload: ArrayLike | None, settled: SettledHand) -> Array:

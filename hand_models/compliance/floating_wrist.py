@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import Array, BoundedStore, Indices
-from hand_models.compliance.compliant_hand import CompliantHand, HandLoads, own_shears
+from hand_models.compliance.compliant_hand import CompliantHand, HandLoads
 from hand_models.compliance.grasp import (
     CompliantGrasp,
     GraspLoads,
@@ -199,11 +199,12 @@ class FloatingWrist(CompliantGrasp):
         return found
 
     def _grasp_loads(self, loads: HandLoads) -> GraspLoads:
-        elements = [loads.shears, loads.normals, loads.laterals, loads.tensions, loads.palm]
+        palm, wrenches = loads.palm, loads.wrenches
+        if not self.palm_carries:
+            palm, wrenches = 0.0 * palm, wrenches - palm @ self.hand.palm_wrenches
+        elements = [loads.shears, loads.normals, loads.laterals, loads.tensions, palm]
         return GraspLoads(
-            np.concatenate([*elements, loads.stop_torques], axis=1),
-            self.hand.wrenches(loads),
-            loads.reached,
+            np.concatenate([*elements, loads.stop_torques], axis=1), wrenches, loads.reached
         )
 
     def sieve(self, twists: Array) -> Indices:
@@ -216,7 +217,7 @@ class FloatingWrist(CompliantGrasp):
             own, phalanges = self.hand.tiles_of(i), self.hand.tiles_of(i)[-len(PHALANGES) :]
             found = self.hand.finger_loads(i, twists[left])
             laterals = self.hand.lateral_loads(i, twists[left])
-            shears = own_shears(found, len(own))
+            shears = found.tile_shears[:, : len(own)]
             elements = np.concatenate([shears, found.normals, laterals], axis=1)
             mine = np.flatnonzero(np.isin(self.layout.plane_tiles, own))
             P = rows.P[np.ix_(mine, [*own, *n + phalanges, *2 * n + own])]
@@ -282,13 +283,9 @@ class FloatingWrist(CompliantGrasp):
         list of WrenchSpace, length k
             Each as from `linearised`.
         """
-        carried = [
-            loads if self.palm_carries else loads._replace(palm=0.0 * loads.palm)
-            for loads in self._stepped(twists)
-        ]
         return [
             self._about(at, self._grasp_loads(loads), *self.travel_rows, within)
-            for at, loads in zip(twists, carried, strict=True)
+            for at, loads in zip(twists, self._stepped(twists), strict=True)
         ]
 
     def _stepped(self, twists: Array) -> list[HandLoads]:
@@ -335,7 +332,8 @@ class FloatingWrist(CompliantGrasp):
         list of (bytes, HandLoads), length k
             Cache key of each pose, and its d loads.
         """
-        each = [np.split(part, len(poses)) for part in loads]
-        made = [(at.tobytes(), HandLoads(*own)) for at, *own in zip(poses, *each, strict=True)]
+        d = poses.shape[1]
+        each = [HandLoads(*(part[k : k + d] for part in loads)) for k in range(0, poses.size, d)]
+        made = [(at.tobytes(), own) for at, own in zip(poses, each, strict=True)]
         self._kept.keep(made)
         return made

@@ -86,7 +86,7 @@ def _nearest(hand: CompliantHand, wanted: Array, first: Array) -> WristPose:
     units = pose_units(WRIST_COLUMNS)
 
     def wrenches(twists: Numbers) -> Numbers:
-        return np.asarray(hand.wrenches(hand.loads(twists)) * WRENCH_SCALE)
+        return np.asarray(hand.loads(twists).wrenches * WRENCH_SCALE)
 
     def residual(x: Array) -> Array:
         left = wrenches((x * units)[None])[0] - wanted * WRENCH_SCALE
@@ -109,5 +109,5 @@ def _nearest(hand: CompliantHand, wanted: Array, first: Array) -> WristPose:
             max_nfev=40,
         )
         at = found.x * units
-    left = wanted - hand.wrenches(hand.loads(at[None]))[0]
+    left = wanted - hand.loads(at[None]).wrenches[0]
     return WristPose(at, left, float(np.abs(left * WRENCH_SCALE).max()) <= BASE_TOLERANCES.force)

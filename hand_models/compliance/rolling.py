@@ -42,7 +42,7 @@ Numbers = NDArray[Any]
 
 
 class MovedPosture(NamedTuple):
-    """Postures of F fingers after m displacements of their bases, shapes (F, m, 3) or (F, m, 3, 2).
+    """Postures of F fingers after m displacements of their bases, shapes (F, 3, m) or (F, 3, 2, m).
 
     Attributes
     ----------
@@ -54,6 +54,8 @@ class MovedPosture(NamedTuple):
         δx of each phalanx along the rock, toward the base; 0 without contact [m].
     joints, points : ndarray
         (x, z) in F of each joint and of each contact [m].
+    directions : ndarray
+        Unit vector (x, z) along each phalanx, turned by its contact's ``tilt``.
     reached : ndarray of bool, shape (F, m)
         Whether every phalanx with a contact still meets rock.
     """
@@ -63,6 +65,7 @@ class MovedPosture(NamedTuple):
     slips: Numbers
     joints: Numbers
     points: Numbers
+    directions: Numbers
     reached: NDArray[np.bool_]
 
 
@@ -79,8 +82,8 @@ class _Link(NamedTuple):
     """Phalanges that turn as one about a free joint, and the rock under the one that bears.
 
     Lengths "along" and "above" are in axes of the bearing phalanx that are turned by its contact's
-    tilt: the contact presses upward in them. Of one finger these are numbers, of F fingers arrays
-    of shape (F, 1).
+    tilt: the contact presses upward in them. Of one finger these are numbers and vectors (x, z) in
+    F, of F fingers arrays of shapes (F, 1) and (F, 2, 1).
 
     Attributes
     ----------
@@ -88,8 +91,8 @@ class _Link(NamedTuple):
         -1 where no link begins.
     along, above : float
         Where the contact's axes begin, and how high the contact is, from the link's joint [m].
-    rest : float
-        Angle of the axes at rest [rad].
+    rest, raised : (float, float)
+        Unit vector along the axes at rest, and ``above`` as a vector [m].
     rolls : bool
         Whether its face rolls on the circle; otherwise its point slides.
     flat : bool
@@ -98,94 +101,110 @@ class _Link(NamedTuple):
         Where on the phalanx the contact may roll to [m].
     contact : float
         c⁰ at rest, or the place of the point that slides [m].
-    depth : float
-        How far the tile is pressed in [m].
-    point_x, point_z, into_x, into_z : float
-        A place of the face, at c⁰ [m], and the unit vector into the rock there.
+    depth, widest : float
+        How far the tile is pressed in, and how far it then presses to both sides of the contact
+        where its end is not nearer [m]; ``widest`` is −∞ where no bed is pressed.
+    centre : (float, float)
+        Centre of the circle, or a place on the line [m].
+    into, back : (float, float)
+        Unit vectors at c⁰: into the rock, and along it toward the base.
     radius : float
         Of the rock there [m].
-    offset : float
-        Of the contact's path from the rock: what spines reach across [m].
+    reach : float
+        Distance of the contact's path from the centre: spines may reach across a gap [m].
+    off_at_rest : float
+        How far from c⁰ the middle of the pressures is at rest [m].
     """
 
     bearing: Any = -1
     along: Any = 0.0
     above: Any = 0.0
-    rest: Any = 0.0
+    rest: Any = (1.0, 0.0)
+    raised: Any = (0.0, 0.0)
     rolls: Any = False
     flat: Any = False
     start: Any = 0.0
     end: Any = 0.0
     contact: Any = 0.0
-    depth: Any = 0.0
-    point_x: Any = 0.0
-    point_z: Any = 1.0
-    into_x: Any = 0.0
-    into_z: Any = 1.0
+    depth: Any = 1.0
+    widest: Any = -math.inf
+    centre: Any = (0.0, 2.0)
+    into: Any = (0.0, 1.0)
+    back: Any = (-1.0, 0.0)
     radius: Any = 1.0
-    offset: Any = 0.0
+    reach: Any = 1.0
+    off_at_rest: Any = 0.0
 
-    def turn(self, jx: Numbers, jz: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-        """Return how far bearing phalanges turn, contacts go along them, and they slip.
+    def turn(self, joint: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+        """Return the turns of bearing phalanges, and how far contacts go along them, and slip.
 
-        NaN where a phalanx finds no rock.
+        A turn is the unit vector, shape (F, 2, m), to which it turns x. NaN where a phalanx finds
+        no rock.
 
         Parameters
         ----------
-        jx, jz : ndarray, shape (F, m)
+        joint : ndarray, shape (F, 2, m)
             Places of the links' joints [m].
         """
-        reach = self.radius + self.offset
-        ox, oz = self.point_x + reach * self.into_x, self.point_z + reach * self.into_z
-        dx, dz = ox - jx, oz - jz
-        square = dx * dx + dz * dz
-        away = reach + self.above
-        rolled = np.sqrt(square - away * away) - self.along
-        near = ~(rolled.real >= self.start)
-        far = rolled.real > self.end
-        c = np.where(near, self.start, np.where(far, self.end, rolled))
-        c = np.where(self.rolls, c, self.contact)
+        apart = self.centre - joint
+        toward = np.where(self.flat[:, None], self.into, apart)
+        square = dot(toward, toward)
+        # a face is tangent to the circle up to its ends; a point slides on it, or along the line
+        rolled = np.sqrt(square - (self.reach + self.above) ** 2) - self.along
+        rolled = np.where(rolled.real > self.end, self.end, rolled)
+        rolled = np.where(rolled.real >= self.start, rolled, self.start)
+        c = np.where(self.rolls, rolled, self.contact)
         ahead = self.along + c
-        arm = np.sqrt(ahead * ahead + self.above * self.above)
-        # a face is tangent to the circle; a point slides on it, or along the line
-        tangent = bearing_angle(dx, dz) - np.arcsin(away / np.sqrt(square))
-        cosine = (arm * arm + square - reach * reach) / (2.0 * arm * np.sqrt(square))
-        gap = (self.point_x - jx) * self.into_x + (self.point_z - jz) * self.into_z
-        toward = np.where(
-            self.flat,
-            np.arctan2(self.into_z, self.into_x) - np.arccos(gap / arm),
-            bearing_angle(dx, dz) - np.arccos(cosine),
-        )
-        touch = toward - bearing_angle(ahead, self.above + 0.0 * ahead)
-        angle = np.where(self.rolls & ~near & ~far, tangent, touch)
-        turn = _within_half_a_turn(angle - self.rest)
-        cosine, sine = np.cos(self.rest + turn), np.sin(self.rest + turn)
-        px = jx + ahead * cosine - self.above * sine
-        pz = jz + ahead * sine + self.above * cosine
+        arm = ahead * ahead + self.above * self.above
+        # of the arm from joint to contact: what is toward the centre, and what is across
+        near = 0.5 * (arm + square - self.reach * self.reach)
+        near = np.where(self.flat, dot(apart, self.into), near)
+        beside = np.sqrt(arm * square - near * near)
+        place = _turned_back(toward, np.stack([near, beside], axis=1)) / square[:, None]
+        rest = self.rest * ahead[:, None] + self.raised
+        way = _turned_back(place, rest) / arm[:, None]
         # the contact seen from the circle's centre, turned from where it was at rest; on a line
-        # along the tangent (into_z, −into_x) that points away from the base
-        seen = bearing_angle(
-            (ox - px) * self.into_x + (oz - pz) * self.into_z,
-            (px - ox) * self.into_z - (pz - oz) * self.into_x,
-        )
-        line = (px - self.point_x) * self.into_z - (pz - self.point_z) * self.into_x
+        # along the tangent that points away from the base
+        seen = apart - place
+        line = dot(seen, self.back)
+        arc = self.radius * bearing_angle(dot(seen, self.into), line)
         went = c - self.contact
-        aside = self._aside(c) - self._aside(self.contact)
-        return turn, went + aside, went - np.where(self.flat, line, self.radius * seen)
+        slip = went - np.where(self.flat, line, arc)
+        return way, went + (self.off(c) - self.off_at_rest), slip
 
-    def _aside(self, c: Any) -> Numbers:
+    def off(self, c: Any) -> Any:
         """Return how far from c⁰ the middle of the pressures is: of a parabola cut short [m]."""
-        pressed = self.rolls & (self.depth > 0.0)
-        depth = np.where(pressed, self.depth, 1.0)
-        widest = np.sqrt(2.0 * depth * self.radius)
-        rooms = (c - self.start, self.end - c)
-        reaches = [np.where(pressed & (room.real < widest), room, widest) for room in rooms]
-        middle = middle_of_bed(reaches, [1.0 / self.radius] * 2, depth)
-        return np.asarray(np.where(pressed, middle, 0.0))
+        rooms = c - self.start, self.end - c
+        cut = np.minimum(rooms[0].real, rooms[1].real) < self.widest
+        if not cut.any():
+            return 0.0
+        reaches = [np.where(room.real < self.widest, room, self.widest) for room in rooms]
+        middle = middle_of_bed(reaches, [1.0 / self.radius] * 2, self.depth)
+        return np.where(cut, middle, 0.0)
 
 
-def _within_half_a_turn(angle: Numbers) -> Numbers:
-    return np.asarray(angle - math.tau * np.round(angle.real / math.tau))
+def _unit(angle: Numbers) -> Numbers:
+    """Return unit vectors (x, z), shape (..., 2, m), at angles (..., m) from x toward z."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-2)
+
+
+def dot(a: Numbers, b: Numbers) -> Numbers:
+    return np.asarray(a[..., 0, :] * b[..., 0, :] + a[..., 1, :] * b[..., 1, :])
+
+
+def across(vectors: Numbers) -> Numbers:
+    """Return vectors (x, z), shape (..., 2, m), turned by a quarter from x toward z."""
+    return np.asarray(vectors[..., ::-1, :] * np.array([[-1.0], [1.0]]))
+
+
+def _turned(vectors: Numbers, by: Numbers) -> Numbers:
+    """Return vectors turned as ``by`` is from x, and as much longer."""
+    return np.asarray(vectors * by[..., :1, :] + across(vectors) * by[..., 1:, :])
+
+
+def _turned_back(vectors: Numbers, by: Numbers) -> Numbers:
+    """Return vectors turned by as much the other way, and as much longer."""
+    return np.asarray(vectors * by[..., :1, :] - across(vectors) * by[..., 1:, :])
 
 
 class RollingContact:
@@ -210,17 +229,18 @@ class RollingContact:
         pressed = np.broadcast_to(np.asarray(depths), (len(fingers), len(PHALANGES)))
         each = [_links(*own) for own in zip(fingers, sections, pressed.tolist(), strict=True)]
         self._links = [
-            _Link(*(np.array(column)[:, None] for column in zip(*links, strict=True)))
+            _Link(*(np.array(column)[..., None] for column in zip(*links, strict=True)))
             for links in zip(*each, strict=True)
         ]
 
         def of_contacts(name: str) -> Array:
-            return np.array([[getattr(c, name) for c in f.contacts] for f in fingers])[:, None]
+            return np.array([[getattr(c, name) for c in f.contacts] for f in fingers])[..., None]
 
-        self._angles, self.tilts = of_contacts("angle"), of_contacts("tilt")
+        self._angles = of_contacts("angle")
+        self._rest, self._tilt = _unit(self._angles), _unit(of_contacts("tilt"))
         heights = np.array([finger.model.tile_height for finger in fingers])[:, None, None]
-        self._along, self._heights = of_contacts("along"), heights + of_contacts("rise")
-        self._spacing = np.array([finger.model.joint_spacing for finger in fingers])[:, None]
+        self._contact = np.stack([of_contacts("along"), heights + of_contacts("rise")], axis=2)
+        self._spacing = np.array([finger.model.joint_spacing for finger in fingers])[:, None, None]
 
     def move(self, x: Numbers, z: Numbers, turn: Numbers) -> MovedPosture:
         """Return the postures of the fingers after m displacements of their bases.
@@ -232,41 +252,34 @@ class RollingContact:
         turn : ndarray, shape (F, m)
             ψ, rotation of the base from x toward z [rad].
         """
-        jx = x + 0.0 * (z + turn)
-        jz, base = z + 0.0 * jx, turn + 0.0 * jx
-        shape = (*jx.shape, len(PHALANGES))
-        theta, rolled, slips = (np.zeros(shape, dtype=jx.dtype) for _ in range(3))
-        joints = np.zeros((*shape, 2), dtype=jx.dtype)
-        turned = base
-        for i, link in enumerate(self._links):
-            begins = link.bearing >= 0
-            if begins.any():
-                with np.errstate(invalid="ignore", divide="ignore"):
-                    turn, roll, slip = link.turn(jx, jz)
-                turned = np.where(begins, turn, turned)
-                for j in range(i, len(PHALANGES)):
-                    bears = link.bearing == j
-                    rolled[..., j] += np.where(bears, roll, 0.0)
-                    slips[..., j] += np.where(bears, slip, 0.0)
-            theta[..., i] = self._angles[..., i] + turned
-            joints[..., i, 0], joints[..., i, 1] = jx, jz
-            jx = jx + self._spacing * np.cos(theta[..., i])
-            jz = jz + self._spacing * np.sin(theta[..., i])
-        cosine, sine = np.cos(theta), np.sin(theta)
-        c = self._along + rolled * np.cos(self.tilts)
-        height = self._heights + rolled * np.sin(self.tilts)
-        points = joints + np.stack(
-            [c * cosine - height * sine, c * sine + height * cosine], axis=-1
-        )
-        change = theta - self._angles
-        before = np.concatenate([base[..., None], change[..., :-1]], axis=-1)
+        base = turn + 0.0 * (x + z)
+        way = _unit(base)
+        joint = np.stack([x, z], axis=1) + 0.0 * way
+        shape = (len(base), len(PHALANGES), *way.shape[1:])
+        joints, ways, along = (np.empty(shape, dtype=base.dtype) for _ in range(3))
+        rolled, slips = (np.zeros_like(ways[:, :, 0]) for _ in range(2))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            for i, link in enumerate(self._links):
+                begins = link.bearing >= 0
+                own = begins[:, 0].nonzero()[0]
+                if len(own):
+                    turned, roll, slip = link.turn(joint)
+                    way = np.where(begins[:, None], turned, way)
+                    bears = own, link.bearing[own, 0]
+                    rolled[bears], slips[bears] = roll[own], slip[own]
+                joints[:, i], ways[:, i] = joint, way
+                along[:, i] = _turned(way, self._rest[:, i])
+                joint = joint + self._spacing * along[:, i]
+        changes = bearing_angle(ways[:, :, 0], ways[:, :, 1])
+        contacts = self._contact + rolled[:, :, None] * self._tilt
         return MovedPosture(
-            angles=theta,
-            turns=change - before,
+            angles=self._angles + changes,
+            turns=np.diff(changes, axis=1, prepend=base[:, None]),
             slips=slips,
             joints=joints,
-            points=points,
-            reached=np.isfinite(theta.real).all(axis=-1),
+            points=joints + _turned(along, contacts),
+            directions=_turned(along, self._tilt),
+            reached=np.isfinite(changes.real).all(axis=1),
         )
 
 
@@ -300,32 +313,38 @@ def _link(finger: SettledFinger, section: Section, first: int, bearing: int, dep
         near, far, depth = far, model.joint_spacing, 0.0
     start, end = (arm.real + (each - contact.along) for each in (near, far))
     flat = curvature * 10.0 <= 1.0  # from a radius of 10 m on
+    radius = 10.0 if flat else 1.0 / curvature
     # beyond its radius there is no more of the circle that the rock is taken for
-    near_by = not flat and abs(away) < 1.0 / curvature
+    near_by = not flat and abs(away) < radius
     rolls = near_by and contact.kind != "edge" and start <= arm.real + away <= end
     if rolls:
         arm += away
         point = (point[0] + away * u.real, point[1] + away * u.imag)
         # of the face's line from the rock
-        gap = math.sqrt((1.0 / curvature + gap) ** 2 - away**2) - 1.0 / curvature
-    return _Link(
+        gap = math.sqrt((radius + gap) ** 2 - away**2) - radius
+    reach = radius + (gap if rolls else max(gap, 0.0))
+    pressed, beyond = rolls and depth > 0.0, 0.0 if flat else reach
+    above = ahead.imag + arm.imag
+    link = _Link(
         bearing=bearing,
         along=ahead.real,
-        above=ahead.imag + arm.imag,
-        rest=contact.angle + contact.tilt,
+        above=above,
+        rest=(u.real, u.imag),
+        raised=(-above * u.imag, above * u.real),
         rolls=rolls,
         flat=flat,
         start=start,
         end=end,
         contact=arm.real,
-        depth=depth,
-        point_x=point[0],
-        point_z=point[1],
-        into_x=into[0],
-        into_z=into[1],
-        radius=10.0 if flat else 1.0 / curvature,
-        offset=gap if rolls else max(gap, 0.0),
+        depth=depth if pressed else 1.0,
+        widest=math.sqrt(2.0 * depth * radius) if pressed else -math.inf,
+        centre=(point[0] + beyond * into[0], point[1] + beyond * into[1]),
+        into=into,
+        back=(-into[1], into[0]),
+        radius=radius,
+        reach=reach,
     )
+    return link._replace(off_at_rest=float(link.off(arm.real)))
 
 
 def _under_face(

@@ -289,8 +289,8 @@ def middle_of_bed(
     moment: Any = 0.0
     for side, reach, bend in zip((-1.0, 1.0), reaches, bends, strict=True):
         square = reach * reach
-        load = load + reach * (depth - bend * square / 6.0)
-        moment = moment + side * square * (0.5 * depth - bend * square / 8.0)
+        load = load + reach * (depth - bend / 6.0 * square)
+        moment = moment + square * (side * depth / 2.0 - side * bend / 8.0 * square)
     found: Pressed = moment / load
     return found
 

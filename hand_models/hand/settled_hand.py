@@ -19,7 +19,7 @@ from hand_models.hand.names import CONTACT_NAMES, FINGERS, FINGERTIP_FORCE, NAIL
 from hand_models.hand.seating import Seating
 from hand_models.parameters import FITTED_SURFACE
 from hand_models.rock import Hold
-from hand_models.tendon import share_load
+from hand_models.tendon import shear_stiffness
 from hand_models.tile import HalfPlane, Surface
 from hand_models.wrench_spaces import WrenchSpace
 
@@ -309,8 +309,8 @@ class SettledHand:
         for share, tiles in self.palm.layers:
             contacts = tuple(hand.palm_contact[i] for i in tiles)
             rubs = hand.palm_friction, hand.palm_own_friction
-            sharing = share_load(contacts, hand.palm_spring, *rubs)
-            each = sharing.tile_stiffness.sum(), hand.palm_pressing_stiffness * len(tiles)
+            shear = shear_stiffness(contacts, hand.palm_spring, *rubs)
+            each = shear, hand.palm_pressing_stiffness * len(tiles)
             found += share * np.array(each)
         return found
 

@@ -4,6 +4,7 @@ from .load_sharing import (
     check_palm as check_palm,
     share_load as share_load,
     shear_capacity as shear_capacity,
+    shear_stiffness as shear_stiffness,
 )
 from .regimes import (
     MotorScheme as MotorScheme,

@@ -31,7 +31,7 @@ from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.tendon.complementarity import stick_slip
 from hand_models.tendon.finger_tendon import LEAST_FRICTION
 
-__all__ = ["PalmSharing", "check_palm", "share_load", "shear_capacity"]
+__all__ = ["PalmSharing", "check_palm", "share_load", "shear_capacity", "shear_stiffness"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,3 +210,18 @@ def shear_capacity(
     """
     sharing = share_load(contact_stiffness, spring_stiffness, friction, own_friction)
     return sharing.capacity(np.full(len(contact_stiffness), tile_limit))
+
+
+@lru_cache(maxsize=4096)
+def shear_stiffness(
+    contact_stiffness: tuple[float, ...],
+    spring_stiffness: float,
+    friction: float,
+    own_friction: float = 0.0,
+) -> float:
+    """Return the load of a palm's tiles together over its travel from rest [N/m].
+
+    The last 4096 results are kept in an LRU cache. Parameters are those of `share_load`.
+    """
+    sharing = share_load(contact_stiffness, spring_stiffness, friction, own_friction)
+    return float(sharing.tile_stiffness.sum())

@@ -38,9 +38,9 @@ class TendonResponse(NamedTuple):
 
     Attributes
     ----------
-    tensions : ndarray, shape (F, m, n)
+    tensions : ndarray, shape (F, n, m)
         t_i, tension at each tile [N].
-    shears : ndarray, shape (F, m, n)
+    shears : ndarray, shape (F, n, m)
         T_i, shear of each tile on the rock [N].
     regime : ndarray of int, shape (F, m)
         Index of the regime of stick and slip.
@@ -79,60 +79,66 @@ class TendonRegimes:
 
     def __init__(self, tendons: Sequence[FingerTendon], losses: Array, scheme: MotorScheme) -> None:
         self.scheme = scheme
-        self._losses = losses
-        self._stiffness = pad_tiles([tendon.contact_stiffness for tendon in tendons], 0.0)
-        self._radii = pad_tiles([tendon.pulley_radii for tendon in tendons], 0.0)
-        self._ratio = np.array([tendon.pulley_ratio for tendon in tendons])[:, None]
+        stiffness = pad_tiles([tendon.contact_stiffness for tendon in tendons], 0.0)
+        radii = pad_tiles([tendon.pulley_radii for tendon in tendons], 0.0)
+        ratio = np.array([tendon.pulley_ratio for tendon in tendons])[:, None]
         count, n = losses.shape
         own = pad_tiles([np.ones(len(tendon.pulley_radii)) for tendon in tendons], 0.0)
         springs = np.array([tendon.spring_stiffness for tendon in tendons])[:, None]
-        self._give = own / (self._stiffness + np.where(own > 0.0, springs, 1.0))
+        give = own / (stiffness + np.where(own > 0.0, springs, 1.0))
+        by_tile = losses, stiffness, radii, give, ratio
+        self._losses, self._stiffness, self._radii, self._give, self._ratio = (
+            part[..., None] for part in by_tile
+        )
         mu = np.array([tendon.friction for tendon in tendons])[:, None] * own
         mu[:, 0] = [tendon.entry_friction for tendon in tendons]
-        self._mu = np.where(mu > LEAST_FRICTION, mu, 0.0)
-        # v = travel @ t + by_push @ pushed + by_turn @ wound + constant f, in newtons (over `unit`)
-        unit = self._ratio**2 * (self._give.sum(axis=1) / own.sum(axis=1))[:, None]
+        mu = np.where(mu > LEAST_FRICTION, mu, 0.0)
+        # v = travel @ t + given @ (pushed, wound, f), in newtons (over `unit`)
+        unit = ratio**2 * (give.sum(axis=1) / own.sum(axis=1))[:, None]
         later = np.triu(np.ones((n, n))) / unit[..., None]
-        travel = later * (self._ratio**2 * self._give)[:, None, :]
-        by_push = -later * (self._ratio * self._give)[:, None, :]
+        travel = later * (ratio**2 * give)[:, None, :]
+        by_push = -later * (ratio * give)[:, None, :]
         constant = -np.einsum("fij,fj->fi", travel, losses)
-        given = np.concatenate([by_push, later, constant[..., None]], axis=-1)
-        self._signs, slipping = self._choices(count, n)
+        given = np.concatenate([by_push, later, constant[..., None]], axis=-1)[:, None]
+        signs, slipping = self._choices(mu)
         # where next to nothing slips is looked for first
         ends = np.searchsorted(slipping, [1, 2, 2 * n + 1])
-        self._groups = [np.arange(start, end) for start, end in itertools.pairwise([0, *ends])]
-        self._tensions = np.stack(
-            [self._regime(signs, travel, given) for signs in np.moveaxis(self._signs, 1, 0)], axis=1
-        )
-        self._travels = travel[:, None] @ self._tensions + given[:, None]
+        self._groups = [slice(start, end) for start, end in itertools.pairwise([0, *ends])]
+        slack, mu = signs == 2, mu[:, None]
+        sticks, factor = (signs == 0)[..., None], np.where(slack, 0.0, 1.0 - signs * mu)
+        rows = np.where(sticks, travel[:, None], np.eye(n) - factor[..., None] * np.eye(n, k=-1))
+        aims = np.where(sticks, -given, 0.0)
+        aims[..., 0, -1] = np.where(sticks[..., 0, 0], aims[..., 0, -1], factor[..., 0])
+        self._tensions = t = np.linalg.solve(rows, aims)
+        # what contradicts a regime where it is positive, by (pushed, wound, f)
+        v = travel[:, None] @ t + given
+        motor = np.broadcast_to(np.eye(2 * n + 1)[-1], t[..., :1, :].shape)
+        before, mu = np.concatenate([motor, t[..., :-1, :]], axis=-2), mu[..., None]
+        against = np.where(mu > 0.0, -signs[..., None] * v, 0.0)
+        sides = [(1.0 - mu) * before - t, t - (1.0 + mu) * before]
+        off = np.stack([np.where(sticks, side, against) for side in sides], axis=2)
+        if scheme == "held":
+            off = np.where(slack[:, :, None, :, None], 0.0, off)
+            first = np.where(slack[..., :1], -v[..., 0, :], -t[..., 0, :])
+            off[..., 0, :] = first[:, :, None]
+        self._contradictions = off.reshape(count, len(slipping), 2 * n, 2 * n + 1)
 
-    def _choices(self, count: int, n: int) -> tuple[Indices, Indices]:
+    def _choices(self, mu: Array) -> tuple[Indices, Indices]:
         """Return the signs of every finger's boundaries in every regime, shape (F, R, n).
 
         0 sticks, 1 slips toward the motor, −1 away; all are 2 where the tendon is slack.
         And how many boundaries slip in each, in rising order, shape (R,).
         """
-        held = self.scheme == "held"
+        n, held = mu.shape[1], self.scheme == "held"
         options = [(0,) if held and i == 0 else (0, 1, -1) for i in range(n)]
         choices = sorted(itertools.product(*options), key=lambda signs: sum(map(abs, signs)))
         if held:
             choices.append((2,) * n)
-        signs = np.tile(np.array(choices), (count, 1, 1))
-        slides = self._mu == 0.0
+        signs = np.tile(np.array(choices), (len(mu), 1, 1))
+        slides = mu == 0.0
         slides[:, 0] &= not held
         signs = np.where(slides[:, None] & (signs != 2), 1, signs)
         return signs, np.abs(choices).sum(axis=1)
-
-    def _regime(self, signs: Indices, travel: Array, given: Array) -> Array:
-        """Return tensions by (pushed, wound, f) in a regime of each finger, (F, n, 2 n + 1)."""
-        n = signs.shape[1]
-        sticks = (signs == 0)[..., None]
-        factor = np.where(signs == 2, 0.0, 1.0 - signs * self._mu)
-        slides = np.eye(n) - factor[..., None] * np.eye(n, k=-1)
-        rows = np.where(sticks, travel, slides)
-        aims = np.where(sticks, -given, 0.0)
-        aims[:, 0, -1] = np.where(sticks[:, 0, 0], aims[:, 0, -1], factor[:, 0])
-        return np.asarray(np.linalg.solve(rows, aims))
 
     def respond(
         self,
@@ -145,66 +151,54 @@ class TendonRegimes:
 
         Parameters
         ----------
-        slips : ndarray, shape (F, m, n)
+        slips : ndarray, shape (F, n, m)
             δx_i, displacement of each phalanx along the rock, toward the finger's base [m].
-        turns : ndarray, shape (F, m, n)
+        turns : ndarray, shape (F, n, m)
             δq_i, turn of each joint, closing [rad].
         tension : ndarray, shape (F, m)
             Tension of each motor at rest [N].
-        at_rest : ndarray, shape (F, m, n)
+        at_rest : ndarray, shape (F, n, m)
             Shear of each tile at rest [N].
         """
-        pushed = slips * self._stiffness[:, None]
-        given = [pushed, turns * self._radii[:, None], tension[..., None]]
-        changes = np.concatenate(given, axis=-1)
-        regime = self._consistent(changes.real)
-        tensions = np.empty(pushed.shape, dtype=changes.dtype)
-        for i, found in enumerate(regime):
-            for k in np.unique(found):
-                those = found == k
-                tensions[i, those] = changes[i, those] @ self._tensions[i, k].T
-        rise = self._ratio[:, None] * (tensions - tension[..., None] * self._losses[:, None])
-        travel = self._give[:, None] * (rise - pushed)
-        shears = at_rest + pushed + self._stiffness[:, None] * travel
+        pushed = slips * self._stiffness
+        given = [pushed, turns * self._radii, tension[:, None]]
+        changes = np.concatenate(given, axis=1)
+        # complex steps from one change of load share its regime
+        starts = np.ones(changes.shape[-1], dtype=bool)
+        starts[1:] = (changes[..., 1:].real != changes[..., :-1].real).any(axis=(0, 1))
+        regime = self._consistent(changes.real[..., starts])[:, np.cumsum(starts) - 1]
+        of_each = self._tensions[np.arange(len(regime))[:, None], regime]
+        tensions = np.einsum("fmij,fjm->fim", of_each, changes)
+        rise = self._ratio * (tensions - tension[:, None] * self._losses)
+        shears = at_rest + pushed + self._stiffness * self._give * (rise - pushed)
         return TendonResponse(tensions, shears, regime)
 
     def _consistent(self, changes: Array) -> Indices:
-        """Return the regime of each change of load (F, m, 2 n + 1), shape (F, m).
+        """Return the regime of each change of load (F, 2 n + 1, m), shape (F, m).
 
         The first that does not contradict itself; by rounding, that which does least.
         """
         first, *later = self._groups
-        least = self._contradictions(np.arange(len(changes)), first, changes)[..., 0]
+        least = self._off(first, changes, slice(None))[:, 0]
         found = np.zeros(least.shape, dtype=np.intp)
-        for i in np.flatnonzero((least > 0.0).any(axis=1)):
-            for group in later:
-                left = np.flatnonzero(least[i] > 0.0)
-                # so many at once, which bounds the memory
-                for those in np.array_split(left, -(-len(left) // 4096)) if len(left) else ():
-                    off = self._contradictions(np.array([i]), group, changes[i : i + 1, those])[0]
-                    best = off.argmin(axis=1)
-                    worst = off[np.arange(len(those)), best]
-                    better = worst < least[i, those]
-                    found[i, those[better]] = group[best[better]]
-                    least[i, those[better]] = worst[better]
+        for group in later:
+            left = least > 0.0
+            fingers, rows = (np.flatnonzero(left.any(axis=axis)) for axis in (1, 0))
+            # so many at once, which bounds the memory
+            for those in np.array_split(rows, -(-left.size // 4096)) if len(rows) else ():
+                own = np.ix_(fingers, those)
+                off = self._off(group, changes[fingers][..., those], fingers)
+                best, worst = off.argmin(axis=1), off.min(axis=1)
+                better = worst < least[own]
+                found[own] = np.where(better, group.start + best, found[own])
+                least[own] = np.where(better, worst, least[own])
         return found
 
-    def _contradictions(self, fingers: Indices, group: Indices, changes: Array) -> Array:
-        """Return by how many newtons changes (k, m, 2 n + 1) contradict regimes, (k, m, R)."""
-        own = fingers[:, None], group
-        signs, mu = self._signs[own][:, :, None], self._mu[fingers][:, None, None]
-        with np.errstate(invalid="ignore"):
-            t = changes[:, None] @ np.swapaxes(self._tensions[own], -1, -2)
-            v = changes[:, None] @ np.swapaxes(self._travels[own], -1, -2)
-            motor = np.broadcast_to(changes[:, None, :, -1:], t[..., :1].shape)
-            before = np.concatenate([motor, t[..., :-1]], axis=-1)
-            stuck = np.maximum((1.0 - mu) * before - t, t - (1.0 + mu) * before)
-            off = np.where(signs == 0, stuck, np.where(mu > 0.0, -signs * v, 0.0))
-            if self.scheme == "held":
-                slack = (signs == 2).all(axis=-1)[..., 0]
-                off[slack] = 0.0
-                off[..., 0] = np.where(slack[..., None], -v[..., 0], -t[..., 0])
-            worst = np.swapaxes(off.max(axis=-1), 1, 2)
+    def _off(self, group: slice, changes: Array, fingers: slice | Indices) -> Array:
+        """Return by how many newtons changes (k, 2 n + 1, m) contradict regimes, (k, R, m)."""
+        rows = self._contradictions[fingers][:, group]
+        flat = rows.reshape(len(rows), -1, rows.shape[-1]) @ changes
+        worst = flat.reshape(*rows.shape[:3], changes.shape[-1]).max(axis=2)
         return np.where(
             worst <= BASE_TOLERANCES.force, 0.0, np.where(np.isnan(worst), np.inf, worst)
         )

@@ -82,7 +82,7 @@ def survey(
 def _end(wrist: FloatingWrist, found: WristSearch, direction: Array) -> Farthest | None:
     """Return the farthest limit that is reached, begun in each state of the palm."""
     reach = found.wrenches @ direction
-    carries = wrist.hand.palm_loads(found.poses) > 0.0
+    carries = wrist.hand_loads(found.poses).palm > 0.0
     starts, ends = [wrist.pressing], []
     for state in itertools.product((False, True), repeat=2):  # whether it drags, and presses
         those = np.flatnonzero((carries == state).all(axis=1))

@@ -204,7 +204,7 @@ class _Hands:
         for own, together, closed in self._groups:
             stepped = [complex_steps(twists[at]) for at in own]
             found = together.loads(stepped, closed)
-            for at, hand, loads in zip(own, together.hands, found, strict=True):
-                of_steps = hand.wrenches(loads)
+            for at, loads in zip(own, found, strict=True):
+                of_steps = loads.wrenches
                 wrenches[at], slope[at] = of_steps[0].real, slopes(of_steps)
         return wrenches, slope

@@ -338,7 +338,7 @@ def error_at_rest(wrist: FloatingWrist) -> float:
         if result.status != 0 or result.x is None:
             continue
         twist = result.x * TWIST_UNIT
-        exact = wrist.hand.wrenches(wrist.hand.loads(twist[None]))[0]
+        exact = wrist.hand.loads(twist[None]).wrenches[0]
         off = np.abs((space.wrench(twist) - exact) * WRENCH_SCALE).max()
         error = max(error, float(off)) if math.isfinite(off) else error
     return error

@@ -339,9 +339,9 @@ def recover_floating_hand(
     -------
     HandPlan
     """
-    hand, closed = wrist.hand, wrist.closed_at(y)
+    closed = wrist.closed_at(y)
     found = wrist.loads_of(y)
-    wrench = hand.wrenches(found)[0]
+    wrench = found.wrenches[0]
     loads, positions, axes = found.tile_loads[0], found.positions[0], found.axes[0]
     mode, stretches = wrist.palm_mode(y), wrist.stretches(loads[:, 0])
     pose = replace(pose, palm=mode, driven=wrist.driven, stretches=stretches)

@@ -21,7 +21,7 @@ import numpy as np
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
 from hand_models.hand import FINGERS, FingerFrame, SettledHand
-from hand_models.tendon import FingerTendon, TendonState, share_load
+from hand_models.tendon import FingerTendon, TendonState, shear_stiffness
 from planner.prepare import HandBatch
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
@@ -206,7 +206,7 @@ class _RestingFinger(NamedTuple):
     compliance: Array
 
 
-@lru_cache(maxsize=256)  # the fingers of as many hands as `_palm_stiffness` has
+@lru_cache(maxsize=256)  # the fingers of as many hands as `SETTLED_LIMITS` keeps stances
 def _resting(hand: SettledHand, index: int) -> _RestingFinger:
     """Return a finger of a settled hand at rest, by its index among `FINGERS`."""
     settled, model = hand.fingers[index], hand.fingers[index].model
@@ -322,7 +322,14 @@ def _check_palm(
     """Check the force of the palm of a floating hand."""
     if not hand.palm.engaged:
         return
-    body, stiffness = hand.hand, _palm_stiffness(hand)
+    body, stiffness = hand.hand, 0.0
+    for share, engaged in hand.palm.layers:
+        stiffness += share * shear_stiffness(
+            tuple(body.palm_contact[i] for i in engaged),
+            body.palm_spring,
+            body.palm_friction,
+            body.palm_own_friction,
+        )
     step = moved(hand.palm.centre, wrist)
 
     # the integral of a stiffness that rises from zero to its whole over the onset [m]
@@ -342,18 +349,3 @@ def _check_palm(
         found.append(
             f"{limb}: the palm carries {shear:.6g} and {pressing:.6g} N, not what is planned"
         )
-
-
-@lru_cache(maxsize=64)  # as many hands as `SETTLED_LIMITS` keeps stances
-def _palm_stiffness(hand: SettledHand) -> float:
-    """Return the stiffness of a palm's springs in shear, by the sharing of their load [N/m]."""
-    body, stiffness = hand.hand, 0.0
-    for share, engaged in hand.palm.layers:
-        sharing = share_load(
-            tuple(body.palm_contact[i] for i in engaged),
-            body.palm_spring,
-            body.palm_friction,
-            body.palm_own_friction,
-        )
-        stiffness += share * float(sharing.tile_stiffness.sum())
-    return stiffness

@@ -48,6 +48,12 @@ def test_many_hands_at_once_are_each_alone() -> None:
             np.testing.assert_allclose(part, alone, atol=1e-10)
 
 
+def test_no_twists_have_no_loads() -> None:
+    found = driven("pinch").loads(np.zeros((0, 6)))
+    assert {len(part) for part in found} == {0}
+    assert found.axes.shape[1:] == (14, 3, 3)
+
+
 def test_a_palm_presses_past_its_gap_and_shears_by_its_travel() -> None:
     hand = driven("pinch")
     gaps = hand.settled.palm.gaps[list(hand.settled.palm.engaged)]

@@ -29,7 +29,7 @@ def moving(hold, grasp=PINCH, finger="inner_left"):
 def move(resettling, x, z, turn):
     """Return the postures of the only finger, for bases displaced by numbers or arrays (m,)."""
     found = resettling.move(*(np.atleast_1d(value)[None] for value in (x, z, turn)))
-    return MovedPosture(*(part[0] for part in found))
+    return MovedPosture(*(np.moveaxis(part[0], -1, 0) for part in found))
 
 
 @pytest.mark.parametrize("diameter", [0.2, 0.3, 0.7])

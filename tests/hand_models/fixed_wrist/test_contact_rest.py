@@ -42,7 +42,7 @@ def along_z(settled: SettledHand, distance: float) -> SettledHand:
 def net(settled: SettledHand) -> np.ndarray:
     """Net wrench in newtons, by the compliant hand, whose fingers and palm no wrist has moved."""
     hand = CompliantHand(settled)
-    wrench = hand.wrenches(hand.loads(np.zeros((1, 6))))[0]
+    wrench = hand.loads(np.zeros((1, 6))).wrenches[0]
     for i, share in zip(settled.palm.engaged, settled.palm.engagement, strict=True):
         depth = max(-settled.palm.gaps[i], 0.0)
         force = np.array([0.0, 0.0, HAND.palm_pressing_stiffness * share * depth])

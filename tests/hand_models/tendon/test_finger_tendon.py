@@ -210,10 +210,10 @@ def test_tiles_partly_on_the_rock_give_that_part_of_a_whole_tiles_shear():
         tendon.closed(CLOSING, part * ENGAGED) for tendon, part in ((whole, 1.0), (some, share))
     ]
     losses = np.array([state.tensions for state in states]) / CLOSING
-    at_rest = np.array([[state.shears] * 2 for state in states])
+    at_rest = np.array([state.shears for state in states])[..., None]
     drags = (
         TendonRegimes([whole, some], losses, "tension")
-        .respond(np.array([slips] * 2), np.zeros((2, 2, 3)), np.full((2, 2), CLOSING), at_rest)
+        .respond(np.array([slips.T] * 2), np.zeros((2, 3, 2)), np.full((2, 2), CLOSING), at_rest)
         .shears
     )
-    np.testing.assert_allclose(drags[1], share * drags[0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(drags[1], share[:, None] * drags[0], rtol=1e-12, atol=1e-12)

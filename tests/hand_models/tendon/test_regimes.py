@@ -29,9 +29,9 @@ def respond(tendon, state, scheme, slips, turns):
     regimes = TendonRegimes([tendon], losses[None], scheme)
     m = len(slips)
     tension = np.full((1, m), state.motor_tension)
-    at_rest = np.broadcast_to(state.shears, (1, m, len(losses)))
-    found = regimes.respond(slips[None], turns[None], tension, at_rest)
-    return TendonResponse(*(part[0] for part in found))
+    at_rest = state.shears[None, :, None]
+    found = regimes.respond(slips.T[None], turns.T[None], tension, at_rest)
+    return TendonResponse(found.tensions[0].T, found.shears[0].T, found.regime[0])
 
 
 @pytest.mark.slow
@@ -103,13 +103,13 @@ def test_tendons_of_other_lengths_change_nothing_of_each_other(scheme):
     regimes = TendonRegimes([tendon for tendon, _ in pairs], losses, scheme)
 
     def padded(parts):
-        return np.array([np.pad(part, ((0, 0), (0, 4 - part.shape[1]))) for part in parts])
+        return np.array([np.pad(part.T, ((0, 4 - part.shape[1]), (0, 0))) for part in parts])
 
     tension = np.full((len(pairs), m), 37.0)
-    rest = pad_tiles([state.shears for _, state in pairs], 0.0)[:, None] + np.zeros((1, m, 1))
+    rest = pad_tiles([state.shears for _, state in pairs], 0.0)[..., None]
     found = regimes.respond(padded(slips), padded(turns), tension, rest)
     for i, (tendon, state) in enumerate(pairs):
         alone = respond(tendon, state, scheme, slips[i], turns[i])
         n = len(state.shears)
-        np.testing.assert_allclose(found.tensions[i, :, :n], alone.tensions, atol=1e-9)
-        np.testing.assert_allclose(found.shears[i, :, :n], alone.shears, atol=1e-9)
+        np.testing.assert_allclose(found.tensions[i, :n].T, alone.tensions, atol=1e-9)
+        np.testing.assert_allclose(found.shears[i, :n].T, alone.shears, atol=1e-9)

@@ -208,7 +208,7 @@ def test_very_soft_limbs_keep_the_planned_wrenches() -> None:
         found = equilibria([wrists], tensions, pull, twists)
         assert found.found.all()
         there = [
-            wrist.hand.wrenches(wrist.hand.loads(x[None], f[None]))[0]
+            wrist.hand.loads(x[None], f[None]).wrenches[0]
             for wrist, x, f in zip(wrists, found.twists[0], tensions, strict=True)
         ]
         off.append(np.abs(np.array(there) - wrenches).max())

@@ -60,7 +60,7 @@ def test_the_model_confirms_the_plan_and_the_body_is_balanced() -> None:
         model = CompliantHand(settle_hand(place, question.stance), scheme="tension")
         loads = model.loads(hand.wrist.twist[None], hand.tensions[None])
         np.testing.assert_allclose(hand.loads, loads.tile_loads[0], atol=1e-9)
-        np.testing.assert_allclose(hand.wrench, model.wrenches(loads)[0], atol=1e-9)
+        np.testing.assert_allclose(hand.wrench, loads.wrenches[0], atol=1e-9)
         total -= wrench_transport(body @ place.pose) @ hand.wrench
     np.testing.assert_allclose(total, answer.body_wrench, atol=1e-5)
 
@@ -192,9 +192,9 @@ def test_a_limb_that_aims_at_its_pose_target_exerts_the_wrench() -> None:
         # stiffness of the hand at its tensions, by central differences
         small = np.array([1e-8] * 3 + [1e-7] * 3)
         ends = [
-            model.wrenches(
-                model.loads(wrist.twist + sign * np.diag(small), np.tile(hand.tensions, (6, 1)))
-            )
+            model.loads(
+                wrist.twist + sign * np.diag(small), np.tile(hand.tensions, (6, 1))
+            ).wrenches
             for sign in (1.0, -1.0)
         ]
         own = ((ends[0] - ends[1]) / (2.0 * small[:, None])).T

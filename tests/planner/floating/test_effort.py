@@ -99,7 +99,7 @@ class Model:
                 twists = self.best[i] + (x[6 * i : 6 * i + 6] + steps) * TWIST_UNIT
                 loads, judged = wrist.hand.loads(twists), wrist.evaluate(twists)
                 effort = effort + np.sum((loads.tensions / self.most) ** 2, axis=1)
-                total = total + wrist.hand.wrenches(loads) @ self.carried[i].T
+                total = total + loads.wrenches @ self.carried[i].T
                 room += [1.0 - judged.utilisation, -judged.violation / 100.0]
             self._at = x.copy()
             self._found = np.column_stack([effort, total / WRENCH_UNIT, *room])

@@ -49,12 +49,12 @@ def test_set_is_tangent_to_the_model():
     wrist = wrist_of(PAIR.hands[0], PAIR)
     space = wrist.linearised(NEAR)
     steps = 1e-4 * np.diag(TWIST_UNIT)
-    up, down = (wrist.hand.wrenches(wrist.hand.loads(NEAR + sign * steps)) for sign in (1.0, -1.0))
+    up, down = (wrist.hand.loads(NEAR + sign * steps).wrenches for sign in (1.0, -1.0))
     slopes = ((up - down) / (2.0 * np.diag(steps)[:, None])).T
     np.testing.assert_allclose(
         space.generators * TWIST_UNIT, slopes * TWIST_UNIT, atol=1e-5 * np.abs(slopes).max() * 1e-3
     )
-    exact = wrist.hand.wrenches(wrist.hand.loads(NEAR[None]))[0]
+    exact = wrist.hand.loads(NEAR[None]).wrenches[0]
     np.testing.assert_allclose(space.wrench(NEAR), exact, atol=1e-9)
     judged = wrist.evaluate(NEAR[None]).utilisation[0]
     assert space.utilisations(NEAR).max() == pytest.approx(judged, abs=1e-9)
@@ -78,7 +78,7 @@ def test_model_confirms_the_plan(found):
         np.testing.assert_allclose(told, loads.tile_loads[0], atol=1e-9)
         tensions = [finger.tendon_tension for finger in hand.fingers]
         np.testing.assert_allclose(tensions, loads.tensions[0], atol=1e-9)
-        np.testing.assert_allclose(hand.wrench, wrist.hand.wrenches(loads)[0], atol=1e-9)
+        np.testing.assert_allclose(hand.wrench, loads.wrenches[0], atol=1e-9)
         verdict = wrist.evaluate(hand.wrist.twist[None])
         assert verdict.utilisation[0] == pytest.approx(hand.utilisation, abs=1e-7)
         assert verdict.violation[0] <= 1e-6
@@ -143,7 +143,7 @@ def test_nothing_near_a_plan_is_better():
         for _ in range(8):
             parts = np.split(x, 2)
             total = sum(
-                A @ w.hand.wrenches(w.hand.loads(p[None]))[0]
+                A @ w.hand.loads(p[None]).wrenches[0]
                 for A, w, p in zip(carried, wrists, parts, strict=True)
             )
             slopes = np.hstack(

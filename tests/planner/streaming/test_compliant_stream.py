@@ -55,7 +55,7 @@ def exerted(question: Question, points: SetPoints) -> np.ndarray:
     places = zip(question.stance.hands, points.wrists, points.tensions, strict=True)
     for place, wrist, tensions in places:
         model = CompliantHand(settle_hand(place, question.stance), scheme="tension")
-        wrench = model.wrenches(model.loads(wrist.twist[None], tensions[None]))[0]
+        wrench = model.loads(wrist.twist[None], tensions[None]).wrenches[0]
         total -= wrench_transport(body @ place.pose) @ wrench
     return total
 

@@ -88,6 +88,6 @@ def given(stance: Stance, chance: np.random.Generator) -> np.ndarray:
             wrench = space.wrench(np.array(loads))
         else:
             twist = chance.uniform(-1.0, 1.0, 6) * [*[1e-4] * 3, *[5e-4] * 3]
-            wrench = wrist.hand.wrenches(wrist.hand.loads(twist[None]))[0]
+            wrench = wrist.hand.loads(twist[None]).wrenches[0]
         total -= wrench_transport(body @ hand.pose) @ wrench
     return total

@@ -32,7 +32,7 @@ def body_wrench(stance: Stance, twists) -> np.ndarray:
     body, total = stance.body.inverse(), np.zeros(6)
     for hand, twist in zip(stance.hands, twists, strict=True):
         model = wrist_of(hand, stance).hand
-        wrench = model.wrenches(model.loads(np.asarray(twist)[None]))[0]
+        wrench = model.loads(np.asarray(twist)[None]).wrenches[0]
         total -= wrench_transport(body @ hand.pose) @ wrench
     return total
 
