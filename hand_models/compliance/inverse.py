@@ -73,11 +73,14 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
     other_starts, farthest_start = 8, 2.0
     directions = np.random.default_rng(0).normal(size=(other_starts, 6)) * pose_units(WRIST_COLUMNS)
     shares = np.linspace(0.0, farthest_start, other_starts + 1)[1:]
-    found: list[WristPose] = []
+    palm, found = hand.settled.palm, list[WristPose]()
+    nearest = [max(0.0, min(palm.gaps[i] for i in palm.engaged))] if palm.engaged else []
     for start in (np.zeros(6), *(shares[:, None] * directions)):
-        found.append(_nearest(hand, wanted, start))
-        if found[-1].converged:
-            return found[-1]
+        # from there, and where the palm's springs begin
+        for inward in (0.0, *nearest):
+            found.append(_nearest(hand, wanted, start + inward * np.eye(6)[2]))
+            if found[-1].converged:
+                return found[-1]
     return min(found, key=lambda pose: float(np.abs(pose.residual * WRENCH_SCALE).max()))
 
 

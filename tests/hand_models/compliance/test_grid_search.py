@@ -18,6 +18,7 @@ from hand_models.compliance import (
     gripper_table,
     linear_extreme,
     pieces,
+    pose_units,
     search,
     search_box,
     wrist_pose,
@@ -305,11 +306,13 @@ GRASPS = {
 
 
 def wrenches_inside(wrist, count):
-    """Wrenches at random poses at which nothing lets go."""
+    """Wrenches at random poses near rest at which nothing lets go."""
     box, rng = search_box(wrist), np.random.default_rng(3)
     found = np.zeros((0, 6))
     for _ in range(100):
         poses = box.poses(rng.uniform(-1.0, 1.0, (20000, 6)) * box.range)
+        near = (np.abs(poses) <= 10.0 * pose_units(wrist.columns)).all(axis=1)
+        poses = poses[near]  # 10 mm and 0.1 rad: farther no twist is small
         there = wrist.evaluate(poses[wrist.sieve(poses)])
         found = np.vstack([found, there.wrenches[there.holds]])
         if len(found) >= count:
