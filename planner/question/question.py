@@ -115,7 +115,8 @@ class Question:
             if wrists.get(limb) != "fixed":
                 valid = ", ".join(name for name, wrist in wrists.items() if wrist == "fixed")
                 raise InvalidInputError(
-                    f"must be a hand of the stance with a fixed wrist; valid: {valid or 'none'}",
+                    "must be a hand of the stance with a fixed wrist; "
+                    + (f"valid are {valid}" if valid else "there is none: remove present"),
                     field=f"present.{limb}",
                 )
             present[limb] = finite_vector(tensions, len(FINGERS), f"present.{limb}")
