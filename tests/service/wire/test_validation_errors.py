@@ -146,7 +146,12 @@ INVALID = [
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
     (("want",), ["model", "price"], "want[1]", "valid: advice, clearance, load_factor, model"),
     (("id",), "x" * 257, "id", "length <= 256"),
-    (("stance", "joints"), "guess", "stance.joints", "'guess' is not known; valid: solve, an object"),
+    (
+        ("stance", "joints"),
+        "guess",
+        "stance.joints",
+        "'guess' is not known; valid: solve, an object",
+    ),
     (("stance", "joints"), 3, "stance.joints", "a string or an object or null"),
     (("stance", "joints"), {}, "stance.joints", "missing for front_right, which is on the rock"),
     (("stance", "joints"), {"front_left": []}, "stance.joints.front_left", "length >= 1"),
