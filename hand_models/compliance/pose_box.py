@@ -193,4 +193,6 @@ def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
 
 
 def _nothing_holds() -> EmptySetError:
-    return EmptySetError("no wrist pose near rest is feasible: the preload alone exceeds a limit")
+    return EmptySetError(
+        "no wrist pose near rest is feasible: the preload alone exceeds a limit; try another"
+    )

@@ -273,8 +273,9 @@ def unloaded_pose(grasp: Gripper) -> Array | None:
     Returns
     -------
     ndarray, shape (3,), or None
-        Pose (0, z, 0) [m, m, rad]; None if F_z does not vanish within the printed shift of the
-        base, or only where a phalanx has lost the rock.
+        Pose (0, z, 0) [m, m, rad]; None if F_z does not vanish within ``base_shift`` of rest
+        (section ``parameter_studies`` of the experiment table), or only where a phalanx has lost
+        the rock. The gripper moves along z against its F_z at rest.
     """
     far = experiment_table().scalar("parameter_studies", "base_shift")
 

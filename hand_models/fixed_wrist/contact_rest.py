@@ -352,9 +352,9 @@ class _Search:
         return InvalidInputError(
             f"a hand closed at {tension:g} N comes to rest nowhere from {off:g} mm off its pose to "
             f"{deeper:g} mm deeper, tilted by at most {1e3 * self._hand.seat_tilt:.3g} mrad: its "
-            "net force along z and its moments about x and y are nowhere zero, as on flat rock, "
-            "along which fingers drag it that do not oppose each other; valid there is 'given', or "
-            "give another pose, grasp.outer_rotation or grasp.closing_tension",
+            "net force along z and its moments about x and y are nowhere zero together, as on flat "
+            "rock where no fingers oppose each other; use 'given', or give another pose, "
+            "grasp.outer_rotation or grasp.closing_tension",
             field="placing",
         )
 

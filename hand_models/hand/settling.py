@@ -99,7 +99,7 @@ def _close(
     for i, (tension, gaps) in enumerate(zip(tensions, placed.gaps, strict=True)):
         if tension > hand.maximum_tension:
             errors[i] = InvalidInputError(
-                f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g}",
+                f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g} N",
                 field="grasp.closing_tension",
             )
         elif min(gaps[STACK_ROWS.base_count :]) < -hand.spine_travel:
@@ -183,7 +183,7 @@ def _too_slack(
             InvalidInputError(
                 f"must be at least {least:g} N, at which the {PHALANGES[joint]} joint of "
                 f"{FINGERS[finger]} has closed on this hold, "
-                f"got {tensions[i]:g}",
+                f"got {tensions[i]:g} N",
                 field="grasp.closing_tension",
             ),
         )

@@ -133,7 +133,8 @@ def wound_alike(triangles: Triangles) -> Triangles:
     as_is, over = part[:count], part[count:]
     if (as_is == over).any():
         raise InvalidInputError(
-            "the mesh is not orientable: its surface has only one side", field="faces"
+            "the mesh is not orientable: its surface has only one side; cut it where it twists",
+            field="faces",
         )
     # of the two ways to wind a part, one keeps more triangles than the other
     kept = np.bincount(as_is, minlength=2 * count)

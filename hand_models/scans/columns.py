@@ -109,7 +109,7 @@ def _numbers(cells: Sequence[str], style: _Style) -> bool:
 def _number(cell: str, style: _Style) -> float:
     if style.decimal == ",":
         if "." in cell:
-            raise ValueError(cell)
+            raise ValueError(f"{cell!r} has a point, and its decimals stand after commas")
         cell = cell.replace(",", ".")
     return float(cell or "nan")
 

@@ -38,7 +38,9 @@ def keep_triangles(scan: Scan, hole: float) -> ScannedRock:
     middle = 0.5 * (scan.points.min(axis=0) + scan.points.max(axis=0))
     points, faces = weld(Triangles((scan.points - middle) @ axes, scan.faces))
     if not len(faces):
-        raise InvalidInputError("no triangle has an area", field="file")
+        raise InvalidInputError(
+            "no triangle has an area; its three vertices must not be on a line", field="file"
+        )
     shown = scan.shown()
     turned = shown is not None and float(shown @ view) > 0.0
     if turned:

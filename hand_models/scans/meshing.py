@@ -252,7 +252,7 @@ def wider_holes(hole: float) -> list[float]:
 
 def _length(value: float, field: str) -> float:
     if not (math.isfinite(value) and value > 0.0):
-        raise InvalidInputError(f"must be finite and above zero, got {value:g}", field=field)
+        raise InvalidInputError(f"must be finite and above zero, got {value:g} m", field=field)
     return value
 
 

@@ -263,7 +263,7 @@ def _scale(points: Array, unit: Unit, width: float | None) -> float:
     if unit != "m":
         raise InvalidInputError("give a unit or a width, not both", field="width")
     if not (math.isfinite(width) and width > 0.0):
-        raise InvalidInputError(f"must be finite and above zero, got {width:g}", field="width")
+        raise InvalidInputError(f"must be finite and above zero, got {width:g} m", field="width")
     longest = float(np.ptp(points, axis=0).max())
     if longest == 0.0:
         raise InvalidInputError("all points are equal", field="file")

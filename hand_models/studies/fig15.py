@@ -144,7 +144,10 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     slack = 0.02
     both = strong.holds & weak.holds
     if not both.any():
-        raise InvalidInputError("exceeds a limit at every closing tension", field="hand")
+        raise InvalidInputError(
+            f"exceeds a limit at every closing tension from {tried[0]:g} to {tried[-1]:g} N",
+            field="hand",
+        )
     for curve in (strong, weak):
         best, moderate = curve.best("volume"), curve.last // 2
         widened = curve["volume"][moderate] / curve["volume"][0]

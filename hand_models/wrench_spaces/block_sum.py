@@ -149,7 +149,7 @@ class BlockSum:
         if candidates > most:
             raise LimitError(
                 f"{candidates} candidate vertices are too many (at most {most}): "
-                "use fewer half_planes, or leave lateral out"
+                "use fewer half_planes, or a grasp without lateral loads (lateral false)"
             )
         return [
             Summand((s.points - s.points[0]) @ directions.T / reach, s.dimension) for s in summands

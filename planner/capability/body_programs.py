@@ -95,11 +95,12 @@ class BodyPrograms:
     plan : Plan
         Plan of that question.
     data : StanceData
-        Scaled rows of the hands; those of floating hands are linearised about the plan.
+        Scaled rows of the hands; those of compliant and floating hands are linearised about
+        the plan.
     motion : Motion or None
         Effect of the body's acceleration; None if the question gives a body wrench.
     exact : bool
-        Whether no wrist floats, so that no set is linearised.
+        Whether all wrists are fixed, so that no set is linearised.
     """
 
     def __init__(self, question: Question) -> None:
@@ -387,7 +388,8 @@ def _unsolved(outcome: Outcome) -> CruxError:
     deadline.check(MISSING_RESULT)
     if outcome.status in ("unbounded", "unbounded_inaccurate"):
         return UnsupportedError(
-            "the body space is unbounded: wrench spaces of floating wrists are linearised about "
-            "this body wrench, too far from a feasible one; give one closer to feasible"
+            "the body space is unbounded: wrench spaces of compliant and floating wrists are "
+            "linearised about this body wrench, too far from a feasible one; give one closer to "
+            "feasible"
         )
     return SolverError(f"body space: the solver found no solution ({outcome.status})")

@@ -219,8 +219,8 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
     settled, wrist = _hand_at(stance, limb)
     if wrist is not None and wrist.driven:
         raise UnsupportedError(
-            f"the wrench space of {limb} is curved, as its wrist is compliant; valid for a wrench "
-            "space is fixed or floating",
+            f"the wrench space of {limb} is not available, as its wrist is compliant; valid are "
+            "fixed and floating",
             field="stance.hands.wrist",
         )
     if wrist is None:

@@ -126,8 +126,10 @@ class Load(Strict, frozen=True):
         given = None if self.com is None else finite_vector(self.com, 3, "com")
         linear, angular = self.motion(stance)
         if angular.any() and (weights is None or given is not None):
+            lacks = "give joints" if weights is None else "remove com"
             raise InvalidInputError(
-                "requires stance.joints, and a load without com", field="angular_acceleration"
+                f"requires stance.joints, and a load without com: {lacks}",
+                field="angular_acceleration",
             )
         if given is not None or weights is None:
             found = held_up(mass, stance.robot.com if given is None else given, linear, angular)

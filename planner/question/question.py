@@ -103,15 +103,20 @@ class Question:
         self._check_limits()
         self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
-        if "robust" in self.want and {*wrists.values()} != {"fixed"}:
-            raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
+        moving = [name for name, wrist in wrists.items() if wrist != "fixed"]
+        if "robust" in self.want and moving:
+            raise InvalidInputError(
+                f"'robust' requires fixed wrists on all hands; not fixed are {', '.join(moving)}",
+                field="want",
+            )
         self._check_open_loop()
         present = {}
         for limb, tensions in self.present.items():
             if wrists.get(limb) != "fixed":
                 valid = ", ".join(name for name, wrist in wrists.items() if wrist == "fixed")
                 raise InvalidInputError(
-                    f"must be a hand of the stance with a fixed wrist; valid: {valid or 'none'}",
+                    "must be a hand of the stance with a fixed wrist; "
+                    + (f"valid are {valid}" if valid else "there is none: remove present"),
                     field=f"present.{limb}",
                 )
             present[limb] = finite_vector(tensions, len(FINGERS), f"present.{limb}")
@@ -122,12 +127,15 @@ class Question:
                 )
         object.__setattr__(self, "present", present)
         if self.limits.tension_change is not None and not present:
-            raise InvalidInputError("requires 'present' tensions", field="limits.tension_change")
+            raise InvalidInputError(
+                "requires 'present' tensions; give them, or remove tension_change",
+                field="limits.tension_change",
+            )
 
     def _check_draws(self) -> None:
         if "spread" not in self.want:
             if self.draws is not None:
-                raise InvalidInputError("requires 'spread' in want", field="draws")
+                raise InvalidInputError("requires 'spread' in want; add it", field="draws")
             return
         if self.draws is not None:
             object.__setattr__(self, "draws", tuple(self.draws))
@@ -154,8 +162,8 @@ class Question:
             )
         if self.stance.limb_stiffness is None:
             raise InvalidInputError(
-                "'open_loop' requires stance.limb_stiffness; give the position [N/m] and the "
-                "angle [N·m/rad] with which limbs hold wrists",
+                "'open_loop' requires stance.limb_stiffness, with which limbs hold wrists; give "
+                "its position [N/m] and angle [N·m/rad]",
                 field="want",
             )
 
@@ -200,9 +208,9 @@ class Question:
                 preload = float(hand.tendon_preload.min())
             if least > max(preload, 0.0):  # no preload is below zero
                 raise InvalidInputError(
-                    f"must be at most the tendon_preload of {hand.limb}, whose motors stand still "
-                    f"({preload:g} N), got {least:g} N; lower it, give more tendon_preload, or "
-                    "let the wrist be 'compliant'",
+                    f"must be at most the tendon_preload of {hand.limb}, {preload:g} N, as motors "
+                    f"of floating hands stand still; got {least:g} N; lower it, give more "
+                    "tendon_preload, or let the wrist be 'compliant'",
                     field="limits.least_tension",
                 )
 

@@ -266,17 +266,17 @@ def _torque_limits(mount: Mount, coupled: JointCoupling) -> Array:
             )
         return np.broadcast_to(np.array(given), len(joints)).copy()
     efforts = np.array([joint.effort for joint in joints])
-    advice = "give torque_limit; 0 in its list is a joint without a motor"
+    advice = "give torque_limit; 0 in its list means a joint without a motor"
     unknown = [joint.name for joint in joints if not 0.0 < joint.effort <= TOLERANCES.joint_torque]
     if unknown:
         raise InvalidInputError(
-            f"missing, and the URDF has no effort up to {TOLERANCES.joint_torque:g} of "
-            f"{shorten(', '.join(unknown), 100, placeholder=' …')} (0 is none); {advice}"
+            f"missing, and the URDF has no effort above 0 and up to {TOLERANCES.joint_torque:g} "
+            f"N·m (sliding: N) for {shorten(', '.join(unknown), 100, placeholder=' …')}; {advice}"
         )
     if efforts.min() == efforts.max() >= 1e3:  # [N·m, N] a placeholder
         raise InvalidInputError(
-            f"missing, and the URDF has an effort of {efforts[0]:g} of every joint, which "
-            f"exporters write where nothing is known; {advice}"
+            f"missing, and the URDF has an effort of {efforts[0]:g} N·m (sliding: N) for "
+            f"every joint, which exporters write where nothing is known; {advice}"
         )
     return efforts
 

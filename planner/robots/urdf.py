@@ -326,7 +326,8 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
     ):
         (effort,) = _numbers(owner, limit, "effort", 1, sys.float_info.max)
         if effort < 0.0:
-            raise InvalidInputError(f"{owner}: effort must not be negative, got {effort:g}")
+            unit = "N" if kind == "prismatic" else "N·m"
+            raise InvalidInputError(f"{owner}: effort must not be negative, got {effort:g} {unit}")
     if kind in ("revolute", "prismatic"):
         if limit is None:
             raise InvalidInputError(f"{owner} is {kind} and has no <limit>; continuous needs none")
@@ -387,6 +388,7 @@ def _link(element: ElementTree.Element) -> Link:
     # rounding, relative to the largest moment or to a radius of gyration of 1 µm
     if principal[0] < -max(1e-9 * principal[-1], 1e-6**2 * mass):
         raise InvalidInputError(
-            f"{owner}: its inertia must have no negative principal moment, got {principal[0]:g}"
+            f"{owner}: its inertia must have no negative principal moment, got "
+            f"{principal[0]:g} kg·m²"
         )
     return Link(name, mass, at.position, at.rotation @ own @ at.rotation.T)

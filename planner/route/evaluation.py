@@ -133,5 +133,5 @@ def _must_touch(stage: RouteStage) -> None:
         settled = settle_hand(stance.hands[i], stance)
         if not (settled.holding.any() or settled.palm.engaged):
             raise InvalidInputError(
-                f"{stage.limb} does not touch this hold: move it closer", field="hold"
+                f"{stage.limb} does not touch this hold: move the hand closer to it", field="hold"
             )

@@ -64,11 +64,12 @@ class FixedSolution(Solution):
         least : Outcome
             Outcome of the program of least utilisation.
         loads : tuple of ndarray, shape (m,), optional
-            Loads y of each hand [N].
+            Loads y of each hand to report [N]; by default none, as a later program computes them.
         bound : float, optional
             Lower bound of the least utilisation; by default computed from the multipliers.
         start : LeastUtilisation, optional
-            Result from which the loads were computed.
+            Result that has these loads, as a warm start for other body wrenches; its spare hands
+            are taken over.
         """
         cap, faults = prepared.question.limits.utilisation, tuple[str, ...]()
         if least.solved:

@@ -102,13 +102,13 @@ class CappedObjective(Objective):
 
     @abstractmethod
     def value(self, data: StanceData, loads: Sequence[Array]) -> float:
-        """Return the value of the minimised function.
+        """Return the value of the function that `solve` minimises.
 
         Parameters
         ----------
         data : StanceData
         loads : sequence of ndarray, shape (m,)
-            Loads y of each hand [N], of a floating wrist [m, rad].
+            Loads y of each hand [N]; of a floating hand instead the twist of its wrist [m, rad].
         """
 
     @abstractmethod
@@ -119,7 +119,7 @@ class CappedObjective(Objective):
         ----------
         data : StanceData
         loads : sequence of ndarray, shape (m,)
-            Loads y of each hand [N], of a floating wrist [m, rad].
+            Loads y of each hand [N]; of a floating hand instead the twist of its wrist [m, rad].
         """
 
     def bound(self, data: StanceData, outcome: Outcome, cap: float) -> float:
@@ -137,7 +137,7 @@ class CappedObjective(Objective):
         return convex_bound(data, outcome, value, slopes, cap)
 
     def goal(self, cap: float, farthest: Sequence[Array]) -> Goal:
-        """Return the goal of the search for the wrists' poses of floating hands.
+        """Return the goal of the search for the wrists' poses of compliant and floating hands.
 
         Parameters
         ----------
@@ -152,7 +152,8 @@ class CappedObjective(Objective):
             If the objective requires fixed wrists, as by default.
         """
         raise UnsupportedError(
-            f"{self.name} requires fixed wrists; with floating wrists only max_margin is valid",
+            f"{self.name} requires fixed wrists on all hands; with a compliant or floating wrist, "
+            f"valid are {', '.join(NAMED_OBJECTIVES)}",
             field="objective",
         )
 

@@ -95,7 +95,10 @@ def answer_wrench_space(
     _add_views(reply, hand.space, request.want)
     if "robust" in (request.want or ()):
         if hand.palm is not None:
-            raise InvalidInputError("'robust' requires fixed wrists on all hands", field="want")
+            raise InvalidInputError(
+                f"'robust' requires fixed wrists on all hands; that of {request.limb} is not fixed",
+                field="want",
+            )
         both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
         reply.robust = _robust(robustness(asked.robot.hand, settled, both_ways))
     reply.closing = _closings(settled)
@@ -210,7 +213,7 @@ def _add_views(
             return None
         try:
             if (size := candidates()) > most:
-                raise LimitError(f"{size} candidates to go through are too many (at most {most})")
+                raise LimitError(f"{size} candidates for {name} are too many (at most {most})")
             return found()
         except LimitError as error:
             why = f"{error.message}; {less}"

@@ -23,7 +23,7 @@ def check_costs(stance: requests.Stance) -> None:
         If they have too many half-planes or points of outlines; the field is relative to the
         stance.
     """
-    # a plan of wrists that give way is found in several rounds
+    # a plan of wrists that move is found in several rounds
     rounds = 4
     # four hands with 64 half-planes have some 7500 rows in a program
     most_planes = 256
@@ -32,8 +32,8 @@ def check_costs(stance: requests.Stance) -> None:
     )
     if planes > most_planes:
         raise LimitError(
-            f"half_planes of all hands are {planes} together, those of a floating hand counted "
-            f"{rounds} times; the maximum is {most_planes}",
+            f"half_planes of all hands are {planes} together, those of a compliant or floating "
+            f"hand counted {rounds} times; the maximum is {most_planes}: use fewer half_planes",
             field="hands",
         )
     points = sum(_points(hand.hold, stance.rocks) for hand in stance.hands)
@@ -41,7 +41,8 @@ def check_costs(stance: requests.Stance) -> None:
     most_points = 40_000
     if points > most_points:
         raise LimitError(
-            f"profiles of all hands have {points} points together; the maximum is {most_points}",
+            f"profiles of all hands have {points} points together, those of a shared rock counted "
+            f"for each hand on it; the maximum is {most_points}: use fewer points",
             field="hands",
         )
 

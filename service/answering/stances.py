@@ -177,8 +177,8 @@ def _hand(
         raise InvalidInputError("missing; give a pose, or a place on the rock", field="pose")
     if message.contact_offset is not None and message.placing != "contact":
         raise InvalidInputError(
-            "only a hand placed by contact has an offset from its rest; valid is none, or placing "
-            "contact",
+            f"requires a hand that is placed by contact, got placing {message.placing!r}; remove "
+            "it, or give placing 'contact'",
             field="contact_offset",
         )
     return HandOnHold(

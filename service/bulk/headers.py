@@ -65,7 +65,8 @@ class Header(msgspec.Struct):
             there = msgspec.json.decode(before, type=Header)
         except (msgspec.DecodeError, UnicodeDecodeError):
             raise InvalidInputError(
-                f"{path}: not a table of crux batch or crux sweep", field="--resume"
+                f"{path}: not a table of crux batch or crux sweep; give another output",
+                field="--resume",
             ) from None
         known, wanted = there._compared(), self._compared()
         for name in dict.fromkeys([*known, *wanted]):

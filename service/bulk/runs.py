@@ -157,10 +157,16 @@ class Run(ABC):
         reply = b'{"v":1,'
         if last and not heads and not last.startswith(reply[: len(last)]):
             raise InvalidInputError(
-                f"{file}: its end is not a reply of a batch",
+                f"{file}: its last line, which has no end of line, is {_quoted(last)}, not the "
+                "start of a reply; remove that line, or name the file of the batch with -o",
                 field="--resume",
             )
         return kept
+
+
+def _quoted(line: bytes) -> str:
+    """Return the beginning of a line, in quotes."""
+    return repr(line[:40].decode(errors="replace"))
 
 
 def _append(line: bytes, out: FileIO) -> None:
@@ -221,7 +227,7 @@ class ReplyLines(Run):
             reply = msgspec.json.decode(line, type=_Reply)
         except (msgspec.DecodeError, UnicodeDecodeError):
             raise InvalidInputError(
-                f"{where}: not a reply of a batch",
+                f"{where}: not a reply of a batch; name the file of the batch with -o",
                 field="--resume",
             ) from None
         name = identifier(question, Format.JSON)
@@ -233,7 +239,7 @@ class ReplyLines(Run):
             )
         if reply.status is None and reply.error is None:
             raise InvalidInputError(
-                f"{where}: not a reply of a batch",
+                f"{where}: not a reply of a batch; name the file of the batch with -o",
                 field="--resume",
             )
         return reply.outcome
@@ -296,7 +302,7 @@ class TableLines(Run):
         # an unfinished table may have less of its header
         if not b'{"crux":'.startswith(first):
             raise InvalidInputError(
-                f"{file}: not a table of crux batch or crux sweep",
+                f"{file}: not a table of crux batch or crux sweep; give another output",
                 field="--resume" if resume else "-o",
             )
 
@@ -312,7 +318,8 @@ class TableLines(Run):
             )
         if table.exists():
             raise InvalidInputError(
-                f"{table}: not a table of crux batch or crux sweep", field="--resume"
+                f"{table}: not a table of crux batch or crux sweep; give another output",
+                field="--resume",
             )
 
     def row(self, payload: bytes) -> TableRow:
@@ -366,7 +373,10 @@ class TableLines(Run):
         except (msgspec.DecodeError, UnicodeDecodeError):
             whole = False
         if not whole:
-            raise InvalidInputError(f"{where}: not a row of this table", field="--resume")
+            raise InvalidInputError(
+                f"{where}: not a row of this table; is it of another batch or sweep?",
+                field="--resume",
+            )
         if row.asked != _digest(question):
             raise InvalidInputError(
                 f"{where}: its rows answer other requests than those given now; "

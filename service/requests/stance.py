@@ -222,7 +222,7 @@ class Stance(Strict, frozen=True, kw_only=True):
         list[Hand],
         Meta(
             max_length=16,
-            description="together with at most 256 half_planes, those of a floating hand counted "
-            "four times, and 40000 points of profiles; more is an error of kind limit",
+            description="together with at most 256 half_planes, those of a compliant or floating "
+            "hand counted four times, and 40000 points of profiles; more is an error of kind limit",
         ),
     ]

@@ -139,7 +139,7 @@ class CruxClient:
         except NoServiceError as error:
             if wait is None:
                 raise NoServiceError(
-                    f"{error}; {_how_to_start()}, or wait for it (--wait)"
+                    f"{error}; {_how_to_start()}, or wait for it (wait, --wait)"
                 ) from None
             raise self._not_come(wait, f" ({error})") from None
 
@@ -250,14 +250,14 @@ class CruxClient:
             reply = self._get(key, request, waits)
         if reply is None:
             raise NoServiceError(
-                f"no service answers at {key}; {_how_to_start()}, or wait for it (--wait)"
+                f"no service answers at {key}; {_how_to_start()}, or wait for it (wait, --wait)"
             )
         if reply.ok is not None:
             return reply.ok
         if reply.err is None or not str(reply.err.encoding).startswith("application/"):
             # an error of zenoh's own, in a plain string: it has only this one
             raise ServiceTimeout(
-                f"no answer at {key} within {waits:g} s; allow it longer (--timeout)"
+                f"no answer at {key} within {waits:g} s; allow it longer (timeout, --timeout)"
             )
         detail = _read(reply.err, ErrorReply).error
         raise ServiceError(

@@ -71,7 +71,10 @@ def validation_error(
             message = f"unknown field; known are {', '.join(known)}"
     elif complaint.startswith(("Invalid value ", "Invalid enum value ")):
         value = complaint.partition("value ")[2]
-        message = f"{_clip(value)} is not known; valid: {', '.join(_values(types))}"
+        valid = _values(types)
+        if any(isinstance(kind, inspect.DictType | inspect.StructType) for kind in types):
+            valid.append("an object")
+        message = f"{_clip(value)} is not known; valid: {', '.join(valid)}"
     else:
         message = re.sub(r"`([^`]*)`", _plain, complaint)
         message = message[:1].lower() + message[1:]
@@ -86,7 +89,7 @@ def validation_error(
         ):
             given = _given(document, where)
             if isinstance(given, list | str | dict):
-                message += f", got {len(given)}"
+                message += f", got length {len(given)}"
     return _clip(field.removeprefix(".")) or None, _clip(message)
 
 

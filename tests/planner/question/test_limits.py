@@ -17,7 +17,7 @@ def floating() -> Question:
 
 
 def test_a_least_tension_above_a_floating_hands_preload_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"rear_right.*\(50 N\), got 50.5 N") as caught:
+    with pytest.raises(InvalidInputError, match=r"rear_right, 50 N, .*; got 50.5 N") as caught:
         replace(floating(), limits=Limits(least_tension=50.5))
     assert caught.value.field == "limits.least_tension"
     assert replace(floating(), limits=Limits(least_tension=50.0)).limits.least_tension == 50.0

@@ -41,14 +41,14 @@ def test_efforts_are_taken_joint_by_joint(hip, knee):
 @pytest.mark.parametrize(
     ("hip", "knee", "words"),
     [
-        (0, 0, "no effort up to 1e+06 of hip, knee (0 is none)"),
-        (100, 0, "of knee (0 is none)"),
-        (100, None, "of knee (0 is none)"),
-        (0, 100, "of hip (0 is none)"),
-        (100, 3e7, "of knee (0 is none)"),
-        (1000, 1000, "an effort of 1000 of every joint, which exporters write"),
-        (1e4, 1e4, "an effort of 10000 of every joint"),
-        (1000000, 1000000, "an effort of 1e+06 of every joint"),
+        (0, 0, "no effort above 0 and up to 1e+06 N·m (sliding: N) for hip, knee;"),
+        (100, 0, "for knee;"),
+        (100, None, "for knee;"),
+        (0, 100, "for hip;"),
+        (100, 3e7, "for knee;"),
+        (1000, 1000, "an effort of 1000 N·m (sliding: N) for every joint, which exporters write"),
+        (1e4, 1e4, "an effort of 10000 N·m (sliding: N) for every joint"),
+        (1000000, 1000000, "an effort of 1e+06 N·m (sliding: N) for every joint"),
     ],
 )
 def test_efforts_that_are_no_rating_are_refused(hip, knee, words):

@@ -114,7 +114,7 @@ INVALID = [
     (("v",), 2, "v", "2 is not known; valid: 1"),
     (("stance", "robot"), "loris", "stance.robot", "known are robosimian"),
     (("stance", "hands"), [], "stance.hands", "at least one hand"),
-    (("stance", "gravity"), [0.0, 0.0], "stance.gravity", "length 3, got 2"),
+    (("stance", "gravity"), [0.0, 0.0], "stance.gravity", "length 3, got length 2"),
     (("stance", "body", "position", 1), 2e4, "stance.body.position[1]", "a number <= 10000"),
     (("stance", "body", "position", 1), 2e4, "stance.body.position[1]", "got 20000; in map coord"),
     (
@@ -146,7 +146,12 @@ INVALID = [
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
     (("want",), ["model", "price"], "want[1]", "valid: advice, clearance, load_factor, model"),
     (("id",), "x" * 257, "id", "length <= 256"),
-    (("stance", "joints"), "guess", "stance.joints", "'guess' is not known; valid: solve"),
+    (
+        ("stance", "joints"),
+        "guess",
+        "stance.joints",
+        "'guess' is not known; valid: solve, an object",
+    ),
     (("stance", "joints"), 3, "stance.joints", "a string or an object or null"),
     (("stance", "joints"), {}, "stance.joints", "missing for front_right, which is on the rock"),
     (("stance", "joints"), {"front_left": []}, "stance.joints.front_left", "length >= 1"),
