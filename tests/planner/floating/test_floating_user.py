@@ -122,10 +122,10 @@ def test_parts_of_a_budget_spend_the_whole():
 
 
 def test_tension_that_a_slack_hand_needs_holds_its_tiles():
-    asked = question(request(preload=20.0))
+    asked = question(request(preload=8.0))
     answer = plan(asked)
     assert answer.status != "optimal"
-    told = [text for text in answer.warnings if "tendon_preload of 20 N" in text]
+    told = [text for text in answer.warnings if "tendon_preload of 8 N" in text]
     assert [text.split(":")[0] for text in told] == list(REAR)
     if answer.status == "failed":
         assert told[0] in answer.reason
