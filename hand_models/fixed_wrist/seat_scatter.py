@@ -163,7 +163,11 @@ def scattered_places(name: str, count: int, seed: int) -> Array:
 
 
 def closed_about(
-    hand: SpinyHand, settled: SettledHand, places: Array, scatter: tuple[float, float]
+    hand: SpinyHand,
+    settled: SettledHand,
+    places: Array,
+    scatter: tuple[float, float],
+    contact_scatter: tuple[float, float] | None = None,
 ) -> Iterator[Sequence[SettledHand | InvalidInputError]]:
     """Close a hand again at places near its place, 64 at a time.
 
@@ -174,9 +178,11 @@ def closed_about(
     settled : SettledHand
     places : ndarray, shape (n, 6)
         Along and about each axis of H, in units of ``scatter``; of a hand that was placed by
-        contact, those along z and about x and y in units of its ``contact_scatter``.
+        contact, those along z and about x and y in units of ``contact_scatter``.
     scatter : tuple of float
         Unit along an axis [m], and about an axis [rad].
+    contact_scatter : tuple of float, optional
+        The same of what contact leaves; that of the hand's parameters by default.
 
     Yields
     ------
@@ -186,7 +192,9 @@ def closed_about(
     at_once = 64  # hands that are closed together
     start = Placement(settled.hold, settled.surface, settled.grasp, settled.seating.pose)
     frames_of: Callable[[Array, tuple[float, float]], Sequence[Pose | InvalidInputError]] = (
-        _posed if settled.seating.offset is None else _ContactFrames(hand, settled)
+        _posed
+        if settled.seating.offset is None
+        else _ContactFrames(hand, settled, contact_scatter or hand.contact_scatter)
     )
     for first in range(0, len(places), at_once):
         frames = frames_of(places[first : first + at_once], scatter)
@@ -213,10 +221,13 @@ class _ContactFrames:
     hand : SpinyHand
     settled : SettledHand
         Placed by contact.
+    left : tuple of float
+        Unit of what contact leaves, along z [m] and about x and y [rad].
     """
 
-    def __init__(self, hand: SpinyHand, settled: SettledHand) -> None:
+    def __init__(self, hand: SpinyHand, settled: SettledHand, left: tuple[float, float]) -> None:
         assert settled.seating.offset is not None
+        self._left = left
         self._hand, self._offset = hand, settled.seating.offset
         at_rest = self._offset @ settled.seating.pose
         self._rest = Placement(settled.hold, settled.surface, settled.grasp, at_rest)
@@ -227,7 +238,7 @@ class _ContactFrames:
     ) -> list[Pose | InvalidInputError]:
         wrist = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
         moved = _posed(places * wrist, scatter)
-        left = _posed(places * (1.0 - wrist), self._hand.contact_scatter)
+        left = _posed(places * (1.0 - wrist), self._left)
         assert self._rest.hold_in_hand is not None
         starts = [
             self._rest._replace(hold_in_hand=each.inverse() @ self._rest.hold_in_hand)

@@ -122,12 +122,10 @@ def execute(
     closed: list[list[SettledHand | InvalidInputError]] = []
     for i, limb in enumerate(prepared.limbs):
         closed.append([])
-        settled, units = prepared.batch.hands[i], np.ones(6)
-        if settled.seating.offset is not None:
-            # one placed by contact comes to rest anew, displaced from there by units of its own
-            height, tilt = hand.contact_scatter
-            units[2:5] = height, tilt, tilt
-        for outcomes in closed_about(hand, settled, displacements[:, i] / units, (1.0, 1.0)):
+        units = (1.0, 1.0)  # displacements are in metres and radians
+        for outcomes in closed_about(
+            hand, prepared.batch.hands[i], displacements[:, i], units, units
+        ):
             closed[i] += outcomes
             deadline.check(NEWTON_SETTINGS.late)
         for each in closed[i]:

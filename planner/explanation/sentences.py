@@ -219,7 +219,7 @@ def overload_sentence(certificate: Certificate | None, *, floating: Collection[s
         within = "within the limits" if cap == 1.0 else f"up to a utilisation of {cap:g}"
         sentence = f"; {within} {_missing(certificate.shortfall)} (in B) would be missing"
     if _floats(certificate, floating):
-        sentence += ", with floating wrists where this plan puts them"
+        sentence += ", with the wrists where this plan puts them"
     return sentence
 
 

@@ -177,11 +177,12 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
     and the lower end returned. On its way up it passes the whole body wrench.
     """
     now, best, whole = start, None, None
-    high, sure, overloaded = math.inf, False, False
+    high, sure, overloaded, anew = math.inf, False, False, False
     least = 0.02  # of the factors that are tried
     for _ in range(10):  # factors of the body wrench
         used, factor = now.measure.utilisation, now.point.factor
-        whole = now if factor == 1.0 else whole
+        if factor == 1.0 and (whole is None or used < whole.measure.utilisation):
+            whole = now
         low = 0.0 if best is None else best.point.factor
         if used <= 1.0 + CAP_SLACK:
             if factor >= low:
@@ -197,8 +198,17 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
             break
         # bracketed to 0.2 %, where Newton's method does not end
         if high < math.inf and high - low <= 2e-3 * high:
-            sure = overloaded
-            break
+            jumps = best is not None and best.measure.utilisation < 0.98  # over 0.2 % of the load
+            sure = overloaded and not jumps
+            if best is None or not jumps or anew:
+                break
+            # the search ended at a poor plan at the upper end: from the lower end it may not
+            anew, upper = True, replace(best.point, factor=high)
+            now = find_wrists(hands, upper, budget, SETTINGS.rounds_nearby)
+            if not now.exact or now.measure.utilisation > 1.0 + CAP_SLACK:
+                break
+            high, overloaded = math.inf, False
+            continue
         assert now.outcome.balance_dual is not None
         slope = -float(now.outcome.balance_dual[:6] @ hands.wrench[:6])
         aim = math.inf if used < 1.0 else 0.0

@@ -13,7 +13,7 @@ from hand_models.base import Array
 from hand_models.hand import FINGERS
 from planner import deadline
 from planner.advice import Attempt
-from planner.deadline import Unfinished, late, late_sentence
+from planner.deadline import DeadlineError, Unfinished, late, late_sentence
 from planner.execution import find_open_loop
 from planner.explanation import (
     ActiveLimits,
@@ -83,6 +83,8 @@ def explained_plan(
     """
     question, where, solution = prepared.question, prepared.where, answer.solution
     start, prepared_at, solved = moments
+    # before the extras, which may take all of the time
+    of_wrists = tuple(_wrist_warnings(prepared, answer))
     odd = wrench_findings(question)
     unfinished = solution.unfinished + (("load_factor",) if factor.unfinished else ())
     further: list[str] = []
@@ -118,7 +120,7 @@ def explained_plan(
         *checks.oddities,
         *(each.message for each in odd),
         *([late_sentence(seconds, unfinished)] if unfinished and seconds is not None else ()),
-        *_wrist_warnings(prepared, answer),
+        *of_wrists,
         *further,
         *_factor_warnings(prepared, factor),
     )
@@ -269,7 +271,10 @@ def _wrist_warnings(prepared: PreparedStance, answer: Answer) -> Iterator[str]:
         yield from strained_preloads(prepared)
         if isinstance(answer, Verified):
             yield from far_wrists(answer.by_hand())
-            yield from changed_contacts(prepared, answer.by_hand())
+            try:
+                yield from changed_contacts(prepared, answer.by_hand())
+            except DeadlineError:
+                yield "whether hands would close alike where their wrists go was not found in time"
     if not answer.solution.proven:
         yield (
             "the loads are exact, but the utilisation is not proven minimal: at these poses of the "

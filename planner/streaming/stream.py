@@ -158,7 +158,7 @@ class WrenchStream:
             last = self._last
             if last is not None and last.verified and self._key == key:
                 return last
-            self._last, self._key = self._source.find(wrench), key
+            self._last, self._key = _frozen(self._source.find(wrench)), key
             return self._last
 
 
@@ -181,3 +181,12 @@ def _refuse(question: Question) -> None:
             "not available for streams, whose tensions change with the wrench: remove it",
             field="limits.tension_change",
         )
+
+
+def _frozen(points: SetPoints) -> SetPoints:
+    """Return set-points whose arrays are read-only: they are returned again for an equal wrench."""
+    wrists = [wrist.twist for wrist in points.wrists or () if wrist is not None]
+    for each in (points.tensions, points.loads, points.wrenches, points.winch_angle, *wrists):
+        if each is not None:
+            each.flags.writeable = False
+    return points

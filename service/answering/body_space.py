@@ -174,8 +174,8 @@ def _acceleration(space: BodySpace, way: Array) -> replies.Acceleration | None:
 def _warnings(space: BodySpace, moves: bool, error: float) -> Iterator[str]:
     if not space.exact:
         yield (
-            "floating wrists: what their hands hold is linearised where the plan puts them; at the "
-            f"extents the exact model differs by up to {error:.1f} N (moments over 0.1 m)"
+            "wrists that move: what their hands hold is linearised where the plan puts them; at "
+            f"the extents the exact model differs by up to {error:.1f} N (moments over 0.1 m)"
         )
     if not moves and space.accelerates:
         yield "no accelerations: the body cannot be held at rest"

@@ -17,6 +17,8 @@ from planner.prepare import PreparedStance, prepare_stance, settle_hand, wrists_
 from planner.question import LimbStiffness, Limits, OpenLoopSettings, Question
 from planner.result import HandPlan, OpenLoop, OpenLoopSample, Plan
 from planner.solving import KnownStance, plan
+from service.answering import questions
+from service.commands.stances import read_request
 from tests.planner.floating.test_compliant_plan import asked
 
 SAME_USE = 1e-6
@@ -324,3 +326,21 @@ def test_five_newtons_of_margin_drag_no_tile_backwards() -> None:
         question = replace(executed(name, samples=64), limits=Limits(hold_margin=5.0))
         _, found = found_in(question)
         assert (found.dragged, found.without) == (0, 0)
+
+
+def test_contact_that_leaves_nothing_leaves_the_rest() -> None:
+    request = read_request("wall-300")
+    hands = [
+        msgspec.structs.replace(hand, wrist="compliant", placing="contact")
+        for hand in request.stance.hands
+    ]
+    exact = {"seat": {"contact_position": {"value": 0.0, "unit": "m", "source": "assumed"}}}
+    limbs = LimbStiffness(position=5000.0, angle=100.0)
+    stance = msgspec.structs.replace(request.stance, hands=hands, limb_stiffness=limbs, hand=exact)
+    settings = OpenLoopSettings(samples=4, position=0.0, height=0.0, tilt=0.0, yaw=0.0)
+    request_of_rest = msgspec.structs.replace(
+        request, stance=stance, want=["open_loop"], open_loop=settings
+    )
+    answer = plan(questions.question(request_of_rest))
+    assert answer.open_loop is not None
+    assert answer.open_loop.ninetieth == pytest.approx(answer.utilisation, rel=1e-6)

@@ -196,3 +196,10 @@ def test_the_same_wrench_has_the_same_set_points_until_the_stream_closes():
         assert source.set_points(source.first) is points
     with pytest.raises(InvalidInputError, match="closed"):
         source.set_points(source.first)
+
+
+def test_set_points_that_are_kept_cannot_be_written(stream):
+    points = stream.set_points(stream.first)
+    for array in (points.tensions, points.wrists[0].twist):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
