@@ -182,7 +182,7 @@ def shortfall_sentence(
     constraints = blocking_sentence(_blamed(certificate))
     note = ""
     if _floats(certificate, floating):
-        note = "; floating wrists are where the search for a plan ended"
+        note = "; the wrists are where the search for a plan ended"
     if not certificate.direction.any():
         return f"no loads at any utilisation, whatever the body needs: {constraints}{note}"
     sentence = "no loads balance the body at any utilisation"

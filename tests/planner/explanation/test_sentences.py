@@ -110,7 +110,7 @@ def test_that_floating_hands_give_way_is_said_where_one_of_them_is_to_blame(gras
     assert said(others) == said(())
     for limb in limbs:
         assert said({limb}).startswith(said(()))
-        assert "with the wrists where" in said({limb})
+        assert "the wrists" in said({limb})
 
 
 def test_a_stance_in_the_air_says_so():
