@@ -120,8 +120,8 @@ def test_a_batch_does_not_go_on_with_the_replies_of_another_or_what_is_none(line
     for content, words in (
         (b'{"v": 1, "id": "other"}\n{"v"', "answers 'other', and the request is 'r0'"),
         (b"x\n", "line 1: not a reply"),
-        (b"notes", "not a reply"),
-        (b'{"vx', "not a reply"),
+        (b"notes", "not the start of a reply"),
+        (b'{"vx', "not the start of a reply"),
         (b"{}\n" * (COUNT + 1), f"has {COUNT + 1} replies, and there are {COUNT} requests"),
     ):
         output.write_bytes(content)
