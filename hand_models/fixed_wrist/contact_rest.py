@@ -141,7 +141,8 @@ def placed_by_contact(
             continue
         (there,) = hand.settle_each([_moved(starts[i], rest @ offsets[i])])
         if isinstance(there, InvalidInputError):
-            outcomes.append(there.within("contact_offset"))
+            there.field = "contact_offset"
+            outcomes.append(there)
             continue
         seating = Seating(there.seating.pose, "contact", offset=offsets[i])
         outcomes.append(replace(there, seating=seating))

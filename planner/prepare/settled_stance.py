@@ -221,7 +221,7 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
         raise UnsupportedError(
             f"the wrench space of {limb} is not available, as its wrist is compliant; valid are "
             "fixed and floating",
-            field="stance.hands.wrist",
+            field=f"stance.hands[{[hand.limb for hand in stance.hands].index(limb)}].wrist",
         )
     if wrist is None:
         return RestingHand(settled, wrench_space(settled))

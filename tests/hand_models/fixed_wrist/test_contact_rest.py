@@ -201,3 +201,11 @@ def test_mirrored_hands_rest_at_mirrored_poses() -> None:
     np.testing.assert_allclose(poses[1].position, mirror @ poses[0].position, atol=1e-6)
     np.testing.assert_allclose(poses[1].rotation, mirror @ poses[0].rotation @ mirror, atol=1e-5)
     assert math.isclose(net(rest(pinch()))[3], 0.0, abs_tol=CONTACT_SETTINGS.force)
+
+
+def test_an_offset_into_the_rock_is_blamed_on_the_offset() -> None:
+    (refused,) = placed_by_contact(
+        HAND, [pinch(0.3)], [Pose(np.array([0.0, 0.0, 0.05]), np.eye(3))]
+    )
+    assert isinstance(refused, InvalidInputError)
+    assert refused.field == "contact_offset"

@@ -14,7 +14,7 @@ from hand_models.parameters import own_draw, own_hand
 from hand_models.tile import Surface
 from planner.deadline import Budget
 from planner.floating.elastic_search import find_wrists, without_hindrance
-from planner.prepare import prepare_stance, settle_hand
+from planner.prepare import hand_space, prepare_stance, settle_hand
 from planner.question import LimbStiffness, OpenLoopSettings, Question
 from planner.result import Plan
 from planner.robots import robosimian
@@ -350,3 +350,9 @@ def test_on_the_sandpaper_of_the_calibration_it_counts_nothing() -> None:
         model = CompliantHand(settle_hand(place, stance), scheme="tension")
         loads.append(model.loads(twist).shears)
     np.testing.assert_array_equal(*loads)
+
+
+def test_the_wrench_space_of_a_compliant_hand_is_refused_by_its_place_in_the_stance() -> None:
+    with pytest.raises(UnsupportedError) as caught:
+        hand_space(asked().stance, "rear_left")
+    assert caught.value.field == "stance.hands[2].wrist"
