@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import threading
 from concurrent.futures import wait
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Self
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from hand_models.base import (
@@ -185,8 +186,8 @@ def _refuse(question: Question) -> None:
 
 def _frozen(points: SetPoints) -> SetPoints:
     """Return set-points whose arrays are read-only: they are returned again for an equal wrench."""
-    wrists = [wrist.twist for wrist in points.wrists or () if wrist is not None]
-    for each in (points.tensions, points.loads, points.wrenches, points.winch_angle, *wrists):
-        if each is not None:
-            each.flags.writeable = False
+    for part in (points, *(points.wrists or ())):
+        for field in () if part is None else fields(part):
+            if isinstance(each := getattr(part, field.name), np.ndarray):
+                each.flags.writeable = False
     return points
