@@ -194,11 +194,6 @@ class CompliantHand:
         return np.asarray(torques[:, own] * np.where(upper, 1.0, -1.0))
 
     @property
-    def palm_shear_stiffness(self) -> float:
-        """Stiffness of the palm's shear toward −x [N/m]."""
-        return float(self._batch.palm_springs.stiffness[0, 0, 0])
-
-    @property
     def palm_wrenches(self) -> Array:
         """Wrench on the rock per newton of the palm's shear, and of its pressing, shape (2, 6)."""
         return np.asarray(self._batch.palm_wrenches[0].T)

@@ -238,17 +238,16 @@ class FloatingWrist(CompliantGrasp):
         """Pose of the wrist, shape (d,), at which the nearest palm tile just meets the rock."""
         y, palm = self.at_rest, self.hand.settled.palm
         if self.palm_carries:
-            y[WRIST_COLUMNS.index("wrist/vz") - len(WRIST_COLUMNS)] += max(
-                0.0, min(palm.gaps[i] for i in palm.engaged)
-            )
+            inward = WRIST_COLUMNS.index("wrist/vz") - len(WRIST_COLUMNS)
+            y[inward] += max(0.0, palm.nearest_gap)
         return y
 
     def palm_mode(self, y: Array) -> PalmMode:
         """Return how the palm carries at a pose y, shape (d,)."""
         twist = y[-len(WRIST_COLUMNS) :]
         shear, inward = self.hand.palm_travel(twist[None])[0].tolist()
-        gap = self.hand.settled.palm.gaps[list(self.hand.settled.palm.engaged)].min(initial=np.inf)
-        return PALM_MODES[self.palm_carries and shear > 0.0, self.palm_carries and inward > gap]
+        presses = inward > self.hand.settled.palm.nearest_gap
+        return PALM_MODES[self.palm_carries and shear > 0.0, self.palm_carries and presses]
 
     def without_palm(self) -> Self:
         """Return a copy whose palm carries no load; both share one cache of loads."""

@@ -44,7 +44,7 @@ class PalmSprings:
         self.stiffness = np.zeros((len(hands), 2, 1 + tiles))
         for springs, settled in zip(self.stiffness, hands, strict=True):
             hand, palm = settled.hand, settled.palm
-            springs[0, 0] = settled.palm_stiffness[0]
+            springs[0, 0] = settled.palm_shear_stiffness
             pressing = np.array(palm.engagement) * hand.palm_pressing_stiffness
             springs[1, [1 + i for i in palm.engaged]] = pressing
         nearest = np.where(self.stiffness[:, 1, 1:] > 0.0, np.maximum(gaps, 0.0), 0.0)

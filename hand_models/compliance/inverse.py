@@ -74,7 +74,7 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
     directions = np.random.default_rng(0).normal(size=(other_starts, 6)) * pose_units(WRIST_COLUMNS)
     shares = np.linspace(0.0, farthest_start, other_starts + 1)[1:]
     palm, found = hand.settled.palm, list[WristPose]()
-    nearest = [max(0.0, min(palm.gaps[i] for i in palm.engaged))] if palm.engaged else []
+    nearest = [max(0.0, palm.nearest_gap)] if palm.engaged else []
     for start in (np.zeros(6), *(shares[:, None] * directions)):
         # from there, and where the palm's springs begin
         for inward in (0.0, *nearest):

@@ -253,10 +253,7 @@ class _Search:
             [_moved(self._starts[i], _move(at)) for i, at in zip(which, x, strict=True)]
         )
         least = [
-            each.palm.gaps[list(each.palm.engaged)].min(initial=np.inf)
-            if isinstance(each, SettledHand)
-            else np.inf
-            for each in there
+            each.palm.nearest_gap if isinstance(each, SettledHand) else np.inf for each in there
         ]
         return np.array(least) < max(CONTACT_SETTINGS.roundings)
 

@@ -129,6 +129,11 @@ class SettledPalm(NamedTuple):
     pressing_limit: float
 
     @property
+    def nearest_gap(self) -> float:
+        """Gap of the engaged tile that is nearest to the rock; infinite without one [m]."""
+        return float(self.gaps[list(self.engaged)].min(initial=np.inf))
+
+    @property
     def layers(self) -> list[tuple[float, tuple[int, ...]]]:
         """Palm as nested sets of whole tiles: pairs (weight, indices of the tiles).
 
@@ -300,18 +305,16 @@ class SettledHand:
         return 1.0 if self.surface.name == FITTED_SURFACE else self.hand.rock_stiffness_ratio
 
     @cached_property
-    def palm_stiffness(self) -> Array:
-        """Stiffness of the palm in shear and in pressing, shape (2,) [N/m].
+    def palm_shear_stiffness(self) -> float:
+        """Stiffness of the palm's shear toward −x [N/m].
 
         Load sharing of whole tiles, averaged over the palm's layers; zero if no tile is engaged.
         """
-        hand, found = self.hand, np.zeros(2)
+        hand, found = self.hand, 0.0
         for share, tiles in self.palm.layers:
             contacts = tuple(hand.palm_contact[i] for i in tiles)
             rubs = hand.palm_friction, hand.palm_own_friction
-            shear = shear_stiffness(contacts, hand.palm_spring, *rubs)
-            each = shear, hand.palm_pressing_stiffness * len(tiles)
-            found += share * np.array(each)
+            found += share * shear_stiffness(contacts, hand.palm_spring, *rubs)
         return found
 
     @cached_property

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array
 from hand_models.compliance import CompliantHands, FloatingWrist, complex_steps, slopes
+from hand_models.wrench_spaces import WRENCH_SCALE
 from planner import deadline
 
 __all__ = ["NEWTON_SETTINGS", "Equilibria", "LimbPull", "equilibria"]
@@ -40,9 +41,6 @@ class EquilibriumSettings:
 
 
 NEWTON_SETTINGS: Final = EquilibriumSettings()
-
-PER_TENTH: Final = np.array([1.0] * 3 + [10.0] * 3)
-"""Scale of wrenches and twists with which moments are over 0.1 m, shape (6,) [1, 1/m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +145,7 @@ def equilibria(
         If the deadline passes before the search ends.
     """
     hands, count, n = _Hands(samples, tensions), len(samples), len(start)
-    scale, coupling = np.tile(PER_TENTH, n), pull.coupling
+    scale, coupling = np.tile(WRENCH_SCALE, n), pull.coupling
     twists = np.broadcast_to(start, (count, n, 6)).copy()
     steps, shares = np.zeros_like(twists), np.ones(count)
     least = np.full(count, np.inf)

@@ -19,11 +19,7 @@ from zlib import crc32
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.compliance import (
-    CompliantWrist,
-    CompliantWrists,
-    FloatingWrist,
-)
+from hand_models.compliance import CompliantWrist, CompliantWrists, FloatingWrist
 from hand_models.fixed_wrist import closed_about, scattered_places
 from hand_models.hand import SettledHand
 from planner import deadline

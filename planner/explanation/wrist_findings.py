@@ -40,8 +40,8 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
         if hand.wrist is not None or not settled.palm.engaged:
             continue
         shear, pressing = -float(hand.palm.force[0]), float(hand.palm.force[2])
-        travel = shear / float(settled.palm_stiffness[0])
-        gap = max(float(settled.palm.gaps[list(settled.palm.engaged)].min()), 0.0)
+        travel = shear / settled.palm_shear_stiffness
+        gap = max(settled.palm.nearest_gap, 0.0)
         if pressing < TOLERANCES.palm_pressing:
             gap = 0.0
         lacks = max(travel, gap)
@@ -57,11 +57,9 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
         words.append(f"{shear:.0f} N of shear, which needs {1e3 * travel:.1f} mm of travel")
     if gap > TOLERANCES.palm_travel:
         words.append(f"{pressing:.0f} N of pressing across a gap of {1e3 * gap:.1f} mm")
-    others = len(lacking) - 1
-    alike = f" (and {others} other hand{'s' * (others > 1)} alike)" if others else ""
     message = (
         f"{prepared.limbs[i]}: a fixed wrist does not move, but its palm carries "
-        f"{', and '.join(words)}{alike}"
+        f"{', and '.join(words)}{_alike(len(lacking) - 1, 'hand')}"
     )
     if not prepared.question.stance.hands[i].grasp.fingernail:
         message += "; 'wrist': 'compliant' plans with wrists that move"
@@ -91,8 +89,7 @@ def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
     # of tiles alike but for rounding, to a micrometre, the first
     stretch, i, tile = max(beyond, key=lambda each: (round(each[0], 6), -each[1], -each[2]))
     hand, most = hands[i], prepared.batch.hands[i].hand.largest_tile_stretch
-    others = len(beyond) - 1
-    alike = f" (and {others} other tile{'s' * (others > 1)} alike)" if others else ""
+    alike = _alike(len(beyond) - 1, "tile")
     driven = prepared.question.stance.hands[i].wrist == "compliant"
     less = "a shorter wrist_travel or less load" if driven else "less load"
     message = (
@@ -102,3 +99,8 @@ def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
         f"far; {less} stretches it less"
     )
     yield Finding(TILE_STRETCHED_FAR, f"stance.hands[{i}].wrist", message, stretch, "m")
+
+
+def _alike(others: int, what: str) -> str:
+    """Return a remark that so many others are alike; nothing where there are none."""
+    return f" (and {others} other {what}{'s' * (others > 1)} alike)" if others else ""

@@ -19,7 +19,7 @@ from hand_models.finger import PHALANGES
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR, layout_of
 from hand_models.hand import FINGERS, NAIL, SettledHand, SettledTile
 from hand_models.tile import inner_half_planes
-from hand_models.wrench_spaces import Row, WrenchSpace
+from hand_models.wrench_spaces import WRENCH_SCALE, Row, WrenchSpace
 from planner.prepare import (
     CONTACT_CODES,
     KEPT_NAMES,
@@ -393,7 +393,7 @@ def _aimed(
         return pose
     limb, count = np.array(stiffness.each), len(pose.twist)
     # of turns over 0.1 m, so that all are in newtons per metre
-    over = np.array([1.0] * 3 + [10.0] * 3)
-    both = over[:, None] * (space.generators[:, -count:] + np.diag(limb)) * over
+    whole = space.generators[:, -count:] + np.diag(limb)
+    both = WRENCH_SCALE[:, None] * whole * WRENCH_SCALE
     least = float(np.linalg.eigvalsh(0.5 * (both + both.T))[0])
     return replace(pose, pose_target=pose.twist + wrench / limb, least_stiffness=least)

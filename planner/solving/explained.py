@@ -104,8 +104,7 @@ def explained_plan(
         parts["robust"] = find_robust_load_factor(prepared, overloaded=checks.overloaded)
         unfinished += late("robust") if parts["robust"] is None else ()
     if "open_loop" in question.want and isinstance(answer, Verified):
-        idle = max([each.utilisation for each in checks.idle], default=0.0)
-        parts["open_loop"] = find_open_loop(prepared, answer.by_hand(), idle)
+        parts["open_loop"] = find_open_loop(prepared, answer.by_hand(), checks.idle_use)
         unfinished += late("open_loop") if parts["open_loop"] is None else ()
     if "spread" in question.want:
         parts["spread"] = find_spread(prepared, checks.idle, solution, attempt)

@@ -52,9 +52,14 @@ class Checks(NamedTuple):
     oddities: tuple[str, ...] = ()
 
     @property
+    def idle_use(self) -> float:
+        """Largest utilisation of the joints of limbs without a hand; 0 without such joints."""
+        return max([used.utilisation for used in self.idle], default=0.0)
+
+    @property
     def overloaded(self) -> bool:
         """True if a limb without a hand cannot carry its own weight, whatever the body wrench."""
-        return any(used.utilisation > 1.0 + CAP_SLACK for used in self.idle)
+        return self.idle_use > 1.0 + CAP_SLACK
 
     @classmethod
     def of(cls, prepared: PreparedStance, idle: Sequence[LimitUse] | None = None) -> Checks:

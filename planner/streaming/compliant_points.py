@@ -66,7 +66,6 @@ class CompliantPoints:
             return SetPoints("failed", wrench, verified=False, reason=found.reason)
         arrays = answer.arrays
         torque, current, angle = arrays.drives.reshape(3, -1, len(FINGERS))
-        idle = max([each.utilisation for each in found.checks.idle], default=0.0)
         loads = np.zeros((len(self.columns), max(map(len, self.columns))))
         for row, y in zip(loads, answer.solution.loads, strict=True):
             row[: len(y)] = y
@@ -75,7 +74,7 @@ class CompliantPoints:
             body_wrench=wrench,
             verified=True,
             utilisation=answer.whole,
-            gap=max(answer.whole - max(answer.solution.least.value, idle), 0.0),
+            gap=max(answer.whole - max(answer.solution.least.value, found.checks.idle_use), 0.0),
             tensions=arrays.tensions.reshape(-1, len(FINGERS)),
             wrenches=arrays.wrenches,
             loads=loads,

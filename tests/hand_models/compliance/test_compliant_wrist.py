@@ -71,7 +71,7 @@ def test_a_palm_presses_past_its_gap_and_shears_by_its_travel() -> None:
     sliding[:, 0] = -3e-3, 3e-3
     toward, back = hand.loads(sliding).palm[:, 0]
     # likewise within 0.1 mm
-    assert toward == pytest.approx(2.95e-3 * hand.palm_shear_stiffness, rel=1e-9)
+    assert toward == pytest.approx(2.95e-3 * hand.settled.palm_shear_stiffness, rel=1e-9)
     assert back == 0.0
 
 
