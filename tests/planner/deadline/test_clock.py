@@ -405,7 +405,7 @@ def test_a_search_for_floating_wrists_gives_the_best_plan_it_has_come_to(monkeyp
     question = replace(question, load=load, objective="min_effort", want=wanted)
     whole, last = held(question, 10**6, monkeypatch)
     seen, used, efforts = set(), [], []
-    for ticks in range(1, last + 2, max(1, last // 20)):
+    for ticks in range(1, last + 2, max(1, last // 160)):
         answer, _ = held(question, ticks, monkeypatch)
         if answer is None:
             # a search may come by a point that a longer one passes by; not once it has settled
