@@ -7,17 +7,16 @@ from .closed_finger import (
 from .closure import settle_finger as settle_finger
 from .closure_loads import stays as stays, tendon_loads as tendon_loads
 from .fingernail import Fingernail as Fingernail
-from .model import (
-    JOINT_STOPS as JOINT_STOPS,
-    PHALANGES as PHALANGES,
-    Contact as Contact,
-    FingerModel as FingerModel,
-    SettledFinger as SettledFinger,
-)
+from .model import PHALANGES as PHALANGES, FingerModel as FingerModel
 from .path_state import OpenFinger as OpenFinger
 from .phalanx_gaps import middle_of_bed as middle_of_bed
 from .sequential_closure import (
     CONTACT_KINDS as CONTACT_KINDS,
     ClosedPhalanx as ClosedPhalanx,
     SequentialClosure as SequentialClosure,
+)
+from .settled_finger import (
+    JOINT_STOPS as JOINT_STOPS,
+    Contact as Contact,
+    SettledFinger as SettledFinger,
 )

@@ -9,13 +9,7 @@ import numpy as np
 
 from hand_models.base import Array
 from hand_models.finger.closing import follow
-from hand_models.finger.model import (
-    JOINT_STOPS,
-    PHALANGES,
-    Contact,
-    FingerModel,
-    SettledFinger,
-)
+from hand_models.finger.model import PHALANGES, FingerModel
 from hand_models.finger.path_state import (
     JOINT_COUNT,
     Around,
@@ -28,7 +22,8 @@ from hand_models.finger.path_state import (
 )
 from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out
 from hand_models.finger.settings import CONTACT_CODES
-from hand_models.sections import Complexes, Face, Flags, Outlines, Section
+from hand_models.finger.settled_finger import JOINT_STOPS, Contact, SettledFinger
+from hand_models.sections import Complexes, Face, FingerRock, Flags, Outlines, Section
 
 __all__ = ["ClosedFinger", "Refused", "cling", "close_all"]
 
@@ -112,19 +107,19 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
         its joints fully open, or that finds no equilibrium.
     """
     shape = PhalanxShape.of(model)
-    sections = [closing.section for closing in closings]
-    rock = Outlines.of(sections, model.reach + model.tile_length, shape.spacing)
+    rocks = [closing.rock for closing in closings]
+    rock = Outlines.of(rocks, model.reach + model.tile_length, shape.spacing)
     drive = Drive.of(model, closings)
     lower, straight = drive.lower, np.clip(0.0, drive.lower, drive.upper)
-    blocked = _in_rock(rock, shape, drive, sections, straight)
+    blocked = _in_rock(rock, shape, drive, rocks, straight)
     bent = blocked.nonzero()[0]
     shut = blocked.copy()
     shut[bent] = _in_rock(
-        take(rock, bent), shape, take(drive, bent), [sections[i] for i in bent], lower[bent]
+        take(rock, bent), shape, take(drive, bent), [rocks[i] for i in bent], lower[bent]
     )
     found = [
-        _refused(shape, section, q) if starts and section is not None else None
-        for section, q, starts in zip(sections, lower, shut.tolist(), strict=True)
+        _refused(shape, each, q) if starts and each.sections else None
+        for each, q, starts in zip(rocks, lower, shut.tolist(), strict=True)
     ]
     going = np.array([i for i, each in enumerate(found) if each is None], dtype=np.intp)
     if not len(going):
@@ -141,16 +136,22 @@ def _in_rock(
     rock: Outlines,
     shape: PhalanxShape,
     drive: Drive,
-    sections: Sequence[Section | None],
+    rocks: Sequence[FingerRock],
     q: Array,
 ) -> Flags:
     """Return which fingers turned by q have rock in them, at their sides or all over."""
     found = Around.of(rock, shape, drive, q).gap.min(axis=1) < -shape.closes
     for i in (~found).nonzero()[0].tolist():
-        section = sections[i]
-        if section is not None:
-            found[i] = section.clearances(_axes(shape, q[i])).min() < 0.0
+        found[i] = _inside(rocks[i], _axes(shape, q[i])).any()
     return np.asarray(found)
+
+
+def _inside(rock: FingerRock, places: Complexes) -> Flags:
+    """Return which places are inside the rock."""
+    inside = np.zeros(places.shape, dtype=bool)
+    for each in rock.sections:
+        inside |= each.clearances(places) < 0.0
+    return inside
 
 
 def _axes(shape: PhalanxShape, q: Array) -> Complexes:
@@ -161,19 +162,19 @@ def _axes(shape: PhalanxShape, q: Array) -> Complexes:
     return np.asarray(joints[:, None] + (along + 1j * rise) * u[:, None])
 
 
-def _refused(shape: PhalanxShape, section: Section, q: Array) -> Refused:
+def _refused(shape: PhalanxShape, rock: FingerRock, q: Array) -> Refused:
     """Return how deep rock is in a finger, and the lift that would clear it."""
     places, most = _axes(shape, q), JOINT_COUNT * shape.end
-    rock = Outlines.of([section], 2.0 * most + shape.end, shape.spacing)
+    outline = Outlines.of([rock], 2.0 * most + shape.end, shape.spacing)
 
     def depth(lift: float, *, how_far: bool = False) -> float:
         """Return how deep rock is in the finger; where it is, only asked ``how_far`` exactly."""
         lifted = places - 1j * lift
-        away = np.abs(lifted[..., None] - rock.points[0]).min(axis=-1)
+        away = np.abs(lifted[..., None] - outline.points[0]).min(axis=-1)
         near = float(shape.radius - away.min())
         if near > 0.0 and not how_far:
             return near
-        inside = section.clearances(lifted) < 0.0
+        inside = _inside(rock, lifted)
         return float(shape.radius - np.where(inside, -away, away).min())
 
     now, low, high = max(depth(0.0, how_far=True), shape.closes), 0.0, most
@@ -225,6 +226,7 @@ def _closed(
                     rise,
                     tilt,
                     phi,
+                    float(around.across[row, j]) if caught[j] else 0.0,
                 )
             )
         finger, of_tile = SettledFinger(model, tuple(contacts)), closing.base_tile

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import cmath
 
-from hand_models.finger.model import Contact, FingerModel, SettledFinger
+from hand_models.finger.model import FingerModel
+from hand_models.finger.settled_finger import Contact, SettledFinger
 from hand_models.sections import Face, Rest, Section, Vector2
 
 __all__ = ["settle_finger"]

@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.finger.model import SettledFinger
+from hand_models.finger.settled_finger import SettledFinger
 from hand_models.parameters import ParameterTable
 from hand_models.sections import Face, Section, Vector2
 

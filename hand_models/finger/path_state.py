@@ -8,11 +8,11 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices
+from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.finger.model import PHALANGES, FingerModel
 from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out, nearest_points
 from hand_models.finger.settings import CONTACT_CODES, SETTINGS
-from hand_models.sections import Complexes, Flags, Outlines, Section
+from hand_models.sections import Complexes, FingerRock, Flags, Outlines
 from hand_models.tile import Surface, engaged_share
 
 __all__ = [
@@ -54,9 +54,8 @@ class OpenFinger(NamedTuple):
 
     Attributes
     ----------
-    section : Section or None
-        Rock in the finger's plane, with the proximal joint at the origin of the finger frame F;
-        None if no rock.
+    rock : FingerRock
+        Rock in the finger's plane, with the proximal joint at the origin of the finger frame F.
     surface : Surface
         Strength of the tiles on the rock.
     tension : float
@@ -65,7 +64,7 @@ class OpenFinger(NamedTuple):
         Whether a base tile comes first on the tendon.
     """
 
-    section: Section | None
+    rock: FingerRock
     surface: Surface
     tension: float
     base_tile: bool = False
@@ -163,6 +162,8 @@ class Around(NamedTuple):
     place, push : ndarray of complex, shape (n, 3)
         Place of each contact's force [m] and its unit vector toward the rock, in the phalanx's
         axes: real part along it, imaginary part above it.
+    across : ndarray, shape (n, 3)
+        Middle of the engaged part of each tile: its distance from the finger's plane [m].
     """
 
     gap: Array
@@ -175,6 +176,7 @@ class Around(NamedTuple):
     d_b: Array
     place: Complexes
     push: Complexes
+    across: Array
 
     @classmethod
     def of(cls, rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array) -> Around:
@@ -195,8 +197,13 @@ class Around(NamedTuple):
         joints, u = fan_out(q + SEEN_POSES[:, None], shape.end)
         depth = np.broadcast_to(drive.depth, u.shape)
         beside = shape.beside(near.of_poses(len(SEEN_POSES)), joints, u, depth)
+        # in each of the strips across a tile its spines reach the rock or not
+        strips = _strip_gaps(rock, shape, joints, u)
+        parts = engaged_share(beside.tile_gap[..., None] + strips, shape.travel)
+        share = parts.mean(axis=-1)
+        middle = np.einsum("njk,nk->nj", parts[0], rock.across)
+        middle = middle / np.maximum(parts[0].sum(axis=-1), BASE_TOLERANCES.rounding)
         # a phalanx that presses aside, with its end, has its spines beside the rock
-        share = engaged_share(beside.tile_gap, shape.travel)
         share = engaged_share(1.0 - share * beside.push.imag, 1.0)
         # from joint i to contact j, in the axes of its force
         arms = (joints + beside.place * u)[..., None, :] - joints[..., None]
@@ -207,7 +214,41 @@ class Around(NamedTuple):
             np.moveaxis((value[1:] - value[:1]) / turn, 0, -1) for value in values
         )
         place, push = beside.place[0], beside.push[0]
-        return cls(gap, share, a, b, d_gap, d_share, d_a, d_b, place, push)
+        return cls(gap, share, a, b, d_gap, d_share, d_a, d_b, place, push, middle)
+
+
+def _strip_gaps(rock: Outlines, shape: PhalanxShape, joints: Complexes, u: Complexes) -> Array:
+    """Return how much farther from tiles the rock of each strip is than the envelope of all.
+
+    Parameters
+    ----------
+    rock : Outlines
+        Rock in the plane of each of the n fingers, with k strips.
+    shape : PhalanxShape
+    joints, u : ndarray of complex, shape (m, n, 3)
+        x + i z of each phalanx's joint [m], and the unit vector along the phalanx, in m poses near
+        to each other.
+
+    Returns
+    -------
+    ndarray, shape (m, n, 3, k)
+        Not negative [m].
+    """
+    fingers, k = np.arange(len(rock.places))[:, None, None], rock.behind.shape[-1]
+    if k == 1:
+        return np.zeros((*u.shape, 1))
+
+    def from_tile(places: Complexes, joints: Complexes, u: Complexes) -> Array:
+        seen = (places - joints[..., None]) * u.conj()[..., None]
+        return np.abs(seen - (np.clip(seen.real, shape.near, shape.far) + 1j * shape.lift))
+
+    # half a millimetre apart: what is under the tile, and some millimetres on both sides
+    near = from_tile(rock.places[:, None], joints[0], u[0])
+    count = min(64, near.shape[-1])
+    chosen = np.argpartition(near, count - 1, axis=-1)[..., :count]
+    away = from_tile(rock.places[fingers, chosen], joints, u)
+    least = (away[..., None] + rock.behind[fingers, chosen]).min(axis=-2)
+    return np.asarray(least - away.min(axis=-1, keepdims=True))
 
 
 class PathState(NamedTuple):

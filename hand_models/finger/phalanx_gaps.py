@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.finger.model import FingerModel
-from hand_models.sections import SECTION_SETTINGS, Complexes, Outlines, stretch_minima
+from hand_models.sections import SECTION_SETTINGS, Complexes, Flags, Outlines, stretch_minima
 
 __all__ = [
     "Beside",
@@ -85,12 +85,15 @@ class NearPoints(NamedTuple):
         Index of each point's phalanx.
     first : ndarray of int
         Index of the first point of each phalanx; every phalanx has at least one point.
+    bare : ndarray of bool, shape (p,)
+        True for rock that the bare frame meets, beside the tiles.
     """
 
     points: Complexes
     lengths: Array
     phalanx: Indices
     first: Indices
+    bare: Flags
 
     def of_poses(self, count: int) -> NearPoints:
         """Return the points repeated for ``count`` poses of all phalanges, pose after pose."""
@@ -100,6 +103,7 @@ class NearPoints(NamedTuple):
             np.tile(self.lengths, count),
             (self.phalanx + len(self.first) * poses).ravel(),
             (self.first + len(self.points) * poses).ravel(),
+            np.tile(self.bare, count),
         )
 
     def sums(self, values: Values) -> Values:
@@ -186,7 +190,7 @@ class PhalanxShape(NamedTuple):
         """
         of = near.phalanx
         seen = (near.points - joint.ravel()[of]) * u.ravel().conj()[of]
-        away, from_tile = self._from_axis(seen)
+        away, from_tile = self._from_axis(seen, near.bare)
         size = np.abs(away)
         depths = size - self.radius
         gap = self._level(depths, near) - self.fine
@@ -215,7 +219,7 @@ class PhalanxShape(NamedTuple):
         within : ndarray
             Margin of each phalanx: its tile's depth plus the largest further motion [m].
         """
-        away, from_tile = self._from_axis(seen)
+        away, from_tile = self._from_axis(seen, near.bare)
         size = np.abs(away)
         # the bed sinks no lower than with any point alone
         least = near.least(size + self.alone(near.lengths)) + within
@@ -227,16 +231,23 @@ class PhalanxShape(NamedTuple):
             near.lengths[chosen],
             near.phalanx[chosen],
             np.cumsum(count) - count,
+            near.bare[chosen],
         )
 
-    def _from_axis(self, seen: Complexes) -> tuple[Complexes, Array]:
-        """Return the way to points from the axis; and how far from under the tile they are [m]."""
-        from_tile = seen - (np.clip(seen.real, self.near, self.far) + 1j * self.lift)
-        corner, step = complex(self.far, self.lift), complex(self.end - self.far, -self.lift)
-        part = ((seen - corner) * step.conjugate()).real / abs(step) ** 2
+    def _from_axis(self, seen: Complexes, bare: Flags) -> tuple[Complexes, Array]:
+        """Return the way to points from the axis; and how far from under the tile they are [m].
+
+        The axis of a bare frame has no lift. Its points are infinitely far from under the tile.
+        """
+        lift = np.where(bare, 0.0, self.lift) if bare.any() else np.array(self.lift)
+        from_tile = seen - (np.clip(seen.real, self.near, self.far) + 1j * lift)
+        corner, step = self.far + 1j * lift, (self.end - self.far) - 1j * lift
+        length = np.hypot(self.end - self.far, lift)
+        part = ((seen - corner) * step.conj()).real / length**2
         beyond = seen - (corner + np.clip(part, 0.0, 1.0) * step)
         distance = np.abs(from_tile)
-        return np.where(distance <= np.abs(beyond), from_tile, beyond), distance
+        away = np.where(distance <= np.abs(beyond), from_tile, beyond)
+        return away, np.where(bare, np.inf, distance)
 
     def alone(self, lengths: Array) -> Array:
         """Return how far a bed of springs sinks if it rests on a single point of rock [m].
@@ -352,8 +363,9 @@ def nearest_points(
     each = SECTION_SETTINGS.points_per_circle
     points = rock.points.reshape(-1, each)[block].ravel()
     lengths = rock.lengths.reshape(-1, each)[block].ravel()
+    bare = rock.bare.reshape(-1, each)[block].ravel()
     count = each * np.bincount(phalanx, minlength=q.size)
     phalanx = np.repeat(phalanx, each)
-    near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count)
+    near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count, bare)
     seen = (points - joints.ravel()[phalanx]) * u.ravel().conj()[phalanx]
     return shape.may_press(seen, near, within.ravel())

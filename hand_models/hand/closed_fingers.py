@@ -38,12 +38,12 @@ __all__ = ["ClosedFingers", "close_fingers"]
 FingerNumbers = list[float]
 """Numbers of a closed finger, phalanx by phalanx: three times the `PHALANX_NUMBERS`."""
 
-PHALANX_NUMBERS: Final = 22
+PHALANX_NUMBERS: Final = 23
 """Numbers of a phalanx: its angle [rad], its contact's place along and above it [m] and tilt [rad],
 its joint [m]; its shear and normal load, each at zero tension [N] and per newton; the share of its
 tile's spines that are on the rock; the codes of its contact and its joint's stop; and in the
 finger's plane, each in homogeneous coordinates, its contact and its axes of shear and of normal
-load."""
+load; and how far its contact is from that plane, along the finger's y [m]."""
 
 
 class ClosedFingers:
@@ -87,13 +87,13 @@ class ClosedFingers:
         codes = table[..., 11:13].astype(np.int8)  # of the `PHALANX_NUMBERS`
         for array in (table, codes):
             array.setflags(write=False)
-        self.places = table[..., 13:].reshape(-1, count, 3 * len(PHALANGES), 3)
+        self.places = table[..., 13:22].reshape(-1, count, 3 * len(PHALANGES), 3)
         # the loads, the share and the code of the contact
         self.tiles = table[..., 6:12]
         angle, along, rise, tilt = (table[..., i] for i in range(4))
         joint, share = table[..., 4:6].view(complex)[..., 0], table[..., 10]
         self.postures = HandPostures(
-            angle, joint, along, rise, tilt, share, codes[..., 0], codes[..., 1]
+            angle, joint, along, rise, tilt, share, codes[..., 0], codes[..., 1], table[..., 22]
         )
 
     def stops_of(self, index: int) -> tuple[tuple[int, int, Array], ...]:
@@ -220,7 +220,7 @@ def _alone(
         key = (k if cuts is None else (cuts[0], cuts[1][finger]), *given)
         keys.append(key)
         if key not in closings:
-            closings[key] = OpenFinger(placed.section(i, finger), *given)
+            closings[key] = OpenFinger(placed.rock(i, finger), *given)
     if closings:
         found = close_all(hand.finger, list(closings.values()))
         closed.update(zip(closings, found, strict=True))
@@ -257,7 +257,7 @@ def _row(
         # the tile of a phalanx that is laid is on the rock with all its spines
         row += (angle, along, 0.0, 0.0, joint.real, joint.imag)
         row += (t.real, t.imag, n.real, n.imag, 1.0, *laid)
-        row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0)
+        row += (place.real, place.imag, 1.0, -u.real, -u.imag, 0.0, -u.imag, u.real, 0.0, 0.0)
     return row
 
 
@@ -277,5 +277,5 @@ def _row_alone(closed: ClosedFinger) -> FingerNumbers:
         row += (contact.angle, contact.along, contact.rise, contact.tilt, *contact.joint)
         kind, stop = CONTACT_KINDS.index(contact.kind), JOINT_STOPS.index(contact.stop)
         row += (*shear, *normal, share, kind, stop)
-        row += (*place, 1.0, -x, -z, 0.0, -z, x, 0.0)
+        row += (*place, 1.0, -x, -z, 0.0, -z, x, 0.0, contact.across)
     return row

@@ -12,7 +12,7 @@ from hand_models.base import Array, Pose
 from hand_models.finger import CONTACT_KINDS, PHALANGES
 from hand_models.hand.names import FINGERS
 from hand_models.rock import Hold
-from hand_models.sections import Section
+from hand_models.sections import FingerRock, Section
 
 __all__ = ["HAND_Z", "OUTER_FINGERS", "STACK_ROWS", "TILE_COLUMNS", "FingerFrame", "FrameStack"]
 
@@ -103,9 +103,17 @@ class FingerFrame:
         raw : bool, optional
             Whether to use `Hold.raw_section`, with steps and edges smaller than a tile.
         """
-        cut = hold.raw_section if raw else hold.section
+        plane = self._plane(hand_in_hold)
+        return hold.raw_section(*plane) if raw else hold.finger_rock(*plane).tile
+
+    def rock(self, hold: Hold, hand_in_hold: Pose) -> FingerRock:
+        """Return the rock that the finger meets with its whole width, in its coordinates F."""
+        return hold.finger_rock(*self._plane(hand_in_hold))
+
+    def _plane(self, hand_in_hold: Pose) -> tuple[Array, Array, Array]:
+        """Return origin and axes of the finger's plane in the hold's frame."""
         rotation = hand_in_hold.rotation
-        return cut(hand_in_hold.apply(self.joint), rotation @ self.along, rotation[:, 2])
+        return hand_in_hold.apply(self.joint), rotation @ self.along, rotation[:, 2]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from hand_models.hand.grasp import Grasp
 from hand_models.hand.model import HandModel
 from hand_models.hand.seating import Seating
 from hand_models.rock import Hold
-from hand_models.sections import FingerPlane, Section, Swept, entry_distances
+from hand_models.sections import FingerPlane, FingerRock, Section, Swept, entry_distances
 from hand_models.tile import Surface
 
 __all__ = ["PlacedHands", "Placement", "PlacementKey"]
@@ -156,6 +156,11 @@ class PlacedHands:
         places = there.apply(self.frames.rows[index, STACK_ROWS.tiles, :3])
         return [hold.entry(place, into) for place in places]
 
+    def rock(self, index: int, finger: int) -> FingerRock:
+        """Return the rock that a finger of a hand meets with its whole width, by their indices."""
+        hand_in_hold = self.seatings[index].pose.inverse()
+        return self.frames.hands[index][finger].rock(self.placements[index].hold, hand_in_hold)
+
     def section(self, index: int, finger: int) -> Section | None:
         """Return the rock in a finger's plane, in its coordinates F; None if there is none.
 
@@ -169,7 +174,7 @@ class PlacedHands:
         Returns
         -------
         Section or None
-            `Hold.raw_section` in a fingernail grasp, else `Hold.section`.
+            `Hold.raw_section` in a fingernail grasp, else what stands out across the tiles.
         """
         hold, grasp = self.placements[index].hold, self.placements[index].grasp
         hand_in_hold = self.seatings[index].pose.inverse()

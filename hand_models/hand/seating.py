@@ -19,7 +19,7 @@ the grasp, and the other follows.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
@@ -216,23 +216,23 @@ class RockUnder:
     """
 
     def __init__(self, hand: HandModel, hold: Hold, at: Pose) -> None:
-        self._hold, self._at = hold, at
+        self._at = at
         self._half = 0.5 * hand.palm_length
         self._reach = hand.finger.reach + hand.palm_length
         y = hand.inner_place[1]
         across = np.abs(hand.palm_tiles[:, 1]).max() + 0.5 * hand.palm_tile_size[1]
-        self.under = self._cut((y, -y))
+        self.under = self._outlines(hold.finger_rock(*self._plane(each)).tile for each in (y, -y))
         # lines along the palm on which the highest rock under it is looked for
-        self._lines = self._cut(np.linspace(-across, across, 5).tolist()) if self.under else []
+        lines = np.linspace(-across, across, 5).tolist() if self.under else []
+        self._lines = self._outlines(hold.section(*self._plane(each)) for each in lines)
 
-    def _cut(self, offsets: Sequence[float]) -> list[PolylineSection]:
-        """Return the rock in planes along x, each so far beside the frame's origin."""
+    def _plane(self, offset: float) -> tuple[Array, Array, Array]:
+        """Return origin and axes of a plane along x, so far along y from the frame's origin."""
         axes = self._at.rotation
-        found = (
-            self._hold.section(self._at.apply([0.0, y, 0.0]), axes[:, 0], axes[:, 2])
-            for y in offsets
-        )
-        lines = [self._outline(section) for section in found if section is not None]
+        return self._at.apply([0.0, offset, 0.0]), axes[:, 0], axes[:, 2]
+
+    def _outlines(self, sections: Iterable[Section | None]) -> list[PolylineSection]:
+        lines = [self._outline(section) for section in sections if section is not None]
         return [line for line in lines if line is not None]
 
     def _outline(self, section: Section) -> PolylineSection | None:

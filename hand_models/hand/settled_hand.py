@@ -42,6 +42,8 @@ class HandPostures(NamedTuple):
         angle of its force from the phalanx's normal [rad], share of the tile's spines on the rock.
     kinds, stops : ndarray of int8
         Codes: indices into `CONTACT_NAMES`, and into `hand_models.finger.JOINT_STOPS`.
+    across : ndarray
+        Distance of each contact from its finger's plane, along y of F [m].
     """
 
     angles: Array
@@ -52,6 +54,7 @@ class HandPostures(NamedTuple):
     engagement: Array
     kinds: NDArray[np.int8]
     stops: NDArray[np.int8]
+    across: Array
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
         """Return the posture of each finger as a `SettledFinger`, in the order of `FINGERS`.
@@ -71,8 +74,9 @@ class HandPostures(NamedTuple):
                         rise,
                         tilt,
                         share,
+                        across,
                     )
-                    for angle, joint, along, rise, tilt, share, kind, stop in zip(
+                    for angle, joint, along, rise, tilt, share, kind, stop, across in zip(
                         *finger, strict=True
                     )
                 ),

@@ -93,6 +93,7 @@ def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence
     count, frames = len(tensions), placed.frames
     # each phalanx's contact, axis of shear and axis of normal load, from the finger's plane to H
     places = (closed.places @ frames.planes).reshape((*frames.across.shape[:3], 9))
+    places[..., :3] += closed.postures.across[..., None] * frames.across
     bodies = np.concatenate([places, frames.across, closed.tiles], axis=3)
     bases = _base_tiles(placed, tensions)
     return np.concatenate([bases, bodies.reshape(count, -1, TILE_COLUMNS.total)], axis=1)

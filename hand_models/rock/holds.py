@@ -17,7 +17,14 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError, Pose, check_positive
 from hand_models.parameters import scan_table
 from hand_models.rock.surface import Triangles, drawn_out, grid
-from hand_models.sections import SECTION_SETTINGS, Section, Swept, cut_of, entry_distances
+from hand_models.sections import (
+    SECTION_SETTINGS,
+    FingerRock,
+    Section,
+    Swept,
+    cut_of,
+    entry_distances,
+)
 
 __all__ = ["Cylinder", "Edge", "Ellipsoid", "Hold", "Plane", "Section", "Sphere"]
 
@@ -87,6 +94,13 @@ class Hold(ABC):
             None where the plane misses the rock. For a smooth shape the same as `section`.
         """
         return self.section(origin, s_axis, t_axis)
+
+    def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
+        """Return the rock that a finger meets with its whole width, in its plane.
+
+        A smooth shape is taken as alike across the finger: as it is in the finger's plane.
+        """
+        return FingerRock(self.section(origin, s_axis, t_axis))
 
     @abstractmethod
     def entry(self, point: ArrayLike, direction: ArrayLike) -> float:

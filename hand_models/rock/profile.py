@@ -109,6 +109,18 @@ class Profile(OutlinedHold):
         pieces = np.linalg.solve(M, (outline - o[[0, 2]]).T).T
         return [pieces if determinant > 0.0 else pieces[::-1]]
 
+    def _cuts(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, offsets: Array
+    ) -> list[list[Array]]:
+        """Return the outline under the finger in each plane: the first cut, moved along s."""
+        s, t = np.asarray(s_axis, dtype=float), np.asarray(t_axis, dtype=float)
+        M = np.array([[s[0], t[0]], [s[2], t[2]]])
+        if abs(np.linalg.det(M)) < SECTION_SETTINGS.parallel_sine:
+            return super()._cuts(origin, s_axis, t_axis, offsets)
+        first = self._pieces(origin, s_axis, t_axis)
+        shift = np.linalg.solve(M, np.cross(t, s)[[0, 2]])
+        return [[piece - y * shift for piece in first] for y in offsets.tolist()]
+
     def _along_axis(self, o: Array, s: Array, t: Array) -> list[Array]:
         """Return the straight rock in a plane that holds the direction of drawing."""
         depth = self.entry(o, t)

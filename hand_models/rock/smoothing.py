@@ -29,8 +29,9 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
+from hand_models.rock.envelopes import Heights, alike, envelope_outlines
 from hand_models.rock.holds import Hold
-from hand_models.sections import PolylineSection, Section
+from hand_models.sections import NO_STRIPS, FingerRock, PolylineSection, RockStrips, Section
 
 __all__ = ["OutlinedHold", "Scale", "smooth"]
 
@@ -51,6 +52,10 @@ class Scale:
         Half the side of the square about a finger's base outside which rock is left out.
     longest : float
         Length of the rock's outline within that square above which the rock is refused.
+    tile_width, frame_width : float
+        Widths of a finger's tiles and of its phalanges' frames.
+    strip : float
+        Largest width of the strips in which rock is cut across them.
     """
 
     tile: float
@@ -58,6 +63,9 @@ class Scale:
     bridged_gap: float
     reach: float
     longest: float
+    tile_width: float
+    frame_width: float
+    strip: float
 
     @classmethod
     def of(cls, hand: ParameterTable | None = None) -> Scale:
@@ -86,7 +94,24 @@ class Scale:
             bridged_gap=table.scalar("cut", "bridged_gap"),
             reach=reach,
             longest=table.scalar("cut", "longest") * (reach / usual),
+            tile_width=hand.scalar("finger", "tile_width"),
+            frame_width=hand.scalar("finger", "frame_width"),
+            strip=table.scalar("cut", "strip"),
         )
+
+    @property
+    def strips(self) -> tuple[Array, slice]:
+        """Return the middles of strips across a finger [m], and which are under its tiles.
+
+        An odd number is under the tiles, so that one is in the finger's plane; as many on either
+        side as it takes are under the frame beside them.
+        """
+        half = math.ceil(0.5 * self.tile_width / self.strip - 0.5)
+        beside = math.ceil(0.5 * (self.frame_width - self.tile_width) / self.strip)
+        under = self.tile_width / (2 * half + 1) * np.arange(-half, half + 1)
+        width = 0.5 * (self.frame_width - self.tile_width) / max(beside, 1)
+        outer = 0.5 * self.tile_width + width * (np.arange(beside) + 0.5)
+        return np.concatenate([-outer[::-1], under, outer]), slice(beside, beside + 2 * half + 1)
 
 
 def smooth(points: Array, scale: Scale) -> Array | None:
@@ -245,6 +270,25 @@ def _runs(piece: Array, reach: float) -> list[Array]:
     return runs
 
 
+def _strips(
+    heights: Heights, section: PolylineSection | None, offsets: Array, tiles: slice
+) -> RockStrips:
+    """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
+    if section is None:
+        return NO_STRIPS
+    curves, own = section.pieces, heights.t[tiles]
+    least = own.min(axis=0)
+    depths = np.where(np.isfinite(own), own - np.where(np.isfinite(least), least, 0.0), np.inf)
+    places = np.concatenate(curves)
+    normals = [_outward(curve, np.array_equal(curve[0], curve[-1])) for curve in curves]
+    upright = np.maximum(-np.concatenate(normals)[:, 1], BASE_TOLERANCES.angle)
+    at = np.searchsorted(heights.s, places[:, 0]).clip(0, len(heights.s) - 1)
+    # what is hidden under an overhang is known in the finger's plane only, and taken as alike
+    seen = places[:, 1] < least[at] + 1e-3
+    behind = np.where(seen, depths[:, at] * upright, 0.0)
+    return RockStrips(offsets[tiles], places[:, 0] + 1j * places[:, 1], behind.T)
+
+
 class OutlinedHold(Hold):
     """A hold whose cut in each plane is a set of polylines: smoothed for fingers, raw for nails.
 
@@ -259,6 +303,53 @@ class OutlinedHold(Hold):
 
     def __init__(self, hand: ParameterTable | None = None) -> None:
         self._scale = Scale.of(hand)
+
+    def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
+        """Cut the hold with planes across a finger, and smooth their envelope to a tile's scale.
+
+        Returns
+        -------
+        FingerRock
+            Only rock within a finger's reach of the plane's origin.
+
+        Raises
+        ------
+        InvalidInputError
+            If an outline is too long to be a surface of rock; the field is ``hold``.
+        """
+        scale = self._scale
+        offsets, tiles = scale.strips
+        strips = [
+            [_corners(run) for run in map(_distinct, _reached(cut, scale)) if len(run) > 1]
+            for cut in self._cuts(origin, s_axis, t_axis, offsets)
+        ]
+        middle = strips[len(strips) // 2]
+        if alike(strips) or not any(strips):
+            return FingerRock(self._smooth(middle))
+        heights = Heights.of(strips, scale.spacing)
+        peaks = self._peaks(origin, s_axis, t_axis, 0.5 * scale.frame_width)
+        under = peaks[np.abs(peaks[:, 2]) <= 0.5 * scale.tile_width, :2]
+        tile = self._smooth(envelope_outlines(heights, middle, under, scale.bridged_gap, tiles))
+        frame = self._smooth(envelope_outlines(heights, middle, peaks[:, :2], scale.bridged_gap))
+        return FingerRock(tile, frame, _strips(heights, tile, offsets, tiles))
+
+    def _peaks(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, half: float) -> Array:
+        """Return corners (s, t, y) of rock up to ``half`` beside a finger's plane, (n, 3) [m]."""
+        return np.zeros((0, 3))
+
+    def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
+        curves = [smooth(run, self._scale) for run in runs]
+        reached = [curve for curve in curves if curve is not None]
+        return PolylineSection(reached) if reached else None
+
+    def _cuts(
+        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, offsets: Array
+    ) -> list[list[Array]]:
+        """Return the raw outlines in planes moved by ``offsets`` along t × s [m]."""
+        across = np.cross(np.asarray(t_axis), np.asarray(s_axis))
+        return [
+            self._pieces(np.asarray(origin) + y * across, s_axis, t_axis) for y in offsets.tolist()
+        ]
 
     @abstractmethod
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
@@ -277,10 +368,7 @@ class OutlinedHold(Hold):
         InvalidInputError
             If the outline is too long to be a surface of rock; the field is ``hold``.
         """
-        runs = _reached(self._pieces(origin, s_axis, t_axis), self._scale)
-        curves = [smooth(run, self._scale) for run in runs]
-        reached = [curve for curve in curves if curve is not None]
-        return PolylineSection(reached) if reached else None
+        return self._smooth(_reached(self._pieces(origin, s_axis, t_axis), self._scale))
 
     def raw_section(
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import BASE_TOLERANCES, Array
-from hand_models.sections.section import Complexes, Section
+from hand_models.sections.finger_rock import FingerRock
+from hand_models.sections.section import Complexes, Flags, Section
 from hand_models.sections.settings import SECTION_SETTINGS
 
 __all__ = ["Outlines"]
@@ -30,6 +31,10 @@ class Outlines(NamedTuple):
         Radius of that circle [m].
     longest : ndarray, shape (n, p / 16)
         Largest of the lengths in each block [m].
+    bare : ndarray of bool, shape (n, p)
+        True for rock that the bare frame meets, beside the tiles.
+    places, behind, across : ndarray, shapes (n, c), (n, c, k) and (n, k)
+        Rock in the strips across each finger's tiles, as in `RockStrips`; a filler is 1 km away.
     """
 
     points: Complexes
@@ -37,34 +42,49 @@ class Outlines(NamedTuple):
     centres: Complexes
     radii: Array
     longest: Array
+    bare: Flags
+    places: Complexes
+    behind: Array
+    across: Array
 
     @classmethod
-    def of(cls, sections: Sequence[Section | None], reach: float, spacing: float) -> Outlines:
-        """Sample the boundaries of sections, one for each finger.
+    def of(cls, rocks: Sequence[FingerRock], reach: float, spacing: float) -> Outlines:
+        """Sample the boundaries of the rock under fingers.
 
         Parameters
         ----------
-        sections : sequence of Section or None, length n
-            None for a finger without rock.
+        rocks : sequence of FingerRock, length n
         reach : float
             Distance from the origin beyond which rock is left out [m].
         spacing : float
             Largest distance between neighbouring points [m].
         """
         block = SECTION_SETTINGS.points_per_circle
-        taken = [_points(section, reach, spacing) for section in sections]
-        blocks = math.ceil(max([1, *(len(points) for points, _ in taken)]) / block)
+        taken = [
+            [_points(section, reach, spacing) for section in (rock.tile, rock.frame)]
+            for rock in rocks
+        ]
+        blocks = math.ceil(max([1, *(len(a[0]) + len(b[0]) for a, b in taken)]) / block)
         # what stands for no rock is 1 km away, and next to nothing long
         points = np.full((len(taken), blocks * block), complex(1e3))
-        lengths = np.full(points.shape, 1e-12)
-        for i, each in enumerate(taken):
-            for values, own in zip((points, lengths), each, strict=True):
-                values[i, : len(own)] = own
+        lengths, bare = np.full(points.shape, 1e-12), np.zeros(points.shape, dtype=bool)
+        for i, (under, beside) in enumerate(taken):
+            for values, own, more in zip((points, lengths), under, beside, strict=True):
+                values[i, : len(own) + len(more)] = np.concatenate([own, more])
+            bare[i, len(under[0]) : len(under[0]) + len(beside[0])] = True
+        strips = [rock.strips for rock in rocks]
+        k = max(len(each.across) for each in strips)
+        places = np.full((len(rocks), max([1, *(len(each.places) for each in strips)])), 1e3 + 0j)
+        behind, across = np.zeros((*places.shape, k)), np.zeros((len(rocks), k))
+        for i, each in enumerate(strips):
+            there = slice(len(each.places))
+            places[i, there], behind[i, there] = each.places, each.behind
+            across[i] = each.across
         in_blocks = points.reshape(len(taken), blocks, block)
         centres = in_blocks.mean(axis=-1)
         radii = np.abs(in_blocks - centres[..., None]).max(axis=-1)
         longest = lengths.reshape(in_blocks.shape).max(axis=-1)
-        return cls(points, lengths, centres, radii, longest)
+        return cls(points, lengths, centres, radii, longest, bare, places, behind, across)
 
 
 def _points(section: Section | None, reach: float, spacing: float) -> tuple[Complexes, Array]:

@@ -19,7 +19,7 @@ from hand_models.finger import (
 )
 from hand_models.hand.tightening import resting_tensions
 from hand_models.rock import Profile
-from hand_models.sections import Disc, PolylineSection, Wall
+from hand_models.sections import Disc, FingerRock, PolylineSection, Wall
 from tests.suite.helpers.fingers import (
     GRASPS,
     any_hold,
@@ -44,7 +44,7 @@ def kinds(closed):
 
 
 def close_one(*opened, model=MODEL):
-    (closed,) = close_all(model, [OpenFinger(*opened)])
+    (closed,) = close_all(model, [OpenFinger(FingerRock(opened[0]), *opened[1:])])
     return closed
 
 
@@ -142,7 +142,7 @@ def test_beside_a_low_knob_fingertips_cling_to_the_ground():
     hold = knob(0.04, 60.0)
     settled = HAND.settle(hold, ROCK, Grasp())
     section = HAND.section("inner_left", hold, Grasp(), settled.seating.pose)
-    plain = PlainFinger(MODEL, OpenFinger(section, ROCK, 37.0))
+    plain = PlainFinger(MODEL, OpenFinger(FingerRock(section), ROCK, 37.0))
     plain.close()
     np.testing.assert_allclose(plain.q, settled.fingers[1].joint_angles, atol=SAME)
     for finger in settled.fingers:
@@ -280,7 +280,7 @@ def test_without_rock_a_finger_turns_until_its_springs_or_stops_hold_it():
 def random_closings(rng, count):
     return [
         OpenFinger(
-            random_section(rng),
+            FingerRock(random_section(rng)),
             random_surface(rng),
             float(rng.uniform(15.0, 60.0)),
             bool(rng.random() < 0.5),
@@ -395,7 +395,11 @@ def test_a_little_change_of_the_rock_changes_little():
     ]
     one, other = (
         close_all(
-            MODEL, [OpenFinger(Disc(complex(x, z + dz), r), ROCK, 37.0) for (x, z), r in discs]
+            MODEL,
+            [
+                OpenFinger(FingerRock(Disc(complex(x, z + dz), r)), ROCK, 37.0)
+                for (x, z), r in discs
+            ],
         )
         for dz in (0.0, 1e-6)
     )

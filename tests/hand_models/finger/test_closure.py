@@ -8,7 +8,7 @@ import pytest
 
 from hand_models import Cylinder, Edge, Grasp, InvalidInputError, Plane, Pose, Surface
 from hand_models.finger import OpenFinger, close_all, settle_finger
-from hand_models.sections import Disc
+from hand_models.sections import Disc, FingerRock
 from tests.suite.helpers.hands import HAND, PINCH, ROCK
 
 MODEL = HAND.finger
@@ -115,5 +115,5 @@ def test_an_open_hand_in_the_air_touches_nothing_and_stays():
     assert not settled.touching.any()
     for i in range(4):
         assert kinds(settled, i) == [("none", "upper")] * 3
-    (closed,) = close_all(MODEL, [OpenFinger(None, ROCK, 46.0)])
+    (closed,) = close_all(MODEL, [OpenFinger(FingerRock(None), ROCK, 46.0)])
     assert (closed.torques @ [1.0, 46.0] > 0.0).all()

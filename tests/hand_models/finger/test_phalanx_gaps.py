@@ -10,7 +10,7 @@ from hand_models.finger.phalanx_gaps import (
     fan_out,
     nearest_points,
 )
-from hand_models.sections import Disc, Outlines, Wall
+from hand_models.sections import Disc, FingerRock, Outlines, Wall
 from tests.suite.helpers.hands import HAND
 
 MODEL = HAND.finger
@@ -24,12 +24,18 @@ seeds = st.integers(0, 2**32 - 1)
 def all_of(points, lengths):
     """All points, (..., p), as those that phalanges may press on."""
     phalanx, along = np.divmod(np.arange(points.size), points.shape[-1])
-    return NearPoints(points.ravel(), lengths.ravel(), phalanx, np.flatnonzero(along == 0))
+    return NearPoints(
+        points.ravel(),
+        lengths.ravel(),
+        phalanx,
+        np.flatnonzero(along == 0),
+        np.zeros(points.size, dtype=bool),
+    )
 
 
 def beside(section, angle, joint=0.0, depth=DEPTH):
     """A phalanx at an angle beside rock."""
-    rock = Outlines.of([section], 0.2, SHAPE.spacing)
+    rock = Outlines.of([FingerRock(section)], 0.2, SHAPE.spacing)
     u = np.exp(1j * np.asarray(angle, dtype=float))
     shape = u.shape
     points = np.broadcast_to(rock.points[0], (*shape, rock.points.shape[1]))
@@ -116,7 +122,7 @@ def bed(section, q, depth):
 
     With the place and the direction of its force.
     """
-    rock = Outlines.of([section], 0.2, SHAPE.spacing)
+    rock = Outlines.of([FingerRock(section)], 0.2, SHAPE.spacing)
     depths = np.full(3, depth)
     near = nearest_points(rock, SHAPE, q[None], depths[None])
     joints, u = fan_out(q, SHAPE.end)
@@ -181,7 +187,7 @@ def test_of_the_points_that_may_press_phalanges_are_as_beside_all_rock(seed):
     rng = np.random.default_rng(seed)
     r, turn = float(rng.uniform(0.003, 0.3)), float(rng.choice([0.0, 1e-7, 1e-3]))
     round_rock = Disc(complex(rng.uniform(0.0, 0.1), r + rng.uniform(0.0, 0.03)), r)
-    rock = Outlines.of([flat(H), round_rock], 0.2, SHAPE.spacing)
+    rock = Outlines.of([FingerRock(flat(H)), FingerRock(round_rock)], 0.2, SHAPE.spacing)
     q, depth = rng.uniform(-0.1, 0.4, (2, 3)), rng.uniform(0.0, 5e-4, (2, 3))
     near = nearest_points(rock, SHAPE, q, depth, turn)
     joints, u = fan_out(q + turn * rng.uniform(-1.0, 1.0, (2, 3)), SHAPE.end)

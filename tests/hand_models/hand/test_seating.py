@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hand_models import Cylinder, Grasp, InvalidInputError, Pose, Sphere
 from hand_models.rock import Mesh, Profile
 from hand_models.sections import Face
-from tests.suite.helpers.hands import HAND, ROCK, seating_on
+from tests.suite.helpers.hands import HAND, ROCK, line_hand, seating_on
 from tests.suite.helpers.rocks import cylinder_mesh, distance, random_mesh, random_profile
 from tests.suite.helpers.shares import given_some
 
@@ -34,7 +34,8 @@ def test_a_meshed_cylinder_seats_as_the_cylinder():
 def test_a_meshed_ball_seats_as_the_ball():
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.2)
     want = seating_on(Sphere(0.4), Grasp())
-    got = seating_on(Mesh(ball.vertices + [0.0, 0.0, 0.2], ball.faces), Grasp())  # noqa: RUF005
+    rock = Mesh(ball.vertices + np.array([0.0, 0.0, 0.2]), ball.faces, line_hand())
+    got = seating_on(rock, Grasp())
     assert got.rule == want.rule == "palm_on_rock"
     np.testing.assert_allclose(got.pose.position, want.pose.position, atol=1e-4)
 

@@ -9,6 +9,7 @@ from hypothesis import given, strategies as st
 from hand_models import Cylinder, Edge
 from hand_models.sections import (
     Disc,
+    FingerRock,
     Outlines,
     PolylineSection,
     Wall,
@@ -23,7 +24,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 def outlines(section, reach=REACH, spacing=SPACING):
     """Of one section: points and lengths."""
-    rock = Outlines.of([section], reach, spacing)
+    rock = Outlines.of([FingerRock(section)], reach, spacing)
     real = np.abs(rock.points[0]) < 1.0
     return tuple(each[0][real] for each in rock[:2])
 
@@ -174,7 +175,7 @@ def test_what_is_out_of_reach_is_left_out():
 
 
 def test_fingers_with_less_rock_are_filled_with_places_far_off():
-    rock = Outlines.of([None, Wall(1j, 0.0)], REACH, SPACING)
+    rock = Outlines.of([FingerRock(None), FingerRock(Wall(1j, 0.0))], REACH, SPACING)
     assert rock.points.shape == rock.lengths.shape
     assert rock.points.shape[0] == 2
     assert (np.abs(rock.points[0]) > 100.0).all()

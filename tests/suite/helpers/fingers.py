@@ -12,7 +12,7 @@ import numpy as np
 from hand_models import Surface
 from hand_models.finger import ClosedFinger, FingerModel, OpenFinger, SettledFinger
 from hand_models.rock import Hold, Profile
-from hand_models.sections import PolylineSection, Section
+from hand_models.sections import FingerRock, PolylineSection, Section
 from hand_models.tile import pull_strength
 from tests.suite.helpers.rocks import (
     distance,
@@ -84,7 +84,7 @@ def random_opening(model: FingerModel, seed: int) -> OnHold:
                 return np.asarray(np.abs(away))
         return away
 
-    return OnHold(OpenFinger(section, surface, tension, outer), clearance)
+    return OnHold(OpenFinger(FingerRock(section), surface, tension, outer), clearance)
 
 
 def fractal(rng: np.random.Generator, amplitude: float, roughness: float) -> np.ndarray:
@@ -135,16 +135,18 @@ def rough_opening(
         places = origin + points[..., :1] * x + points[..., 1:] * z
         return np.asarray(distance(hold, places))
 
-    return OnHold(OpenFinger(section, surface, *grasp), clearance)
+    return OnHold(OpenFinger(FingerRock(section), surface, *grasp), clearance)
 
 
 def lifted(on_hold: OnHold, lift: float) -> OnHold:
     """The same finger, farther from its rock of outlines."""
     opened, clearance = on_hold
     away = np.array([0.0, lift])
-    assert isinstance(opened.section, PolylineSection)
-    section = PolylineSection([piece + away for piece in opened.section.pieces])
-    return OnHold(opened._replace(section=section), lambda points: clearance(points - away))
+    assert isinstance(opened.rock.tile, PolylineSection)
+    section = PolylineSection([piece + away for piece in opened.rock.tile.pieces])
+    return OnHold(
+        opened._replace(rock=FingerRock(section)), lambda points: clearance(points - away)
+    )
 
 
 def torques(
@@ -207,8 +209,8 @@ def faults(on_hold: OnHold, closed: ClosedFinger) -> list[str]:
     if clear.min() < -DEEPEST:
         wrong.append(f"in the rock: {clear}")
     # rock of outlines is smoothed: on that they press
-    if isinstance(opened.section, PolylineSection):
-        clear = np.array([from_lines(opened.section.pieces, axis).min() for axis in axes])
+    if isinstance(opened.rock.tile, PolylineSection):
+        clear = np.array([from_lines(opened.rock.tile.pieces, axis).min() for axis in axes])
         clear -= min(model.frame_radius, model.tile_height)
         if clear.min() < -DEEPEST:
             wrong.append(f"in the smoothed rock: {clear}")

@@ -88,7 +88,7 @@ class PlainFinger:
         self.model, self.surface = model, opened.surface
         self.shape = PhalanxShape.of(model)
         reach = model.reach + model.tile_length
-        self.rock = Outlines.of([opened.section], reach, self.shape.spacing)
+        self.rock = Outlines.of([opened.rock], reach, self.shape.spacing)
         loss = model.losses(opened.base_tile)
         self.closing = opened.tension
         self.pull, self.drag = loss * model.pulley_radii, loss * model.engagement

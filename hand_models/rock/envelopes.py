@@ -1,0 +1,135 @@
+"""Envelopes of rock across a finger: what stands out first in strips side by side.
+
+The rock in each strip is given by its outlines in the plane through the strip's middle. Seen along
+t, into the rock, each strip begins at a height t over every s; the least of them is the envelope.
+Rock that is hidden from there, under an overhang, is taken from the middle strip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hand_models.base import BASE_TOLERANCES, Array
+from hand_models.rock.triangles import bridge
+
+__all__ = ["Heights", "alike", "envelope_outlines"]
+
+GRID_LENGTH = 2e-5
+"""Points of outlines nearer to each other along s than this are one point of an envelope [m]."""
+
+
+class Heights(NamedTuple):
+    """Heights t at which the rock of k strips begins, over places along s.
+
+    Attributes
+    ----------
+    s : ndarray, shape (g,)
+        Ascending [m].
+    t : ndarray, shape (k, g)
+        Infinite where a strip has no rock [m].
+    """
+
+    s: Array
+    t: Array
+
+    @classmethod
+    def of(cls, strips: Sequence[Sequence[Array]], spacing: float) -> Heights:
+        """Return the heights of strips over all points of their outlines.
+
+        Parameters
+        ----------
+        strips : sequence of sequence of ndarray, shape (n, 2)
+            Outlines (s, t) of each strip, rock on their left [m].
+        spacing : float
+            Largest distance of neighbouring places [m].
+        """
+        points = np.concatenate([piece[:, 0] for strip in strips for piece in strip])
+        between = np.arange(points.min(), points.max(), spacing)
+        cells = np.unique(np.round(np.concatenate([points, between]) / GRID_LENGTH))
+        s = GRID_LENGTH * cells
+        return cls(s, np.array([_first(strip, s) for strip in strips]))
+
+
+def _first(pieces: Sequence[Array], at: Array) -> Array:
+    """Return the least t of outlines over places along s; infinite without rock [m]."""
+    least = np.full(len(at), np.inf)
+    for piece in pieces:
+        # what is seen along t runs forward, with the rock on its left
+        back = np.flatnonzero(np.diff(piece[:, 0]) < 0.0)
+        for run in np.split(np.arange(len(piece)), back + 1):
+            s, t = piece[run].T
+            if len(run) > 1 and s[-1] > s[0]:
+                low, high = np.searchsorted(at, [s[0] - 0.5 * GRID_LENGTH, s[-1] + GRID_LENGTH])
+                np.minimum(least[low:high], np.interp(at[low:high], s, t), out=least[low:high])
+    return least
+
+
+def alike(strips: Sequence[Sequence[Array]]) -> bool:
+    """Return True if all strips have the same outlines, but for rounding."""
+    first, *others = strips
+    return all(
+        len(strip) == len(first)
+        and all(
+            piece.shape == own.shape and np.abs(piece - own).max() <= BASE_TOLERANCES.length
+            for piece, own in zip(strip, first, strict=True)
+        )
+        for strip in others
+    )
+
+
+def envelope_outlines(
+    heights: Heights,
+    middle: Sequence[Array],
+    peaks: Array,
+    gap: float,
+    chosen: slice = slice(None),
+) -> list[Array]:
+    """Return the outlines of what stands out first in strips, rock on their left.
+
+    Parameters
+    ----------
+    heights : Heights
+    middle : sequence of ndarray, shape (n, 2)
+        Outlines of the middle strip; what overhangs hide there, if it reaches under them by more
+        than ``gap``, is part of the result [m].
+    peaks : ndarray, shape (n, 2)
+        Points (s, t) of rock between the strips' middles, which may stand out of these [m].
+    gap : float
+        Ends no farther apart than this are joined [m].
+    chosen : slice, optional
+        Strips that count; all by default.
+    """
+    s, t = heights.s, heights.t[chosen].min(axis=0)
+    at = np.searchsorted(s, peaks[:, 0])
+    inside = (at > 0) & (at < len(s))
+    higher = np.minimum(t[at[inside] - 1], t[at[inside]])
+    peaks = peaks[inside][peaks[inside, 1] < higher]
+    s, t = np.concatenate([s, peaks[:, 0]]), np.concatenate([t, peaks[:, 1]])
+    order = np.argsort(s, kind="stable")
+    s, t = s[order], t[order]
+    hidden = [run for piece in middle for run in _hidden(piece, gap)]
+    lips = np.array([run[end, 0] for run in hidden for end in (0, -1)])
+    there = np.isfinite(t)
+    rise = np.abs(np.diff(np.where(there, t, 0.0)))
+    at_lip = (np.abs(s[:-1, None] - lips) <= gap).any(axis=1)
+    broken = (there[1:] != there[:-1]) | (at_lip & (rise > gap))
+    seen = [
+        np.column_stack([s[run], t[run]])
+        for run in np.split(np.arange(len(s)), np.flatnonzero(broken) + 1)
+        if len(run) > 1 and there[run].all()
+    ]
+    return bridge([*seen, *hidden], gap) if hidden else seen
+
+
+def _hidden(piece: Array, gap: float) -> list[Array]:
+    """Return the parts of an outline that cannot be seen along t, and reach under what can be."""
+    if (np.diff(piece[:, 0]) >= 0.0).all():
+        return []
+    first = _first([piece], piece[:, 0])
+    under = piece[:, 1] > first + BASE_TOLERANCES.length
+    edges = np.flatnonzero(np.diff(under.astype(np.int8), prepend=0, append=0))
+    runs = [piece[max(begin - 1, 0) : end + 1] for begin, end in edges.reshape(-1, 2).tolist()]
+    return [run for run in runs if len(run) > 1 and np.ptp(run[:, 0]) > gap]
