@@ -154,7 +154,7 @@ class PlacedHands:
         into = there.rotation[:, 2]
         hold = self.placements[index].hold
         places = there.apply(self.frames.rows[index, STACK_ROWS.tiles, :3])
-        return [hold.entry(place, into) for place in places]
+        return hold.entries(places, into)
 
     def section(self, index: int, finger: int) -> Section | None:
         """Return the rock in a finger's plane, in its coordinates F; None if there is none.
