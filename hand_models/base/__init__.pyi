@@ -5,6 +5,7 @@ from .bounded_store import (
     stored as stored,
     stores as stores,
 )
+from .compiling import compiled as compiled
 from .distribution import (
     DISTRIBUTION_NAME as DISTRIBUTION_NAME,
     installed_version as installed_version,

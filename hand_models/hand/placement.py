@@ -154,7 +154,7 @@ class PlacedHands:
         into = there.rotation[:, 2]
         hold = self.placements[index].hold
         places = there.apply(self.frames.rows[index, STACK_ROWS.tiles, :3])
-        return [hold.entry(place, into) for place in places]
+        return hold.entries(places, into)
 
     def rock(self, index: int, finger: int) -> FingerRock:
         """Return the rock that a finger of a hand meets with its whole width, by their indices."""

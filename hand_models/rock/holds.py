@@ -118,6 +118,10 @@ class Hold(ABC):
             rock [m].
         """
 
+    def entries(self, points: ArrayLike, direction: ArrayLike) -> list[float]:
+        """Return the distance of `entry` for each of several points, shape (n, 3) [m]."""
+        return [self.entry(point, direction) for point in np.asarray(points, dtype=float)]
+
     def surface(self, low: Array, high: Array) -> Triangles:
         """Return the rock's surface as triangles in the hold's frame, at least within a region.
 

@@ -10,13 +10,12 @@ and the nails meet the raw triangles.
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError, Pose, go_on
+from hand_models.base import Array, InvalidInputError, Pose, go_on, skew
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
 from hand_models.rock.smoothing import OutlinedHold
@@ -132,24 +131,12 @@ class Mesh(OutlinedHold):
         """
         there, table = at or Pose.identity(), scan_table()
         near, view = table.scalar("scan", "near"), table.vector("scan", "view")
-        box = there.position - near, there.position + near
-        found = self.triangles.faces[self._cells.within(np.eye(3), *box)]
-        corners = self.triangles.vertices[found]
-        beside = (corners.min(axis=1) <= box[1]) & (corners.max(axis=1) >= box[0])
-        if at is None and not beside.all(axis=1).any():
-            nearest = np.linalg.norm(self.triangles.vertices - there.position, axis=1).min()
-            raise InvalidInputError(
-                f"the nearest vertex is {nearest:.3g} m from the hold's origin, which is to be on "
-                f"the rock under the palm; at most {near:g} m is possible",
-                field="vertices",
-            )
+        if at is None:
+            self._check_near(near)
         rays = 5  # along each side of the palm
-        met = [
-            self._first_side(there.apply((x, y, 0.0)), there.rotation[:, 2])
-            for x in np.linspace(-view[0], view[0], rays)
-            for y in np.linspace(-view[1], view[1], rays)
-        ]
-        if sum(met) < 0:
+        x, y = np.meshgrid(*(np.linspace(-half, half, rays) for half in view))
+        places = there.apply(np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)]))
+        if self._cells.lines(places, there.rotation[:, 2])[1].sum() < 0:
             raise InvalidInputError(
                 "the triangles under the palm face away from it: is the approach into the rock? "
                 "their vertices must be counterclockwise seen from outside the rock: flip every "
@@ -158,14 +145,27 @@ class Mesh(OutlinedHold):
             )
         super().check_place(at)
 
+    def _check_near(self, near: float) -> None:
+        """Check that a triangle is so near to the origin along each axis [m]."""
+        most = np.full(3, near)
+        found = self.triangles.faces[self._cells.within(np.eye(3), -most, most)]
+        corners = self.triangles.vertices[found]
+        beside = (corners.min(axis=1) <= near) & (corners.max(axis=1) >= -near)
+        if not beside.all(axis=1).any():
+            nearest = np.linalg.norm(self.triangles.vertices, axis=1).min()
+            raise InvalidInputError(
+                f"the nearest vertex is {nearest:.3g} m from the hold's origin, which is to be on "
+                f"the rock under the palm; at most {near:g} m is possible",
+                field="vertices",
+            )
+
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
         """Return the cut through the triangles, small gaps bridged."""
         o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
-        axes, reach = np.array([np.cross(s, t), s, t]), self._scale.reach
+        axes, reach = np.array([skew(s) @ t, s, t]), self._scale.reach
         beside, middle = np.array([0.0, reach, reach]), axes @ o
         near = self._cells.within(axes, middle - beside, middle + beside)
-        crossed = Triangles(self.triangles.vertices, self.triangles.faces[near])
-        return bridge(cut(crossed, o, s, t, reach), self._scale.bridged_gap)
+        return bridge(cut(self.triangles, o, s, t, reach, near), self._scale.bridged_gap)
 
     def _peaks(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, half: float) -> Array:
         o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
@@ -189,40 +189,12 @@ class Mesh(OutlinedHold):
             Negative where the point is inside the rock; infinite where the ray meets no front side
             of a triangle [m].
         """
-        where, entering = self._hits(point, direction)
-        behind = np.flatnonzero(where <= 0.0)
-        if len(behind) and entering[behind[-1]]:
-            return float(where[behind[-1]])
-        ahead = np.flatnonzero((where > 0.0) & entering)
-        return float(where[ahead[0]]) if len(ahead) else math.inf
+        return self.entries(np.asarray(point, dtype=float)[None], direction)[0]
 
-    def _first_side(self, point: ArrayLike, direction: ArrayLike) -> int:
-        """Return 1 if the first triangle on a line faces it, −1 if it shows its back, else 0."""
-        _, entering = self._hits(point, direction)
-        return 0 if not len(entering) else 1 if entering[0] else -1
-
-    def _hits(self, point: ArrayLike, direction: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-        """Return where a line meets triangles, in order, and which of these it enters."""
-        p, along = np.asarray(point, dtype=float), np.asarray(direction, dtype=float)
-        across = np.linalg.svd(along[None])[2][1:]
-        axes = np.vstack([across, along])
-        near = self._cells.within(across, across @ p, across @ p)
-        corners = (self.triangles.vertices[self.triangles.faces[near]] - p) @ axes.T
-        a, b, c = corners.transpose(1, 0, 2)
-        weights = np.stack([_area(b, c), _area(c, a), _area(a, b)])
-        area = weights.sum(axis=0)
-        # a ray may pass beside a triangle by rounding
-        slack = BASE_TOLERANCES.relative * np.abs(area)
-        met = ((weights >= -slack).all(axis=0) | (weights <= slack).all(axis=0)) & (area != 0.0)
-        depth = np.stack([a[:, 2], b[:, 2], c[:, 2]])
-        where = (weights * depth).sum(axis=0)[met] / area[met]
-        order = np.argsort(where, kind="stable")
-        # counterclockwise from outside is clockwise for a ray that enters
-        return where[order], (area[met] * np.linalg.det(axes) < 0.0)[order]
-
-
-def _area(a: Array, b: Array) -> Array:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    def entries(self, points: ArrayLike, direction: ArrayLike) -> list[float]:
+        places, along = np.array(points, float, order="C"), np.asarray(direction, dtype=float)
+        found: list[float] = self._cells.lines(places, along)[0].tolist()
+        return found
 
 
 def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tuple[Triangles, int]:

@@ -8,11 +8,13 @@ edges' names, without comparing coordinates.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError, go_on
+from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError, go_on
 from hand_models.rock.surface import Triangles
 
 __all__ = [
@@ -73,9 +75,8 @@ def weld(triangles: Triangles) -> Triangles:
     mesh.update_faces(solid & mesh.unique_faces())
     mesh.remove_unreferenced_vertices()
     go_on()
-    # columns of faces one after the other: cuts go through them one by one
     return Triangles(
-        np.array(mesh.vertices, dtype=float), np.asfortranarray(mesh.faces, dtype=np.intp)
+        np.array(mesh.vertices, dtype=float, order="C"), np.array(mesh.faces, np.intp, order="C")
     )
 
 
@@ -141,9 +142,7 @@ def wound_alike(triangles: Triangles) -> Triangles:
     flip = kept[over] > kept[as_is]
     ties = kept[over] == kept[as_is]
     flip |= ties & (over < as_is)
-    return Triangles(
-        triangles.vertices, np.asfortranarray(np.where(flip[:, None], faces[:, ::-1], faces))
-    )
+    return Triangles(triangles.vertices, np.where(flip[:, None], faces[:, ::-1], faces))
 
 
 def _neighbours(faces: Indices) -> tuple[Indices, Indices, NDArray[np.bool_]]:
@@ -214,7 +213,12 @@ def border_edges(triangles: Triangles, gap: float) -> Array:
 
 
 def cut(
-    triangles: Triangles, origin: Array, s_axis: Array, t_axis: Array, reach: float
+    triangles: Triangles,
+    origin: Array,
+    s_axis: Array,
+    t_axis: Array,
+    reach: float,
+    some: Indices | None = None,
 ) -> list[Array]:
     """Cut a mesh with a plane and return the polylines of the cut, with the rock on their left.
 
@@ -227,80 +231,26 @@ def cut(
         Origin [m] and orthonormal axes of the plane's coordinates (s, t).
     reach : float
         Triangles outside the square −reach ≤ s, t ≤ reach are left out [m].
+    some : ndarray of int, optional
+        Indices of the triangles to cut; all by default.
 
     Returns
     -------
     list of ndarray, shape (n, 2)
         Points (s, t) of each polyline; a closed one ends where it begins [m].
     """
+    from hand_models.rock.compiled_cuts import plane_cut
+
     vertices, faces = triangles
-    normal = np.cross(s_axis, t_axis)
-    # each vertex by itself, so that triangles that share it get the same result
-    beyond = np.empty((3, len(faces)), dtype=bool)
-    heights = np.empty((3, len(faces)))
-    for i in range(3):
-        x, y, z = vertices.take(faces[:, i], axis=0).T
-        np.multiply(x, normal[0], out=heights[i])
-        heights[i] += y * normal[1]
-        heights[i] += z * normal[2]
-        heights[i] -= origin @ normal
-        np.greater_equal(heights[i], 0.0, out=beyond[i])
-    crossed = ((beyond[0] != beyond[1]) | (beyond[0] != beyond[2])).nonzero()[0]
-    faces, heights, sides = faces[crossed], heights[:, crossed].T, beyond[:, crossed].T
-    flat = (vertices[faces] - origin) @ np.column_stack([s_axis, t_axis])
-    near = ((flat.min(axis=1) <= reach) & (flat.max(axis=1) >= -reach)).all(axis=1)
-    faces, heights, sides, flat = faces[near], heights[near], sides[near], flat[near]
-    if not len(faces):
-        return []
-    # turn each triangle so that its first vertex is alone on its side of the plane
-    alone = np.where(sides.sum(axis=1) == 1, sides.argmax(axis=1), sides.argmin(axis=1))
-    turn = (alone[:, None] + np.arange(3)) % 3
-    row = np.arange(len(faces))[:, None]
-    faces, flat, height = faces[row, turn], flat[row, turn], heights[row, turn]
-    part = (height[:, :1] / (height[:, :1] - height[:, 1:]))[..., None]
-    points = flat[:, :1] + part * (flat[:, 1:] - flat[:, :1])
-    names = _edge_names(faces[:, :1], faces[:, 1:], len(vertices))
-    # with the rock on the left, from edge ab to ca if a is beyond the plane, else the other way
-    enter = np.where(sides[row[:, 0], alone], 0, 1)
-    ways = [(names[row[:, 0], i], points[row[:, 0], i]) for i in (enter, 1 - enter)]
-    (begins, begin), (leaves, end) = ways
-    return [_points(chain, begin, end) for chain in _chains(begins, leaves)]
+    vertices, faces = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
+    some = np.arange(len(faces)) if some is None else some
+    plane = np.array([origin, s_axis, t_axis])
+    return _parted(*plane_cut(vertices, faces, some, plane, reach))
 
 
-def _chains(enter: Indices, leave: Indices) -> list[list[int]]:
-    """Return the order of steps, each of which leads from one name to another."""
-    order = np.argsort(enter, kind="stable")
-    place = np.minimum(np.searchsorted(enter[order], leave), len(enter) - 1)
-    return _followed(np.where(enter[order][place] == leave, order[place], -1))
-
-
-def _followed(after: Indices) -> list[list[int]]:
-    """Return chains of indices of which each leads to another, or to none (−1).
-
-    A closed chain ends with its first index again.
-    """
-    led = np.zeros(len(after), dtype=bool)
-    led[after[after >= 0]] = True
-    following = after.tolist()
-    done = [False] * len(following)
-    chains: list[list[int]] = []
-    # open chains begin where none leads; what is left then is closed
-    for first in [*np.flatnonzero(~led).tolist(), *range(len(following))]:
-        chain: list[int] = []
-        step = first
-        while step >= 0 and not done[step]:
-            done[step] = True
-            chain.append(step)
-            step = following[step]
-        if chain:
-            chains.append([*chain, step] if step == first else chain)
-    return chains
-
-
-def _points(chain: list[int], begin: Array, end: Array) -> Array:
-    if len(chain) > 1 and chain[0] == chain[-1]:
-        return begin[chain]
-    return np.vstack([begin[chain], end[chain[-1:]]])
+def _parted(points: Array, ends: Indices) -> list[Array]:
+    """Return polylines, given one after another, each by itself."""
+    return [points[i:j] for i, j in pairwise([0, *ends.tolist()])]
 
 
 def bridge(pieces: list[Array], gap: float) -> list[Array]:
@@ -320,31 +270,21 @@ def bridge(pieces: list[Array], gap: float) -> list[Array]:
     list of ndarray, shape (n, 2)
         The closed polylines as given, then the joined ones.
     """
-    closed = [p for p in pieces if np.array_equal(p[0], p[-1])]
-    pieces = [p for p in pieces if not np.array_equal(p[0], p[-1])]
+    from hand_models.rock.compiled_cuts import bridged
+
+    rings = [bool((piece[0] == piece[-1]).all()) for piece in pieces]
+    closed = [piece for piece, ring in zip(pieces, rings, strict=True) if ring]
+    pieces = [piece for piece, ring in zip(pieces, rings, strict=True) if not ring]
     if not pieces:
         return closed
-    begins, ends = np.array([p[0] for p in pieces]), np.array([p[-1] for p in pieces])
-    near = scipy.spatial.cKDTree(ends).sparse_distance_matrix(
-        scipy.spatial.cKDTree(begins), gap, output_type="ndarray"
-    )
-    after = np.full(len(pieces), -1)
-    led = np.zeros(len(pieces), dtype=bool)
-    for pair in near[np.argsort(near["v"], kind="stable")]:
-        i, j = int(pair["i"]), int(pair["j"])
-        short = i == j and np.hypot(*np.diff(pieces[i], axis=0).T).sum() <= 2.0 * gap
-        if after[i] < 0 and not led[j] and not short:
-            after[i], led[j] = j, True
-    joined = []
-    for chain in _followed(after):
-        ring = len(chain) > 1 and chain[0] == chain[-1]
-        parts = [pieces[i] for i in (chain[:-1] if ring else chain)]
-        joined.append(np.vstack([*parts, parts[0][:1]] if ring else parts))
-    return [*closed, *joined]
+    stops = np.cumsum([len(piece) for piece in pieces])
+    return [*closed, *_parted(*bridged(np.concatenate(pieces), stops, gap))]
 
 
 class TriangleCells:
-    """Spatial index of a mesh: finds the triangles in a box through a grid of cells.
+    """Spatial index of a mesh: finds the triangles in a box through a tree of cells.
+
+    What a search takes grows with what it finds, and with the logarithm of the mesh's size.
 
     Parameters
     ----------
@@ -352,18 +292,21 @@ class TriangleCells:
     """
 
     def __init__(self, triangles: Triangles) -> None:
-        corners = triangles.vertices[triangles.faces]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        side = 0.03  # [m] of a cell; what is found does not depend on it
-        where = np.floor(0.5 * (low + high) / side).astype(np.intp)
-        where -= where.min(axis=0)
-        name = np.ravel_multi_index(tuple(where.T), tuple(where.max(axis=0) + 1))
-        self._order = np.argsort(name, kind="stable")
-        begins = np.flatnonzero(np.diff(name[self._order], prepend=-1))
-        self._begins, self._ends = begins, np.append(begins[1:], len(name))
-        low = np.minimum.reduceat(low[self._order], begins)
-        high = np.maximum.reduceat(high[self._order], begins)
-        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+        from hand_models.rock.compiled_cells import curve_places, leaf_boxes
+
+        self._triangles = triangles
+        self._order = np.argsort(curve_places(*triangles))
+        go_on()
+        levels = [leaf_boxes(*triangles, self._order)]
+        while len(levels[-1]) > 1:
+            below = levels[-1]
+            pairs = below[::2].copy()
+            other = below[1::2]
+            np.minimum(pairs[: len(other), 0], other[:, 0], out=pairs[: len(other), 0])
+            np.maximum(pairs[: len(other), 1], other[:, 1], out=pairs[: len(other), 1])
+            levels.append(pairs)
+        self._boxes = np.concatenate(levels)
+        self._levels = np.cumsum([0, *map(len, levels)])
 
     def within(self, axes: Array, low: Array, high: Array) -> Indices:
         """Return candidates for the triangles that reach into a box: all that do, and some more.
@@ -380,9 +323,32 @@ class TriangleCells:
         ndarray of int
             Indices of the triangles, ascending.
         """
-        middle, half = self._middle @ axes.T, self._half @ np.abs(axes).T
-        # rounding must not leave one out
-        half += 1e-9
-        cells = np.flatnonzero(((middle - half <= high) & (middle + half >= low)).all(axis=1))
-        parts = [self._order[self._begins[i] : self._ends[i]] for i in cells.tolist()]
-        return np.sort(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.intp)
+        from hand_models.rock.compiled_cells import triangles_in_box
+
+        tree = self._order, self._boxes, self._levels
+        return np.sort(triangles_in_box(*tree, np.ascontiguousarray(axes), low, high))
+
+    def lines(self, points: Array, direction: Array) -> tuple[Array, Indices]:
+        """Return where parallel lines enter the rock, and which side of a triangle they meet first.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            A point of each line [m].
+        direction : ndarray, shape (3,)
+            Unit vector along all of them.
+
+        Returns
+        -------
+        entries : ndarray, shape (n,)
+            Distance from each point at which rock begins; negative inside the rock, infinite where
+            the line meets no front side of a triangle [m].
+        sides : ndarray of int, shape (n,)
+            1 if the first triangle on a line faces it, −1 if it shows its back, 0 without any.
+        """
+        from hand_models.rock.compiled_cells import lines_met
+
+        axes = np.vstack([np.linalg.svd(direction[None])[2][1:], direction])
+        slack = BASE_TOLERANCES.relative
+        (vertices, faces), tree = self._triangles, (self._order, self._boxes, self._levels)
+        return lines_met(vertices, faces, *tree, points, axes, slack)

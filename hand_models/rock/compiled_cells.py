@@ -1,0 +1,200 @@
+"""Find the triangles of a mesh in a box or on a line, by a tree of boxes (compiled).
+
+Triangles in the order of a space-filling curve make up leaves of equally many. Each box of a level
+holds two of the level below it, so that a search visits those boxes alone that it meets, however
+large the mesh is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from hand_models.base import Array, Indices, compiled
+
+__all__ = ["curve_places", "leaf_boxes", "lines_met", "triangles_in_box"]
+
+LEAF_SIZE: Final = 8
+"""Triangles in a leaf; what is found does not depend on it."""
+
+
+@compiled("f2", "i2")
+def curve_places(vertices: Array, faces: Indices) -> Indices:
+    """Return the place of each triangle's middle on Morton's curve through all of space."""
+    low, high = np.full(3, math.inf), np.full(3, -math.inf)
+    for vertex in vertices:
+        for k in range(3):
+            low[k], high[k] = min(low[k], vertex[k]), max(high[k], vertex[k])
+    bits = 20
+    cell = max((high - low).max(), 1e-9) * (1.0 + 1e-9) / 2.0**bits
+    places = np.zeros(len(faces), dtype=np.intp)
+    for i in range(len(faces)):
+        a, b, c = vertices[faces[i, 0]], vertices[faces[i, 1]], vertices[faces[i, 2]]
+        for k in range(3):
+            number = int(((a[k] + b[k] + c[k]) / 3.0 - low[k]) / cell)
+            for bit in range(bits):
+                places[i] |= (number >> bit & 1) << (3 * bit + k)
+    return places
+
+
+@compiled("f2", "i2", "i1")
+def leaf_boxes(vertices: Array, faces: Indices, order: Indices) -> Array:
+    """Return opposite corners of the box about each leaf of triangles in order, (n, 2, 3)."""
+    boxes = np.empty(((len(order) + LEAF_SIZE - 1) // LEAF_SIZE, 2, 3))
+    boxes[:, 0], boxes[:, 1] = math.inf, -math.inf
+    for i in range(len(order)):
+        box = boxes[i // LEAF_SIZE]
+        for corner in faces[order[i]]:
+            for k in range(3):
+                box[0, k] = min(box[0, k], vertices[corner, k])
+                box[1, k] = max(box[1, k], vertices[corner, k])
+    return boxes
+
+
+@compiled()
+def _meets(box: Array, axes: Array, low: Array, high: Array) -> bool:
+    """Return whether boxes along the frame's axes and along others may meet."""
+    for i in range(len(axes)):
+        # rounding must not leave one out
+        middle, half = 0.0, 1e-9
+        for k in range(3):
+            middle += axes[i, k] * 0.5 * (box[0, k] + box[1, k])
+            half += abs(axes[i, k]) * 0.5 * (box[1, k] - box[0, k])
+        if middle - half > high[i] or middle + half < low[i]:
+            return False
+    return True
+
+
+@compiled()
+def _leaves(boxes: Array, levels: Indices, axes: Array, low: Array, high: Array) -> Indices:
+    """Return the leaves that a box meets."""
+    found, count = np.empty(256, dtype=np.intp), 0
+    # boxes still to be looked at, at most one of each level and one more
+    waiting = np.empty((len(levels) + 1, 2), dtype=np.intp)
+    waiting[0, 0], waiting[0, 1] = len(levels) - 2, 0
+    more = 1
+    while more:
+        more -= 1
+        level, box = waiting[more]
+        if not _meets(boxes[levels[level] + box], axes, low, high):
+            continue
+        if level == 0:
+            if count == len(found):
+                found = np.concatenate((found, np.empty_like(found)))
+            found[count] = box
+            count += 1
+            continue
+        for child in (2 * box + 1, 2 * box):
+            if levels[level - 1] + child < levels[level]:
+                waiting[more, 0], waiting[more, 1] = level - 1, child
+                more += 1
+    return found[:count]
+
+
+@compiled("i1", "f3", "i1", "f2", "f1", "f1")
+def triangles_in_box(
+    order: Indices, boxes: Array, levels: Indices, axes: Array, low: Array, high: Array
+) -> Indices:
+    """Return the triangles of all leaves that a box meets, leaf by leaf.
+
+    Parameters
+    ----------
+    order : ndarray of int, shape (m,)
+        Triangles, leaf by leaf.
+    boxes : ndarray, shape (n, 2, 3)
+        Opposite corners of the boxes, the leaves first, then those of each level above [m].
+    levels : ndarray of int, shape (k + 1,)
+        Index of the first box of each level, and their number.
+    axes, low, high : ndarray
+        As of `TriangleCells.within`.
+    """
+    leaves = _leaves(boxes, levels, axes, low, high)
+    found = np.empty(len(leaves) * LEAF_SIZE, dtype=np.intp)
+    count = 0
+    for leaf in leaves:
+        for i in range(leaf * LEAF_SIZE, min(leaf * LEAF_SIZE + LEAF_SIZE, len(order))):
+            found[count] = order[i]
+            count += 1
+    return found[:count]
+
+
+@compiled()
+def _area(a: Array, b: Array) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+@compiled("f2", "i2", "i1", "f3", "i1", "f2", "f2", "f0")
+def lines_met(
+    vertices: Array,
+    faces: Indices,
+    order: Indices,
+    boxes: Array,
+    levels: Indices,
+    points: Array,
+    axes: Array,
+    relative: float,
+) -> tuple[Array, Indices]:
+    """Return where parallel lines enter the rock, and which side of a triangle they meet first.
+
+    Parameters
+    ----------
+    vertices, faces, order, boxes, levels
+        The mesh and its tree, as of `triangles_in_box`.
+    points : ndarray, shape (n, 3)
+        A point of each line [m].
+    axes : ndarray, shape (3, 3)
+        Two unit vectors across the lines, then their direction.
+    relative : float
+        Share of a triangle's area by which a line may pass beside it by rounding.
+
+    Returns
+    -------
+    entries : ndarray, shape (n,)
+        Distance of each point from the place where the rock begins along the line; negative inside
+        the rock, infinite where there is none [m].
+    sides : ndarray of int, shape (n,)
+        1 if a line meets the front of its first triangle, −1 if the back, 0 if it meets none.
+    """
+    turn = np.empty(3)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        turn[k] = (axes[0, i] * axes[1, j] - axes[0, j] * axes[1, i]) * axes[2, k]
+    handed = turn.sum()
+    entries, sides = np.full(len(points), math.inf), np.zeros(len(points), dtype=np.intp)
+    middle, corners = np.empty(2), np.empty((3, 3))
+    for line in range(len(points)):
+        p = points[line]
+        for k in range(2):
+            middle[k] = axes[k, 0] * p[0] + axes[k, 1] * p[1] + axes[k, 2] * p[2]
+        first, first_at = math.inf, -1
+        behind, behind_at, inside = -math.inf, -1, False
+        ahead = math.inf
+        for leaf in _leaves(boxes, levels, axes[:2], middle, middle):
+            for i in range(leaf * LEAF_SIZE, min(leaf * LEAF_SIZE + LEAF_SIZE, len(order))):
+                at = order[i]
+                for corner in range(3):
+                    for k in range(3):
+                        corners[corner, k] = 0.0
+                        for j in range(3):
+                            away = vertices[faces[at, corner], j] - p[j]
+                            corners[corner, k] += away * axes[k, j]
+                a, b, c = corners
+                u, v, w = _area(b, c), _area(c, a), _area(a, b)
+                area = u + v + w
+                slack = relative * abs(area)
+                if area == 0.0 or (min(u, v, w) < -slack and max(u, v, w) > slack):
+                    continue
+                where = (u * a[2] + v * b[2] + w * c[2]) / area
+                # counterclockwise from outside is clockwise for a line that enters
+                enters = area * handed < 0.0
+                # of triangles at the same place the first comes first
+                if (where, at) < (first, first_at):
+                    first, first_at, sides[line] = where, at, 1 if enters else -1
+                if where <= 0.0 and ((where, at) > (behind, behind_at)):
+                    behind, behind_at, inside = where, at, enters
+                if where > 0.0 and enters:
+                    ahead = min(ahead, where)
+        entries[line] = behind if inside else ahead
+    return entries, sides
