@@ -107,19 +107,29 @@ def answer_wrench_space(
 
 def _contacts(settled: SettledHand) -> list[replies.ContactReply]:
     """Return the contact of each tile with the rock."""
-    places = zip(settled.tiles, settled.positions.tolist(), settled.axes.tolist(), strict=True)
+    frames = settled.hand.frames(settled.grasp.outer_rotation)
+    places = zip(
+        settled.tiles,
+        [frames[finger] for finger in settled.finger_of.tolist()],
+        settled.positions,
+        settled.engagement.tolist(),
+        settled.axes.tolist(),
+        strict=True,
+    )
     return [
         replies.ContactReply(
             finger=tile.finger,
             phalanx=tile.phalanx,
             contact=tile.contact,
             stop=_stop(settled, tile),
-            position=position,
+            position=position.tolist(),
+            engagement=share,
+            across=float((position - frame.joint) @ frame.across),
             shear_axis=shear,
             normal_axis=normal,
             lateral_axis=lateral,
         )
-        for tile, position, (shear, normal, lateral) in places
+        for tile, frame, position, share, (shear, normal, lateral) in places
     ]
 
 

@@ -34,6 +34,9 @@ class ContactReply(Struct):
       where tendon and springs keep the joint without contact; null where contacts keep it, or where
       the tile is on no phalanx.
     - ``position``: point of contact in H [m].
+    - ``engagement``: share of the tile's spines that reach the rock, by its area.
+    - ``across``: distance of the contact from the finger's plane, along z of H × the finger [m]:
+      a tile that bears on one side only has its contact there.
     - ``shear_axis``: unit force of the shear load on the rock, in H.
     - ``normal_axis``: unit force of the normal load on the rock, in H.
     - ``lateral_axis``: unit force of the lateral load on the rock, in H.
@@ -44,6 +47,8 @@ class ContactReply(Struct):
     contact: str
     stop: str | None
     position: Vector
+    engagement: float
+    across: float
     shear_axis: Vector
     normal_axis: Vector
     lateral_axis: Vector
