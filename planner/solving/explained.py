@@ -54,7 +54,7 @@ from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
 
-__all__ = ["explained_plan", "reason_of_none", "unexplained"]
+__all__ = ["explained_plan", "reason_of_none", "reason_of_overload", "unexplained"]
 
 
 def explained_plan(
@@ -160,6 +160,20 @@ def reason_of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> str
     return shortfall_sentence(answer.proof, touching, floating=prepared.floating)
 
 
+def reason_of_overload(prepared: PreparedStance, checks: Checks, found: Verified) -> str:
+    """Return a sentence that says which limit an overloaded plan exceeds most.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    checks : Checks
+    found : Verified
+    """
+    spaces, cap = found.solution.sets.spaces, prepared.question.limits.utilisation
+    binding = ActiveLimits(prepared.limbs, spaces, found.solution.least.limit_duals)
+    return _explain(binding, found, found.by_hand(), checks.idle, cap)[1]
+
+
 def _of_plan(
     prepared: PreparedStance, checks: Checks, found: Verified
 ) -> tuple[dict[str, Any], tuple[Unfinished, ...], list[str]]:
@@ -199,6 +213,11 @@ def _of_plan(
             parts["certificate"] = proof
             reason += overload_sentence(proof, floating=prepared.floating)
             unfinished += late("certificate") if proof is None else unexplained(prepared, proof)
+            if not solution.proven and proof is None:
+                warnings.append(
+                    "no certificate proves the overload: the search for the wrists' poses is "
+                    "local, and there may be a plan of less utilisation"
+                )
     return {**parts, "reason": reason}, unfinished, warnings
 
 

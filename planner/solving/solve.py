@@ -20,7 +20,12 @@ from planner.prepare import PreparedStance, checked_question, prepare_stance
 from planner.programs import CAP_SLACK, LOAD_BOX, LOAD_UNIT
 from planner.question import Question, checked_body_wrench
 from planner.result import LoadFactor, Plan, Time
-from planner.solving.explained import explained_plan, reason_of_none, unexplained
+from planner.solving.explained import (
+    explained_plan,
+    reason_of_none,
+    reason_of_overload,
+    unexplained,
+)
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
 from planner.solving.floating_wrists import (
     FloatingSolution,
@@ -123,9 +128,11 @@ class StanceAnswer(NamedTuple):
 
     @property
     def reason(self) -> str | None:
-        """Why there is no plan; None if there is one."""
+        """Why there is no plan within the cap on the utilisation; None if there is one."""
         answer = self.answer
-        return None if isinstance(answer, Verified) else reason_of_none(self.prepared, answer)
+        if not isinstance(answer, Verified):
+            return reason_of_none(self.prepared, answer)
+        return None if self.optimal else reason_of_overload(self.prepared, self.checks, answer)
 
     def plan(self) -> Plan:
         """Return the plan, with its explanation and the extras that the question wants."""
