@@ -54,7 +54,7 @@ from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
 
-__all__ = ["explained_plan", "reason_of_none", "reason_of_overload", "unexplained"]
+__all__ = ["explained_plan", "reason_beyond", "unexplained"]
 
 
 def explained_plan(
@@ -139,39 +139,37 @@ def explained_plan(
 
 def _of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> dict[str, Any]:
     """Return what is to be said of no plan, by fields of `Plan`."""
-    reason = reason_of_none(prepared, answer)
+    reason = _reason_of_none(prepared, answer)
     if isinstance(answer, Failed):
         return {"status": "failed", "verified": False, "reason": reason}
     proof = answer.proof if prepared.question.explain else None
     return {"status": "infeasible", "reason": reason, "certificate": proof}
 
 
-def reason_of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> str:
-    """Return a sentence that says why there is no plan.
-
-    Parameters
-    ----------
-    prepared : PreparedStance
-    answer : Infeasible or Failed
-    """
+def _reason_of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> str:
+    """Return a sentence that says why there is no plan."""
     if isinstance(answer, Failed):
         return answer.reason
     touching = any(h.holding.any() or h.palm.engaged for h in prepared.batch.hands)
     return shortfall_sentence(answer.proof, touching, floating=prepared.floating)
 
 
-def reason_of_overload(prepared: PreparedStance, checks: Checks, found: Verified) -> str:
-    """Return a sentence that says which limit an overloaded plan exceeds most.
+def reason_beyond(prepared: PreparedStance, checks: Checks, answer: Answer) -> str | None:
+    """Return why there is no plan, or which limit an overloaded one exceeds most; else None.
 
     Parameters
     ----------
     prepared : PreparedStance
     checks : Checks
-    found : Verified
+    answer : Answer
     """
-    spaces, cap = found.solution.sets.spaces, prepared.question.limits.utilisation
-    binding = ActiveLimits(prepared.limbs, spaces, found.solution.least.limit_duals)
-    return _explain(binding, found, found.by_hand(), checks.idle, cap)[1]
+    if not isinstance(answer, Verified):
+        return _reason_of_none(prepared, answer)
+    solution, cap = answer.solution, prepared.question.limits.utilisation
+    if answer.whole <= cap + CAP_SLACK:
+        return None
+    binding = ActiveLimits(prepared.limbs, solution.sets.spaces, solution.least.limit_duals)
+    return _explain(binding, answer, answer.by_hand(), checks.idle, cap)[1]
 
 
 def _of_plan(

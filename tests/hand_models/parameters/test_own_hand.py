@@ -91,7 +91,7 @@ def test_what_is_no_coordinate_may_not_be_negative() -> None:
         if value.min() < 0.0 or (section, name) == ("fingers", "base_tile_surface"):
             SpinyHand(own_hand(own(section, name, (value - 1e-4).tolist())))
         else:
-            with pytest.raises(InvalidInputError, match="must be (from|above) 0 ") as caught:
+            with pytest.raises(InvalidInputError, match=r"must be (from|above) 0 ") as caught:
                 own_hand(own(section, name, negative))
             assert caught.value.field == f"{section}.{name}"
 
