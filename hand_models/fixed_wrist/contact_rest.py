@@ -52,10 +52,15 @@ class ContactSettings:
     """Longest step [m]: a contact moves over its tile by no more than a part of it."""
     steps: int = 25
     """Largest number of steps."""
+    closings: int = 300
+    """Closings of a hand after which its search ends: of the rests that are found, the farthest
+    took 274."""
     patience: int = 8
     """Steps in which the net wrench must halve: where there is a rest, most take five in all."""
     shares: tuple[float, ...] = (1.0, 0.5, 0.2, 0.05, 0.01)
     """Shares of a step that are tried in turn until the net wrench falls."""
+    border: float = 0.2
+    """Share of a step that must stay where a hand may be: beyond, it creeps along the border."""
     roundings: tuple[float, ...] = (1e-4, 2e-5, 4e-6, 0.0)
     """Roundings of the palm's law, in turn, where steps get caught as its tiles meet rock [m]."""
     ways: tuple[float, ...] = tuple([1e-3 * k for k in range(-8, 6)])
@@ -200,7 +205,7 @@ def rests_on_rock(
         left = kept(left, *search.solve(left, np.zeros((len(left), 3)), slopes * MOVE_UNITS[0]))
     left, begin = search.crossings(left)
     ends, rested = search.solve(left, begin)
-    caught = ~rested & search.on_palm(left, ends)
+    caught = ~rested & search.kinked_on_palm(left, ends)
     kept(left, ends, rested)
     left, ends = left[caught], begin[caught]
     for rounding in CONTACT_SETTINGS.roundings:
@@ -226,7 +231,10 @@ class _Search:
         self._least = np.array([ends[0], -tilt, -tilt]) / MOVE_UNITS
         self._most = np.array([ends[1], tilt, tilt]) / MOVE_UNITS
         self._closed = np.zeros(len(starts), dtype=bool)
+        self._kinked = np.zeros(len(starts), dtype=bool)
+        """Whether a step was too long although it stayed where the hand may be."""
         self._refused: dict[int, InvalidInputError] = {}
+        self._closings = np.zeros(len(starts), dtype=int)
 
     def wrenches(self, x: Array, which: Indices) -> Array:
         """Return (f_z, m_x, m_y) of hands at moves x, (m, 3) [N, moments over 0.1 m].
@@ -235,9 +243,9 @@ class _Search:
         """
         found = np.full(x.shape, np.inf)
         within = np.flatnonzero(((self._least <= x) & (x <= self._most)).all(axis=1))
-        outcomes = self._hand.settle_each(
-            [_moved(self._starts[which[k]], _move(x[k])) for k in within]
-        )
+        moves = [_moved(self._starts[which[k]], _move(x[k])) for k in within]
+        outcomes = self._hand.settle_each(moves)
+        np.add.at(self._closings, which[within], 1)
         for k, outcome in zip(within, outcomes, strict=True):
             if isinstance(outcome, SettledHand):
                 wrench = closed_wrench(outcome, self.rounding)
@@ -247,15 +255,16 @@ class _Search:
                 self._refused.setdefault(int(which[k]), outcome)
         return found
 
-    def on_palm(self, which: Indices, x: Array) -> NDArray[np.bool_]:
-        """Return which hands have a palm tile within the largest rounding of rock, at moves x."""
+    def kinked_on_palm(self, which: Indices, x: Array) -> NDArray[np.bool_]:
+        """Return which hands may be caught at moves x by palm tiles that just meet rock."""
         there = self._hand.settle_each(
             [_moved(self._starts[i], _move(at)) for i, at in zip(which, x, strict=True)]
         )
         least = [
             each.palm.nearest_gap if isinstance(each, SettledHand) else np.inf for each in there
         ]
-        return np.array(least) < max(CONTACT_SETTINGS.roundings)
+        near = np.array(least) < max(CONTACT_SETTINGS.roundings)
+        return near & self._kinked[which]
 
     def slopes(self, x: Array, which: Indices) -> Array:
         """Return the derivatives of the wrenches at m moves, (m, 3, 3), by central differences."""
@@ -304,7 +313,7 @@ class _Search:
         mark = np.full(count, np.inf)
         for number in range(settings.steps):
             size = np.abs(left).max(axis=1)
-            going &= size > settings.force
+            going &= (size > settings.force) & (self._closings[which] < settings.closings)
             if number % settings.patience == 0:
                 going &= size < 0.5 * mark
                 mark = size
@@ -322,7 +331,7 @@ class _Search:
                 steps[i] = np.linalg.lstsq(known[i], -left[i])[0]
             longest = np.abs(steps).max(axis=1, initial=1e-30) * MOVE_UNITS[0]
             steps *= np.minimum(1.0, settings.longest / longest)[:, None]
-            was = np.linalg.norm(left, axis=1)
+            was, beyond = np.linalg.norm(left, axis=1), active[:0]
             for share in settings.shares:
                 if not len(active):
                     break
@@ -334,7 +343,12 @@ class _Search:
                     known[i] += np.outer(miss, step) / (step @ step)
                     x[i], left[i] = x[i] + step, wrench
                     stale[i] = np.linalg.norm(wrench) > 0.5 * was[i]
-                active = active[~better]
+                known_there = np.isfinite(there).all(axis=1)
+                self._kinked[which[active[~better & known_there]]] = True
+                out = ~known_there & (share <= settings.border)
+                beyond, active = np.append(beyond, active[out]), active[~better & ~out]
+            active = np.append(active, beyond)
+            self._kinked[which[beyond]] = False
             # steps along derivatives computed here lead nowhere
             going[active[fresh[active]]] = False
             stale[active] = True

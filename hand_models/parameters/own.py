@@ -160,6 +160,9 @@ def _check(own: Quantity, bundled: Quantity, field: str) -> None:
     least = 0.0 if usual.min() >= 0.0 and not coordinate else -largest
     if not (least <= got.min() and got.max() <= largest):
         unit = "" if own.unit == "1" else f" {own.unit}"
+        # a hand divides by this ratio, and refuses zero
+        positive = field == "tile.rock_stiffness_ratio"
+        start = "above 0 and at most" if positive else f"from {least:.4g} to"
         raise InvalidInputError(
-            f"must be from {least:.4g} to {largest:.4g}{unit}, got {own.value}", field=field
+            f"must be {start} {largest:.4g}{unit}, got {own.value}", field=field
         )

@@ -104,8 +104,11 @@ def least_use(
 
 def most_load(
     hands: HandSets, plan: WristSolution, known: LargestFactor | None, budget: Budget
-) -> LargestFactor | None:
+) -> tuple[LargestFactor | None, WristSolution]:
     """Return the largest multiple of the body wrench that has a plan of utilisation 1.
+
+    On its way the search may come to wrist poses that carry more. Then another search for the whole
+    body wrench begins there.
 
     Parameters
     ----------
@@ -119,15 +122,39 @@ def most_load(
 
     Returns
     -------
-    LargestFactor or None
+    most : LargestFactor or None
         None if no multiple was found.
+    plan : WristSolution
+        The given plan, or a better one for the whole body wrench.
     """
     if (known is not None and known.sure) or not _held(plan):
-        return known
+        return known, plan
     way = _way(hands, plan, budget)
-    if way is None or (known is not None and known.factor > way.most.factor):
-        return known
-    return way.most
+    if way is None:
+        return known, plan
+    plan = _carried_back(hands, plan, way.at, budget)
+    return (known if known is not None and known.factor > way.most.factor else way.most), plan
+
+
+def _carried_back(
+    hands: HandSets, plan: WristSolution, at: WristSolution, budget: Budget
+) -> WristSolution:
+    """Return a plan of the whole body wrench that uses less, if that for a multiple promises one.
+
+    It does where it uses less than the plan's own slope allows: the least utilisation of wrists
+    near the plan rises at least by that slope.
+    """
+    least = plan.measure.utilisation + _slope(hands, plan) * (at.point.factor - 1.0)
+    if at.measure.utilisation > least - SETTINGS.better_branch:
+        return plan
+    start = replace(at.point, factor=1.0)
+    return _better(plan, find_wrists(hands, start, budget, SETTINGS.rounds_nearby))
+
+
+def _slope(hands: HandSets, plan: WristSolution) -> float:
+    """Return the change of a plan's utilisation with the factor of the body wrench."""
+    assert plan.outcome.balance_dual is not None
+    return -float(plan.outcome.balance_dual[:6] @ hands.wrench[:6])
 
 
 def _held(found: WristSolution) -> bool:
@@ -209,8 +236,7 @@ def _way(hands: HandSets, start: WristSolution, budget: Budget) -> _Way | None:
                 break
             high, overloaded = math.inf, False
             continue
-        assert now.outcome.balance_dual is not None
-        slope = -float(now.outcome.balance_dual[:6] @ hands.wrench[:6])
+        slope = _slope(hands, now)
         aim = math.inf if used < 1.0 else 0.0
         if slope > 1e-3:  # it gets harder with the load
             aim = factor + (1.0 - used) / slope

@@ -57,6 +57,9 @@ class FloatingSettings:
     """Price, as utilisation, of a `WRENCH_UNIT` of missing wrench or a `LOAD_UNIT` of violation."""
     small_factors: tuple[float, ...] = (0.5, 0.1)
     """Multiples of the body wrench to start the search from if the whole one has no plan."""
+    better_branch: float = 2e-3
+    """Utilisation by which a plan for a multiple of the body wrench must be below what follows from
+    the plan for the whole, for another search: searches end within some thousandths."""
     binding_multiplier: float = 1e-6  # above this it binds
     dependent_rows: float = 1e-8  # relative size of binding rows that count as dependent
     effort_nearness: float = 2e-4

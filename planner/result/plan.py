@@ -200,7 +200,7 @@ class SetPoints:
     motor_torque, motor_current : ndarray, shape (hands, 4), or None
         Torque [N·m] and current [A] of each motor while it tightens its tendon to the tension.
     reason : str or None
-        Why there is no plan.
+        Why there is no plan, or which limit an overloaded one exceeds most.
     wrists : tuple of WristPlan or None, or None
         Planned pose of each compliant wrist, None of a fixed one; None where all are fixed.
     """

@@ -54,7 +54,7 @@ from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
 from planner.solving.verified import Checks
 
-__all__ = ["explained_plan", "reason_of_none", "unexplained"]
+__all__ = ["explained_plan", "reason_beyond", "unexplained"]
 
 
 def explained_plan(
@@ -139,25 +139,37 @@ def explained_plan(
 
 def _of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> dict[str, Any]:
     """Return what is to be said of no plan, by fields of `Plan`."""
-    reason = reason_of_none(prepared, answer)
+    reason = _reason_of_none(prepared, answer)
     if isinstance(answer, Failed):
         return {"status": "failed", "verified": False, "reason": reason}
     proof = answer.proof if prepared.question.explain else None
     return {"status": "infeasible", "reason": reason, "certificate": proof}
 
 
-def reason_of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> str:
-    """Return a sentence that says why there is no plan.
-
-    Parameters
-    ----------
-    prepared : PreparedStance
-    answer : Infeasible or Failed
-    """
+def _reason_of_none(prepared: PreparedStance, answer: Infeasible | Failed) -> str:
+    """Return a sentence that says why there is no plan."""
     if isinstance(answer, Failed):
         return answer.reason
     touching = any(h.holding.any() or h.palm.engaged for h in prepared.batch.hands)
     return shortfall_sentence(answer.proof, touching, floating=prepared.floating)
+
+
+def reason_beyond(prepared: PreparedStance, checks: Checks, answer: Answer) -> str | None:
+    """Return why there is no plan, or which limit an overloaded one exceeds most; else None.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    checks : Checks
+    answer : Answer
+    """
+    if not isinstance(answer, Verified):
+        return _reason_of_none(prepared, answer)
+    solution, cap = answer.solution, prepared.question.limits.utilisation
+    if answer.whole <= cap + CAP_SLACK:
+        return None
+    binding = ActiveLimits(prepared.limbs, solution.sets.spaces, solution.least.limit_duals)
+    return _explain(binding, answer, answer.by_hand(), checks.idle, cap)[1]
 
 
 def _of_plan(
@@ -199,6 +211,11 @@ def _of_plan(
             parts["certificate"] = proof
             reason += overload_sentence(proof, floating=prepared.floating)
             unfinished += late("certificate") if proof is None else unexplained(prepared, proof)
+            if not solution.proven and proof is None:
+                warnings.append(
+                    "no certificate proves the overload: the search for the wrists' poses is "
+                    "local, and there may be a plan of less utilisation"
+                )
     return {**parts, "reason": reason}, unfinished, warnings
 
 

@@ -119,10 +119,12 @@ class FixedSolution(Solution):
             faults=self.faults + further,
         )
 
-    def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+    def load_factor(
+        self, prepared: PreparedStance, budget: Budget
+    ) -> tuple[LoadFactor, FixedSolution]:
         """Return the load factor: the largest multiple of the body wrench at utilisation 1."""
         factor = most_of_fixed(prepared.hands, self.sets.data)
-        return LoadFactor(factor, unfinished=factor is None and deadline.expired())
+        return LoadFactor(factor, unfinished=factor is None and deadline.expired()), self
 
     def no_answer(self, prepared: PreparedStance) -> str:
         """Return a sentence with the solver's status."""

@@ -98,12 +98,17 @@ class FloatingSolution(Solution):
         )
         return found if found.proven else replace(found, faults=(), most=np.inf)
 
-    def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+    def load_factor(
+        self, prepared: PreparedStance, budget: Budget
+    ) -> tuple[LoadFactor, FloatingSolution]:
         """Search for the load factor; it is a lower bound if no plan was found beyond it."""
-        most = most_load(prepared.hands, self.usual, self.factor, budget)
+        most, search = most_load(prepared.hands, self.usual, self.factor, budget)
+        found = self
+        if search is not self.usual and self.objective is MAX_MARGIN:
+            found = _of_search(prepared, search, self.factor)
         if most is None:
-            return LoadFactor(unfinished=deadline.expired())
-        return LoadFactor(most.factor, least=not most.sure)
+            return LoadFactor(unfinished=deadline.expired()), found
+        return LoadFactor(most.factor, least=not most.sure), found
 
     def no_answer(self, prepared: PreparedStance) -> str:
         """Return a sentence about the missing equilibrium of the wrists, with a likely reason."""

@@ -92,8 +92,10 @@ class Solution:
         """
 
     @abstractmethod
-    def load_factor(self, prepared: PreparedStance, budget: Budget) -> LoadFactor:
+    def load_factor(self, prepared: PreparedStance, budget: Budget) -> tuple[LoadFactor, Solution]:
         """Return the load factor: the largest multiple of the body wrench at utilisation 1.
+
+        And the solution, or a better one that the search has come upon, not verified.
 
         Parameters
         ----------
@@ -185,10 +187,11 @@ Answer = Verified | Failed | Infeasible
 
 def load_factor_of(
     prepared: PreparedStance, answer: Answer, budget: Budget, *, overloaded: bool
-) -> LoadFactor:
+) -> tuple[LoadFactor, Solution]:
     """Return the load factor: the largest multiple of the body wrench at utilisation 1.
 
-    Without a body wrench the factor is unbounded, if the stance is feasible at utilisation 1.
+    And the answer's solution, or a better one that the search has come upon, not verified. Without
+    a body wrench the factor is unbounded, if the stance is feasible at utilisation 1.
 
     Parameters
     ----------
@@ -199,13 +202,13 @@ def load_factor_of(
     overloaded : bool
         True if a limb without a hand cannot carry its own weight; there is no factor then.
     """
+    solution = answer.solution
     if overloaded:
-        return LoadFactor()
+        return LoadFactor(), solution
     if not prepared.needs_hands:
         # any multiple of it can be held, or none
-        least = answer.solution.least
-        held = least.solved and least.value <= 1.0 + CAP_SLACK
-        return LoadFactor(unbounded=held and not isinstance(answer, Infeasible))
+        held = solution.least.solved and solution.least.value <= 1.0 + CAP_SLACK
+        return LoadFactor(unbounded=held and not isinstance(answer, Infeasible)), solution
     if deadline.expired():
-        return LoadFactor(unfinished=True)
-    return answer.solution.load_factor(prepared, budget)
+        return LoadFactor(unfinished=True), solution
+    return solution.load_factor(prepared, budget)

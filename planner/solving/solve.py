@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from planner.prepare import PreparedStance, checked_question, prepare_stance
 from planner.programs import CAP_SLACK, LOAD_BOX, LOAD_UNIT
 from planner.question import Question, checked_body_wrench
 from planner.result import LoadFactor, Plan, Time
-from planner.solving.explained import explained_plan, reason_of_none, unexplained
+from planner.solving.explained import explained_plan, reason_beyond, unexplained
 from planner.solving.fixed_wrists import FixedSolution, fixed_solutions, nearest_solutions
 from planner.solving.floating_wrists import (
     FloatingSolution,
@@ -123,16 +122,20 @@ class StanceAnswer(NamedTuple):
 
     @property
     def reason(self) -> str | None:
-        """Why there is no plan; None if there is one."""
-        answer = self.answer
-        return None if isinstance(answer, Verified) else reason_of_none(self.prepared, answer)
+        """Why there is no plan within the cap on the utilisation; None if there is one."""
+        return reason_beyond(self.prepared, self.checks, self.answer)
 
     def plan(self) -> Plan:
         """Return the plan, with its explanation and the extras that the question wants."""
         prepared, checks, answer, budget, moments = self
         factor = LoadFactor()
         if "load_factor" in prepared.question.want:
-            factor = load_factor_of(prepared, answer, budget, overloaded=checks.overloaded)
+            factor, solution = load_factor_of(
+                prepared, answer, budget, overloaded=checks.overloaded
+            )
+            if solution is not answer.solution:
+                better = _first_verified(prepared, checks, [solution])
+                answer = better if better.utilisation < answer.utilisation else answer
         solved = *moments, time.perf_counter()
         return explained_plan(prepared, checks, answer, factor, try_stance, solved)
 
@@ -280,7 +283,10 @@ def try_stance(
     if isinstance(answer, Failed):
         answer = _second_look(prepared, checks, answer, budget, prove=False)
     overloaded = checks.overloaded
-    factor = partial(load_factor_of, prepared, answer, budget, overloaded=overloaded)
+
+    def factor() -> LoadFactor:
+        return load_factor_of(prepared, answer, budget, overloaded=overloaded)[0]
+
     solution, whole = answer.solution, answer.whole
     return StanceTrial(prepared, solution.sets.data, solution.least, whole, factor)
 

@@ -81,5 +81,6 @@ class CompliantPoints:
             winch_angle=angle,
             motor_torque=torque,
             motor_current=current,
+            reason=found.reason,
             wrists=arrays.wrists,
         )

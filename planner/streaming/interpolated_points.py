@@ -16,6 +16,7 @@ continuously with the wrench, so set-points do.
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 
 from hand_models.base import Array
 from hand_models.hand import FINGERS
@@ -114,7 +115,11 @@ class InterpolatedPoints:
                 return points
         read = self._stance.read(solved.loads)
         points = self._told(wrench, solved.loads, read, solved.bound, "solved")
-        return points if points.verified else self._without(wrench)
+        if not points.verified:
+            return self._without(wrench)
+        if points.status == "overloaded":
+            points = replace(points, reason=self._stance.overload(wrench))
+        return points
 
     def _told(
         self, wrench: Array, loads: Array, read: LoadEffects, bound: float, source: SetPointSource

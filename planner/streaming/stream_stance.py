@@ -6,6 +6,7 @@ m, the largest number of loads of a hand. So recovery and checks are products of
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -167,6 +168,16 @@ class StreamStance:
         if meant is None:
             meant = programs.less_tension(data, tension_trade(outcome.value, self.cap))
         return Solved(self._stacked((meant if meant.solved else outcome).loads), outcome, bound)
+
+    def overload(self, body_wrench: Array) -> str | None:
+        """Return which limit the plan of a body wrench exceeds most; None if it exceeds none.
+
+        Parameters
+        ----------
+        body_wrench : ndarray, shape (6,)
+            Wrench that the rock must exert on the robot, in B [N, N·m].
+        """
+        return self.known.answer(body_wrench, time.perf_counter()).reason
 
     def affine_bound(self, body_wrench: Array, solved: Solved) -> AffineBound | None:
         """Return the lower bound of the utilisation that a solved plan proves for every wrench.

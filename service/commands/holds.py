@@ -169,9 +169,8 @@ def holds_command(
         # after a lost worker the hold keeps its first result
         outcomes[best[k]] = outcomes[best[k]] if isinstance(each, InvalidInputError) else each
     found = [(trials[i], each) for i, each in _sorted(outcomes)]
-    refused = Counter(
-        _reason(each) for each in outcomes.values() if isinstance(each, InvalidInputError)
-    )
+    errors = [each for each in outcomes.values() if isinstance(each, InvalidInputError)]
+    refused = Counter(map(_reason, errors))
     result = {
         "v": 1,
         "rock": str(rock),
@@ -200,7 +199,8 @@ def holds_command(
         summary = {name: value for name, value in result.items() if name != "refusals"}
         tables.say({**summary, "holds": len(found), "file": str(output)})
     else:
-        _print(trials, found, refused, mesh.oddities, output, tables.console())
+        restless = sum(each.field == "placing" for each in errors)
+        _print(trials, found, refused, restless, mesh.oddities, output, tables.console())
 
 
 def _keep(
@@ -318,11 +318,15 @@ def _print(
     trials: list[fixed_wrist.HoldTrial],
     found: list[Pair],
     refused: Counter[str],
+    restless: int,
     oddities: Sequence[str],
     output: Path,
     out: Console,
 ) -> None:
-    """Print the best holds, and why hands cannot be at other places."""
+    """Print the best holds, and why hands cannot be at other places.
+
+    ``restless``: at how many places a closed hand comes to no rest.
+    """
     from hand_models.fixed_wrist import AT_BORDER
     from service.tables import name
 
@@ -345,12 +349,15 @@ def _print(
         "of them also where they are pulled off (pull; shear is the least to any side)"
     )
     if not found:
-        open_rock = [reason for reason, _ in refused.most_common(1)] == [AT_BORDER]
-        out.print(
-            "nothing holds: is the scan full of holes? `crux rock` says what helps against them"
-            if open_rock
-            else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
-        )
+        hint = "does z of the file point into the rock, as `crux rock` writes it?"
+        if [reason for reason, _ in refused.most_common(1)] == [AT_BORDER]:
+            hint = "is the scan full of holes? `crux rock` says what helps against them"
+        elif 2 * restless > refused.total():
+            hint = (
+                "closed hands come to rest nowhere; with --placing given they are tried at their "
+                "seats"
+            )
+        out.print(f"nothing holds: {hint}")
     tables.print_warnings(oddities, out)
     for reason, count in refused.most_common(3):
         out.print(f"{count:,} refused: {reason}")

@@ -286,7 +286,8 @@ class StreamReply(StanceReply, kw_only=True):
       plans [N], along a moment a tenth of it per metre [N·m]; null where each set-point is solved
       for.
     - ``status``: status of the plan at ``body_wrench``.
-    - ``reason``: why there is no plan at ``body_wrench``; null where there is one.
+    - ``reason``: why there is no plan at ``body_wrench``, or what overloads it; null where it is
+      within its limits.
     - ``body_wrench``: centre of the first interpolation, in B [N, N·m].
     - ``utilisation``: utilisation of the plan at ``body_wrench``; null without a plan.
     - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
@@ -311,7 +312,7 @@ class SetPointsReply(Reply, kw_only=True):
 
     - ``stream``: identifier of the stream that was asked.
     - ``status``: ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
-    - ``reason``: why there is no plan; null where there is one.
+    - ``reason``: why there is no plan, or what overloads it; null where it is within its limits.
     - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
     - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
     - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of

@@ -59,7 +59,7 @@ def print_plan(
     palm_parts : PalmLoadFactors, optional
         Load factors without the palms' shear, and without their pressing, which are printed, too.
     brief : bool, optional
-        True to print only the status, the reason and the sentence about samples.
+        True to print only the status, the reason and what is known of samples.
     """
     spread = reply.spread if isinstance(reply.spread, planner.Spread) else None
     known = [f"   {part}" for part in _first_line(reply, spread)]
@@ -68,6 +68,7 @@ def print_plan(
         out.print(spread_sentence(spread))
     out.print(reply.reason)
     if brief:
+        _print_displaced(reply, out)
         return
     print_warnings(reply.warnings, out)
     for limb, pose in (reply.poses or {}).items():
@@ -85,10 +86,7 @@ def print_plan(
             out.print(
                 f"without their shear alone: {shear}; without their pressing alone: {pressing}"
             )
-    if isinstance(reply.robust, planner.RobustLoadFactor):
-        out.print(robust_sentence(reply.robust))
-    if isinstance(reply.open_loop, planner.OpenLoop):
-        print_open_loop(reply.open_loop, out)
+    _print_displaced(reply, out)
     if isinstance(reply.clearance, planner.Clearance):
         _print_clearance(reply.clearance, out)
     if reply.hands is not None:
@@ -100,6 +98,14 @@ def print_plan(
             _print_prices(prices, what, out)
     if reply.certificate is not None:
         _print_certificate(reply.certificate, reply.body_wrench, out)
+
+
+def _print_displaced(reply: replies.PlanReply, out: Console) -> None:
+    """Print how a plan fares where hands are displaced, planned anew or executed as it is."""
+    if isinstance(reply.robust, planner.RobustLoadFactor):
+        out.print(robust_sentence(reply.robust))
+    if isinstance(reply.open_loop, planner.OpenLoop):
+        print_open_loop(reply.open_loop, out)
 
 
 def _print_prices(prices: Sequence[planner.Price], what: str, out: Console) -> None:

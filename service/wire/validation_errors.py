@@ -306,7 +306,7 @@ def entered(places: Iterable[PossibleType], step: Step) -> list[PossibleType]:
             if not fields and parent.tag_field == step:
                 fields = [inspect.LiteralType((parent.tag,))]
             found += [bare for field in fields for bare in _bare(field)]
-        elif isinstance(parent, inspect.ListType):
+        elif isinstance(parent, inspect.CollectionType):
             found += _bare(parent.item_type, place.units)
         elif isinstance(parent, inspect.DictType) and step is None:
             found += _bare(parent.value_type, place.units)

@@ -1,6 +1,7 @@
 """Hands placed by contact: where they rest nothing pulls or pushes them, wherever they began."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -10,10 +11,13 @@ from hand_models.base import turns_about
 from hand_models.compliance import CompliantHand
 from hand_models.fixed_wrist import (
     CONTACT_SETTINGS,
+    ContactSettings,
     closed_about,
+    contact_rest,
     placed_by_contact,
     robustness,
 )
+from hand_models.hand import Placement, SpinyHand, spiny_hand
 from hand_models.wrench_spaces import WRENCH_SCALE
 from tests.suite.helpers.hands import HAND, PINCH, ROCK, pinch
 
@@ -136,6 +140,30 @@ def test_a_hand_without_a_rest_is_refused(hold, grasp: Grasp, why: str) -> None:
     assert error.field == "placing"
     assert why in error.message
     assert "'given'" in error.message
+
+
+def test_a_search_without_a_rest_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a ball of 150 mm a pinch is tilted as far as it may be, and has no rest on the way."""
+    hand, closed = spiny_hand(), 0
+    settle = SpinyHand.settle_each
+
+    def counted(self: SpinyHand, placements: Sequence[Placement]) -> object:
+        nonlocal closed
+        closed += len(placements)
+        return settle(self, placements)
+
+    seats = [hand.settle(Sphere(diameter), ROCK, PINCH) for diameter in (0.15, 0.2)]
+    monkeypatch.setattr(SpinyHand, "settle_each", counted)
+    (outcome,) = placed_by_contact(hand, seats[:1])
+    assert isinstance(outcome, InvalidInputError)
+    assert closed <= 120
+    # with too few closings a rest is not found
+    monkeypatch.setattr(contact_rest, "CONTACT_SETTINGS", ContactSettings(closings=20))
+    closed = 0
+    (outcome,) = placed_by_contact(hand, seats[1:])
+    assert isinstance(outcome, InvalidInputError)
+    assert outcome.field == "placing"
+    assert closed < 40
 
 
 def test_one_without_a_rest_does_not_keep_others_from_theirs() -> None:

@@ -91,7 +91,7 @@ def test_what_is_no_coordinate_may_not_be_negative() -> None:
         if value.min() < 0.0 or (section, name) == ("fingers", "base_tile_surface"):
             SpinyHand(own_hand(own(section, name, (value - 1e-4).tolist())))
         else:
-            with pytest.raises(InvalidInputError, match="must be from 0 to") as caught:
+            with pytest.raises(InvalidInputError, match=r"must be (from|above) 0 ") as caught:
                 own_hand(own(section, name, negative))
             assert caught.value.field == f"{section}.{name}"
 
@@ -220,6 +220,10 @@ BAD = {
     "a negative number without a unit": (
         "[tile]\npulley_ratio = -1",
         "tile.pulley_ratio: must be from 0 to 2e+04, got -1",
+    ),
+    "a negative ratio of stiffness": (
+        "[tile]\nrock_stiffness_ratio = -1",
+        "tile.rock_stiffness_ratio: must be above 0 and at most 1e+04, got -1",
     ),
     "an unknown section": (
         '[fingr]\nlength = { value = 1, unit = "m", source = "assumed" }',

@@ -49,6 +49,21 @@ def answered(name: str = "wall-300", *, palm: bool = True) -> Plan:
     return plan(asked(name, palm=palm))
 
 
+def test_what_the_search_for_the_load_factor_comes_upon_is_the_plan() -> None:
+    """The whole wrench is a part of the largest one: its plan uses less than in proportion."""
+    wrench = np.array([1025.0909, -107.1625, -67.3291, -3.4212, -134.7414, 4.1731])
+    alone = replace(asked(), body_wrench=wrench)
+    question = replace(alone, want=frozenset(["load_factor"]))
+    answer = plan(question)
+    assert answer.verified
+    assert answer.load_factor == pytest.approx(1.094, abs=2e-3)
+    assert answer.utilisation < 1.0 / answer.load_factor
+    assert answer.utilisation < plan(alone).utilisation - 0.05
+    assert not problems(question, answer)
+    known = KnownStance(question).plan(wrench)
+    assert known.utilisation == pytest.approx(answer.utilisation, rel=1e-6)
+
+
 def test_the_model_confirms_the_plan_and_the_body_is_balanced() -> None:
     question, answer = asked(), answered()
     assert answer.status == "optimal"

@@ -153,9 +153,11 @@ def test_the_cap_decides_the_status():
 
 
 def test_overloaded_wrenches_are_solved_one_by_one():
-    with WrenchStream(ask(on_wall(Cylinder(0.7)))) as stream:
+    question = replace(ask(on_wall(Cylinder(0.7))), explain=False)
+    with WrenchStream(question) as stream:
         points = stream.set_points(stream.first + 0.1)
     assert (points.status, points.source) == ("overloaded", "solved")
+    assert points.reason == plan(replace(question, body_wrench=points.body_wrench)).reason
     assert points.utilisation > 1.0
     assert points.verified
 

@@ -135,6 +135,11 @@ def test_a_plan_says_how_it_fares_on_displaced_hands(stance_file, capfd):
     target = 1e3 * reply["hands"][0]["wrist"]["pose_target"][0]
     assert "where limbs are to aim" in out
     assert f"{target:.2f}" in out
+    run_command_line(["plan", path, "--open-loop", "-q"])
+    brief = capfd.readouterr().out
+    assert "everything holds in" in brief
+    assert " ".join(row) in " ".join(brief.split())
+    assert "where limbs are to aim" not in brief
 
 
 def test_displaced_hands_require_wrists_that_comply(stance_file, capfd):

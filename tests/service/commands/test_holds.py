@@ -158,6 +158,21 @@ def test_a_hold_by_contact_is_where_a_plan_places_the_hand_by_contact(tmp_path, 
     assert there.position == pytest.approx(best["pose"]["position"], abs=1e-6)
 
 
+def test_where_no_hand_comes_to_rest_the_hint_says_so(tmp_path, capfd):
+    """Four fingers side by side on flat rock drag the hand along."""
+    flat, output = tmp_path / "flat.ply", tmp_path / "holds.json"
+    corners = [[-0.4, -0.4, 0.0], [0.4, -0.4, 0.0], [0.4, 0.4, 0.0], [-0.4, 0.4, 0.0]]
+    trimesh.Trimesh(corners, [[0, 2, 1], [0, 3, 2]], process=False).export(flat)
+    grid = ["--spacing", "1", "--angles", "1", "--outer-rotation", "0"]
+    options = ["-o", str(output), *grid, "--robust", "0", "--workers", "1"]
+    for placing, rests in (("contact", False), ("given", True)):
+        run_command_line(["holds", str(flat), *options, "--placing", placing])
+        told = " ".join(capfd.readouterr().out.split())
+        assert ("nothing holds: closed hands come to rest nowhere" in told) != rests
+        assert "does z of the file point" not in told
+        assert ("--placing given" in told) != rests
+
+
 def test_what_was_tried_is_kept_when_the_rest_is_broken_off(rock, tmp_path, monkeypatch):
     output = tmp_path / "holds.json"
     real = processes.HoldTrials.each
