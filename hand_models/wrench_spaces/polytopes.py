@@ -214,7 +214,7 @@ def hull(points: Array, options: str | None = None) -> scipy.spatial.ConvexHull:
             return scipy.spatial.ConvexHull(points, qhull_options=tried)
         except scipy.spatial.QhullError as error:
             failed = str(error).splitlines()[0]
-    raise SolverError(f"convex hull: {failed}")
+    raise SolverError(f"no convex hull of {len(points)} points found (Qhull said {failed})")
 
 
 def hull_facets(points: Array) -> tuple[Array, Array]:

@@ -155,7 +155,7 @@ class WrenchStream:
         key = wrench.tobytes()
         with self._lock:
             if self._closed:
-                raise InvalidInputError("is closed; open another", field="stream")
+                raise InvalidInputError("is closed; open another stream", field="stream")
             last = self._last
             if last is not None and last.verified and self._key == key:
                 return last

@@ -96,7 +96,8 @@ def answer_wrench_space(
     if "robust" in (request.want or ()):
         if hand.palm is not None:
             raise InvalidInputError(
-                f"'robust' requires fixed wrists on all hands; that of {request.limb} is not fixed",
+                f"'robust' requires fixed wrists on all hands; that of {request.limb} is not "
+                "fixed: fix it, or remove 'robust'",
                 field="want",
             )
         both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
