@@ -187,7 +187,7 @@ def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputEr
         if scan.heights:
             cause = "is the cell in degrees, or in another unit than the heights?"
             return InvalidInputError(f"{message}; {cause}", field="cell")
-        return InvalidInputError(f"{message}; was it seen from another side?", field="view")
+        return InvalidInputError(f"{message}; was the rock seen from another side?", field="view")
     if extent > table.scalar("scan", "largest"):
         return InvalidInputError(f"{message}, {open_}; {too_large(extent)}", field="hole")
     for wider in wider_holes(hole):

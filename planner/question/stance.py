@@ -232,7 +232,8 @@ class HandOnHold:
             _possible(self.contact_offset, "contact_offset")
             if not posed:
                 raise InvalidInputError(
-                    "requires the pose of the hold, as planner.come_to_rest gives it",
+                    "requires the pose of the hold, as planner.come_to_rest gives it; give the "
+                    "pose, or remove contact_offset",
                     field="contact_offset",
                 )
         if self.seat_direction is not None:

@@ -185,7 +185,7 @@ def parse_urdf(text: str) -> Urdf:
         if "xacro:" in text:
             raise _unexpanded() from None
         raise InvalidInputError(
-            f"must be a URDF, which is XML; correct it there: {error}"
+            f"must be a URDF, which is XML: {error}; correct the file there"
         ) from None
     if root.tag != "robot":
         raise InvalidInputError(f"must be a URDF, whose root is <robot>, got <{root.tag}>")

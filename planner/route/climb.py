@@ -272,7 +272,8 @@ def stages(route: Route) -> Iterator[RouteStage]:
             )
         if len(hands) == 1:
             raise InvalidInputError(
-                "the only hand on the rock cannot be lifted", field=f"moves[{number - 1}].limb"
+                "the only hand on the rock cannot be lifted; add another hand to the start stance",
+                field=f"moves[{number - 1}].limb",
             )
         given = dict(move.joints) if isinstance(move.joints, Mapping) else {}
         if joints is None and given:

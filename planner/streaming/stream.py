@@ -179,7 +179,7 @@ def _refuse(question: Question) -> None:
         )
     if question.limits.tension_change is not None:
         raise UnsupportedError(
-            "not available for streams, whose tensions change with the wrench: remove it",
+            "not available for streams, whose tensions change with the wrench: leave it out",
             field="limits.tension_change",
         )
 

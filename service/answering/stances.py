@@ -178,7 +178,7 @@ def _hand(
     if message.contact_offset is not None and message.placing != "contact":
         raise InvalidInputError(
             f"requires a hand that is placed by contact, got placing {message.placing!r}; remove "
-            "it, or give placing 'contact'",
+            "contact_offset, or give placing 'contact'",
             field="contact_offset",
         )
     return HandOnHold(
