@@ -172,7 +172,9 @@ def limit(points: Array, measure: Measure) -> Limit:
             f"{measure} cannot be measured: no wrench of the hull has F_z ≤ 0{also}"
         )
     if result.status != 0 or result.x is None or result.fun is None:
-        raise SolverError(f"no largest {measure} of the hull found (HiGHS said {result.message})")
+        raise SolverError(
+            f"no largest {measure} of {len(points)} wrenches found (HiGHS said {result.message})"
+        )
     corners = np.flatnonzero(result.x > 0.0)
     return Limit(
         value=-float(result.fun),

@@ -61,7 +61,10 @@ def linear_program(
         raise UnsupportedError(
             f"{what} is unbounded: fingers with lateral reactions (grasp.lateral) would bound it"
         )
-    raise SolverError(f"{what}: no solution of a linear program found (HiGHS said {found.message})")
+    raise SolverError(
+        f"{what}: no solution of a linear program found (HiGHS said {found.message}); change a "
+        "number slightly"
+    )
 
 
 def ends_along(

@@ -47,9 +47,7 @@ def polytope(A: Array, b: Array) -> Polytope:
     everything = np.arange(len(b))
     norms = np.linalg.norm(A, axis=1)
     A, b = A / norms[:, None], b / norms
-    unbounded = SolverError(
-        f"the set of {d} coupled loads is not bounded: vertices cannot be listed"
-    )
+    unbounded = SolverError(f"no limit bounds {d} coupled loads: vertices cannot be listed")
     if d == 1:
         if (A > 0.0).all() or (A < 0.0).all():
             raise unbounded
@@ -70,9 +68,7 @@ def polytope(A: Array, b: Array) -> Polytope:
         return Polytope(np.zeros((0, d)), everything)
     middle, half = box
     if not (half > 0.0).all():
-        raise SolverError(
-            f"the set of {d} coupled loads has no interior: vertices cannot be listed"
-        )
+        raise _flat(d)
     # in a box of unit half widths, where a thin or skew set is as round as any other
     A, b = A * half, b - A @ middle
     norms = np.linalg.norm(A, axis=1)
@@ -85,12 +81,17 @@ def polytope(A: Array, b: Array) -> Polytope:
     what, bounds = f"a block of {d} columns", [(None, None)] * d + [(0.0, None)]
     ball = linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
     if ball is None or ball[-1] <= SETTINGS.tolerance:
-        raise SolverError(
-            f"the set of {d} coupled loads has no interior: vertices cannot be listed"
-        )
+        raise _flat(d)
     go_on()
     cut = scipy.spatial.HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
     return Polytope(middle + half * distinct(cut.intersections, SETTINGS.tolerance), rows)
+
+
+def _flat(d: int) -> SolverError:
+    return SolverError(
+        f"limits leave {d} coupled loads no room in some direction, vertices cannot be listed: "
+        "loosen a limit slightly"
+    )
 
 
 def _touching(vertices: Array, A: Array, b: Array) -> Polytope:

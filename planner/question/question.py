@@ -185,7 +185,7 @@ class Question:
             return
         if self.stance.joints is None:
             raise InvalidInputError(
-                "requires stance.joints, angles or 'solve'",
+                "requires stance.joints, angles or 'solve'; add them, or remove joint_torque",
                 field="limits.joint_torque",
             )
         if isinstance(limits.joint_torque, Mapping):

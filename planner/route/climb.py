@@ -278,7 +278,8 @@ def stages(route: Route) -> Iterator[RouteStage]:
         given = dict(move.joints) if isinstance(move.joints, Mapping) else {}
         if joints is None and given:
             raise InvalidInputError(
-                "requires stance.joints in the start stance, angles or 'solve'",
+                "requires stance.joints in the start stance, angles or 'solve'; add them, or "
+                "remove the joints of the move",
                 field=f"moves[{number - 1}].joints",
             )
         known_limbs(given, route.start.robot, f"moves[{number - 1}].joints")
