@@ -146,9 +146,21 @@ def in_file(name: str) -> Iterator[None]:
         yield
     except OSError as error:
         raise InvalidInputError(error.strerror or str(error), field=name) from None
-    except UnicodeDecodeError:
-        raise InvalidInputError("must be TOML in UTF-8", field=name) from None
+    except UnicodeDecodeError as error:
+        byte, line = error.object[error.start], error.object.count(b"\n", 0, error.start) + 1
+        raise InvalidInputError(
+            f"is not in UTF-8 (byte 0x{byte:02x} in line {line}); save it as TOML in UTF-8",
+            field=name,
+        ) from None
     except RecursionError:
-        raise InvalidInputError("is nested too deep", field=name) from None
-    except (ValueError, InvalidInputError) as error:
+        raise InvalidInputError(
+            "has lists [ ] or tables { } nested too deep to be read, hundreds of levels; entries "
+            "need a few: remove the extra brackets",
+            field=name,
+        ) from None
+    except InvalidInputError as error:
         raise InvalidInputError(str(error), field=name) from None
+    except ValueError as error:
+        raise InvalidInputError(
+            f"is not valid TOML: {error}; correct the file there", field=name
+        ) from None

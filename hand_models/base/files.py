@@ -34,13 +34,20 @@ def reading_file(path: Path) -> Iterator[None]:
         error.field = error.field or "file"
         raise
     except UnicodeDecodeError:
-        raise InvalidInputError(f"not a text file: {path}", field="file") from None
+        raise InvalidInputError(
+            f"not a text in UTF-8: {path}; save it as UTF-8", field="file"
+        ) from None
     except OSError as error:
         raise InvalidInputError(f"{error.strerror or error}: {path}", field="file") from None
     except Exception as error:
         # every reader fails in its own way on what is none of its files
-        what = " ".join(str(error).split()) or type(error).__name__
-        raise InvalidInputError(f"cannot read {path}: {what}", field="file") from None
+        said = " ".join(str(error).split())
+        reader = f"{type(error).__name__}: {said}" if said else type(error).__name__
+        raise InvalidInputError(
+            f"cannot read {path}: it may be broken, cut short, or no {path.suffix} file; export "
+            f"it again (its reader said {reader})",
+            field="file",
+        ) from None
 
 
 def _check_plain(path: Path) -> None:
@@ -52,7 +59,11 @@ def _check_plain(path: Path) -> None:
     except OSError as error:
         what = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
         raise InvalidInputError(f"{what}: {path}", field="file") from None
-    kind = "a folder" if path.is_dir() else "a pipe or a device; write what comes from it to a file"
+    kind = (
+        "a folder; give a file"
+        if path.is_dir()
+        else "a pipe or a device; write what comes from it to a file"
+    )
     raise InvalidInputError(f"{path} is {kind}", field="file")
 
 

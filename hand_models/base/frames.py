@@ -52,7 +52,8 @@ def finite_vector(value: ArrayLike, size: int, field: str) -> Array:
     except (TypeError, ValueError):
         raise InvalidInputError(f"expected {size} numbers, got {value!r}", field=field) from None
     if vector.shape != (size,):
-        raise InvalidInputError(f"expected {size} numbers, got shape {vector.shape}", field=field)
+        got = len(vector) if vector.ndim == 1 else f"an array of shape {vector.shape}"
+        raise InvalidInputError(f"expected {size} numbers, got {got}", field=field)
     numbers = vector.tolist()
     if not all(map(math.isfinite, numbers)):
         raise InvalidInputError(f"every number must be finite, got {numbers}", field=field)
@@ -122,9 +123,10 @@ class Pose:
         norm = math.hypot(*q)
         tolerance = BASE_TOLERANCES.unit_norm
         if not abs(norm - 1.0) <= tolerance:
+            remedy = "divide all four numbers by it" if norm else "no rotation is [0, 0, 0, 1]"
             raise InvalidInputError(
                 f"a quaternion [x, y, z, w] of norm 1 ± {tolerance:g} is needed, "
-                f"the norm is {norm:.6g}",
+                f"the norm is {norm:.6g}: {remedy}",
                 field="orientation",
             )
         x, y, z, w = [component / norm for component in q]

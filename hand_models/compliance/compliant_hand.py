@@ -96,7 +96,9 @@ class CompliantHand:
         scheme: MotorScheme = "held",
     ) -> None:
         if settled.grasp.fingernail:
-            raise UnsupportedError("a fingernail grasp requires a fixed wrist")
+            raise UnsupportedError(
+                "a grasp with fingernail requires wrist 'fixed'; set this, or remove fingernail"
+            )
         hand = settled.hand
         self.settled = settled
         self.preload = _preload(preload, settled)
@@ -376,7 +378,8 @@ def _preload(preload: ArrayLike | None, settled: SettledHand) -> Array:
     most = settled.hand.maximum_tension
     if tensions.shape != (len(FINGERS),) or not ((tensions >= 0.0) & (tensions <= most)).all():
         raise InvalidInputError(
-            f"four tensions from 0 to {most:g} N are needed, got {tensions.tolist()}",
+            f"four tensions from 0 to tendon.maximum_tension, {most:g} N, are needed, got "
+            f"{tensions.tolist()}",
             field="tendon_preload",
         )
     return tensions

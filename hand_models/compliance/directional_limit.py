@@ -93,8 +93,8 @@ def farthest(
             break
     else:
         raise EmptySetError(
-            "no feasible wrist pose found toward this wrench: limits are exceeded by "
-            f"{100.0 * excess:.2g} %"
+            "no wrist pose within every limit found toward this wrench, the best exceeds a limit "
+            f"by {100.0 * excess:.2g} % of its capacity: try another start or preload"
         )
     binding = float(found.utilisation[0]) >= 1.0 - kept
     return Farthest(

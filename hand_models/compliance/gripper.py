@@ -117,7 +117,8 @@ class Gripper(CompliantGrasp):
         finger = settle_finger(model, self.section, (0.0, 0.0))
         if len(finger.bearing) != len(PHALANGES) or not all(finger.touching):
             raise InvalidInputError(
-                f"the fingers do not touch a surface with a diameter of {1e3 * diameter:g} mm",
+                f"a phalanx of each finger does not touch a surface with a diameter of "
+                f"{1e3 * diameter:g} mm; give a larger one",
                 field="diameter",
             )
         tendon = FingerTendon.from_table(table)

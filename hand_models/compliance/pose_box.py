@@ -133,7 +133,9 @@ def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Ar
         space = grasp.linearised(at, within=20.0 * units)
         found = _analytic_centre(space.A * units, space.b)
     if found is None:
-        raise SolverError("no centre of the linearised set of wrist poses found")
+        raise SolverError(
+            "no centre of the linearised set of wrist poses found; try another preload"
+        )
     y, hessian = found
     lengths, directions = np.linalg.eigh(hessian)
     return space, y * units, units[:, None] * directions / np.sqrt(lengths)
@@ -194,5 +196,6 @@ def _range(space: WrenchSpace, centre: Array, axes: Array) -> Array:
 
 def _nothing_holds() -> EmptySetError:
     return EmptySetError(
-        "no wrist pose near rest is feasible: the preload alone exceeds a limit; try another"
+        "no wrist pose near rest is within every limit, as when the preload alone exceeds one; try "
+        "another preload"
     )

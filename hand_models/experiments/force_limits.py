@@ -167,9 +167,14 @@ def limit(points: Array, measure: Measure) -> Limit:
         method="highs",
     )
     if result.status == 2:
-        raise EmptySetError(f"the wrench hull is empty: {measure} cannot be measured")
+        also = f" and F_x = {ratio:g} M_y" if measure == "shear" else ""
+        raise EmptySetError(
+            f"{measure} cannot be measured: no wrench of the hull has F_z ≤ 0{also}"
+        )
     if result.status != 0 or result.x is None or result.fun is None:
-        raise SolverError(f"limit: {result.message}")
+        raise SolverError(
+            f"no largest {measure} of {len(points)} wrenches found (HiGHS said {result.message})"
+        )
     corners = np.flatnonzero(result.x > 0.0)
     return Limit(
         value=-float(result.fun),

@@ -246,7 +246,9 @@ class GripperFit:
         pull = settings.scalar("fig12", "pull")
         poses = pulled_off_poses(gripper, np.array([0.0, pull]))
         if len(poses) < 2:
-            raise SolverError(f"no equilibrium found for a pull of {pull:g} N on the gripper")
+            raise SolverError(
+                f"no equilibrium found for a pull of {pull:g} N (fig12.pull) on the gripper"
+            )
         loads, _ = gripper.finger_loads(poses)
         held = self.wrenches(gripper, fine=fine)
         # of F_x and M_y, and of F_x and −F_z

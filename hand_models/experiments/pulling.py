@@ -172,7 +172,8 @@ def unloaded(gripper: Gripper) -> Array:
     poses = pulled_off_poses(gripper, np.zeros(1))
     if not (len(poses) and gripper.evaluate(poses).holds[0]):
         raise EmptySetError(
-            "the gripper exceeds a limit before any load: the closing tension alone is too large"
+            "the gripper exceeds a limit before any load: the closing tension alone is too large; "
+            "lower it"
         )
     return np.asarray(poses[0])
 

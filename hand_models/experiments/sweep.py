@@ -200,8 +200,8 @@ class GripperSweep:
         strongest = table.scalar("tendon", "maximum_tension")
         if not 0.0 < conditions.tension <= strongest:
             raise InvalidInputError(
-                f"must be above 0 and at most the tendon's {strongest:g} N, got "
-                f"{conditions.tension:g}",
+                f"must be above 0 and at most tendon.maximum_tension, {strongest:g} N, got "
+                f"{conditions.tension:g} N",
                 field="--tension",
             )
         grasp = conditions.gripper(table)

@@ -51,7 +51,7 @@ def approach_frame(
     )
     for value, field in ((z, "approach"), (above, "up")):
         if not value.any():
-            raise InvalidInputError("must not be zero", field=field)
+            raise InvalidInputError("must be a direction, not zero", field=field)
     if not np.isfinite(wrist_angle):
         raise InvalidInputError(f"must be finite, got {wrist_angle}", field="wrist_angle")
     z, above = (value / np.abs(value).max() for value in (z, above))

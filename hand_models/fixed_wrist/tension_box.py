@@ -93,7 +93,8 @@ def parallelepiped(settled: SettledHand) -> WrenchSpace:
     for limit in tension_limits(settled):
         if limit.tension <= 0.0:
             raise EmptySetError(
-                f"the {limit.phalanx} tile of {limit.finger} exceeds its limit at every tension"
+                f"the {limit.phalanx} tile of {limit.finger} exceeds its limit at every tension; "
+                "place the hand otherwise, or on a stronger surface"
             )
         by_tile = limit.tension < settled.hand.maximum_tension
         name = "f_t_max" if by_tile else "tendon_tension"

@@ -70,8 +70,8 @@ class HandModel:
         self.closing_tension = table.positive("tendon", "closing_tension")
         if self.closing_tension > self.maximum_tension:
             raise InvalidInputError(
-                f"must be at most the tendon's {self.maximum_tension:g} N, "
-                f"got {self.closing_tension:g}",
+                f"must be at most tendon.maximum_tension, {self.maximum_tension:g} N, got "
+                f"{self.closing_tension:g} N; lower it, or raise maximum_tension",
                 field="tendon.closing_tension",
             )
         for name in ("holding_friction", "entry_friction"):

@@ -99,7 +99,8 @@ def _close(
     for i, (tension, gaps) in enumerate(zip(tensions, placed.gaps, strict=True)):
         if tension > hand.maximum_tension:
             errors[i] = InvalidInputError(
-                f"must be at most the tendon's {hand.maximum_tension:g} N, got {tension:g} N",
+                f"must be at most tendon.maximum_tension, {hand.maximum_tension:g} N, got "
+                f"{tension:g} N",
                 field="grasp.closing_tension",
             )
         elif min(gaps[STACK_ROWS.base_count :]) < -hand.spine_travel:

@@ -234,7 +234,10 @@ def _checked_count(sets: ParameterTable) -> int:
             )
     for name in ("rock_ratio", "rock_stiffness"):
         if (size := len(sets.vector("ranges", name))) != 2:
-            raise InvalidInputError(f"two numbers are needed, got {size}", field=f"ranges.{name}")
+            raise InvalidInputError(
+                f"two numbers are needed, the least and the largest, got {size}",
+                field=f"ranges.{name}",
+            )
     return count
 
 
@@ -254,7 +257,10 @@ def _check_entry(section: str, name: str, quantity: Quantity) -> None:
     size = len(usual.value) if isinstance(usual.value, list) else 0
     if (index is None) != (size == 0) or int(index or 0) > max(size - 1, 0):
         form = f"one of {entry}[0] to {entry}[{size - 1}]" if size else entry
-        raise InvalidInputError(f"must be {form}, got {name}", field=field)
+        has = f"a list of {size} numbers" if size else "one number"
+        raise InvalidInputError(
+            f"the entry's name must be {form}, as the hand has {has} there; got {name}", field=field
+        )
     if quantity.unit != usual.unit:
         raise InvalidInputError(f"must be in {usual.unit!r}, got {quantity.unit!r}", field=field)
 

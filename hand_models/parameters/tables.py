@@ -133,7 +133,9 @@ class ParameterTable:
         for section, entries in raw.items():
             if not isinstance(entries, Mapping):
                 raise InvalidInputError(
-                    f"a section of entries is needed, got {type(entries).__name__}", field=section
+                    f"a section of entries is needed, got {type(entries).__name__}; an entry is in "
+                    "a section",
+                    field=section,
                 )
             sections[section] = {
                 name: _quantity(entry, f"{section}.{name}", _unit(units, section, name))

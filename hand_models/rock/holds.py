@@ -168,10 +168,10 @@ class Hold(ABC):
         near = scan_table().scalar("scan", "place")
         depth = self.entry(at.position, at.rotation[:, 2])
         if not abs(depth) <= near:
-            where = f"begins {depth:.3g} m from it" if math.isfinite(depth) else "is not there"
+            rock = f"the rock begins {depth:.3g} m" if math.isfinite(depth) else "there is no rock"
             raise InvalidInputError(
-                f"along the approach the rock {where}; at most {near:g} m is possible: is the "
-                "point in the frame that is named, and the approach into the rock?",
+                f"{rock} from this point along the approach; at most {near:g} m is possible: is "
+                "the point in the frame that is named, and the approach into the rock?",
                 field="place.point",
             )
 

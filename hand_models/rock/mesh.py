@@ -226,7 +226,8 @@ def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tu
     bad = corners[~finite[corners]]
     if len(bad):
         raise InvalidInputError(
-            f"every number of a triangle must be finite, got {points[bad.min()].tolist()}",
+            "must have three finite coordinates, as a triangle uses it, got "
+            f"{points[bad.min()].tolist()}; remove its triangles, or repair it",
             field=f"vertices[{bad.min()}]",
         )
     left_out = len(points) - int(finite.sum())

@@ -37,7 +37,11 @@ def read_mesh(path: Path) -> tuple[Array, Indices]:
     """
     vertices, faces = read_vertices(path)
     if not len(faces):
-        raise InvalidInputError(f"no triangles in {path}", field="file")
+        raise InvalidInputError(
+            f"no triangles in {path}: export it again, or make them from a point cloud by `crux "
+            "rock`",
+            field="file",
+        )
     return vertices, faces
 
 
@@ -61,14 +65,15 @@ def read_vertices(path: Path) -> tuple[Array, Indices]:
     ending = path.suffix.lower()
     if ending not in MESH_ENDINGS:
         raise InvalidInputError(
-            f"{path}: a mesh file ends in {', '.join(MESH_ENDINGS)}", field="file"
+            f"{path}: a mesh file ends in {', '.join(MESH_ENDINGS)}; export it as one of these",
+            field="file",
         )
     with reading_file(path):
         content = path.read_bytes()
         if ending == ".ply":
-            _check_counts(content)
+            _check_counts(content, path)
         elif ending == ".obj":
-            content = _absolute(content)
+            content = _absolute(content, path)
         try:
             # from memory, and so without a folder in which it would look for what the file names
             found = trimesh.load(
@@ -76,13 +81,13 @@ def read_vertices(path: Path) -> tuple[Array, Indices]:
             )
         except ImportError:
             # what is no text either, trimesh would have another package guess the encoding of
-            raise ValueError("broken or cut short") from None
+            raise InvalidInputError(f"broken or cut short: {path}; export it again") from None
         except Exception as error:
             if "unexpected length" not in str(error):
                 raise
-            raise ValueError(
-                "cut short, or its faces have different numbers of corners: make them triangles "
-                "before the export"
+            raise InvalidInputError(
+                f"{path} is cut short, or has faces of different numbers of corners: make all "
+                "faces triangles before the export"
             ) from None
         # an OBJ with several materials has several
         parts: list[Any] = (
@@ -104,13 +109,14 @@ def _corners(faces: Array, count: int, path: Path) -> Indices:
     wrong = faces[(faces < 0) | (faces >= count)]
     if len(wrong):
         raise InvalidInputError(
-            f"a triangle's corner is vertex {wrong[0]:.0f}; valid are 0 to {count - 1} in {path}",
+            f"a triangle's corner is vertex {wrong[0]:.0f}; valid are 0 to {count - 1} in {path}: "
+            "export it again",
             field="file",
         )
     return faces.astype(np.intp).reshape(-1, 3)
 
 
-def _absolute(content: bytes) -> bytes:
+def _absolute(content: bytes, path: Path) -> bytes:
     """Return an OBJ whose faces count vertices from the first, not back from the last so far.
 
     The loader would count back from the last of all.
@@ -127,17 +133,21 @@ def _absolute(content: bytes) -> bytes:
         elif kind == b"f":
             corners = [int(entry.split(b"/")[0]) for entry in entries]
             if 0 in corners:
-                raise ValueError(f"line {i + 1}: a face has vertex 0, and an OBJ counts from 1")
+                raise InvalidInputError(
+                    f"a face in line {i + 1} has vertex 0, and an OBJ counts from 1: {path}; "
+                    "export it again"
+                )
             named = [corner if corner > 0 else count + 1 + corner for corner in corners]
             if min(named, default=1) < 1:
-                raise ValueError(
-                    f"line {i + 1}: a face has vertex {min(corners)}, with {count} vertices so far"
+                raise InvalidInputError(
+                    f"a face in line {i + 1} has vertex {min(corners)}, counted back from the "
+                    f"{count} vertices so far: {path}; export it again"
                 )
             lines[i] = b"f " + b" ".join(b"%d" % corner for corner in named)
     return b"\n".join(lines)
 
 
-def _check_counts(content: bytes) -> None:
+def _check_counts(content: bytes, path: Path) -> None:
     """Refuse a PLY whose header names more than can be in the file."""
     head, end, rest = content.partition(b"end_header")
     words = [line.split() for line in head.decode("utf-8", "replace").splitlines()]
@@ -160,8 +170,12 @@ def _check_counts(content: bytes) -> None:
             least[-1] += 2 if ascii_ else sizes.get(kind, 1)
     needed = sum(count * max(size, 1) for count, size in zip(counts, least, strict=True))
     if not end or properties > most_properties or min(counts, default=0) < 0:
-        raise ValueError(f"no header of a PLY, or more than {most_properties} properties")
+        raise InvalidInputError(
+            f"no PLY header that ends, or one with more than {most_properties} properties or a "
+            f"count below 0: {path}; export it again"
+        )
     if needed > len(rest) + 1:  # a text may end without a blank
-        raise ValueError(
-            f"its header names at least {needed:,} bytes, and {len(rest):,} are there: cut short?"
+        raise InvalidInputError(
+            f"the header names at least {needed:,} bytes, and {len(rest):,} are there, cut short: "
+            f"{path}; export it again"
         )

@@ -161,19 +161,20 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
         raise InvalidInputError("points must be two numbers each, [x, z]", field=field) from None
     most = 5000
     if outline.ndim != 2 or outline.shape[1:] != (2,) or not 2 <= len(outline) <= most:
-        raise InvalidInputError(
-            f"2 to {most} points [x, z] are needed, got shape {outline.shape}", field=field
-        )
+        flat = outline.ndim == 2 and outline.shape[1] == 2
+        got = len(outline) if flat else f"an array of shape {outline.shape}"
+        raise InvalidInputError(f"2 to {most} points [x, z] are needed, got {got}", field=field)
     bad = np.flatnonzero(~(np.abs(outline) <= largest).all(axis=1))
     if len(bad):
         raise InvalidInputError(
-            f"numbers must be finite and at most {largest:g} (metres), "
-            f"got {outline[bad[0]].tolist()}",
+            f"both coordinates must be finite and within ±{largest:g} m, got "
+            f"{outline[bad[0]].tolist()}",
             field=f"{field}[{bad[0]}]",
         )
     if outline[0, 0] == outline[-1, 0]:
         raise InvalidInputError(
-            f"must end at another x than it begins, got {outline[0, 0]:g} m", field=field
+            f"must end at another x than it begins at, got {outline[0, 0]:g} m for both",
+            field=field,
         )
     if outline[0, 0] > outline[-1, 0]:
         outline = outline[::-1]
@@ -182,7 +183,7 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
     across, scale = float(np.ptp(outline, axis=0).max()), Scale.of()
     if length * 2.0 * scale.reach > scale.longest * across:
         raise InvalidInputError(
-            f"{length:.3g} m long and {across:.3g} m across; the maximum is "
+            f"is {length:.3g} m long and {across:.3g} m across; the maximum is "
             f"{0.5 * scale.longest / scale.reach:g} times as long as across: remove noise and "
             "spikes",
             field=field,
@@ -190,7 +191,8 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
     crossing = _crossing(outline)
     if crossing is not None:
         raise InvalidInputError(
-            f"crosses itself near x = {outline[crossing, 0]:g} m, z = {outline[crossing, 1]:g} m",
+            f"crosses itself near x = {outline[crossing, 0]:g} m, z = {outline[crossing, 1]:g} m; "
+            "remove or reorder points there",
             field=field,
         )
     return np.asarray(outline)

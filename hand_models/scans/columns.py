@@ -47,7 +47,8 @@ def read_columns(path: Path) -> RawScan:
     style = _style(lines[: sample + 1], path)
     first = _cells(lines[0], style)
     names = None
-    if not _numbers(first, style):
+    # a line of numbers whose decimals have the other mark is no names, and refused below
+    if not any(_numbers(first, style._replace(decimal=mark)) for mark in ".,"):
         names = _names(first, style)
         del lines[0]
     width = len(_cells(lines[0], style)) if lines else len(names or ())
@@ -68,7 +69,7 @@ def _text(path: Path) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16")
     if b"\0" in content:
-        raise InvalidInputError(f"not a text file: {path}")
+        raise InvalidInputError(f"not a text file: {path}; export the points as text")
     return content.decode("utf-8-sig", "replace")
 
 
@@ -77,18 +78,24 @@ def _is_count(line: str, rest: int) -> bool:
 
 
 def _style(lines: Sequence[str], path: Path) -> _Style:
-    """Return the way of writing in which most of some lines are three numbers or more."""
+    """Return the way of writing in which most of some lines are three numbers or more.
+
+    The first line, which may be names, decides only between ways of equally many others.
+    """
     # in the order in which they are tried
     marks = ((";", "."), (";", ","), (None, "."), (",", "."), (None, ","))
     styles = [_Style(*each) for each in marks]
     some = lines[1:] or lines
-    fits = [sum(_numbers(_cells(line, style), style) for line in some) for style in styles]
-    best = max(fits)
-    if not best:
+    fits = [
+        [_numbers(_cells(line, style), style) for line in (*some, lines[0])] for style in styles
+    ]
+    ranks = [(sum(others), first) for *others, first in fits]
+    best = max(ranks)
+    if not best[0]:
         raise InvalidInputError(
             f"no line has three numbers separated by commas, semicolons or spaces: {path}"
         )
-    return styles[fits.index(best)]
+    return styles[ranks.index(best)]
 
 
 def _cells(line: str, style: _Style) -> list[str]:
@@ -109,9 +116,21 @@ def _numbers(cells: Sequence[str], style: _Style) -> bool:
 def _number(cell: str, style: _Style) -> float:
     if style.decimal == ",":
         if "." in cell:
-            raise ValueError(f"{cell!r} has a point, and its decimals stand after commas")
+            raise ValueError(_mixed(cell, "point", "commas"))
         cell = cell.replace(",", ".")
-    return float(cell or "nan")
+    elif "," in cell:
+        raise ValueError(_mixed(cell, "comma", "points"))
+    try:
+        return float(cell or "nan")
+    except ValueError:
+        raise ValueError(f"{cell!r} is not a number") from None
+
+
+def _mixed(cell: str, own: str, usual: str) -> str:
+    return (
+        f"{cell!r} has a decimal {own}, but the file's decimals are {usual}; write all numbers "
+        "with one of them, and without thousands separators"
+    )
 
 
 def _names(cells: Sequence[str], style: _Style) -> list[str]:
@@ -205,5 +224,7 @@ def _read(
         try:
             found[i] = [_number(cells[column], style) for column in columns]
         except ValueError as error:
-            raise InvalidInputError(f"{where} is not a point, {error}: {path}") from None
+            raise InvalidInputError(
+                f"{where} is not three numbers x, y and z: {error}: {path}"
+            ) from None
     return found

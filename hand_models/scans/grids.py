@@ -51,7 +51,9 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
     with path.open("rb") as file:
         # an .npy begins with the first, an .npz with the second
         if not file.read(6).startswith((b"\x93NUMPY", b"PK")):
-            raise InvalidInputError(f"not a NumPy file: {path}")
+            raise InvalidInputError(
+                f"not a NumPy file: {path}; save it by numpy.save or numpy.savez"
+            )
     arrays = _arrays(path)
     flat = [name for name, array in arrays.items() if array.ndim == 2]
     usual = ("elevation", "heights", "height", "z", "dem")
@@ -64,8 +66,8 @@ def read_numpy(path: Path, cell: float | None) -> RawScan:
     heights = arrays[flat[0] if len(flat) == 1 else named[0]]
     if heights.shape[1] == 3 < heights.shape[0]:
         raise InvalidInputError(
-            f"an array of three columns holds points, not a grid of heights: {path}; save it as "
-            ".xyz"
+            f"an array of three columns holds points, not a grid of heights: {path}; save the "
+            "points as .xyz"
         )
     return _grid(heights, _sides(cell, _numpy_cell(arrays)))
 
@@ -80,7 +82,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         for info in archive.infolist():
             # a compressed byte stands for 1032 at most, but for more in an array of 1024 or less
             if info.file_size > 1032 * info.compress_size + 1024:
-                raise InvalidInputError(f"{info.filename} in {path} is corrupt")
+                raise InvalidInputError(f"{info.filename} in {path} is corrupt; save it again")
             with archive.open(info) as file:
                 content = io.BytesIO(file.read(info.file_size))
             version = np.lib.format.read_magic(content)
@@ -89,8 +91,12 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
                 header = np.lib.format.read_array_header_2_0
             shape, _, kind = header(content)
             left = info.file_size - content.tell()
-            if not kind.hasobject and math.prod(shape) * kind.itemsize > left:
-                raise InvalidInputError(f"{info.filename} of shape {shape} is cut short in {path}")
+            needed = math.prod(shape) * kind.itemsize
+            if not kind.hasobject and needed > left:
+                raise InvalidInputError(
+                    f"{info.filename} in {path} is cut short: shape {shape} needs {needed:,} "
+                    f"bytes, {left:,} are there; save it again"
+                )
             content.seek(0)
             name = info.filename.removesuffix(".npy")
             found[name] = np.lib.format.read_array(content, allow_pickle=False)
@@ -134,14 +140,17 @@ def read_geotiff(path: Path, cell: float | None) -> RawScan:
     # heights that a byte of the file may stand for: of LZW at most 1,400
     if math.prod(image.size) > 1500 * path.stat().st_size:
         raise InvalidInputError(
-            f"{path} is too small for {image.size[0]} by {image.size[1]} heights: is it cut short?"
+            f"{path} is too small for {image.size[0]} by {image.size[1]} heights, as if cut short: "
+            "export it again"
         )
     with image:
         tags = {tag: image.getexif().get(tag) for tag in GeoTag}
         heights = np.asarray(image)
     if heights.ndim != 2:
         bands = math.prod(heights.shape[2:])
-        raise InvalidInputError(f"one band of heights is needed, got {bands}: {path}")
+        raise InvalidInputError(
+            f"one band of heights is needed, got {bands}: {path}; take one by gdal_translate -b 1"
+        )
     if (missing := tags[GeoTag.NO_DATA]) is not None:
         heights = _without(heights, float(str(missing).strip("\0 ")))
     return _grid(heights, _sides(cell, _geo_cell(tags)))
@@ -194,7 +203,8 @@ def read_esri(path: Path, cell: float | None) -> RawScan:
     shape = int(header.get("nrows", 0)), int(header.get("ncols", 0))
     if values.size != math.prod(shape):
         raise InvalidInputError(
-            f"{shape[0]} rows of {shape[1]} heights are needed, {values.size} are in {path}"
+            f"{shape[0]} rows (NROWS) of {shape[1]} heights (NCOLS) are needed, {values.size} "
+            f"heights are in {path}: export it again"
         )
     heights = _without(values.reshape(shape), header.get("nodata_value", -9999.0))
     if "cellsize" in header:
@@ -220,7 +230,9 @@ def _sides(cell: float | None, own: Cell | None) -> Cell:
         )
     if not all(math.isfinite(side) and side > 0.0 for side in sides):
         got = f"{sides[0]:g} by {sides[1]:g} from the file" if cell is None else f"{cell:g}"
-        raise InvalidInputError(f"must be finite and above zero, got {got}", field="cell")
+        raise InvalidInputError(
+            f"must be finite and above zero, in the file's unit, got {got}", field="cell"
+        )
     return sides
 
 

@@ -39,7 +39,9 @@ def keep_triangles(scan: Scan, hole: float) -> ScannedRock:
     points, faces = weld(Triangles((scan.points - middle) @ axes, scan.faces))
     if not len(faces):
         raise InvalidInputError(
-            "no triangle has an area; its three vertices must not be on a line", field="file"
+            f"none of its {len(scan.faces)} triangles has an area: the corners of each are on a "
+            "line, or equal when rounded to 1e-8 m; check unit or width, or export the mesh again",
+            field="file",
         )
     shown = scan.shown()
     turned = shown is not None and float(shown @ view) > 0.0

@@ -71,7 +71,7 @@ def mesh_scan(
     if scan.faces is not None:
         if spacing is not None:
             raise InvalidInputError(
-                "is for points, and the file has triangles, which are kept: remove it",
+                "is for points, and the file has triangles, which are kept: leave spacing out",
                 field="spacing",
             )
         rock = keep_triangles(scan, hole)
@@ -157,12 +157,14 @@ def triangulated(
     else:
         points = points[_kept(points, _length(spacing, "spacing"))]
     report(1, SCAN_SETTINGS.mesh_steps)
-    _check_spread(points)
+    _check_spread(points, spacing)
     try:
         flat = scipy.spatial.Delaunay(points[:, :2])
     except scipy.spatial.QhullError as error:
         raise InvalidInputError(
-            f"no triangles: {str(error).splitlines()[0]}", field="file"
+            f"the {len(points)} points cannot be joined to triangles across the view: give another "
+            f"view (Qhull said {str(error).splitlines()[0]})",
+            field="file",
         ) from None
     report(2, SCAN_SETTINGS.mesh_steps)
     corners = flat.simplices.astype(np.intp)
@@ -185,7 +187,7 @@ def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputEr
         if scan.heights:
             cause = "is the cell in degrees, or in another unit than the heights?"
             return InvalidInputError(f"{message}; {cause}", field="cell")
-        return InvalidInputError(f"{message}; was it seen from another side?", field="view")
+        return InvalidInputError(f"{message}; was the rock seen from another side?", field="view")
     if extent > table.scalar("scan", "largest"):
         return InvalidInputError(f"{message}, {open_}; {too_large(extent)}", field="hole")
     for wider in wider_holes(hole):
@@ -256,11 +258,17 @@ def _length(value: float, field: str) -> float:
     return value
 
 
-def _check_spread(points: Array) -> None:
-    """Refuse points that are on a line across the view."""
+def _check_spread(points: Array, spacing: float | None = None) -> None:
+    """Refuse points that are on a line across the view; ``spacing``: to which they were thinned."""
     across = points[:, :2] - points[:, :2].mean(axis=0)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(across.T @ across), 0.0))
     if spread[0] <= math.sqrt(1e-9) * spread[1]:  # width of their length
+        if spacing is not None:
+            raise InvalidInputError(
+                f"must leave points that are not on a line across the view, got {spacing:g} m; "
+                "give a smaller one",
+                field="spacing",
+            )
         raise InvalidInputError(
             "the points lie on one line across the view, not on a surface: give another view",
             field="file",

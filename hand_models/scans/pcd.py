@@ -48,14 +48,18 @@ def read_pcd(path: Path) -> RawScan:
     )
     if len(points) != cloud.metadata.points:
         raise InvalidInputError(
-            f"{len(points)} of {cloud.metadata.points} points, cut short: {path}"
+            f"{len(points)} of {cloud.metadata.points} points are there, cut short: {path}; export "
+            "it again"
         )
     if tuple(cloud.metadata.viewpoint) == UNKNOWN_VIEWPOINT:
         return RawScan(points)
     x, y, z, *turn = cloud.metadata.viewpoint
     length = math.hypot(*turn)
     if not (math.isfinite(x + y + z) and math.isfinite(length) and length > 0.0):
-        raise InvalidInputError(f"VIEWPOINT is not a pose: {cloud.metadata.viewpoint} in {path}")
+        raise InvalidInputError(
+            "VIEWPOINT of the header must be finite, with a quaternion that is not zero, got "
+            f"{' '.join(f'{x:g}' for x in cloud.metadata.viewpoint)}: {path}"
+        )
     w, *axis = (part / length for part in turn)
     return RawScan(points, scanner=Pose.from_quaternion([x, y, z], [*axis, w]))
 
@@ -80,7 +84,8 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
         kind = found[b"DATA"][0]
     except (KeyError, IndexError, ValueError):
         raise InvalidInputError(
-            f"SIZE, COUNT, WIDTH, HEIGHT and POINTS of the header must be whole numbers: {path}"
+            "the header must have SIZE, COUNT, WIDTH, HEIGHT and POINTS, all whole numbers, and a "
+            f"format after DATA: {path}"
         ) from None
     kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", UNKNOWN_VIEWPOINT)
     if len(kinds) != len(sizes) or not {*kinds} <= {b"F", b"I", b"U"}:
@@ -102,11 +107,13 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     # the longest descriptors in use have some 2,000 numbers
     if not 0 < sum(counts) <= 10_000:
         raise InvalidInputError(
-            f"a point must have 1 to 10,000 numbers, the header of {path} has {sum(counts):,}"
+            "the numbers of a point, the sum of COUNT, must be 1 to 10,000, got "
+            f"{sum(counts):,}: {path}"
         )
     if width * height != points:
         raise InvalidInputError(
-            f"WIDTH {width} times HEIGHT {height} is not POINTS {points}: {path}"
+            f"WIDTH {width} times HEIGHT {height} of the header must be POINTS, got {points}: "
+            f"{path}"
         )
     left, record = size - data, sum(a * b for a, b in zip(sizes, counts, strict=False))
     if kind == b"ascii":
@@ -121,7 +128,7 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     if needed > left:
         raise InvalidInputError(
             f"{points:,} points need at least {needed:,} bytes, and {left:,} are there, cut short: "
-            f"{path}"
+            f"{path}; export it again"
         )
 
 

@@ -163,10 +163,11 @@ def _check_numbers(points: Array, read: int, path: Path) -> None:
             f"at least three points are needed, {path} has {len(points)}{others}", field="file"
         )
     largest = float(np.abs(points).max())
-    if largest > 1e12:  # what is beyond that is lost in rounding
+    most = 1e12  # what is beyond that is lost in rounding
+    if largest > most:
         raise InvalidInputError(
-            f"coordinates up to {largest:.3g} are too large; write nan for points that were not "
-            "measured",
+            f"coordinates must be within ±{most:g}, got {largest:.3g} in {path}; write nan for "
+            "points that were not measured",
             field="file",
         )
 
@@ -247,7 +248,7 @@ def _raw(path: Path, cell: float | None) -> RawScan:
                 read = read_columns
         if cell is not None:
             raise InvalidInputError(
-                f"is for grids of heights, {path} has points: remove it", field="cell"
+                f"is for grids of heights, {path} has points: leave cell out", field="cell"
             )
         return read(path)
 
@@ -266,12 +267,15 @@ def _scale(points: Array, unit: Unit, width: float | None) -> float:
         raise InvalidInputError(f"must be finite and above zero, got {width:g} m", field="width")
     longest = float(np.ptp(points, axis=0).max())
     if longest == 0.0:
-        raise InvalidInputError("all points are equal", field="file")
+        raise InvalidInputError(
+            f"all {len(points):,} points are equal; a scan has points at different places",
+            field="file",
+        )
     return width / longest
 
 
 def _unit_vector(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise InvalidInputError("must not be zero", field="view")
+        raise InvalidInputError("must be a direction, not zero", field="view")
     return np.asarray(vector / length)

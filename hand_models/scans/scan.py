@@ -202,7 +202,7 @@ class Scan:
         away = float(np.linalg.norm(middle - self.viewpoint))
         if away > scan_table().scalar("scan", "farthest_scanner") * size:
             raise InvalidInputError(
-                "the scanner's position is unknown: the file does not give it, and its origin is "
+                "the scanner's position is unknown: the file has none, and the file's origin is "
                 f"{away:,.0f} m from rock of {size:.3g} m (map coordinates?): give --view X,Y,Z, "
                 "the direction in which the scanner looked, or --viewpoint",
                 field="view",
@@ -288,7 +288,7 @@ def start_on(points: Array, scan: Scan, middle: Array, axes: Array) -> Array:
     if wanted is not None and distance[nearest] > near:
         raise InvalidInputError(
             f"the nearest rock is {distance[nearest]:.3g} m away, across the view; at most "
-            f"{near:g} m is possible",
+            f"{near:g} m is possible: give a point on the rock, in the file's axes and unit",
             field="origin",
         )
     return np.asarray(points[nearest])

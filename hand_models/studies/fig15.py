@@ -145,7 +145,8 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     both = strong.holds & weak.holds
     if not both.any():
         raise InvalidInputError(
-            f"exceeds a limit at every closing tension from {tried[0]:g} to {tried[-1]:g} N",
+            f"exceeds a limit at every closing tension from {tried[0]:g} to {tried[-1]:g} N, on a "
+            f"surface of {strong.name} or on one of {weak.name}",
             field="hand",
         )
     for curve in (strong, weak):

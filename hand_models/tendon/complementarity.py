@@ -58,7 +58,10 @@ def solve_lcp(M: Array, q: Array, cover: Array) -> Array:
         off = 1e-7  # how negative w and z, and how large w∘z, may be, relative to the size of q
         if min(w.min(), z.min()) >= -off and np.abs(w * z).max() <= off:
             return size * np.maximum(z, 0.0)
-    raise SolverError(f"a complementarity problem of size {n} ended without a solution")
+    raise SolverError(
+        "which of a tendon's pulleys slip was not found (a complementarity problem of size "
+        f"{n}): change a friction or stiffness slightly"
+    )
 
 
 def _follow(M: Array, q: Array, cover: Array) -> Array | None:

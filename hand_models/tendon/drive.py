@@ -100,8 +100,8 @@ class TendonDrive:
             )
         if not 0.0 <= drive.no_load_current < drive.maximum_current:
             raise InvalidInputError(
-                f"must be in [0, {drive.maximum_current:g}) A, below the limit of motor and "
-                f"driver, got {drive.no_load_current:g}",
+                f"must be in [0, {drive.maximum_current:g}) A, below maximum_current and "
+                f"driver_current, got {drive.no_load_current:g} A",
                 field="motor.no_load_current",
             )
         return drive

@@ -155,7 +155,11 @@ class SpineArray:
             check(field.name, math.isfinite(value) and value >= 0.0, "finite and not negative")
         for name in ("contact_stiffness", "shaft_strength", "strength_deviation"):
             check(name, getattr(self, name) > 0.0, "above 0")
-        check("spines", self.spines >= 1 and self.spines == int(self.spines), "a whole number")
+        check(
+            "spines",
+            self.spines >= 1 and self.spines == int(self.spines),
+            "a whole number of at least 1",
+        )
         for name in ("shaft_contact", "asperity_fraction"):
             check(name, getattr(self, name) <= 1.0, "from 0 to 1")
         least = math.tan(self.channel_tilt)

@@ -68,7 +68,8 @@ def clipped(
         vertices = np.vstack([vertices[kept], crossings])
         if len(vertices) > most_vertices:
             raise LimitError(
-                f"{len(vertices)} vertices after a cut are too many (at most {most_vertices})"
+                f"{len(vertices)} vertices after a cut are too many (at most {most_vertices}): use "
+                "fewer half_planes"
             )
         on_cut = np.append(height[kept] >= -slack, np.ones(len(crossings)))[:, None]
         lies = scipy.sparse.vstack([lies[kept], _incidence(crossings, faces, slack)])
@@ -93,7 +94,8 @@ def _edges(
     enough = shared.data >= r - 1
     if (pairs := int(enough.sum())) > most_pairs:
         raise LimitError(
-            f"{pairs} pairs of vertices on common facets are too many (at most {most_pairs})"
+            f"{pairs} pairs of vertices on common facets are too many (at most {most_pairs}): use "
+            "fewer half_planes"
         )
     i, j = shared.row[enough], shared.col[enough]
     squares = np.einsum("kr,ks->krs", faces.normals, faces.normals).reshape(-1, r * r)

@@ -59,9 +59,12 @@ def linear_program(
             return None
     if found.status == 3:
         raise UnsupportedError(
-            f"{what} is unbounded: fingers with lateral reactions would bound it"
+            f"{what} is unbounded: fingers with lateral reactions (grasp.lateral) would bound it"
         )
-    raise SolverError(f"{what}: {found.message}")
+    raise SolverError(
+        f"{what}: no solution of a linear program found (HiGHS said {found.message}); change a "
+        "number slightly"
+    )
 
 
 def ends_along(

@@ -47,7 +47,7 @@ def polytope(A: Array, b: Array) -> Polytope:
     everything = np.arange(len(b))
     norms = np.linalg.norm(A, axis=1)
     A, b = A / norms[:, None], b / norms
-    unbounded = SolverError(f"a block of {d} columns is not bounded")
+    unbounded = SolverError(f"no limit bounds {d} coupled loads: vertices cannot be listed")
     if d == 1:
         if (A > 0.0).all() or (A < 0.0).all():
             raise unbounded
@@ -68,7 +68,7 @@ def polytope(A: Array, b: Array) -> Polytope:
         return Polytope(np.zeros((0, d)), everything)
     middle, half = box
     if not (half > 0.0).all():
-        raise SolverError(f"a block of {d} columns has no interior")
+        raise _flat(d)
     # in a box of unit half widths, where a thin or skew set is as round as any other
     A, b = A * half, b - A @ middle
     norms = np.linalg.norm(A, axis=1)
@@ -81,10 +81,17 @@ def polytope(A: Array, b: Array) -> Polytope:
     what, bounds = f"a block of {d} columns", [(None, None)] * d + [(0.0, None)]
     ball = linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
     if ball is None or ball[-1] <= SETTINGS.tolerance:
-        raise SolverError(f"a block of {d} columns has no interior")
+        raise _flat(d)
     go_on()
     cut = scipy.spatial.HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
     return Polytope(middle + half * distinct(cut.intersections, SETTINGS.tolerance), rows)
+
+
+def _flat(d: int) -> SolverError:
+    return SolverError(
+        f"limits leave {d} coupled loads no room in some direction, vertices cannot be listed: "
+        "loosen a limit slightly"
+    )
 
 
 def _touching(vertices: Array, A: Array, b: Array) -> Polytope:
@@ -214,7 +221,7 @@ def hull(points: Array, options: str | None = None) -> scipy.spatial.ConvexHull:
             return scipy.spatial.ConvexHull(points, qhull_options=tried)
         except scipy.spatial.QhullError as error:
             failed = str(error).splitlines()[0]
-    raise SolverError(f"convex hull: {failed}")
+    raise SolverError(f"no convex hull of {len(points)} points found (Qhull said {failed})")
 
 
 def hull_facets(points: Array) -> tuple[Array, Array]:

@@ -212,7 +212,7 @@ class WrenchSpace:
         names = "" if columns is None else " of " + ", ".join(self.columns[i] for i in columns)
         return EmptySetError(
             f"the wrench space is empty at utilisation 1: the limits{names} contradict the hard "
-            "rows"
+            "rows; try another closing_tension, hold or surface"
         )
 
     @property
@@ -286,7 +286,8 @@ class WrenchSpace:
         """
         if not self.listed:
             raise LimitError(
-                f"{self._most_rows} coupled rows are too many (at most {SETTINGS.most_rows})"
+                f"{self._most_rows} coupled rows are too many (at most {SETTINGS.most_rows}): use "
+                "fewer half_planes"
             )
         sizes = self._sum.sizes
         return sizes._replace(half_spaces=max(sizes)) if len(self._cuts) else sizes

@@ -297,8 +297,12 @@ def _solved(
         if found.outcome.status not in programs.INFEASIBLE_STATUSES:
             raise _unsolved(found.outcome)
         return None
-    if _error(data, found, B, cap, K) > CAP_SLACK * max(1.0, float(np.abs(found.t).max())):
-        raise SolverError("body space: the solution exceeds its tolerances")
+    error = _error(data, found, B, cap, K)
+    if error > (most := CAP_SLACK * max(1.0, float(np.abs(found.t).max()))):
+        raise SolverError(
+            f"body space: the solver's answer violates the balance or a limit by {error:.2g} of "
+            f"its scale; at most {most:.2g} is accepted"
+        )
     return found._replace(t=found.t / unit)
 
 

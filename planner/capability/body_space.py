@@ -308,9 +308,11 @@ class BodySpace(BodyPrograms):
             )
         k = motion.wrench.shape[1]
         if len(direction) not in (3, k):
+            needs = "; angular components require stance.joints, and a load without load.com"
+            angular = needs if k == 3 else ""
             raise InvalidInputError(
                 f"{' or '.join(str(n) for n in sorted({3, k}))} components are needed, got "
-                f"{len(direction)}; angular ones require joints, and a load without com",
+                f"{len(direction)}{angular}",
                 field="direction",
             )
         size_of(direction)

@@ -148,7 +148,10 @@ def enclose(
 def _asked(touching: Callable[[Array], SupportPoint | None], normal: Array) -> SupportPoint:
     touch = touching(normal)
     if touch is None:
-        raise SolverError(f"no support point found toward {normal.tolist()}")
+        raise SolverError(
+            f"the set has no farthest point toward {normal.tolist()}: the set is empty, or the "
+            "solver failed"
+        )
     return touch
 
 

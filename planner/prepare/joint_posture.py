@@ -174,7 +174,8 @@ def _given(stance: Stance, poses: Mapping[str, Pose]) -> dict[str, Array]:
         if off > TOLERANCES.hand_offset or turned > TOLERANCES.hand_turn:
             raise InvalidInputError(
                 f"must be within {TOLERANCES.hand_offset:g} m and {TOLERANCES.hand_turn:g} rad of "
-                f"the pose of {limb}'s joint angles, got {off:.3g} m and {turned:.3g} rad",
+                f"the pose of {limb}'s joint angles, got {off:.3g} m and {turned:.3g} rad; correct "
+                "one of the two, or let the limb's joints be 'solve'",
                 field=f"stance.hands[{index[limb]}].pose",
             )
     return joints

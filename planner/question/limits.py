@@ -195,7 +195,7 @@ class Limits(Strict, frozen=True):
         cap = self.tendon_tension
         if cap is not None and self.least_tension > cap:
             raise InvalidFieldError(
-                f"must be at most tendon_tension ({cap:g} N), got {self.least_tension:g}",
+                f"must be at most tendon_tension ({cap:g} N), got {self.least_tension:g} N",
                 field="least_tension",
             )
         torque = self.joint_torque

@@ -179,8 +179,9 @@ class Load(Strict, frozen=True):
                     places.append((body @ hands[payload.limb]).apply(np.array(payload.com)))
                 else:
                     raise InvalidInputError(
-                        "its position depends on joint angles: add stance.joints, or attach it "
-                        f"to {stance.robot.description.body!r} or a hand of the stance",
+                        "the payload's position depends on joint angles: add stance.joints, or "
+                        f"attach the payload to {stance.robot.description.body!r} or a hand of the "
+                        "stance",
                         field="link" if payload.limb is None else "limb",
                     )
         return np.array(places).reshape(-1, 3)

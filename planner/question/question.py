@@ -106,7 +106,8 @@ class Question:
         moving = [name for name, wrist in wrists.items() if wrist != "fixed"]
         if "robust" in self.want and moving:
             raise InvalidInputError(
-                f"'robust' requires fixed wrists on all hands; not fixed are {', '.join(moving)}",
+                f"'robust' requires fixed wrists on all hands; not fixed are {', '.join(moving)}: "
+                "fix these, or remove 'robust'",
                 field="want",
             )
         self._check_open_loop()
@@ -135,7 +136,9 @@ class Question:
     def _check_draws(self) -> None:
         if "spread" not in self.want:
             if self.draws is not None:
-                raise InvalidInputError("requires 'spread' in want; add it", field="draws")
+                raise InvalidInputError(
+                    "requires 'spread' in want; add 'spread', or remove draws", field="draws"
+                )
             return
         if self.draws is not None:
             object.__setattr__(self, "draws", tuple(self.draws))
@@ -182,7 +185,7 @@ class Question:
             return
         if self.stance.joints is None:
             raise InvalidInputError(
-                "requires stance.joints, angles or 'solve'",
+                "requires stance.joints, angles or 'solve'; add them, or remove joint_torque",
                 field="limits.joint_torque",
             )
         if isinstance(limits.joint_torque, Mapping):

@@ -94,7 +94,9 @@ def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     most = 1e12  # [N, N·m] larger, the unit is wrong
     if not np.abs(wrench).max() <= most:
         raise InvalidInputError(
-            f"must be within ±{most:g} N or N·m, got {wrench.tolist()}", field=field
+            f"every component of the wrench must be within ±{most:g} N or N·m, got "
+            f"{wrench.tolist()}",
+            field=field,
         )
     return wrench
 
@@ -230,17 +232,21 @@ class HandOnHold:
             _possible(self.contact_offset, "contact_offset")
             if not posed:
                 raise InvalidInputError(
-                    "requires the pose of the hold, as planner.come_to_rest gives it",
+                    "requires the pose of the hold, as planner.come_to_rest gives it; give the "
+                    "pose, or remove contact_offset",
                     field="contact_offset",
                 )
         if self.seat_direction is not None:
             if self.seat != "best":
                 raise InvalidInputError(
-                    f"requires the seat 'best', got {self.seat!r}", field="seat_direction"
+                    f"requires the seat 'best', got {self.seat!r}; remove it for any other",
+                    field="seat_direction",
                 )
             direction = finite_vector(self.seat_direction, 6, "seat_direction")
             if not direction.any():
-                raise InvalidInputError("must not be zero", field="seat_direction")
+                raise InvalidInputError(
+                    "must be the direction of a wrench, not zero", field="seat_direction"
+                )
             object.__setattr__(self, "seat_direction", direction)
 
     def placed_hold(self) -> Pose | None:
@@ -338,13 +344,14 @@ class Stance:
                 )
             if hand.limb in seen:
                 raise InvalidInputError(
-                    f"limb {hand.limb!r} appears twice", field=f"hands[{i}].limb"
+                    f"limb {hand.limb!r} appears twice; a limb has one hand",
+                    field=f"hands[{i}].limb",
                 )
             seen.add(hand.limb)
             away = math.dist(hand.pose.position.tolist(), origin)
             if away > 10.0 * reach:  # farther, the unit is wrong
                 raise InvalidInputError(
-                    f"the hand is {away:.3g} m from the body; its limb reaches about "
-                    f"{reach:.2g} m (positions are in metres)",
+                    f"the hand is {away:.3g} m from the body; at most ten times the limbs' reach, "
+                    f"{10.0 * reach:.2g} m, is possible: is the position in W, in metres?",
                     field=f"hands[{i}].pose.position",
                 )

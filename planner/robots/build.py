@@ -155,7 +155,9 @@ def build_model(
         whole = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), "free body\x01")
     except (ValueError, RuntimeError) as error:
         raise InvalidInputError(
-            f"Pinocchio cannot read it: {' '.join(str(error).split())}", field="urdf"
+            "cannot be made a model of the robot; check the URDF with check_urdf (Pinocchio said "
+            f"{' '.join(str(error).split())})",
+            field="urdf",
         ) from None
     model = _reduced(whole, {joint.name for chain in joints.values() for joint in chain}, locked)
     model.gravity.setZero()  # gravity comes as an acceleration of the root, so that it may vary
@@ -217,8 +219,8 @@ def _mounted(
         reach = float(np.linalg.norm(mount.pose.position))
     if reach <= TOLERANCES.axis_distance:
         raise InvalidInputError(
-            "the hand is on the axes of the limb's joints, which cannot move it; must be away "
-            "from them",
+            "the hand is on the axes of the limb's joints, which cannot move the hand; must "
+            "be away from them",
             field=f"limbs.{limb}.position",
         )
     with errors_under(f"limbs.{limb}.torque_limit"):

@@ -53,7 +53,7 @@ class UnreachableError(InvalidInputError):
             if limb in turned and distance <= TOLERANCES.place_error:
                 said.append(f"{limb} cannot be turned as asked, by {turned[limb]:.2g} rad")
                 continue
-            near = f" (turned by {turned[limb]:.2g} rad it is there)" if limb in turned else ""
+            near = f" (in reach turned by {turned[limb]:.2g} rad)" if limb in turned else ""
             said.append(f"{limb} is out of reach by {distance:.2g} m{near}")
         super().__init__("; ".join(said), field=field)
         self.missing = dict(missing)

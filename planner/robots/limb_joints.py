@@ -216,7 +216,7 @@ def coupling_of(chain: Sequence[JointElement]) -> JointCoupling:
             if lower[j] > upper[j]:
                 raise InvalidInputError(
                     f"joint {joint.name!r} follows {driver!r} (mimic), and their limits have no "
-                    "common range"
+                    "common range; widen the limits of one"
                 )
     return JointCoupling(driving, matrix, offset, lower, upper)
 

@@ -219,7 +219,7 @@ class Robot:
                 unit = "m" if chain.sliding[i] else "rad"
                 raise InvalidInputError(
                     f"{chain.joints[i]} goes from {chain.lower[i]:.6g} to {chain.upper[i]:.6g} "
-                    f"{unit}, got {found[limb][i]:.6g}",
+                    f"{unit}, got {found[limb][i]:.6g} {unit}",
                     field=f"{limb}[{i}]",
                 )
         return found

@@ -147,7 +147,7 @@ class RobotDescription:
         try:
             raw = tomllib.loads(toml)
         except tomllib.TOMLDecodeError as error:
-            raise InvalidInputError(str(error)) from None
+            raise InvalidInputError(f"is not valid TOML: {error}; correct the file there") from None
         texts = ("name", "urdf", "body")  # entries that are plain text
         called, urdf, body = (_string(raw.get(name), name) for name in texts)
         _named(called, "name")
@@ -195,7 +195,9 @@ def _urdf(path: Path) -> str:
         reason = f"{path}: {error.strerror or error}"
         raise InvalidInputError(reason, field="urdf") from None
     except ValueError:
-        raise InvalidInputError("must be a URDF in UTF-8", field="urdf") from None
+        raise InvalidInputError(
+            f"{path}: must be a URDF in UTF-8; save it so", field="urdf"
+        ) from None
 
 
 def _string(value: Any, field: str) -> str:
@@ -299,7 +301,7 @@ def _direction(table: ParameterTable, section: str, name: str) -> tuple[float, .
     values = _triple(table, section, name)
     length = math.hypot(*values)
     if not length > 0.0:
-        raise InvalidInputError("must not be zero", field=f"{section}.{name}")
+        raise InvalidInputError("must be a direction, not zero", field=f"{section}.{name}")
     return tuple(value / length for value in values)
 
 
@@ -316,7 +318,7 @@ def _mount(link: str, table: ParameterTable, section: str) -> Mount:
     radius = table.positive(section, "radius") if "radius" in table.sections[section] else None
     if radius is not None and radius > TOLERANCES.link_radius:
         raise InvalidInputError(
-            f"must be at most {TOLERANCES.link_radius:g} m, got {radius:g}",
+            f"must be at most {TOLERANCES.link_radius:g} m, got {radius:g} m",
             field=f"{section}.radius",
         )
     return Mount(link, pose, hand_com, limits, radius)

@@ -151,7 +151,7 @@ class Urdf:
         if body not in trail:
             raise InvalidInputError(
                 f"link {link!r} is not connected to the body {body!r}; every limb must be a chain "
-                f"of joints from the body to its link; all are connected to body = {trail[-1]!r}"
+                f"of joints from the body to its link; every link has one to body = {trail[-1]!r}"
             )
         joints = [self.joints[at] for at in trail[: trail.index(body)]]
         moving = (joint for joint in reversed(joints) if joint.type != "fixed")
@@ -184,7 +184,9 @@ def parse_urdf(text: str) -> Urdf:
     except (ElementTree.ParseError, ValueError) as error:
         if "xacro:" in text:
             raise _unexpanded() from None
-        raise InvalidInputError(f"must be a URDF, which is XML: {error}") from None
+        raise InvalidInputError(
+            f"must be a URDF, which is XML: {error}; correct the file there"
+        ) from None
     if root.tag != "robot":
         raise InvalidInputError(f"must be a URDF, whose root is <robot>, got <{root.tag}>")
     _require_expanded(root, text)
@@ -204,7 +206,8 @@ def parse_urdf(text: str) -> Urdf:
     if len(roots) != 1:
         raise InvalidInputError(
             f"one link must be the root of all others, got {len(roots)}: "
-            f"{shorten(', '.join(roots) or 'a loop of joints', 200, placeholder=' …')}"
+            f"{shorten(', '.join(roots) or 'a loop of joints', 200, placeholder=' …')}; give every "
+            "link but one a parent joint"
         )
     tree = Urdf({}, by_child)
     for child in by_child:
@@ -233,14 +236,17 @@ def _require_expanded(root: ElementTree.Element, text: str) -> None:
 def _name(element: ElementTree.Element) -> str:
     name = element.get("name")
     if not name:
-        raise InvalidInputError(f"a <{element.tag}> has no name")
+        raise InvalidInputError(f"a <{element.tag}> has no name; give it one")
     return name
 
 
 def _distinct(kind: str, names: list[str]) -> None:
     for name in names:
-        if names.count(name) > 1:
-            raise InvalidInputError(f"{kind} {name!r} appears twice")
+        if (count := names.count(name)) > 1:
+            raise InvalidInputError(
+                f"{kind} {name!r} appears {count} times; every {kind} needs a name of its own: "
+                "rename or remove the others"
+            )
 
 
 def _numbers(

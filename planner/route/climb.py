@@ -272,12 +272,14 @@ def stages(route: Route) -> Iterator[RouteStage]:
             )
         if len(hands) == 1:
             raise InvalidInputError(
-                "the only hand on the rock cannot be lifted", field=f"moves[{number - 1}].limb"
+                "the only hand on the rock cannot be lifted; add another hand to the start stance",
+                field=f"moves[{number - 1}].limb",
             )
         given = dict(move.joints) if isinstance(move.joints, Mapping) else {}
         if joints is None and given:
             raise InvalidInputError(
-                "requires stance.joints in the start stance, angles or 'solve'",
+                "requires stance.joints in the start stance, angles or 'solve'; add them, or "
+                "remove the joints of the move",
                 field=f"moves[{number - 1}].joints",
             )
         known_limbs(given, route.start.robot, f"moves[{number - 1}].joints")

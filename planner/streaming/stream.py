@@ -155,7 +155,7 @@ class WrenchStream:
         key = wrench.tobytes()
         with self._lock:
             if self._closed:
-                raise InvalidInputError("is closed; open another", field="stream")
+                raise InvalidInputError("is closed; open another stream", field="stream")
             last = self._last
             if last is not None and last.verified and self._key == key:
                 return last
@@ -179,7 +179,7 @@ def _refuse(question: Question) -> None:
         )
     if question.limits.tension_change is not None:
         raise UnsupportedError(
-            "not available for streams, whose tensions change with the wrench: remove it",
+            "not available for streams, whose tensions change with the wrench: leave it out",
             field="limits.tension_change",
         )
 

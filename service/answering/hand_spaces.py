@@ -96,7 +96,8 @@ def answer_wrench_space(
     if "robust" in (request.want or ()):
         if hand.palm is not None:
             raise InvalidInputError(
-                f"'robust' requires fixed wrists on all hands; that of {request.limb} is not fixed",
+                f"'robust' requires fixed wrists on all hands; that of {request.limb} is not "
+                "fixed: fix it, or remove 'robust'",
                 field="want",
             )
         both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
@@ -203,7 +204,7 @@ def _add_views(
     for i, name in enumerate(want or ()):
         if name in (want or ())[:i]:
             raise InvalidInputError(f"{name} is given twice", field=f"want[{i}]")
-    less = 'take fewer half_planes of its surface, or "lateral": false in its grasp'
+    less = 'use fewer half_planes, or "lateral": false in the grasp'
     # candidates for one view: less than a second's work, and some megabytes of reply
     most = 30_000
     # the hand is closed anew at each sampled place; 16 half-planes have 535 rows
@@ -211,7 +212,7 @@ def _add_views(
     if "robust" in (want or ()) and len(space.rows) > most_rows:
         raise LimitError(
             f"robust: {len(space.rows)} rows at each place are too many (at most {most_rows}); "
-            f"{less}, or leave it out",
+            f"{less}, or leave 'robust' out",
             field="want",
         )
 
@@ -223,12 +224,14 @@ def _add_views(
             return None
         try:
             if (size := candidates()) > most:
-                raise LimitError(f"{size} candidates for {name} are too many (at most {most})")
+                raise LimitError(
+                    f"{size} candidates for {name} are too many (at most {most}): {less}"
+                )
             return found()
         except LimitError as error:
-            why = f"{error.message}; {less}"
+            why = error.message
         if want is not None:
-            raise LimitError(f"{name}: {why}, or leave it out", field="want")
+            raise LimitError(f"{name}: {why}, or leave {name} out", field="want")
         reply.warnings = [*reply.warnings, f"{name} left out: {why}"]
         return None
 

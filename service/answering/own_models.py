@@ -108,7 +108,7 @@ def read_draws(path: Path) -> list[Draw]:
         given = raw.get("draws")
         if list(raw) != ["draws"] or not isinstance(given, list) or not given:
             raise InvalidInputError(
-                "must be a list, [[draws]], with no other entries", field="draws"
+                "must be a list of one or more, [[draws]], and the file's only entry", field="draws"
             )
         found = []
         for i, draw in enumerate(given):
@@ -251,8 +251,8 @@ def with_robot(request: RequestT, file: RobotFile | None) -> RequestT:
     named = request.stance.robot
     if named not in (None, file.name):
         raise InvalidInputError(
-            f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; use "
-            "that name, or none",
+            f"the stance is for {named!r}, the file {file.origin} describes {file.name!r}; name "
+            f"{file.name!r} in the stance, or none",
             field="stance.robot",
         )
     stance = msgspec.structs.replace(request.stance, robot=file.name)

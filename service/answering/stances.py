@@ -178,7 +178,7 @@ def _hand(
     if message.contact_offset is not None and message.placing != "contact":
         raise InvalidInputError(
             f"requires a hand that is placed by contact, got placing {message.placing!r}; remove "
-            "it, or give placing 'contact'",
+            "contact_offset, or give placing 'contact'",
             field="contact_offset",
         )
     return HandOnHold(
@@ -217,7 +217,9 @@ def _placed_hold(
             shared.check_place()
         except InvalidInputError as error:
             raise InvalidInputError(
-                f"without a pose the hand is seated at its origin: {error.message}", field="rock"
+                f"without a pose the hand is seated at the rock's origin: {error.message}; give "
+                "the rock a pose, or the hand a place",
+                field="rock",
             ) from None
     return shared, own
 
@@ -266,8 +268,8 @@ def _frame(place: requests.Place, rock_pose: Pose) -> Pose:
     largest = 4.0 * math.pi
     if abs(place.wrist_angle) > largest:
         raise InvalidInputError(
-            f"must be within ±{largest:.4g} rad (two turns), got {place.wrist_angle:g}: is it "
-            "in rad?",
+            f"must be within ±{largest:.4g} rad (two turns), got {place.wrist_angle:g} rad: "
+            "is it in degrees?",
             field="place.wrist_angle",
         )
     if place.frame == "world":
@@ -353,7 +355,8 @@ def _profile(message: requests.Profile, numbers: ParameterTable) -> Profile:
             "outer_right": strips.outer_right,
         }
         return Profile(outlines, numbers)
-    raise InvalidInputError("give points or profiles, one of them", field="points")
+    got = "neither" if message.points is None else "both"
+    raise InvalidInputError(f"give points or profiles, got {got}", field="points")
 
 
 def _mesh(message: requests.Mesh, numbers: ParameterTable, anywhere: bool) -> Mesh:

@@ -56,7 +56,7 @@ def opened(request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchStr
     """
     if request.limits.tension_change is not None:
         raise UnsupportedError(
-            "not available for streams, whose tensions change with the wrench: remove it",
+            "not available for streams, whose tensions change with the wrench: leave it out",
             field="limits.tension_change",
         )
     first = PlanRequest(

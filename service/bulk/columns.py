@@ -201,7 +201,7 @@ def chosen_columns(
     names = [name.strip() for name in wanted.split(",")]
     for name in names:
         if not any(fnmatchcase(column.name, name) for column in known):
-            hint = "; it needs --explain" if name in {"irreducible", "sufficient"} else ""
+            hint = ", which needs --explain" if name in {"irreducible", "sufficient"} else ""
             listed = ", ".join(column.name for column in known)
             raise InvalidInputError(
                 f"no column {name!r}{hint}; valid are {listed}", field="columns"

@@ -266,4 +266,8 @@ def _encoded(question: Question, form: Format) -> bytes | Answer:
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         name: Any = getattr(question, "id", None)
         known = name if isinstance(name, str) else None
-        return encode_error(MalformedError(f"not a request: {error}"), form, known)
+        return encode_error(
+            MalformedError(f"not a PlanRequest, a RouteRequest or the bytes of one: {error}"),
+            form,
+            known,
+        )

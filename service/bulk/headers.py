@@ -76,7 +76,8 @@ class Header(msgspec.Struct):
                 digest = name in {"hand", "robot", "stance"}
                 which = "" if digest else f" ({values[0]!r}, now {values[1]!r})"
                 raise InvalidInputError(
-                    f"{path}: was started with another {name}{which}; start again without --resume",
+                    f"{path}: was started with another {name}{which}; give that again, or "
+                    "start again without --resume",
                     field="--resume",
                 )
 

@@ -179,7 +179,7 @@ def check_address(address: object) -> None:
     if not good:
         raise InvalidInputError(
             f"{text!r} is unknown; valid are processes, here, {LOCAL_CLUSTER}, tcp://HOST:PORT of "
-            "a Dask scheduler, or its client",
+            "a Dask scheduler, or a client of a scheduler",
             field="on",
         )
 
@@ -215,7 +215,7 @@ class DaskPool:
             check_address(on)
             if workers is not None:
                 raise InvalidInputError(
-                    "not available with a cluster, which has its own workers: remove it",
+                    "not available with a cluster, which has its own workers: leave workers out",
                     field="workers",
                 )
         self._on, self._workers, self._setting = on, workers, setting

@@ -144,8 +144,8 @@ class Run(ABC):
                 self._header.check(stream.readline(), file)
             if count > asked.count:
                 raise InvalidInputError(
-                    f"{file} has {count} replies, and there are {asked.count} requests; "
-                    "is it of another batch?",
+                    f"{file} has {count} replies, and there are {asked.count} requests; is the "
+                    "file of another batch?",
                     field="--resume",
                 )
             for number, question in enumerate(islice(asked, count), start=1 + heads):
@@ -233,8 +233,8 @@ class ReplyLines(Run):
         name = identifier(question, Format.JSON)
         if reply.id != name:
             raise InvalidInputError(
-                f"{where}: answers {reply.id!r}, and the request is {name!r}; "
-                "is it of another batch?",
+                f"{where}: answers {reply.id!r}, and the request is {name!r}; is the file of "
+                "another batch?",
                 field="--resume",
             )
         if reply.status is None and reply.error is None:
@@ -318,7 +318,8 @@ class TableLines(Run):
             )
         if table.exists():
             raise InvalidInputError(
-                f"{table}: not a table of crux batch or crux sweep; give another output",
+                f"{table}: not a table of crux batch or crux sweep, which has a file "
+                f"{table.name}.jsonl beside it; give another output",
                 field="--resume",
             )
 
@@ -374,13 +375,13 @@ class TableLines(Run):
             whole = False
         if not whole:
             raise InvalidInputError(
-                f"{where}: not a row of this table; is it of another batch or sweep?",
+                f"{where}: not a row of this table; is the file of another batch or sweep?",
                 field="--resume",
             )
         if row.asked != _digest(question):
             raise InvalidInputError(
-                f"{where}: its rows answer other requests than those given now; "
-                "is it of another batch?",
+                f"{where}: the rows answer other requests than those given now; is the file of "
+                "another batch?",
                 field="--resume",
             )
         return _Outcome(row.status, row.error)

@@ -225,7 +225,7 @@ def _read_hand(
     if not paths:
         return None
     if len(paths) > 1:
-        raise click.BadParameter(f"one FILE at most, got {', '.join(map(str, paths))}")
+        raise click.BadParameter(f"one FILE at most may be given, got {', '.join(map(str, paths))}")
     if paths[0].suffix != ".toml" and not paths[0].exists():
         raise click.BadParameter(
             f"{paths[0]}: no such file; a FILE with numbers of a hand is wanted, not a LIMB"
@@ -264,7 +264,7 @@ def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
     """Refuse a folder with the file ending of a table or a picture."""
     tables = (".csv", ".parquet", ".json", ".jsonl")
     if path.suffix.lower() in (*tables, *PICTURE_ENDINGS) and not path.is_dir():
-        raise click.BadParameter(f"{path}: names a folder, into which several files go")
+        raise click.BadParameter(f"{path}: must be a folder for several files, not a {path.suffix}")
     return path
 
 

@@ -139,7 +139,9 @@ def rock_command(
     if reading["view"] is not None and reading["viewpoint"] is not None:
         raise InvalidInputError("give a view or a viewpoint, not both", field="view")
     if neighbours is not None and std_ratio is None:
-        raise InvalidInputError("requires --std-ratio", field="neighbours")
+        raise InvalidInputError(
+            "requires --std-ratio; give it, or leave --neighbours out", field="neighbours"
+        )
     if output.exists() and file.exists() and output.samefile(file):
         raise InvalidInputError(f"{output} is the scan itself; name another", field="--output")
     with tables.progress(f"meshing {file.name}") as report:

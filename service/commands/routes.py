@@ -162,7 +162,7 @@ def _files(source: str) -> list[str]:
         return [source]
     found = sorted(str(path) for path in Path(source).glob("*.json"))
     if not found:
-        raise InvalidInputError(f"{source}: no file in it ends in .json", field="ROUTE")
+        raise InvalidInputError(f"{source}: no file in this folder ends in .json", field="ROUTE")
     return found
 
 
@@ -183,7 +183,7 @@ def _many(
     tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
-        raise InvalidInputError(f"{file}: must be a file", field="-o")
+        raise InvalidInputError(f"{file}: is no plain file; name another", field="-o")
     sink = new_run(
         file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )

@@ -57,7 +57,9 @@ def _chosen_study(name: str, **wanted: Any) -> str | studies.Study:
     if name != "sweep" or not given:
         if given:
             option = "--measure" if "measures" in given else f"--{min(given)}"
-            raise InvalidInputError(f"only the study sweep takes it, not {name}", field=option)
+            raise InvalidInputError(
+                f"only the study sweep takes this option, not {name}", field=option
+            )
         # it asks the planner, and so is not among those of one hand
         return _measurements() if name == "measure" else name
 

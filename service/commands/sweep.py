@@ -77,7 +77,7 @@ def sweep_command(
     a point failed or was lost.
     """
     if seed is not None and samples is None:
-        raise InvalidInputError("requires --samples", field="--seed")
+        raise InvalidInputError("requires --samples; give it, or leave --seed out", field="--seed")
     request = own.asked(stances.read_request(stance))
     try:
         chosen = [
@@ -89,7 +89,12 @@ def sweep_command(
         raise InvalidInputError(error.message, field=where) from None
     given = click.get_current_context().get_parameter_source("tolerance")
     if given is ParameterSource.COMMANDLINE and design.number is None:
-        raise InvalidInputError("requires exactly one varied number", field="--tolerance")
+        paths = ", ".join(design.variations[i].path for i in design.varying)
+        raise InvalidInputError(
+            "requires exactly one varied field, and numbers as its values; varied: "
+            f"{paths}; vary one number only, or remove --tolerance",
+            field="--tolerance",
+        )
     pair = None if over is None else over.split(",")
     if pair is not None:
         with errors_under("--over"):

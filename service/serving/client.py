@@ -257,7 +257,7 @@ class CruxClient:
         if reply.err is None or not str(reply.err.encoding).startswith("application/"):
             # an error of zenoh's own, in a plain string: it has only this one
             raise ServiceTimeout(
-                f"no answer at {key} within {waits:g} s; allow it longer (timeout, --timeout)"
+                f"no answer at {key} within {waits:g} s; wait longer (timeout, --timeout)"
             )
         detail = _read(reply.err, ErrorReply).error
         raise ServiceError(
@@ -293,11 +293,14 @@ class CruxClient:
 
 
 def _how_to_start() -> str:
-    return "start one with `crux serve` where this session reaches it"
+    return "start a service with `crux serve` where this session reaches it"
 
 
 def _read(received: zenoh.Sample | zenoh.ReplyError, kind: type[ReplyT]) -> ReplyT:
     try:
         return Format.named(str(received.encoding)).decode(received.payload.to_bytes(), kind)
     except (MalformedError, msgspec.ValidationError) as error:
-        raise ServiceError("internal", f"the reply is not a {kind.__name__}: {error}") from None
+        raise ServiceError(
+            "internal",
+            f"the reply is not a {kind.__name__} ({error}): run client and service of one version",
+        ) from None

@@ -168,7 +168,9 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise NoServiceError(f"no zenoh session: {_first_line(error)}") from None
+        raise NoServiceError(
+            f"no zenoh session: {_first_line(error)}; check its endpoints (--connect, --listen)"
+        ) from None
 
 
 @contextmanager
@@ -327,7 +329,12 @@ def _read(file: Path | None) -> zenoh.Config:
     except OSError as error:
         raise InvalidInputError(f"{source}: {error.strerror}", field=field) from None
     except zenoh.ZError as error:
-        raise InvalidInputError(f"{source}: {_complaint(error)}", field=field) from None
+        place = re.search(r"line: (\d+), column: (\d+)", str(error))
+        where = "" if place is None else f", line {place[1]}, column {place[2]}"
+        # else it lists the fields itself
+        more = "" if "unknown field" in str(error) else "; see zenoh's DEFAULT_CONFIG.json5"
+        said = f"{source}{where}: {_complaint(error)}{more}"
+        raise InvalidInputError(said, field=field) from None
 
 
 def _insert(config: zenoh.Config, key: str, value: str, flag: str) -> None:
@@ -372,7 +379,7 @@ def _first_line(error: Exception) -> str:
 
 def _complaint(error: Exception) -> str:
     """Return what zenoh has against a part of a configuration, without how it is made."""
-    said = re.search(r'(?:msg: |Str\()"((?:[^"\\]|\\.)*)"', str(error))
+    said = re.search(r'(?:msg: |message: |Error\(|Str\()"((?:[^"\\]|\\.)*)"', str(error))
     words = str(error) if said is None else said[1].replace(r"\n", "\n")
     words = words.partition(" at /")[0]
     # a parser's drawing of the place, and what was expected there

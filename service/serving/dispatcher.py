@@ -101,7 +101,7 @@ class Dispatcher:
         if not self._pool.up:
             self.stop()
             self.close()
-            raise LostError("no worker starts; see the log")
+            raise LostError("no worker starts; see the service's log")
 
     def ask(self, query: zenoh.Query, key: str) -> None:
         """Put a query, which arrived at a key, into its queue; returns at once."""
@@ -309,7 +309,7 @@ class Dispatcher:
             how, left = self._end_process(lane.handle)
             for question in left:
                 self._shares.ended_process(question.place, time.perf_counter() - question.begun)
-                lost = LostError(f"its worker {how}; {rest}")
+                lost = LostError(f"the question's worker {how}; {rest}")
                 self._replies.refuse(question, lost)
             return
         if done is None:

@@ -129,7 +129,10 @@ class PlanService:
         try:
             self._monitor.serve(port)
         except OSError as error:
-            raise InvalidInputError(f"{port}: {error.strerror}", field="--metrics-port") from None
+            raise InvalidInputError(
+                f"port {port} cannot be opened: {error.strerror}; give another",
+                field="--metrics-port",
+            ) from None
 
     def __enter__(self) -> Self:
         self._dispatcher.start()

@@ -83,11 +83,12 @@ class Design:
             If there are too many points.
         """
         if not variations:
-            raise InvalidInputError("at least one is needed", field="variations")
+            raise InvalidInputError("at least one is needed, got none", field="variations")
         count = math.prod(len(each.values) for each in variations) if samples is None else samples
         most = 100_000
         if not 1 <= count <= most:
-            raise LimitError(f"must be 1 to {most:,} points, got {count:,}")
+            change = "give another number of values" if samples is None else "change samples"
+            raise LimitError(f"must be 1 to {most:,} points, got {count:,}: {change}")
         asked = msgspec.structs.replace(
             request,
             detail="hands",
@@ -152,6 +153,11 @@ class Design:
             If the paths are not two different variations of this design.
         """
         paths = [each.path for each in self.variations]
+        if len(paths) == 1:
+            raise InvalidInputError(
+                f"requires two varied fields; only {paths[0]} varies: vary another too, or leave "
+                "this out"
+            )
         if len(over) != 2 or over[0] == over[1] or not {*over} <= {*paths}:
             raise InvalidInputError(
                 f"two different ones of {', '.join(paths)} are wanted, got {','.join(over)}"
@@ -221,7 +227,8 @@ def _check_apart(variations: Sequence[Variation], targets: Sequence[Target]) -> 
     ]
     for (first, path), (steps, again) in itertools.combinations(ends, 2):
         if all(map(operator.eq, first, steps)):
-            raise InvalidInputError(f"varies the same field as {path}", field=again)
+            same = "is given twice" if path == again else f"varies the same field as {path}"
+            raise InvalidInputError(f"{same}; vary the field once", field=again)
 
 
 def _whole_numbers(variation: Variation, target: Target) -> Variation:

@@ -189,7 +189,7 @@ class Paths:
                 field=path,
             )
         found = f"is {value!r} in the request" if _meant(places, value) else "is a number or a word"
-        raise InvalidInputError(f"{words} {found}, without entries", field=path)
+        raise InvalidInputError(f"{words} {found}, without entries: end the path there", field=path)
 
     def _own_unit(self, steps: Steps) -> tuple[str, ...]:
         """Return the unit that an entry of a hand names itself."""

@@ -50,7 +50,9 @@ class Variation:
             if isinstance(value, float) and not math.isfinite(value):
                 raise InvalidInputError(f"must be finite numbers, got {value}", field=self.path)
             if value in self.values[:i]:
-                raise InvalidInputError(f"has the value {value} twice", field=self.path)
+                raise InvalidInputError(
+                    f"has the value {value} twice; give it once", field=self.path
+                )
         low, high = self.values[0], self.values[-1]
         if self.ranged and not (self.numbers and low < high):  # type: ignore[operator]
             raise InvalidInputError(f"LOW must be below HIGH, got {low}:{high}", field=self.path)

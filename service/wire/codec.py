@@ -119,7 +119,14 @@ class Format(Enum):
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise MalformedError(f"not {self.name.lower()}: {error}") from None
         except RecursionError:
-            raise MalformedError("nested too deeply") from None
+            raise _too_deep() from None
+
+
+def _too_deep() -> MalformedError:
+    return MalformedError(
+        "has lists or objects nested too deep to be read, hundreds of levels; a request needs a "
+        "few: remove the extra brackets"
+    )
 
 
 def _schema_name(kind: type[msgspec.Struct]) -> str:
@@ -203,7 +210,7 @@ def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.J
             refuse_in_msgpack(payload)
         _check(request)
     except RecursionError:
-        raise MalformedError("nested too deeply") from None
+        raise _too_deep() from None
     return request
 
 

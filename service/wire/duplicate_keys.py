@@ -93,7 +93,8 @@ def _refuse(document: Any, path: str) -> None:
     if isinstance(document, _Repeated):
         key = document.key
         raise MalformedError(
-            f"the key {key[:80]!r} is given twice", field=f"{path}.{key}".removeprefix(".")
+            f"the key {key[:80]!r} is given twice; remove one",
+            field=f"{path}.{key}".removeprefix("."),
         )
     if isinstance(document, dict):
         for key, part in document.items():

@@ -197,7 +197,8 @@ def test_an_impossible_preload_is_told_as_a_plain_list():
     with pytest.raises(InvalidInputError) as caught:
         compliant("pinch", np.full(4, 900.0))
     assert str(caught.value) == (
-        "tendon_preload: four tensions from 0 to 700 N are needed, got [900.0, 900.0, 900.0, 900.0]"
+        "tendon_preload: four tensions from 0 to tendon.maximum_tension, 700 N, are needed, got "
+        "[900.0, 900.0, 900.0, 900.0]"
     )
 
 

@@ -200,8 +200,14 @@ def test_the_command_tells_where_it_is_best(tmp_path, capsys):
         (["--diameter", "-0.3"], "--diameter: must be from 0.02 to 10 m, got -0.3"),
         (["--diameter", "300"], "--diameter: must be from 0.02 to 10 m, got 300"),
         (["--diameter", "nan"], "--diameter: must be from 0.02 to 10 m, got nan"),
-        (["--tension", "0"], "--tension: must be above 0 and at most the tendon's 700 N"),
-        (["--tension", "701"], "--tension: must be above 0 and at most the tendon's 700 N"),
+        (
+            ["--tension", "0"],
+            "--tension: must be above 0 and at most tendon.maximum_tension, 700 N",
+        ),
+        (
+            ["--tension", "701"],
+            "--tension: must be above 0 and at most tendon.maximum_tension, 700 N",
+        ),
     ],
 )
 def test_what_cannot_be_swept_is_refused_in_one_line(options, expected, tmp_path, capsys):
@@ -225,7 +231,10 @@ def test_what_cannot_be_swept_is_refused_in_one_line(options, expected, tmp_path
 )
 def test_other_studies_refuse_the_options_of_a_sweep(option, value, tmp_path, capsys):
     assert run_command_line(["study", "fig06", "-o", str(tmp_path / "new"), option, value]) == 2
-    assert capsys.readouterr().err == f"crux: {option}: only the study sweep takes it, not fig06\n"
+    assert (
+        capsys.readouterr().err
+        == f"crux: {option}: only the study sweep takes this option, not fig06\n"
+    )
     assert not (tmp_path / "new").exists()
 
 

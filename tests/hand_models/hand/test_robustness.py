@@ -222,7 +222,7 @@ def anything_anywhere(seed):
 
 
 def test_closing_beyond_the_tendons_maximum_is_refused():
-    with pytest.raises(InvalidInputError, match="at most the tendon's 700 N") as caught:
+    with pytest.raises(InvalidInputError, match=r"at most tendon.maximum_tension, 700 N") as caught:
         HAND.settle(Cylinder(0.3), ROCK, Grasp(closing_tension=701.0))
     assert caught.value.field == "grasp.closing_tension"
 

@@ -242,7 +242,7 @@ def test_a_hand_that_cannot_be_where_it_is_has_its_error_in_place():
     assert isinstance(first, SettledHand)
     assert (palm.field, tension.field) == ("hold", "grasp.closing_tension")
     assert "20.0 mm inside the palm" in str(palm)
-    assert "must be at most the tendon's 700 N, got 900" in str(tension)
+    assert "must be at most tendon.maximum_tension, 700 N, got 900 N" in str(tension)
     with pytest.raises(InvalidInputError, match=r"^hold: the hold stands 20\.0 mm inside the palm"):
         HAND.settle(Plane(), ROCK, Grasp(), deep)
 

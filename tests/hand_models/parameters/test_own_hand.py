@@ -299,7 +299,7 @@ BAD = {
     ),
     "closing beyond the tendon": (
         entry_toml("tendon", "closing_tension", 800.0),
-        "tendon.closing_tension: must be at most the tendon's 700 N, got 800",
+        "tendon.closing_tension: must be at most tendon.maximum_tension, 700 N, got 800 N",
     ),
     "a gear that gains": (
         entry_toml("motor", "efficiency", 1.2),
@@ -327,8 +327,8 @@ BAD = {
         "hand.mass.value: must be a number or a list of numbers, got 'a'",
     ),
     "no section": ("mass = 2.0\n", "mass: a section of entries is needed"),
-    "no TOML": ("[hand\n", "Expected"),
-    "no text": (b"\xff\xfe", "must be TOML in UTF-8"),
+    "no TOML": ("[hand\n", "is not valid TOML: Expected"),
+    "no text": (b"\xff\xfe", "is not in UTF-8 (byte 0xff in line 1); save it as TOML in UTF-8"),
 }
 
 
@@ -403,7 +403,7 @@ def test_the_file_has_the_last_word_over_the_stance(
 def test_one_file_is_a_hand_and_a_limb_is_none(file, capfd: pytest.CaptureFixture[str]) -> None:
     path = file(entry_toml("hand", "mass", 3.0))
     assert run_command_line(["plan", "wall-300", "--hand", path, "--hand", path]) == 2
-    assert f"one FILE at most, got {path}, {path}" in capfd.readouterr().err
+    assert f"one FILE at most may be given, got {path}, {path}" in capfd.readouterr().err
     assert run_command_line(["plan", "wall-300", "--hand", "front_left"]) == 2
     assert "a FILE with numbers of a hand is wanted" in capfd.readouterr().err
 

@@ -374,7 +374,7 @@ def test_vertices_without_numbers_are_left_out_where_no_triangle_names_them():
     assert got.oddities == (
         "vertices: 4 vertices without numbers, which no triangle names, were left out",
     )
-    with pytest.raises(InvalidInputError, match="of a triangle must be finite") as caught:
+    with pytest.raises(InvalidInputError, match="have three finite coordinates") as caught:
         Mesh(numbers, np.vstack([moved, [[1, 2, 131]]]))
     assert caught.value.field == "vertices[131]"
 

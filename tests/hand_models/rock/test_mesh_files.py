@@ -89,7 +89,7 @@ def test_counts_of_a_ply_beyond_its_size_are_refused(kind, count, more, faces, t
     path = tmp_path / "a.ply"
     head = PLY.format(kind=kind, count=count, more=more, faces=faces)
     path.write_bytes(head.encode() + (b"1 2 3\n" * 9 if kind == "ascii" else bytes(108)))
-    with pytest.raises(InvalidInputError, match=r"its header|no header") as error:
+    with pytest.raises(InvalidInputError, match=r"the header|no PLY header") as error:
         read_vertices(path)
     assert str(path) in str(error.value)
 
@@ -100,7 +100,7 @@ def test_lists_of_a_ply_beyond_its_size_are_refused(size, tmp_path):
     head = PLY.format(kind="binary_little_endian", count=3, more="", faces=faces)
     path = tmp_path / "a.ply"
     path.write_bytes(head.encode() + bytes(36) + size.to_bytes(4, "little") + bytes(12))
-    with pytest.raises(InvalidInputError, match=r"^file: cannot read"):
+    with pytest.raises(InvalidInputError, match=r"^file: .*a\.ply.* cut short, or"):
         read_vertices(path)
 
 
@@ -111,7 +111,7 @@ def test_faces_of_different_numbers_of_corners_are_named(tmp_path):
     square = b"\4" + np.array([0, 1, 2, 3], "<i4").tobytes()
     path = tmp_path / "a.ply"
     path.write_bytes(head.encode() + np.eye(4, 3, dtype="<f4").tobytes() + triangle + square)
-    with pytest.raises(InvalidInputError, match="make them triangles"):
+    with pytest.raises(InvalidInputError, match="make all faces triangles"):
         read_mesh(path)
 
 

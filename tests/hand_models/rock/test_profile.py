@@ -118,7 +118,7 @@ def test_a_section_never_leaves_raw_rock_outside(seed):
         ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], "points", "2 to 5000 points"),
         ([[0.0, 0.0], [1.0]], "points", "two numbers"),
         ([[0.0, 0.0], [0.1, math.nan]], "points[1]", "finite"),
-        ([[0.0, 0.0], [300.0, 0.0]], "points[1]", "at most 10 "),
+        ([[0.0, 0.0], [300.0, 0.0]], "points[1]", "within ±10 m, got "),
         ([[0.0, 0.0], [0.1, 0.1], [0.0, 0.2]], "points", "another x"),
         ([[-0.1, 0.0], [0.1, 0.1], [0.1, 0.0], [-0.1, 0.1], [0.2, 0.3]], "points", "crosses"),
         ([[-0.1, 0.0], [0.2, 0.0], [0.1, 0.0], [0.3, 0.1]], "points", "crosses"),

@@ -65,6 +65,15 @@ def test_every_usual_table_has_the_points_that_were_written(text, encoding, tmp_
         ("1 2\n3 4\n5 6\n", "no line has three numbers"),
         ("POINT (1 2 3)\nPOINT (4 5 6)\n", "no line has three numbers"),
         ("1 2 3\n4 5 6\n7 8 1e38\n", "write nan"),
+        ("1 2 3\n4 5 b\n7 8 9\n1 1 1\n", "line 2, '4 5 b', is not three .* 'b' is not a number: "),
+        *(
+            (text, f"line {line}, .*: '{own}5' has a decimal {mark}, but the file's decimals are")
+            for text, line, own, mark in (
+                ("1,5 2,5 3,5\n1,5 2,5 3,6\n1.5 2.5 3.5\n", 3, r"1\.", "point"),
+                ("1.5 2.5 3.5\n1,5 2,5 3,6\n1,5 2,5 3,5\n", 1, r"1\.", "point"),
+                ("1.5 2.5 3.5\n1,5 2,5 3,6\n1.5 2.5 3.6\n", 2, "1,", "comma"),
+            )
+        ),
     ],
 )
 def test_what_is_no_table_of_points_is_refused_with_its_cause(text, words, tmp_path):

@@ -152,6 +152,11 @@ def test_lengths_are_above_zero(field, value, tmp_path):
         meshed(wall(0.02), tmp_path, {"view": (0, 1, 0)}, **{field: value})
 
 
+def test_a_spacing_that_leaves_no_surface_is_refused_by_its_name(tmp_path):
+    with pytest.raises(InvalidInputError, match=r"^spacing: must leave points .* got 5 m; give a"):
+        meshed(wall(0.02), tmp_path, {"view": (0, 1, 0)}, spacing=5.0)
+
+
 def test_points_too_far_apart_are_told(tmp_path):
     with pytest.raises(InvalidInputError, match=r"^hole: points are 40 mm apart, .* --hole 0\.06 "):
         meshed(wall(0.04), tmp_path, {"view": (0, 1, 0)})

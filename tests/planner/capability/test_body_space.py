@@ -330,9 +330,9 @@ def test_a_given_body_wrench_has_no_mass():
 
 def test_turning_needs_joints_and_the_robots_own_load():
     assert not wall_space().turns
-    with pytest.raises(InvalidInputError, match="3 components are needed, got 6"):
+    with pytest.raises(InvalidInputError, match=r"3 components .* got 6; angular .* load.com$"):
         wall_space().acceleration(np.eye(6)[4])
-    with pytest.raises(InvalidInputError, match="3 or 6 components"):
+    with pytest.raises(InvalidInputError, match=r"3 or 6 components are needed, got 2$"):
         space_with_joints().acceleration([1.0, 0.0])
     with pytest.raises(InvalidInputError, match="not zero"):
         space_with_joints().acceleration(np.zeros(3))

@@ -137,4 +137,4 @@ def test_the_command_names_it_among_the_studies(tmp_path, capfd):
     assert (
         run_command_line(["study", "measure", "-o", str(tmp_path), "--tension", "40"]) == BAD_INPUT
     )
-    assert "only the study sweep takes it, not measure" in complaint(capfd)
+    assert "only the study sweep takes this option, not measure" in complaint(capfd)

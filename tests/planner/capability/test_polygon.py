@@ -101,7 +101,7 @@ def test_an_empty_set_has_no_polygon():
 
 def test_a_set_that_is_empty_only_in_one_direction_is_refused():
     touching = hull_of(SQUARE)
-    with pytest.raises(SolverError, match="no support point"):
+    with pytest.raises(SolverError, match="no farthest point toward"):
         enclose(lambda normal: touching(normal) if normal[0] > 0.5 else None)
 
 

@@ -18,8 +18,8 @@ from tests.suite.helpers.robots import joint, limbs_toml, link, urdf
 GOOD = [0.3, -0.9, 0.5, 1.2, 0.0, 0.4, 0.0]
 
 WRONG = [
-    ({"front_right": [0.0] * 6}, "front_right", "expected 7 numbers, got shape (6,)"),
-    ({"front_right": [0.0] * 8}, "front_right", "expected 7 numbers, got shape (8,)"),
+    ({"front_right": [0.0] * 6}, "front_right", "expected 7 numbers, got 6"),
+    ({"front_right": [0.0] * 8}, "front_right", "expected 7 numbers, got 8"),
     ({"front_right": []}, "front_right", "7"),
     ({"nobody": [0.0] * 7}, "nobody", "unknown limb; known are front_right"),
     ({"Front_Right": [0.0] * 7}, "Front_Right", "unknown limb"),

@@ -205,7 +205,7 @@ def test_a_stance_with_limbs_of_another_robot_names_those_that_are_there(
 
 BAD = {
     "no file": (None, None, "No such file or directory"),
-    "no TOML": ("[limbs\n", None, "Expected"),
+    "no TOML": ("[limbs\n", None, "is not valid TOML: Expected"),
     "no URDF": (TOML, None, "urdf: "),
     "degrees": (TOML, URDF.replace("2.5", "143"), "urdf: "),
     "too few torques": (TOML.replace("80.0", "[80.0, 80.0]"), URDF, "limbs.left.torque_limit: one"),

@@ -427,7 +427,9 @@ def test_streams_and_body_spaces_of_a_question_with_draws_leave_them_out():
 def test_draws_that_cannot_be_are_refused_by_their_entry():
     # possible one by one, but not together
     bad = drawn(tendon={"closing_tension": entry(900.0, "N")})
-    with pytest.raises(InvalidInputError, match=r"must be at most the tendon's 700 N") as caught:
+    with pytest.raises(
+        InvalidInputError, match=r"must be at most tendon.maximum_tension, 700 N"
+    ) as caught:
         ask(on_wall(), "spread", draws=(*FEW, bad))
     assert caught.value.field == "draws[4].hand.tendon.closing_tension"
     ratio = {"surfaces": {"defaults": {"pull_off_ratio": entry(1.5, "1")}}}

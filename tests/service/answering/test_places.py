@@ -127,7 +127,7 @@ def test_an_angle_of_the_wrist_in_degrees_is_refused() -> None:
         with pytest.raises(InvalidInputError) as caught:
             answer_plan(plan_request(placed(wrist_angle=angle)))
         assert caught.value.field == "stance.hands[0].place.wrist_angle"
-        assert f"got {angle:g}: is it in rad?" in caught.value.message
+        assert f"got {angle:g} rad: is it in degrees?" in caught.value.message
 
 
 def test_more_than_a_turn_is_the_same_as_the_rest_of_it() -> None:

@@ -131,7 +131,7 @@ def test_explanations_are_in_a_table_if_they_are_asked_for(lines, tmp_path, capf
     assert "irreducible" not in content(path)[0]
     capfd.readouterr()
     assert run_command_line([*asked, "--columns", "sufficient"]) == BAD_INPUT
-    assert "it needs --explain" in complaint(capfd)
+    assert ", which needs --explain" in complaint(capfd)
     assert run_command_line(["batch", str(lines), "--columns", "id"]) == BAD_INPUT
     assert "requires a table" in complaint(capfd)
 

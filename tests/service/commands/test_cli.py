@@ -210,7 +210,7 @@ def test_a_file_of_draws_that_cannot_be_is_refused_in_one_line(old, new, told, t
 def test_a_folder_that_is_named_as_a_table_is_refused(tmp_path, capfd):
     arguments = ["sweep", "wall-300", "--vary", "load.mass=50:60:2", "-o"]
     assert run_command_line([*arguments, str(tmp_path / "sweep.parquet")]) == BAD_INPUT
-    assert "names a folder, into which several files go" in complaint(capfd)
+    assert "must be a folder for several files, not a ." in complaint(capfd)
     assert not list(tmp_path.iterdir())
 
 

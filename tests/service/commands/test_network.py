@@ -95,7 +95,7 @@ def test_a_query_where_nobody_listens(stance_file, capfd):
     out, err = capfd.readouterr()
     assert out == ""
     assert err.splitlines()[-1].startswith("crux: no zenoh session: ")
-    assert "start one with `crux serve`" in err
+    assert "start a service with `crux serve`" in err
     assert "--wait" in err
 
 
@@ -119,7 +119,7 @@ def test_zenoh_may_talk_but_not_on_standard_output(stance_file):
     assert b"DEBUG" in asked.stderr
     told = asked.stderr.splitlines()[-1]
     assert told.startswith(
-        b"crux: no service answers at crux/robosimian/plan; start one with `crux"
+        b"crux: no service answers at crux/robosimian/plan; start a service with `crux"
     )
 
 
@@ -144,7 +144,7 @@ def test_a_service_that_does_not_come_is_waited_for_no_longer(mode, stance_file,
     assert run_command_line(["query", stance_file(wall_request()), *flags]) == FAILED
     told = complaint(capfd)
     assert told.startswith("crux: no service of robosimian within 0.3 s")
-    assert "start one with `crux serve`" in told
+    assert "start a service with `crux serve`" in told
 
 
 @pytest.mark.parametrize("wait", ["-1", "nan", "soon", "1e7"])
@@ -162,7 +162,9 @@ def test_how_long_a_client_waits_is_checked_before_it_does(wait):
 
 def test_a_client_of_another_robot_s_service_waits_in_vain(served):
     with zenoh.open(client_config(served.endpoint)) as session:
-        with pytest.raises(NoServiceError, match=r"no service of loris within 0\.2 s; start one"):
+        with pytest.raises(
+            NoServiceError, match=r"no service of loris within 0\.2 s; start a service"
+        ):
             CruxClient(session, "loris", wait=0.2)
         assert not session.is_closed()
         with CruxClient(session, wait=PATIENCE) as client:

@@ -126,7 +126,7 @@ def test_many_routes_need_a_file_and_one_a_folder(climbs, tmp_path, capfd):
         (["route", BUNDLED, "-o", out, "--resume"], "--resume: requires -o FILE"),
         (["route", BUNDLED, "-o", out, "--dask", "local"], "--dask: requires -o FILE"),
         (["route", "-", BUNDLED, "-o", f"{out}.csv"], "standard input is one route"),
-        (["route", str(tmp_path), "-o", f"{out}.csv"], "no file in it ends in .json"),
+        (["route", str(tmp_path), "-o", f"{out}.csv"], "no file in this folder ends in .json"),
         (["route", BUNDLED, "-o", str(climbs / "notes.txt")], "notes.txt: must be a folder"),
     ):
         assert run_command_line(asked) == BAD_INPUT

@@ -87,9 +87,17 @@ def test_what_is_printed_fits_a_terminal(arguments, words, tmp_path, capfd, monk
         (["--vary", MASS, "--tolerance", "nan"], "--tolerance"),
         (
             ["--vary", MASS, "--vary", "limits.tendon_tension=40,50", "--tolerance", "0.1"],
-            "--tolerance: requires exactly one varied number",
+            "--tolerance: requires exactly one varied field, and numbers as its values; varied: ",
         ),
-        (["--vary", MASS, "--over", "load.mass,x"], "--over: two different ones of load.mass"),
+        (
+            ["--vary", MASS, "--over", "load.mass"],
+            "--over: requires two varied fields; only load.mass varies: vary another too",
+        ),
+        (
+            ["--vary", MASS, "--vary", "limits.utilisation=0.5,1", "--over", "load.mass,x"],
+            "--over: two different ones of load.mass, limits.utilisation are wanted",
+        ),
+        (["--vary", MASS, "--vary", MASS], "--vary load.mass: is given twice; vary the field once"),
         ([], "--vary"),
         (["--vary", "hands.*.grasp.closing_tension=1,2"], "no point can be answered: invalid: "),
     ],
@@ -280,7 +288,7 @@ def test_a_sweep_does_not_go_on_with_another_stance_or_what_is_none(tmp_path, ca
     assert run_command_line(["sweep", "wall-300", *given, "--json"]) == DONE
     capfd.readouterr()
     assert run_command_line(["sweep", "wall-700", *given, "--resume"]) == BAD_INPUT
-    assert "was started with another stance; start again without --resume" in complaint(capfd)
+    assert "was started with another stance; give that again, or start again" in complaint(capfd)
     lines = tmp_path / "sweep.csv.jsonl"
     lines.write_text(lines.read_text().replace('"optimal",', ""))
     assert run_command_line(["sweep", "wall-300", *given, "--resume"]) == BAD_INPUT

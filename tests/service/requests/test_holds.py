@@ -62,7 +62,11 @@ def test_impossible_rock_is_refused_by_field() -> None:
         ({"shape": "mesh", "vertices": VERTICES, "faces": [[0, 1, 512]]}, "faces[0]", "0 to 511"),
         ({"shape": "mesh", "vertices": [[0, 0]], "faces": FACES}, "vertices[0]", "length 3"),
         ({"shape": "profile"}, "points", "points or profiles"),
-        ({"shape": "profile", "points": WALL, "profiles": STRIPS}, "points", "one of them"),
+        (
+            {"shape": "profile", "points": WALL, "profiles": STRIPS},
+            "points",
+            "give points or profiles, got ",
+        ),
         ({"shape": "profile", "points": WALL[:1]}, "points", "length >= 2"),
         ({"shape": "profile", "profiles": {"outer_left": WALL}}, "profiles.inner_left", "missing"),
         ({"shape": "profile", "points": WALL[::-1] * 2}, "points", "crosses itself|another x"),
