@@ -8,7 +8,6 @@ from .contact_rest import (
 )
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
-    TRIAL_WAYS as TRIAL_WAYS,
     FoundHold as FoundHold,
     HoldTrial as HoldTrial,
     grid_of_trials as grid_of_trials,
@@ -20,6 +19,11 @@ from .placing import (
     SeatRule as SeatRule,
     approach_frame as approach_frame,
     place as place,
+)
+from .pure_forces import (
+    TRIAL_WAYS as TRIAL_WAYS,
+    force_directions as force_directions,
+    pure_reaches as pure_reaches,
 )
 from .row_layout import (
     HAND_LOAD as HAND_LOAD,

@@ -20,6 +20,7 @@ from hand_models.base import (
 from hand_models.finger import CONTACT_KINDS
 from hand_models.fixed_wrist.contact_rest import placed_by_contact
 from hand_models.fixed_wrist.placing import ALONG_FINGERS, approach_frame
+from hand_models.fixed_wrist.pure_forces import TRIAL_WAYS, force_directions
 from hand_models.fixed_wrist.seat_scatter import robustness
 from hand_models.fixed_wrist.seat_search import best_seats
 from hand_models.fixed_wrist.space import wrench_spaces
@@ -27,13 +28,10 @@ from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["AT_BORDER", "TRIAL_WAYS", "FoundHold", "HoldTrial", "grid_of_trials", "try_holds"]
+__all__ = ["AT_BORDER", "FoundHold", "HoldTrial", "grid_of_trials", "try_holds"]
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
 """Message for a place where a finger may reach the scan's border, so that no hand is tried."""
-
-TRIAL_WAYS: Final = {"-fz": 2, "-fx": 0, "+fx": 0, "-fy": 1, "+fy": 1}
-"""Forces on the rock, in H, with their axes: the pull-off, and shear to all sides."""
 
 
 class HoldTrial(NamedTuple):
@@ -243,8 +241,7 @@ def try_holds(
         outcomes = [next(rests) if isinstance(each, SettledHand) else each for each in outcomes]
     spaces = iter(wrench_spaces([each for each in outcomes if isinstance(each, SettledHand)]))
     found: list[FoundHold | InvalidInputError] = []
-    axes = np.eye(6)[list(TRIAL_WAYS.values())]
-    directions = axes * [[1.0 if way[0] == "+" else -1.0] for way in TRIAL_WAYS]
+    directions = force_directions()
     for outcome in outcomes:
         if isinstance(outcome, InvalidInputError):
             found.append(outcome)

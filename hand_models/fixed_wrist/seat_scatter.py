@@ -18,8 +18,17 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_on, turns_about
+from hand_models.base import (
+    Array,
+    EmptySetError,
+    InvalidInputError,
+    Pose,
+    check_positive,
+    go_on,
+    turns_about,
+)
 from hand_models.fixed_wrist.contact_rest import contact_slopes, rests_on_rock
+from hand_models.fixed_wrist.pure_forces import pure_reaches
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
@@ -45,6 +54,9 @@ class ScatterSettings:
     """Percentile that is exceeded at nine in ten places."""
     hundredth: float = 1.0
     """Percentile that stands for the worst place, which would depend on the number of places."""
+    force: float = 0.1
+    """Smallest force that counts as held [N]: the weight of 10 g, far above what linear programs
+    leave undecided, and far below any load of a hand."""
 
 
 SCATTER_SETTINGS = ScatterSettings()
@@ -69,6 +81,14 @@ class Robustness(NamedTuple):
         Value that is exceeded at nine in ten places, and at 99 in a hundred.
     contact : tuple of float, optional
         Half width along z [m], and about x and y [rad], of a hand that was placed by contact.
+    pure_tenth : ndarray, shape (j,)
+        Largest *pure* force in each of j directions, every other component zero, that nine in ten
+        places have (the order statistic, never between two places) [N]. A place counts as zero
+        where no such wrench is above zero.
+    share : ndarray, shape (j,)
+        Share of the places whose largest pure force is at least ``force`` [1].
+    force : float
+        [N]
     """
 
     draws: int
@@ -80,6 +100,9 @@ class Robustness(NamedTuple):
     tenth: Array
     hundredth: Array
     contact: tuple[float, float] | None = None
+    pure_tenth: Array = np.zeros(0)
+    share: Array = np.zeros(0)
+    force: float = SCATTER_SETTINGS.force
 
 
 def robustness(
@@ -89,8 +112,11 @@ def robustness(
     draws: int = SCATTER_SETTINGS.places,
     seed: int = 0,
     scatter: tuple[float, float] | None = None,
+    *,
+    pure: ArrayLike | None = None,
+    force: float = SCATTER_SETTINGS.force,
 ) -> Robustness:
-    """Close a hand again at places near its place, and return quantiles of its support function.
+    """Close a hand again at places near its place, and return quantiles of what it reaches there.
 
     Parameters
     ----------
@@ -98,18 +124,23 @@ def robustness(
         Model of the settled hand.
     settled : SettledHand
     directions : array_like, shape (k, 6)
-        Directions of wrenches on the rock, in H.
+        Directions of wrenches on the rock, in H, for the support function.
     draws : int, optional
         Number of places.
     seed : int, optional
     scatter : tuple of float, optional
         Half width of a uniform scatter along each axis of H [m], and about each axis through the
         middle of the palm [rad]. As in the hand's parameters by default.
+    pure : array_like, shape (j, 6), optional
+        Directions of forces on the rock, in H, for pure forces; none by default, as a place takes
+        two linear programs for each line.
+    force : float, optional
+        Pure force that counts as held, above zero [N].
 
     Raises
     ------
     InvalidInputError
-        If there is no draw, or a scatter is negative.
+        If there is no draw, a scatter is negative, or ``force`` is not above zero.
     """
     position, angle = hand.seat_scatter if scatter is None else scatter
     if draws < 1:
@@ -120,24 +151,41 @@ def robustness(
             f"got {position:g} m and {angle:g} rad",
             field="scatter",
         )
+    check_positive(force, "N", "force")
     there: list[SettledHand] = []
     places = scattered_places("", draws, seed)
     for outcomes in closed_about(hand, settled, places, (position, angle)):
         there += [each for each in outcomes if isinstance(each, SettledHand)]
     ways, reaches = np.atleast_2d(np.asarray(directions, dtype=float)), []
+    alone = np.zeros((0, 6)) if pure is None else np.atleast_2d(np.asarray(pure, dtype=float))
+    held = np.zeros((draws, len(alone)))
     for space in wrench_spaces(there):
         go_on()
         try:
             reaches.append([space.support(way) for way in ways])
         except EmptySetError:
             continue
+        if len(alone):
+            held[len(reaches) - 1] = np.fmax(pure_reaches(space, alone), 0.0)
     without = draws - len(reaches)
     reaches += [[0.0] * len(ways)] * without
     hundredth, tenth = np.percentile(
         reaches, [SCATTER_SETTINGS.hundredth, SCATTER_SETTINGS.tenth], axis=0
     )
-    contact = None if settled.seating.offset is None else hand.contact_scatter
-    return Robustness(draws, without, position, angle, seed, hundredth, tenth, hundredth, contact)
+    return Robustness(
+        draws,
+        without,
+        position,
+        angle,
+        seed,
+        worst=hundredth,
+        tenth=tenth,
+        hundredth=hundredth,
+        contact=None if settled.seating.offset is None else hand.contact_scatter,
+        pure_tenth=np.percentile(held, SCATTER_SETTINGS.tenth, axis=0, method="inverted_cdf"),
+        share=(held >= force).mean(axis=0),
+        force=force,
+    )
 
 
 def scattered_places(name: str, count: int, seed: int) -> Array:
