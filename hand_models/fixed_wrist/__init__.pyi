@@ -8,10 +8,12 @@ from .contact_rest import (
 )
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
-    TRIAL_WAYS as TRIAL_WAYS,
+    HOLD_RANKS as HOLD_RANKS,
     FoundHold as FoundHold,
+    HoldRank as HoldRank,
     HoldTrial as HoldTrial,
     grid_of_trials as grid_of_trials,
+    ranked_holds as ranked_holds,
     try_holds as try_holds,
 )
 from .placing import (
@@ -20,6 +22,11 @@ from .placing import (
     SeatRule as SeatRule,
     approach_frame as approach_frame,
     place as place,
+)
+from .pure_forces import (
+    TRIAL_WAYS as TRIAL_WAYS,
+    force_directions as force_directions,
+    pure_reaches as pure_reaches,
 )
 from .row_layout import (
     HAND_LOAD as HAND_LOAD,

@@ -6,20 +6,31 @@ hands, nor on their order, nor on the machine.
 
 A hand that was placed by contact (`contact_rest`) comes to rest anew at each place along x, y and
 turned about z. Only there it is moved along z and turned about x and y, by what contact leaves.
+So is a hand whose seat's frame on the rock is given: it is seated anew at each place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 from zlib import crc32
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, EmptySetError, InvalidInputError, Pose, go_on, turns_about
+from hand_models.base import (
+    Array,
+    EmptySetError,
+    InvalidInputError,
+    Pose,
+    check_positive,
+    go_on,
+    turns_about,
+)
 from hand_models.fixed_wrist.contact_rest import contact_slopes, rests_on_rock
+from hand_models.fixed_wrist.pure_forces import pure_reaches
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
@@ -45,6 +56,9 @@ class ScatterSettings:
     """Percentile that is exceeded at nine in ten places."""
     hundredth: float = 1.0
     """Percentile that stands for the worst place, which would depend on the number of places."""
+    force: float = 0.1
+    """Smallest force that counts as held [N]: the weight of 10 g, far above what linear programs
+    leave undecided, and far below any load of a hand."""
 
 
 SCATTER_SETTINGS = ScatterSettings()
@@ -68,7 +82,16 @@ class Robustness(NamedTuple):
     tenth, hundredth : ndarray, shape (k,)
         Value that is exceeded at nine in ten places, and at 99 in a hundred.
     contact : tuple of float, optional
-        Half width along z [m], and about x and y [rad], of a hand that was placed by contact.
+        Half width along z [m], and about x and y [rad], of a hand that was placed by contact or is
+        seated anew.
+    pure_tenth : ndarray, shape (j,)
+        Largest *pure* force in each of j directions, every other component zero, that nine in ten
+        places have (the order statistic, never between two places) [N]. A place counts as zero
+        where no such wrench is above zero.
+    share : ndarray, shape (j,)
+        Share of the places whose largest pure force is at least ``force`` [1].
+    force : float
+        [N]
     """
 
     draws: int
@@ -80,6 +103,9 @@ class Robustness(NamedTuple):
     tenth: Array
     hundredth: Array
     contact: tuple[float, float] | None = None
+    pure_tenth: Array = np.zeros(0)
+    share: Array = np.zeros(0)
+    force: float = SCATTER_SETTINGS.force
 
 
 def robustness(
@@ -89,8 +115,12 @@ def robustness(
     draws: int = SCATTER_SETTINGS.places,
     seed: int = 0,
     scatter: tuple[float, float] | None = None,
+    *,
+    at: Pose | None = None,
+    pure: ArrayLike | None = None,
+    force: float = SCATTER_SETTINGS.force,
 ) -> Robustness:
-    """Close a hand again at places near its place, and return quantiles of its support function.
+    """Close a hand again at places near its place, and return quantiles of what it reaches there.
 
     Parameters
     ----------
@@ -98,18 +128,26 @@ def robustness(
         Model of the settled hand.
     settled : SettledHand
     directions : array_like, shape (k, 6)
-        Directions of wrenches on the rock, in H.
+        Directions of wrenches on the rock, in H, for the support function.
     draws : int, optional
         Number of places.
     seed : int, optional
     scatter : tuple of float, optional
         Half width of a uniform scatter along each axis of H [m], and about each axis through the
         middle of the palm [rad]. As in the hand's parameters by default.
+    at : Pose, optional
+        Frame on the hold on which the hand was seated, to seat it anew at each place
+        (`closed_about`).
+    pure : array_like, shape (j, 6), optional
+        Directions of forces on the rock, in H, for pure forces; none by default, as a place takes
+        two linear programs for each line.
+    force : float, optional
+        Pure force that counts as held, above zero [N].
 
     Raises
     ------
     InvalidInputError
-        If there is no draw, or a scatter is negative.
+        If there is no draw, a scatter is negative, or ``force`` is not above zero.
     """
     position, angle = hand.seat_scatter if scatter is None else scatter
     if draws < 1:
@@ -120,24 +158,41 @@ def robustness(
             f"got {position:g} m and {angle:g} rad",
             field="scatter",
         )
+    check_positive(force, "N", "force")
     there: list[SettledHand] = []
     places = scattered_places("", draws, seed)
-    for outcomes in closed_about(hand, settled, places, (position, angle)):
+    for outcomes in closed_about(hand, settled, places, (position, angle), at=at):
         there += [each for each in outcomes if isinstance(each, SettledHand)]
     ways, reaches = np.atleast_2d(np.asarray(directions, dtype=float)), []
+    alone = np.zeros((0, 6)) if pure is None else np.atleast_2d(np.asarray(pure, dtype=float))
+    held = np.zeros((draws, len(alone)))
     for space in wrench_spaces(there):
         go_on()
         try:
             reaches.append([space.support(way) for way in ways])
         except EmptySetError:
             continue
+        if len(alone):
+            held[len(reaches) - 1] = np.fmax(pure_reaches(space, alone), 0.0)
     without = draws - len(reaches)
     reaches += [[0.0] * len(ways)] * without
     hundredth, tenth = np.percentile(
         reaches, [SCATTER_SETTINGS.hundredth, SCATTER_SETTINGS.tenth], axis=0
     )
-    contact = None if settled.seating.offset is None else hand.contact_scatter
-    return Robustness(draws, without, position, angle, seed, hundredth, tenth, hundredth, contact)
+    return Robustness(
+        draws,
+        without,
+        position,
+        angle,
+        seed,
+        worst=hundredth,
+        tenth=tenth,
+        hundredth=hundredth,
+        contact=hand.contact_scatter if at or settled.seating.offset else None,
+        pure_tenth=np.percentile(held, SCATTER_SETTINGS.tenth, axis=0, method="inverted_cdf"),
+        share=(held >= force).mean(axis=0),
+        force=force,
+    )
 
 
 def scattered_places(name: str, count: int, seed: int) -> Array:
@@ -168,6 +223,7 @@ def closed_about(
     places: Array,
     scatter: tuple[float, float],
     contact_scatter: tuple[float, float] | None = None,
+    at: Pose | None = None,
 ) -> Iterator[Sequence[SettledHand | InvalidInputError]]:
     """Close a hand again at places near its place, 64 at a time.
 
@@ -178,11 +234,14 @@ def closed_about(
     settled : SettledHand
     places : ndarray, shape (n, 6)
         Along and about each axis of H, in units of ``scatter``; of a hand that was placed by
-        contact, those along z and about x and y in units of ``contact_scatter``.
+        contact or is seated anew, those along z and about x and y in units of ``contact_scatter``.
     scatter : tuple of float
         Unit along an axis [m], and about an axis [rad].
     contact_scatter : tuple of float, optional
         The same of what contact leaves; that of the hand's parameters by default.
+    at : Pose, optional
+        Frame on the hold on which a hand was seated (`Placement`): at each place along x and y and
+        turned about z the hand is seated anew, and then moved by what contact leaves.
 
     Yields
     ------
@@ -191,11 +250,12 @@ def closed_about(
     """
     at_once = 64  # hands that are closed together
     start = Placement(settled.hold, settled.surface, settled.grasp, settled.seating.pose)
-    frames_of: Callable[[Array, tuple[float, float]], Sequence[Pose | InvalidInputError]] = (
-        _posed
-        if settled.seating.offset is None
-        else _ContactFrames(hand, settled, contact_scatter or hand.contact_scatter)
-    )
+    left = contact_scatter or hand.contact_scatter
+    frames_of: Callable[[Array, tuple[float, float]], Sequence[Pose | InvalidInputError]] = _posed
+    if settled.seating.offset is not None:
+        frames_of = _ContactFrames(hand, settled, left)
+    elif at is not None:
+        frames_of = partial(_seated_frames, hand, settled, left, at)
     for first in range(0, len(places), at_once):
         frames = frames_of(places[first : first + at_once], scatter)
         there = [
@@ -211,6 +271,34 @@ def _posed(places: Array, scatter: tuple[float, float]) -> Sequence[Pose]:
     """Return the frames of a hand at its places, in that where it was put."""
     position, angle = scatter
     return [Pose(position * by[:3], turns_about(angle * by[3:])) for by in places]
+
+
+def _parted(
+    places: Array, scatter: tuple[float, float], left: tuple[float, float]
+) -> tuple[Sequence[Pose], Sequence[Pose]]:
+    """Return the frames of moves along x and y and about z, and those that contact leaves."""
+    wrist = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+    return _posed(places * wrist, scatter), _posed(places * (1.0 - wrist), left)
+
+
+def _seated_frames(
+    hand: SpinyHand,
+    settled: SettledHand,
+    left: tuple[float, float],
+    at: Pose,
+    places: Array,
+    scatter: tuple[float, float],
+) -> list[Pose | InvalidInputError]:
+    """Return the frames of a hand that is seated anew at its places, in that where it was put."""
+    moved, more = _parted(places, scatter, left)
+    start = Placement(settled.hold, settled.surface, settled.grasp, None)
+    seats = hand.settle_each([start._replace(at=at @ each) for each in moved])
+    return [
+        settled.seating.pose @ seat.seating.pose.inverse() @ by
+        if isinstance(seat, SettledHand)
+        else seat
+        for seat, by in zip(seats, more, strict=True)
+    ]
 
 
 class _ContactFrames:
@@ -236,9 +324,7 @@ class _ContactFrames:
     def __call__(
         self, places: Array, scatter: tuple[float, float]
     ) -> list[Pose | InvalidInputError]:
-        wrist = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
-        moved = _posed(places * wrist, scatter)
-        left = _posed(places * (1.0 - wrist), self._left)
+        moved, left = _parted(places, scatter, self._left)
         assert self._rest.hold_in_hand is not None
         starts = [
             self._rest._replace(hold_in_hand=each.inverse() @ self._rest.hold_in_hand)

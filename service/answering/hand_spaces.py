@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
 from hand_models.base import Array, EmptySetError, InvalidInputError, LimitError
 from hand_models.finger import PHALANGES
-from hand_models.fixed_wrist import Robustness, robustness, tension_limits
+from hand_models.fixed_wrist import Robustness, force_directions, robustness, tension_limits
 from hand_models.hand import FINGERS, SettledHand, SettledTile, closing_sequence, nearby_closures
 from hand_models.wrench_spaces import WrenchSpace
 from planner import WristPlan, deadline, resting_hand
@@ -29,6 +29,9 @@ from service.requests import SpaceWant, WrenchSpaceRequest
 __all__ = ["answer_wrench_space"]
 
 View = TypeVar("View")
+
+PURE_WAYS: Final = tuple(f"{sign}{axis}" for sign in "+-" for axis in WRENCH_AXES[:3])
+"""Signs and axes of forces."""
 
 
 def answer_wrench_space(
@@ -101,7 +104,8 @@ def answer_wrench_space(
                 field="want",
             )
         both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
-        reply.robust = _robust(robustness(asked.robot.hand, settled, both_ways))
+        pure = force_directions(PURE_WAYS)
+        reply.robust = _robust(robustness(asked.robot.hand, settled, both_ways, pure=pure))
     reply.closing = _closings(settled)
     return reply
 
@@ -171,6 +175,9 @@ def _robust(found: Robustness) -> replies.RobustCapability:
         worst=_by_side(found.worst),
         tenth=_by_side(found.tenth),
         hundredth=_by_side(found.hundredth),
+        pure_tenth=dict(zip(PURE_WAYS, found.pure_tenth.tolist(), strict=True)),
+        share=dict(zip(PURE_WAYS, found.share.tolist(), strict=True)),
+        force=found.force,
     )
 
 

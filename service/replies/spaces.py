@@ -159,6 +159,10 @@ class RobustCapability(Struct, kw_only=True):
       finite.
     - ``hundredth``: ``extent`` that the hand exceeds at 99 in a hundred places; null where it is
       not finite.
+    - ``pure_tenth``: ``pure`` force, with every other component zero, that the hand has at nine in
+      ten places, by sign and axis of forces only [N]; a place without any counts as zero.
+    - ``share``: share of the places whose ``pure`` force is at least ``force``, likewise [1].
+    - ``force``: the force of ``share`` [N].
     """
 
     draws: int
@@ -171,6 +175,9 @@ class RobustCapability(Struct, kw_only=True):
     hundredth: dict[str, float | None]
     contact_position: float | None = None
     contact_angle: float | None = None
+    pure_tenth: dict[str, float] | None = None
+    share: dict[str, float] | None = None
+    force: float | None = None
 
 
 class WrenchSpaceReply(StanceReply, kw_only=True):

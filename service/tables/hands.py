@@ -81,6 +81,18 @@ def print_robust(robust: replies.RobustCapability, out: Console) -> None:
     _print_ends({"99 in 100 ": robust.hundredth, "9 in 10 ": robust.tenth}, title, out)
     if robust.without:
         out.print(f"at {robust.without} of them the hand cannot be, or holds nothing: 0 there")
+    if robust.pure_tenth and robust.share:
+        rows = [
+            (f"{way} N", value, f"{100.0 * robust.share[way]:.0f}")
+            for way, value in robust.pure_tenth.items()
+        ]
+        columns = (
+            name("force", "0"),
+            number("9 in 10", "1", "z.2f"),
+            number("of the places %", "2"),
+        )
+        title = f"pure forces there, and where they are at least {robust.force:g} N"
+        print_rows(rows, columns, out, title)
 
 
 def _print_ends(

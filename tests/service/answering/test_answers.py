@@ -311,6 +311,11 @@ def test_a_wrench_space_tells_what_is_left_where_the_hand_is_a_little_elsewhere(
     assert (robust.draws, robust.without, robust.seed) == (8, 0, 0)
     assert set(robust.hundredth) == set(robust.tenth) == set(reply.capability)
     assert robust.worst == robust.hundredth
+    assert set(robust.pure_tenth) == set(robust.share) == {f"{s}f{a}" for s in "+-" for a in "xyz"}
+    assert robust.force == 0.1
+    for way, share in robust.share.items():
+        assert (robust.pure_tenth[way] >= robust.force) == (share > 0.9)
+        assert robust.pure_tenth[way] <= max(robust.tenth[way], 0.0)
     for axis, nominal in reply.capability.items():
         assert robust.hundredth[axis] <= robust.tenth[axis]
         assert robust.hundredth[axis] < nominal.extent
