@@ -43,7 +43,7 @@ class HandPostures(NamedTuple):
     kinds, stops : ndarray of int8
         Codes: indices into `CONTACT_NAMES`, and into `hand_models.finger.JOINT_STOPS`.
     across : ndarray
-        Distance of each contact from its finger's plane, along y of F [m].
+        Distance of each contact from its finger's plane [m].
     """
 
     angles: Array
@@ -57,10 +57,7 @@ class HandPostures(NamedTuple):
     across: Array
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
-        """Return the posture of each finger as a `SettledFinger`, in the order of `FINGERS`.
-
-        ``model``: the model that the four fingers share.
-        """
+        """Return the posture of each finger, of one model, in the order of `FINGERS`."""
         return tuple(
             SettledFinger(
                 model,

@@ -188,19 +188,9 @@ class Hold(ABC):
     def tangent_point(self, offset: float, angle: Angle) -> tuple[Angle, Angle] | None:
         """Return the point of the outline in the plane y = ``offset`` where it has a given slope.
 
-        Only an ellipsoid answers; every other hold returns None.
-
-        Parameters
-        ----------
-        offset : float
-            y of the plane, in the hold's frame [m].
-        angle : float or ndarray
-            Angle of the outline's tangent from x toward z [rad].
-
-        Returns
-        -------
-        tuple of (x, z) or None
-            Coordinates [m], each of the shape of ``angle``; None where the plane misses the hold.
+        Only an ellipsoid answers; every other hold returns None. ``angle``: of the outline's
+        tangent from x toward z [rad], one or an array; the result is x and z of that shape [m], or
+        None where the plane misses the hold.
         """
         return None
 
