@@ -21,16 +21,16 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError
+from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
 from hand_models.rock.envelopes import Heights, alike, envelope_outlines
 from hand_models.rock.holds import Hold
+from hand_models.rock.triangles import strung, unstrung
 from hand_models.sections import NO_STRIPS, FingerRock, PolylineSection, RockStrips, Section
 
 __all__ = ["OutlinedHold", "Scale", "smooth"]
@@ -128,49 +128,23 @@ def smooth(points: Array, scale: Scale) -> Array | None:
     ndarray, shape (m, 2), or None
         Smoothed polyline [m]; None if the raw one is a single point or shorter than a bridged gap.
     """
-    points = _distinct(points)
-    if len(points) < 2:
-        # a cut that only touches the rock
-        return None
-    points = _corners(points)
-    lengths = np.hypot(*np.diff(points, axis=0).T)
-    total = float(lengths.sum())
+    from hand_models.rock.compiled_smoothing import corners, smoothed
+
+    points, lengths = corners(np.ascontiguousarray(points))
+    total = float(lengths[-1])
+    # a cut that only touches the rock has no length
     if total < scale.bridged_gap:
         return None
-    closed = np.array_equal(points[0], points[-1])
-    place = np.concatenate([[0.0], np.cumsum(lengths)])
+    closed = bool((points[0] == points[-1]).all())
     # steps from its beginning, whatever its length, as that changes with every move of the plane
     step = min(scale.spacing, total / 4)  # of five points at least
     rounding = BASE_TOLERANCES.relative
     count = round(total / step) if closed else math.floor(total / step + rounding) + 1
     half = min(round(0.5 * scale.tile / step), (count - 1) // 2)
-    over = 2 * half if closed else 0
-    at = step * np.arange(-over, count + over)
-    if closed:
-        at %= total
-    raw = np.column_stack([np.interp(at, place, points[:, i]) for i in range(2)])
-    curve = raw
-    for part in (half, half // 2):
-        curve = _fitted(curve, part)
-    raw, curve = raw[over : over + count], curve[over : over + count]
     rest = total / step - (count - 1)
-    if not closed and rest > rounding:
-        curve = np.vstack([curve, curve[-1] + rest * (curve[-1] - curve[-2])])
-    curve = _raised(curve, np.vstack([raw, points]), half, closed)
-    return np.vstack([curve, curve[:1]]) if closed else curve
-
-
-def _fitted(curve: Array, part: int) -> Array:
-    """Return the middles of parabolas over ``part`` points on both sides of each; at ends, theirs.
-
-    This is `scipy.signal.savgol_filter`, which works its weights out anew each time.
-    """
-    weights = _weights(part)
-    fitted = scipy.ndimage.correlate1d(curve, weights[part], axis=0, mode="nearest")
-    if part:
-        fitted[:part] = weights[:part] @ curve[: 2 * part + 1]
-        fitted[-part:] = weights[part + 1 :] @ curve[-2 * part - 1 :]
-    return np.asarray(fitted)
+    rest = rest if not closed and rest > rounding else 0.0
+    wide, narrow = _weights(half), _weights(half // 2)
+    return smoothed(points, lengths, step, count, rest, closed, wide, narrow)
 
 
 @lru_cache(maxsize=64)
@@ -185,89 +159,20 @@ def _weights(part: int) -> Array:
     )
 
 
-def _raised(curve: Array, raw: Array, half: int, closed: bool) -> Array:
-    """Move a curve outward, smoothly, until no raw point stands out of it."""
-    mode: Literal["wrap", "nearest"] = "wrap" if closed else "nearest"
-    for _ in range(4):  # each time far less is left
-        outward = _outward(curve, closed)
-        nearest: Indices = np.asarray(scipy.spatial.cKDTree(curve).query(raw)[1], dtype=np.intp)
-        excess = np.zeros(len(curve))
-        out = np.einsum("ij,ij->i", raw - curve[nearest], outward[nearest])
-        np.maximum.at(excess, nearest, out)
-        if excess.max() <= 1e-5:  # [m]
-            break
-        rise = scipy.ndimage.maximum_filter1d(excess, 2 * half + 1, mode=mode)
-        # two moving means whose widths add up to that of the maximum leave no point below it
-        for size in (2 * (half // 2) + 1, 2 * (half - half // 2) + 1):
-            rise = scipy.ndimage.uniform_filter1d(rise, size, mode=mode)
-        curve = curve + rise[:, None] * outward
-    return curve
-
-
-def _outward(curve: Array, closed: bool) -> Array:
-    """Return unit normals on the right of a curve, shape (n, 2)."""
-    if closed:
-        step = np.roll(curve, -1, axis=0) - np.roll(curve, 1, axis=0)
-    else:
-        step = np.gradient(curve, axis=0)
-    length = np.maximum(np.hypot(step[:, 0], step[:, 1]), np.finfo(float).tiny)
-    return np.column_stack([step[:, 1], -step[:, 0]]) / length[:, None]
-
-
-def _distinct(points: Array) -> Array:
-    """Return a polyline without points that are as the one before."""
-    return np.asarray(points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))])
-
-
-def _corners(points: Array) -> Array:
-    """Return a polyline without points at which it goes straight on, in however many parts."""
-    steps = np.diff(points, axis=0)
-    steps = steps / np.hypot(*steps.T)[:, None]
-    turns = np.abs(steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0])
-    onward = np.einsum("ni,ni->n", steps[:-1], steps[1:]) > 0.0
-    bends = (turns > 1e-7) | ~onward  # sine of no turn
-    return np.asarray(points[np.concatenate([[True], bends, [True]])])
-
-
 def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     """Return the parts of polylines within the square |s|, |t| ≤ reach."""
-    runs = [run for piece in pieces for run in _runs(piece, scale.reach)]
-    length = sum(float(np.hypot(*np.diff(run, axis=0).T).sum()) for run in runs)
+    from hand_models.rock.compiled_smoothing import reached
+
+    if not pieces:
+        return []
+    points, ends, length = reached(*strung(pieces), scale.reach)
     if length > scale.longest:
         raise InvalidInputError(
             f"its outline is {length:.3g} m long within {scale.reach:g} m of a finger's base; the "
             f"maximum is {scale.longest:g} m: remove noise and spikes",
             field="hold",
         )
-    return runs
-
-
-def _runs(piece: Array, reach: float) -> list[Array]:
-    """Cut a polyline into the parts within the square |s|, |t| ≤ reach."""
-    outside = np.flatnonzero((np.abs(piece) > reach).any(axis=1))
-    if not len(outside):
-        return [piece]
-    if np.array_equal(piece[0], piece[-1]):
-        # begin where nothing is cut apart that belongs together
-        piece = np.roll(piece[:-1], -outside[0], axis=0)
-        piece = np.vstack([piece, piece[:1]])
-    start, step = piece[:-1], np.diff(piece, axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to_low, to_high = (-reach - start) / step, (reach - start) / step
-    still, between = step == 0.0, np.abs(start) <= reach
-    first = np.where(still, np.where(between, -np.inf, np.inf), np.minimum(to_low, to_high))
-    last = np.where(still, np.where(between, np.inf, -np.inf), np.maximum(to_low, to_high))
-    begin = np.maximum(first.max(axis=1), 0.0)
-    end = np.minimum(last.min(axis=1), 1.0)
-    breaks = np.flatnonzero((begin[1:] > 0.0) | (end[:-1] < 1.0)) + 1
-    runs: list[Array] = []
-    for run in np.split(np.arange(len(step)), breaks):
-        kept = run[begin[run] < end[run]]
-        if len(kept):
-            i, j = kept[0], kept[-1]
-            ends = start[i] + begin[i] * step[i], start[j] + end[j] * step[j]
-            runs.append(np.vstack([ends[0], piece[kept[1:]], ends[1]]))
-    return runs
+    return unstrung(points, ends)
 
 
 def _strips(
@@ -280,8 +185,8 @@ def _strips(
     least = own.min(axis=0)
     depths = np.where(np.isfinite(own), own - np.where(np.isfinite(least), least, 0.0), np.inf)
     places = np.concatenate(curves)
-    normals = [_outward(curve, np.array_equal(curve[0], curve[-1])) for curve in curves]
-    upright = np.maximum(-np.concatenate(normals)[:, 1], BASE_TOLERANCES.angle)
+    along, into = np.concatenate([np.gradient(curve, axis=0) for curve in curves]).T
+    upright = np.maximum(along / np.hypot(along, into), BASE_TOLERANCES.angle)
     at = np.searchsorted(heights.s, places[:, 0]).clip(0, len(heights.s) - 1)
     # what is hidden under an overhang is known in the finger's plane only, and taken as alike
     seen = places[:, 1] < least[at] + 1e-3
@@ -317,10 +222,12 @@ class OutlinedHold(Hold):
         InvalidInputError
             If an outline is too long to be a surface of rock; the field is ``hold``.
         """
+        from hand_models.rock.compiled_smoothing import corners
+
         scale = self._scale
         offsets, tiles = scale.strips
         strips = [
-            [_corners(run) for run in map(_distinct, _reached(cut, scale)) if len(run) > 1]
+            [corners(run)[0] for run in _reached(cut, scale)]
             for cut in self._cuts(origin, s_axis, t_axis, offsets)
         ]
         middle = strips[len(strips) // 2]
@@ -386,7 +293,9 @@ class OutlinedHold(Hold):
         InvalidInputError
             If the outline is too long to be a surface of rock; the field is ``hold``.
         """
-        runs = map(_distinct, _reached(self._pieces(origin, s_axis, t_axis), self._scale))
+        from hand_models.rock.compiled_smoothing import without_repeats
+
+        runs = map(without_repeats, _reached(self._pieces(origin, s_axis, t_axis), self._scale))
         least = self._scale.bridged_gap
         reached = [run for run in runs if np.hypot(*np.diff(run, axis=0).T).sum() >= least]
         return PolylineSection(reached, faceted=True) if reached else None

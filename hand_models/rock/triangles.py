@@ -8,6 +8,7 @@ edges' names, without comparing coordinates.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,8 @@ __all__ = [
     "cut",
     "edges_of",
     "grouped",
+    "strung",
+    "unstrung",
     "weld",
     "without_spikes",
     "wound_alike",
@@ -245,11 +248,16 @@ def cut(
     vertices, faces = np.ascontiguousarray(vertices), np.ascontiguousarray(faces)
     some = np.arange(len(faces)) if some is None else some
     plane = np.array([origin, s_axis, t_axis])
-    return _parted(*plane_cut(vertices, faces, some, plane, reach))
+    return unstrung(*plane_cut(vertices, faces, some, plane, reach))
 
 
-def _parted(points: Array, ends: Indices) -> list[Array]:
-    """Return polylines, given one after another, each by itself."""
+def strung(pieces: Sequence[Array]) -> tuple[Array, Indices]:
+    """Return the points of polylines one after another, and the index at which each ends."""
+    return np.ascontiguousarray(np.concatenate(pieces)), np.cumsum([len(each) for each in pieces])
+
+
+def unstrung(points: Array, ends: Indices) -> list[Array]:
+    """Return each of the polylines that `strung` has put one after another."""
     return [points[i:j] for i, j in pairwise([0, *ends.tolist()])]
 
 
@@ -277,8 +285,7 @@ def bridge(pieces: list[Array], gap: float) -> list[Array]:
     pieces = [piece for piece, ring in zip(pieces, rings, strict=True) if not ring]
     if not pieces:
         return closed
-    stops = np.cumsum([len(piece) for piece in pieces])
-    return [*closed, *_parted(*bridged(np.concatenate(pieces), stops, gap))]
+    return [*closed, *unstrung(*bridged(*strung(pieces), gap))]
 
 
 class TriangleCells:

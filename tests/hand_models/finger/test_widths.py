@@ -58,7 +58,7 @@ def assert_clear(seed: int) -> None:
     rock = rough(seed)
     hand = HAND.settle(rock, ROCK, Grasp(math.pi if seed % 2 else 2.0))
     # between the strips in which rock is cut a ridge may stand out a little
-    assert depths(hand, rock).max() < 3e-4
+    assert depths(hand, rock).max() < 2e-4
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -121,7 +121,7 @@ def test_a_tile_that_bears_on_one_side_says_how_much_and_where(off: float) -> No
     hand = HAND.settle(shelf(middle + off), ROCK, Grasp(0.0), pose)
     contact = hand.fingers[inner].contacts[0]
     assert contact.kind == "face"
-    # the step is a millimetre wide, a strip two
+    # the step is a millimetre wide, a strip more
     assert contact.engagement == pytest.approx((TILE / 2.0 - off) / TILE, abs=0.1)
     assert contact.across == pytest.approx((TILE / 2.0 + off) / 2.0, abs=1.2e-3)
     (tile,) = [i for i in np.flatnonzero(hand.finger_of == inner) if hand.engagement[i] > 0.0]

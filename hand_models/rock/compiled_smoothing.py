@@ -1,0 +1,329 @@
+"""Trim a cut through rock to a finger's reach, and smooth it to a tile's scale (compiled).
+
+What is computed, and why, is in `hand_models.rock.smoothing`. Several polylines are an array of
+their points, one after another, and the index at which each ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hand_models.base import Array, Indices, compiled
+
+__all__ = ["corners", "reached", "smoothed", "without_repeats"]
+
+
+@compiled()
+def _distance(a: Array, b: Array) -> float:
+    x, y = b[0] - a[0], b[1] - a[1]
+    return math.sqrt(x * x + y * y)
+
+
+@compiled("f2")
+def without_repeats(points: Array) -> Array:
+    """Return a polyline without points that are as the one before."""
+    kept = np.empty_like(points)
+    count = 0
+    for point in points:
+        if count == 0 or point[0] != kept[count - 1, 0] or point[1] != kept[count - 1, 1]:
+            kept[count, 0], kept[count, 1] = point
+            count += 1
+    return kept[:count]
+
+
+@compiled("f2")
+def corners(points: Array) -> tuple[Array, Array]:
+    """Return a polyline without points at which it goes straight on, in however many parts.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 2)
+        Each different from the one before [m].
+    lengths : ndarray, shape (n,)
+        Length of the polyline up to each point [m].
+    """
+    kept = without_repeats(points)
+    last = len(kept) - 1
+    count = min(1, last + 1)
+    step, before = np.empty(2), np.empty(2)
+    for i in range(last):
+        length = _distance(kept[i], kept[i + 1])
+        for k in range(2):
+            step[k] = (kept[i + 1, k] - kept[i, k]) / length
+        turn = before[0] * step[1] - before[1] * step[0]
+        onward = before[0] * step[0] + before[1] * step[1]
+        if i > 0 and (abs(turn) > 1e-7 or onward <= 0.0):  # sine of no turn
+            kept[count] = kept[i]
+            count += 1
+        before[:] = step
+    if last > 0:
+        kept[count] = kept[last]
+        count += 1
+    lengths = np.zeros(count)
+    for i in range(1, count):
+        lengths[i] = lengths[i - 1] + _distance(kept[i - 1], kept[i])
+    return kept[:count], lengths
+
+
+@compiled()
+def _parts_within(a: Array, b: Array, reach: float) -> tuple[float, float]:
+    """Return from where to where, in parts of it, a segment is within the square; last if none."""
+    first, last = 0.0, 1.0
+    for k in range(2):
+        step = b[k] - a[k]
+        if max(abs(a[k]), abs(b[k])) <= reach:
+            continue
+        if step != 0.0:
+            low, high = (-reach - a[k]) / step, (reach - a[k]) / step
+            first, last = max(first, min(low, high)), min(last, max(low, high))
+        elif abs(a[k]) > reach:
+            first, last = math.inf, -math.inf
+    return first, last
+
+
+@compiled("f2", "i1", "f0")
+def reached(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices, float]:
+    """Return the parts of polylines within the square |s|, |t| ≤ reach, and their whole length."""
+    found, ends = np.empty((3 * len(points), 2)), np.empty(len(points) + len(stops), dtype=np.intp)
+    total = runs = start = 0
+    for stop in stops:
+        piece = points[start:stop]
+        start = stop
+        outside = -1
+        for i in range(len(piece)):
+            if outside < 0 and max(abs(piece[i, 0]), abs(piece[i, 1])) > reach:
+                outside = i
+        if outside < 0:
+            found[total : total + len(piece)] = piece
+            total += len(piece)
+            ends[runs] = total
+            runs += 1
+            continue
+        # begin a ring where nothing is cut apart that belongs together
+        ring = piece[0, 0] == piece[-1, 0] and piece[0, 1] == piece[-1, 1]
+        turn, around = (outside, len(piece) - 1) if ring else (0, len(piece))
+        through = 0.0
+        inside = False
+        for i in range(len(piece) - 1):
+            a, b = piece[(i + turn) % around], piece[(i + turn + 1) % around]
+            first, last = _parts_within(a, b, reach)
+            if inside and (first > 0.0 or through < 1.0):
+                inside = False
+                ends[runs] = total
+                runs += 1
+            through = last
+            if first >= last:
+                continue
+            if not inside:
+                found[total] = a + first * (b - a)
+                total += 1
+            inside = True
+            for k in range(2):
+                found[total, k] = a[k] + last * (b[k] - a[k]) if last < 1.0 else b[k]
+            total += 1
+        if inside:
+            ends[runs] = total
+            runs += 1
+    length = 0.0
+    start = 0
+    for end in ends[:runs]:
+        for i in range(start, end - 1):
+            length += _distance(found[i], found[i + 1])
+        start = end
+    return found[:total], ends[:runs], length
+
+
+@compiled()
+def _sampled(points: Array, lengths: Array, step: float, first: int, last: int) -> Array:
+    """Return places of a polyline at steps of its length; beyond a ring's ends it goes on."""
+    total = lengths[-1]
+    found = np.empty((last - first, 2))
+    place = 0
+    for i in range(len(found)):
+        at = step * (first + i)
+        if first < 0:
+            at %= total
+        if at < lengths[place]:
+            place = 0
+        while place + 1 < len(lengths) and lengths[place + 1] <= at:
+            place += 1
+        beyond = min(place + 1, len(lengths) - 1)
+        part = (at - lengths[place]) / (lengths[beyond] - lengths[place]) if beyond > place else 0.0
+        for k in range(2):
+            found[i, k] = points[place, k] + part * (points[beyond, k] - points[place, k])
+    return found
+
+
+@compiled()
+def _fitted(curve: Array, weights: Array) -> Array:
+    """Return the middles of parabolas over as many points on both sides; at the ends, theirs.
+
+    Row i of the weights, of an odd number, gives the parabola's value at the i-th of its points.
+    """
+    part, count = len(weights) // 2, len(curve)
+    fitted = np.zeros((count, 2))
+    values = curve.copy().reshape(2 * count)
+    middle = fitted.reshape(2 * count)[2 * part : 2 * (count - part)]
+    for k in range(len(weights)):
+        weight, near = weights[part, k], values[2 * k : 2 * k + len(middle)]
+        for i in range(len(middle)):
+            middle[i] += weight * near[i]
+    for i in range(part):
+        for k in range(len(weights)):
+            last = count - len(weights) + k
+            for j in range(2):
+                fitted[i, j] += weights[i, k] * curve[k, j]
+                fitted[count - part + i, j] += weights[part + 1 + i, k] * curve[last, j]
+    return fitted
+
+
+@compiled()
+def _outward(curve: Array, closed: int) -> Array:
+    """Return unit normals on the right of a curve, shape (n, 2)."""
+    count = len(curve)
+    normals = np.empty((count, 2))
+    for i in range(count):
+        before, after = i - 1, i + 1
+        if closed:
+            before, after = before % count, after % count
+        a, b = curve[max(before, 0)], curve[min(after, count - 1)]
+        length = max(_distance(a, b), 1e-300)
+        normals[i, 0], normals[i, 1] = (b[1] - a[1]) / length, (a[0] - b[0]) / length
+    return normals
+
+
+@compiled()
+def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices) -> Array:
+    """Return how far raw points stand out of the points of a curve that are nearest to them.
+
+    ``guesses``: for each raw point one of the curve that is near it.
+    """
+    count, last = len(curve), curve[-1]
+    longest = 1e-9  # [m] or else the longest step of the curve
+    chord = max(_distance(curve[0], last), 1e-9)
+    u, v = (last[0] - curve[0, 0]) / chord, (last[1] - curve[0, 1]) / chord
+    # how far along the chord a curve has been up to each point, and is from there on
+    so_far, yet = np.empty(count), np.empty(count)
+    for i in range(count):
+        so_far[i] = yet[i] = u * curve[i, 0] + v * curve[i, 1]
+        if i:
+            longest = max(longest, _distance(curve[i - 1], curve[i]))
+            so_far[i] = max(so_far[i], so_far[i - 1])
+    for i in range(count - 1, 0, -1):
+        yet[i - 1] = min(yet[i - 1], yet[i])
+    excess = np.zeros(count)
+    for i in range(len(raw)):
+        x, y = raw[i]
+        along = u * x + v * y
+        nearest = guesses[i]
+        least = (x - curve[nearest, 0]) ** 2 + (y - curve[nearest, 1]) ** 2
+        for way in (-1, 1):
+            at = guesses[i] + way
+            while 0 <= at < count:
+                beside = along - so_far[at] if way < 0 else yet[at] - along
+                if beside > 0.0 and beside * beside > least:
+                    # so is all that follows
+                    break
+                square = (x - curve[at, 0]) ** 2 + (y - curve[at, 1]) ** 2
+                if square < least:
+                    nearest, least = at, square
+                # what is farther by so many steps is as many points away at least
+                steps = 1
+                if square > 16.0 * least:
+                    steps = max(1, int((math.sqrt(square) - math.sqrt(least)) / longest))
+                at += way * steps
+        out = (x - curve[nearest, 0]) * outward[nearest, 0]
+        out += (y - curve[nearest, 1]) * outward[nearest, 1]
+        excess[nearest] = max(excess[nearest], out)
+    return excess
+
+
+@compiled()
+def _continued(values: Array, part: int, closed: int) -> Array:
+    """Return values with ``part`` more at both ends: those of a ring, else the last ones."""
+    found = np.empty(len(values) + 2 * part)
+    for i in range(len(found)):
+        place = i - part
+        found[i] = values[place % len(values) if closed else min(max(place, 0), len(values) - 1)]
+    return found
+
+
+@compiled()
+def _highest(values: Array, part: int, closed: int) -> Array:
+    """Return the largest of each value and ``part`` on both sides of it, or zero."""
+    further, found = _continued(values, part, closed), np.zeros(len(values))
+    for k in range(2 * part + 1):
+        beside = further[k : k + len(values)]
+        for i in range(len(found)):
+            found[i] = max(found[i], beside[i])
+    return found
+
+
+@compiled()
+def _mean(values: Array, part: int, closed: int) -> Array:
+    """Return the mean of each value and ``part`` on both sides of it."""
+    further, size = _continued(values, part, closed), 2 * part + 1
+    found = np.empty(len(values))
+    found[0] = further[:size].sum() / size
+    for i in range(1, len(found)):
+        found[i] = found[i - 1] + (further[i + size - 1] - further[i - 1]) / size
+    return found
+
+
+@compiled("f2", "f1", "f0", "i0", "f0", "i0", "f2", "f2")
+def smoothed(
+    points: Array,
+    lengths: Array,
+    step: float,
+    count: int,
+    rest: float,
+    closed: int,
+    wide: Array,
+    narrow: Array,
+) -> Array:
+    """Return a polyline smoothed to the scale of a tile, and raised over its raw points.
+
+    Parameters
+    ----------
+    points, lengths : ndarray
+        As of `corners`.
+    step : float
+        Distance of neighbouring points along the polyline [m].
+    count : int
+        Number of points.
+    rest : float
+        By how many steps the last one goes on straight.
+    closed : int
+        1 if the polyline is a ring, else 0.
+    wide, narrow : ndarray
+        Weights of the first and the second parabolas, as of `_fitted`.
+    """
+    half = len(wide) // 2
+    over = 2 * half if closed else 0
+    sampled = _sampled(points, lengths, step, -over, count + over)
+    fitted = _fitted(_fitted(sampled, wide), narrow)
+    more = 1 if rest > 0.0 else 0
+    curve = np.empty((count + more, 2))
+    curve[:count] = fitted[over : over + count]
+    if more:
+        curve[count] = curve[count - 1] + rest * (curve[count - 1] - curve[count - 2])
+    raw = np.concatenate((sampled[over : over + count], points))
+    guesses = np.empty(len(raw), dtype=np.intp)
+    for i in range(count):
+        guesses[i] = i
+    for i in range(len(points)):
+        guesses[count + i] = min(int(lengths[i] / step), count - 1)
+    for _ in range(4):  # each time far less is left
+        outward = _outward(curve, closed)
+        excess = _excess(curve, outward, raw, guesses)
+        if excess.max() <= 1e-5:  # [m]
+            break
+        # two moving means whose widths add up to that of the maximum leave no point below it
+        rise = _highest(excess, half, closed)
+        rise = _mean(_mean(rise, half // 2, closed), half - half // 2, closed)
+        for i in range(len(curve)):
+            for k in range(2):
+                curve[i, k] += rise[i] * outward[i, k]
+    return np.concatenate((curve, curve[:1])) if closed else curve

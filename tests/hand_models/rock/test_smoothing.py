@@ -1,0 +1,82 @@
+"""The parts of smoothing, against what they are defined as."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given, strategies as st
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.signal import savgol_filter
+
+from hand_models.rock import compiled_smoothing
+from hand_models.rock.smoothing import Scale, smooth
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def folded(rng: np.random.Generator) -> np.ndarray:
+    """A curve that goes to and fro, or around, with steps of any size."""
+    turn = np.cumsum(rng.normal(0.0, rng.choice([0.05, 0.5]), 150))
+    steps = rng.uniform(1e-4, 1e-3, (150, 1)) * np.column_stack([np.cos(turn), np.sin(turn)])
+    return np.cumsum(steps, axis=0)
+
+
+@given(seeds)
+def test_a_raw_point_stands_out_of_the_point_of_the_curve_that_is_nearest(seed):
+    rng = np.random.default_rng(seed)
+    curve = folded(rng)
+    outward = rng.normal(size=curve.shape)
+    raw = curve[rng.integers(0, len(curve), 80)] + rng.normal(0.0, 5e-4, (80, 2))
+    guesses = rng.integers(0, len(curve), 80)
+    nearest = np.linalg.norm(raw[:, None] - curve, axis=2).argmin(axis=1)
+    want = np.zeros(len(curve))
+    np.maximum.at(want, nearest, ((raw - curve[nearest]) * outward[nearest]).sum(axis=1))
+    got = compiled_smoothing._excess(curve, outward, raw, guesses)
+    np.testing.assert_allclose(got, want, atol=1e-15)
+
+
+@given(seeds)
+def test_a_smoothed_line_is_fitted_twice_and_raised_by_what_stands_out(seed):
+    """On points at equal steps, of a line so rough that it is raised."""
+    scale, rng = Scale.of(), np.random.default_rng(seed)
+    rise = 1e-3 * rng.random(401)
+    turn = np.cumsum(rng.normal(0.0, 0.1, 400))
+    turn = np.clip(turn, -1.0, 1.0) + rise[1:]
+    raw = np.vstack([[0.0, 0.0], np.cumsum(np.column_stack([np.cos(turn), np.sin(turn)]), axis=0)])
+    raw *= scale.spacing
+    half = round(0.5 * scale.tile / scale.spacing)
+    curve = savgol_filter(
+        savgol_filter(raw, 2 * half + 1, 2, axis=0), 2 * (half // 2) + 1, 2, axis=0
+    )
+    for _ in range(4):
+        step = np.gradient(curve, axis=0)
+        outward = np.column_stack([step[:, 1], -step[:, 0]]) / np.hypot(*step.T)[:, None]
+        nearest = np.linalg.norm(raw[:, None] - curve, axis=2).argmin(axis=1)
+        excess = np.zeros(len(curve))
+        np.maximum.at(excess, nearest, ((raw - curve[nearest]) * outward[nearest]).sum(axis=1))
+        if excess.max() <= 1e-5:
+            break
+        up = maximum_filter1d(excess, 2 * half + 1, mode="nearest")
+        for size in (2 * (half // 2) + 1, 2 * (half - half // 2) + 1):
+            up = uniform_filter1d(up, size, mode="nearest")
+        curve = curve + up[:, None] * outward
+    np.testing.assert_allclose(smooth(raw, scale)[: len(curve)], curve, atol=1e-9)
+
+
+@given(seeds)
+def test_what_is_within_reach_of_a_line_is_cut_where_it_leaves(seed):
+    rng = np.random.default_rng(seed)
+    line = np.cumsum(rng.normal(0.0, 0.1, (40, 2)), axis=0)
+    if rng.random() < 0.5:
+        line = np.vstack([line, line[:1]])
+    points, ends, length = compiled_smoothing.reached(line, np.array([len(line)]), 0.2)
+    assert np.abs(points).max(initial=0.0) <= 0.2 + 1e-12
+    inner = np.delete(np.arange(len(points) - 1), ends[:-1] - 1) if len(points) else []
+    steps = [math.dist(points[i], points[i + 1]) for i in inner]
+    assert length == np.float64(sum(steps)) or abs(length - sum(steps)) < 1e-12
+    # as long as what of a finely sampled line is within
+    fine = np.linspace(line[:-1], line[1:], 2001, axis=1)
+    within = (np.abs(0.5 * (fine[:, 1:] + fine[:, :-1])) <= 0.2).all(axis=2)
+    want = (np.linalg.norm(np.diff(fine, axis=1), axis=2) * within).sum()
+    assert abs(length - want) < 1e-2 * max(want, 0.1)
