@@ -374,7 +374,8 @@ def _json(value: object) -> str:
 
 def _first_line(error: Exception) -> str:
     """Return zenoh's complaint without where in its source it was made."""
-    return str(error).partition(" at /")[0].partition("\n")[0].strip()
+    said = str(error).partition(" at /")[0].partition("\n")[0]
+    return re.sub(r"Single\((.*?)\)", r"\1", said).strip(" !")
 
 
 def _complaint(error: Exception) -> str:

@@ -117,7 +117,7 @@ class Format(Enum):
         except msgspec.ValidationError:
             raise
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            raise MalformedError(f"not {self.name.lower()}: {error}") from None
+            raise MalformedError(f"not valid {self.name}: {error}") from None
         except RecursionError:
             raise _too_deep() from None
 

@@ -266,7 +266,7 @@ def test_contradictory_rows_leave_an_empty_set(A, b):
 )
 def test_an_unbounded_block_is_an_error_and_not_a_number(A):
     made = space(A, np.ones(len(A)), np.eye(6)[:, : np.shape(A)[1]])
-    with pytest.raises(SolverError, match=r"no limit bounds . coupled"):
+    with pytest.raises(SolverError, match="no limit bounds"):
         made.vertices()
 
 

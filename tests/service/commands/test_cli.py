@@ -250,7 +250,7 @@ def test_bundled_stances(name, capfd):
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("{", "crux: not json: Input data was truncated\n"),
+        ("{", "crux: not valid JSON: Input data was truncated\n"),
         ("{}", "crux: v: missing; valid: 1\n"),
         (json.dumps(wall_request() | {"colour": 1}), "crux: colour: unknown field; known are "),
         (json.dumps(wall_request() | {"confidence": 0.9}), "crux: confidence: not supported in"),

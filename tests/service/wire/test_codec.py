@@ -102,7 +102,7 @@ def test_errors_do_not_grow_with_the_request() -> None:
 
 
 def test_malformed_errors_are_the_callers() -> None:
-    with pytest.raises(MalformedError, match="not json"):
+    with pytest.raises(MalformedError, match="not valid JSON"):
         decode_request(b"{", PlanRequest)
     for form in Format:
         with pytest.raises(MalformedError, match="nothing was sent, a PlanRequest is needed"):
