@@ -129,7 +129,8 @@ def _contacts(settled: SettledHand) -> list[replies.ContactReply]:
             stop=_stop(settled, tile),
             position=position.tolist(),
             engagement=share,
-            across=float((position - frame.joint) @ frame.across),
+            # a picometre is rounding
+            across=round(float((position - frame.joint) @ frame.across), 12) + 0.0,
             shear_axis=shear,
             normal_axis=normal,
             lateral_axis=lateral,
