@@ -15,13 +15,20 @@ from hand_models.base import (
     LimitError,
     Pose,
     Progress,
+    RefusedPlaceError,
     check_positive,
 )
 from hand_models.finger import CONTACT_KINDS
 from hand_models.fixed_wrist.contact_rest import placed_by_contact
 from hand_models.fixed_wrist.placing import ALONG_FINGERS, approach_frame
-from hand_models.fixed_wrist.pure_forces import TRIAL_WAYS, force_directions, pure_reaches
-from hand_models.fixed_wrist.seat_scatter import SCATTER_SETTINGS, Robustness, robustness
+from hand_models.fixed_wrist.pure_forces import (
+    FORCE_TOLERANCE,
+    TRIAL_WAYS,
+    force_directions,
+    impossible_forces,
+    pure_reaches,
+)
+from hand_models.fixed_wrist.seat_scatter import Robustness, robustness
 from hand_models.fixed_wrist.seat_search import best_seats
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
@@ -96,6 +103,14 @@ class FoundHold(NamedTuple):
     support: Array
     pure: Array
     robust: Robustness | None = None
+
+    @property
+    def cannot(self) -> dict[str, str]:
+        """Forces that the hand cannot exert alone, by direction, in words (`impossible_forces`)."""
+        pure, support = (
+            dict(zip(TRIAL_WAYS, each.tolist(), strict=True)) for each in (self.pure, self.support)
+        )
+        return impossible_forces(pure, support)
 
 
 def grid_of_trials(
@@ -214,7 +229,7 @@ def try_holds(
     *,
     placing: str = "given",
     samples: int = 0,
-    force: float = SCATTER_SETTINGS.force,
+    force: float = FORCE_TOLERANCE,
 ) -> list[FoundHold | InvalidInputError]:
     """Close hands at places, all together, and return the forces that they can hold.
 
@@ -265,7 +280,8 @@ def try_holds(
             continue
         space = next(spaces)
         if _at_border(hand, outcome):
-            found.append(InvalidInputError(AT_BORDER, field="place.point"))
+            refused = RefusedPlaceError(AT_BORDER, reason="scan_border", field="place.point")
+            found.append(refused)
             continue
         support = pure = np.full(len(TRIAL_WAYS), math.nan)
         try:
@@ -302,7 +318,8 @@ def ranked_holds(
     by : {'robust', 'share', 'pure', 'support'}, optional
         The pure force that nine in ten samples have, the share of the samples that hold the wanted
         force, or the largest force without a scatter: pure, or whatever the other components. Ties
-        are broken by the others, in this order. A place without samples comes after those with.
+        are broken by the others, in this order. A pure force below zero, or none, counts as zero. A
+        place without samples comes after those with.
     way : str, optional
         Direction of the force: one of `TRIAL_WAYS`.
     """
@@ -312,13 +329,13 @@ def ranked_holds(
         raise InvalidInputError(f"must be one of {', '.join(TRIAL_WAYS)}, got {way!r}", field="way")
     k, ranks = list(TRIAL_WAYS).index(way), []
     for i, each in enumerate(found):
-        if isinstance(each, InvalidInputError) or not each.support.max() >= SCATTER_SETTINGS.force:
+        if isinstance(each, InvalidInputError) or not each.support.max() >= FORCE_TOLERANCE:
             continue
         robust = each.robust
         values = {
             "robust": -math.inf if robust is None else float(robust.pure_tenth[k]),
             "share": -math.inf if robust is None else float(robust.share[k]),
-            "pure": -math.inf if math.isnan(each.pure[k]) else float(each.pure[k]),
+            "pure": float(np.fmax(each.pure[k], 0.0)),
             "support": float(each.support[k]),
         }
         order = values.pop(by), *values.values()

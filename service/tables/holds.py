@@ -4,26 +4,38 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import Array, InvalidInputError, RefusedPlaceError
 from hand_models.fixed_wrist import (
-    AT_BORDER,
-    SCATTER_SETTINGS,
+    FORCE_TOLERANCE,
     TRIAL_WAYS,
     FoundHold,
     HoldRank,
     HoldTrial,
 )
-from service.tables.layout import name, number, print_rows, print_warnings
+from service.tables.layout import name, number, print_rows, print_warnings, text
 
 if TYPE_CHECKING:
     from hand_models.hand import Placing
 
-__all__ = ["hold_json", "print_holds", "refusals_json"]
+__all__ = ["REFUSAL_WORDS", "hold_json", "print_holds", "refusal_kind", "refusals_json"]
+
+REFUSAL_WORDS: Final = {
+    "scan_border": "the scan ends, or has a hole, within a finger's reach",
+    "palm_in_rock": "rock is inside the palm",
+    "finger_in_rock": "rock is inside a finger even with its joints fully open",
+    "tendon_slack": "the closing tension does not close the fingers",
+    "no_equilibrium": "no equilibrium of a finger was found",
+    "no_rest": "the closed hand comes to rest nowhere near its seat",
+    "unstable_rest": "the closed hand does not stay where its net force is zero",
+    "other": "other reasons: see reasons in the file",
+    "holds_nothing": "a hand can be there, but holds nothing in any direction",
+}
+"""Kinds of reasons why there is no hold at a place, in words (`RefusedPlaceError.reason`)."""
 
 Pair = tuple[HoldTrial, FoundHold]
 
@@ -58,6 +70,7 @@ def hold_json(trial: HoldTrial, found: FoundHold, placing: Placing) -> dict[str,
         "support": _by_way(found.support),
         "pure": pure,
         "pure_pull_off": pure["-fz"],
+        "cannot": found.cannot,
         "samples": 0 if robust is None else robust.draws,
         **{key: None if robust is None else _by_way(getattr(robust, key)) for key in quantiles},
     }
@@ -84,21 +97,33 @@ def refusals_json(
     Returns
     -------
     dict
-        Number of ``refused`` trials, by reason (``reasons``), and by point and reason
-        (``refusals``).
+        Number of ``refused`` trials, by kind (``kinds``), by reason (``reasons``), and by point
+        with both (``refusals``).
     """
+    kinds: dict[tuple[float, float, float], Counter[str]] = {}
     found: dict[tuple[float, float, float], Counter[str]] = {}
     for i, each in sorted(outcomes.items()):
         if isinstance(each, InvalidInputError):
-            found.setdefault(trials[i].point, Counter())[_reason(each)] += 1
+            point = trials[i].point
+            kinds.setdefault(point, Counter())[refusal_kind(each)] += 1
+            found.setdefault(point, Counter())[_reason(each)] += 1
     reasons = sum(found.values(), Counter[str]())
     return {
         "refused": reasons.total(),
+        "kinds": dict(sum(kinds.values(), Counter[str]()).most_common()),
         "reasons": dict(reasons.most_common()),
         "refusals": [
-            {"point": point, "reasons": dict(reasons)} for point, reasons in found.items()
+            {"point": point, "kinds": dict(kinds[point]), "reasons": dict(reasons)}
+            for point, reasons in found.items()
         ],
     }
+
+
+def refusal_kind(found: FoundHold | InvalidInputError) -> str:
+    """Return the key of `REFUSAL_WORDS` that says why there is no hold at a place."""
+    if not isinstance(found, InvalidInputError):
+        return "holds_nothing"
+    return found.reason if isinstance(found, RefusedPlaceError) else "other"
 
 
 def _reason(error: InvalidInputError) -> str:
@@ -139,7 +164,7 @@ def print_holds(
         number("outer °", "0.outer_rotation", ".0f", scale=degree),
         number("pure N", f"1.pure.{k}", _finite),
         number("support N", f"1.support.{k}", "z.1f"),
-        number("shear N", lambda row: row[1].support[1:].min(), "z.1f"),
+        name("cannot", lambda row: _ways(row[1].cannot)),
     ]
     if result["samples"]:
         columns[3:3] = [
@@ -157,7 +182,8 @@ def print_holds(
         "support": f"the largest force along {way} with whatever else",
     }
     out.print(f"sorted by {words[by]}")
-    least = SCATTER_SETTINGS.force
+    out.print("cannot: directions in H, of pull-off and shear, without any force alone")
+    least = FORCE_TOLERANCE
     alone = sum(each.pure[k] >= least for _, each in found)
     points = len({trial.point for trial in trials})
     out.print(
@@ -166,7 +192,7 @@ def print_holds(
     )
     if not found:
         hint = "does z of the file point into the rock, as `crux rock` writes it?"
-        if list(result["reasons"])[:1] == [AT_BORDER]:
+        if list(result["kinds"])[:1] == ["scan_border"]:
             hint = "is the scan full of holes? `crux rock` says what helps against them"
         elif 2 * restless > result["refused"]:
             hint = (
@@ -175,8 +201,20 @@ def print_holds(
             )
         out.print(f"nothing holds: {hint}")
     print_warnings(result["warnings"], out)
-    for reason, count in [*result["reasons"].items()][:3]:
-        out.print(f"{count:,} refused: {reason}")
+    idle = result["tried"] - result["refused"] - len(found)
+    without = result["kinds"] | ({"holds_nothing": idle} if idle else {})
+    if without:
+        rows = [(kind, f"{count:,}", REFUSAL_WORDS[kind]) for kind, count in without.items()]
+        columns = [name("kind", "0"), number("places", "1"), text("why", "2")]
+        print_rows(rows, columns, out, "places without a hold")
+
+
+def _ways(ways: Iterable[str]) -> str:
+    """Return directions of forces in short: ``-z ±x +y``."""
+    signs: dict[str, str] = {}
+    for way in ways:
+        signs[way[-1]] = "±" if way[-1] in signs else way[0]
+    return " ".join(f"{sign}{axis}" for axis, sign in signs.items()) or "-"
 
 
 def _finite(value: float) -> str:

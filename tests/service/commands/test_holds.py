@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
+import re
 import signal
 from collections import Counter
 from collections.abc import Iterator
@@ -58,6 +58,8 @@ def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):
     assert {hold["samples"] for hold in held} == {2}
     assert ranks(held) == sorted(ranks(held), reverse=True)
     for hold in held:
+        for way, reach in hold["pure"].items():
+            assert (way in hold["cannot"]) == (reach is None or reach < 0.1)
         assert hold["pure_pull_off"] == hold["pure"]["-fz"]
         assert (hold["pure_tenth"]["-fz"] >= 0.1) == (hold["share"]["-fz"] == 1.0)
         assert 0.0 <= hold["pure_tenth"]["-fz"] <= max(hold["tenth"]["-fz"], 0.0)
@@ -67,12 +69,13 @@ MEASURES = ("pure_tenth", "share", "pure", "support")
 
 
 def ranks(holds: list[dict], way: str = "-fz", order: tuple[str, ...] = MEASURES) -> list:
-    """Measures of holds along a direction; without a value, below any other."""
-    none = -math.inf
-    return [
-        [none if hold[key] is None or hold[key][way] is None else hold[key][way] for key in order]
-        for hold in holds
-    ]
+    """Measures of holds along a direction; −1 without samples, 0 without a pure force."""
+
+    def measure(hold: dict, key: str) -> float:
+        value = -1.0 if hold[key] is None else hold[key][way]
+        return max(value or 0.0, 0.0) if key == "pure" else value
+
+    return [[measure(hold, key) for key in order] for hold in holds]
 
 
 @pytest.mark.parametrize(
@@ -112,16 +115,17 @@ def test_only_the_best_are_sampled_if_asked_for(rock, tmp_path):
 
 def check_refusals(told: dict) -> None:
     """Every refused trial is counted once, at its point and under its reason."""
-    by_reason: Counter[str] = Counter()
-    for refusal in told["refusals"]:
-        by_reason.update(refusal["reasons"])
-    assert by_reason == told["reasons"]
-    assert by_reason.total() == told["refused"]
+    for key in ("reasons", "kinds"):
+        counts: Counter[str] = Counter()
+        for refusal in told["refusals"]:
+            counts.update(refusal[key])
+        assert counts == told[key]
+        assert counts.total() == told["refused"]
     points = [tuple(refusal["point"]) for refusal in told["refusals"]]
     assert len({*points}) == len(points)
 
 
-def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
+def test_file_and_table_say_why_hands_cannot_be_at_places(rock, tmp_path, capfd):
     """At the rim of a wall fingers reach over its border; each trial is tried again."""
     output = tmp_path / "holds.json"
     options = [*COARSE, "--samples", "0", "--workers", "1"]
@@ -129,6 +133,11 @@ def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
     told = json.loads(output.read_text(encoding="utf-8"))
     check_refusals(told)
     assert 0 < told["reasons"][AT_BORDER] < told["trials"] == told["tried"]
+    assert told["kinds"]["scan_border"] == told["reasons"][AT_BORDER]
+    table = capfd.readouterr().out.split("places without a hold")[1]
+    idle = told["tried"] - told["refused"] - len(told["holds"])
+    for kind, count in (told["kinds"] | ({"holds_nothing": idle} if idle else {})).items():
+        assert re.search(rf"^ {kind} +{count} ", table, re.MULTILINE)
     held = {tuple(hold["place"]["point"]) for hold in told["holds"]}
     mesh = Mesh(*read_mesh(rock), hand_table(), anywhere=True)
     radius = 0.5 * hand_table().scalar("palm", "length")
