@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from benchmarks.race import race
+from benchmarks.race import Way, race
 from benchmarks.results import Line, Table, span, times
 from hand_models import Grasp, SettledHand
 from hand_models.fixed_wrist import (
@@ -21,7 +21,7 @@ from hand_models.fixed_wrist import (
     wrench_spaces,
 )
 from hand_models.hand import Placement, settle_hands
-from hand_models.rock import Mesh
+from hand_models.rock import Mesh, Triangles
 from hand_models.rock.smoothing import Scale, smooth
 from hand_models.rock.triangles import TriangleCells
 from hand_models.sections import Section
@@ -32,6 +32,12 @@ __all__ = ["placement_tables"]
 
 HANDS = 32
 """Placed together."""
+
+WALLS = {1: 225, 2: 449, 4: 897}
+"""Vertices along the side of square walls, by its length [m]."""
+
+HURST = 0.8
+"""Exponent by which the walls' steps grow with their length."""
 
 Plane = tuple[ArrayLike, ArrayLike, ArrayLike]
 
@@ -121,5 +127,48 @@ def placement_tables(rounds: int, tick: Callable[[], object]) -> list[Table]:
             ],
             f"{made / HANDS:.1f} cuts each. The 50 draws of one hand's robustness take "
             f"{span(timed.median('robust'))}.",
-        )
+        ),
+        _larger_walls(rounds, tick),
     ]
+
+
+def _larger_walls(rounds: int, tick: Callable[[], object]) -> Table:
+    """Measure look-ups at the same places in the middle of larger and larger walls."""
+    rng, reach = np.random.default_rng(0), Scale.of().reach
+    places = np.column_stack([rng.uniform(-0.2, 0.2, (100, 2)), np.zeros(100)])
+    into, beside = np.array([0.0, 0.0, 1.0]), np.array([0.0, reach, reach])
+    slabs = [
+        np.array(
+            [[-math.sin(turn), math.cos(turn), 0.0], [math.cos(turn), math.sin(turn), 0.0], into]
+        )
+        for turn in rng.uniform(0.0, math.tau, 100)
+    ]
+    ways: dict[tuple[str, int], Way] = {}
+    for side, count in WALLS.items():
+        # as rough as the smallest at every scale
+        wall = fractal_wall(0, size=side, count=count, height=0.01 * side**HURST, hurst=HURST)
+        cells = TriangleCells(Triangles(*wall))
+
+        def crops(_: int, cells: TriangleCells = cells) -> object:
+            return [
+                cells.within(axes, axes @ place - beside, axes @ place + beside)
+                for axes, place in zip(slabs, places, strict=True)
+            ]
+
+        ways["crop", side] = crops
+        ways["ray", side] = lambda _, cells=cells: cells.lines(places, into)
+    timed = race(ways, rounds, tick)
+
+    def line(side: int) -> Line:
+        cells: list[str] = []
+        for name in ("crop", "ray"):
+            cells += [span(timed.median((name, side)) / len(places))]
+            cells += [times(timed.ratio((name, side), (name, 1)))]
+        return Line(f"{side**2} m²", tuple(cells))
+
+    return Table(
+        "Look-ups in larger scans of the same rock, triangles 4.5 mm wide",
+        ("triangles near a cut", "× 1 m²", "ray", "× 1 m²"),
+        list(map(line, WALLS)),
+        "0.1, 0.4 and 1.6 million triangles.",
+    )

@@ -13,7 +13,7 @@ import pytest
 from service.commands.cli import COMMANDS_BY_NAME, crux
 from tests.suite.helpers.checkout import ROOT
 
-HEAVY = ("scipy", "trimesh", "cvxpy", "pinocchio", "matplotlib")
+HEAVY = ("scipy", "trimesh", "cvxpy", "pinocchio", "matplotlib", "numba")
 COMMAND = "from service.commands import main; main()"
 
 
@@ -40,8 +40,11 @@ def test_a_name_of_an_index_is_had_without_the_libraries_behind_others() -> None
         ("from service import CruxClient", (*HEAVY, "numpy", "rich")),
         ("from service import PlanRequest, ServiceError", (*HEAVY, "numpy", "zenoh")),
         ("from hand_models import Pose, Cylinder", HEAVY),
-        ("from planner import Load, Limits", ("scipy.optimize", "trimesh", "cvxpy", "clarabel")),
-        ("from planner import plan", ("scipy.sparse", "trimesh", "cvxpy", "matplotlib")),
+        (
+            "from planner import Load, Limits",
+            ("scipy.optimize", "trimesh", "numba", "cvxpy", "clarabel"),
+        ),
+        ("from planner import plan", ("scipy.sparse", "trimesh", "numba", "cvxpy", "matplotlib")),
     ]:
         assert not {*absent} & loaded(statement)
 
@@ -74,7 +77,7 @@ def test_completion_waits_for_no_numbers() -> None:
 def test_one_plan_loads_what_it_needs() -> None:
     found = loaded(COMMAND, "plan", "wall-300", "--json")
     assert {"numpy", "clarabel"} <= found
-    absent = {"trimesh", "cvxpy", "matplotlib", "distributed", "pyarrow", "rich", "pandas"}
+    absent = {"trimesh", "numba", "cvxpy", "matplotlib", "distributed", "pyarrow", "rich", "pandas"}
     absent |= {f"scipy.{name}" for name in ("linalg", "optimize", "sparse", "spatial", "special")}
     assert not absent & found
 
@@ -83,6 +86,8 @@ def test_a_process_of_the_service_has_all_of_it_before_the_first_question() -> N
     code = "from service.processes import answering; answering(None, None)"
     found = loaded(code)
     assert {"cvxpy", "trimesh", "scipy.optimize", "scipy.spatial", "clarabel", "highspy"} <= found
+    compiled = {f"hand_models.rock.compiled_{part}" for part in ("cells", "cuts", "smoothing")}
+    assert compiled <= found
 
 
 def test_what_is_told_of_a_command_is_how_its_own_help_begins() -> None:

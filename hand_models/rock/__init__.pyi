@@ -14,6 +14,7 @@ from .mesh_files import (
     read_vertices as read_vertices,
 )
 from .profile import Profile as Profile
+from .smoothing import load_compiled as load_compiled
 from .surface import Triangles as Triangles, drawn_out as drawn_out, grid as grid
 from .triangles import (
     connected as connected,

@@ -21,6 +21,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 
 import numpy as np
 import scipy
@@ -33,7 +34,7 @@ from hand_models.rock.holds import Hold
 from hand_models.rock.triangles import strung, unstrung
 from hand_models.sections import NO_STRIPS, FingerRock, PolylineSection, RockStrips, Section
 
-__all__ = ["OutlinedHold", "Scale", "smooth"]
+__all__ = ["OutlinedHold", "Scale", "load_compiled", "smooth"]
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,15 @@ class Scale:
         width = 0.5 * (self.frame_width - self.tile_width) / max(beside, 1)
         outer = 0.5 * self.tile_width + width * (np.arange(beside) + 0.5)
         return np.concatenate([-outer[::-1], under, outer]), slice(beside, beside + 2 * half + 1)
+
+
+def load_compiled() -> None:
+    """Import what numba compiles of scanned and drawn rock, so that no cut waits for it.
+
+    The first process of a machine compiles, in some 15 s; others load in 0.3 s.
+    """
+    for part in ("cells", "cuts", "smoothing"):
+        import_module(f"hand_models.rock.compiled_{part}")
 
 
 def smooth(points: Array, scale: Scale) -> Array | None:
@@ -207,6 +217,7 @@ class OutlinedHold(Hold):
     scanned = True
 
     def __init__(self, hand: ParameterTable | None = None) -> None:
+        load_compiled()
         self._scale = Scale.of(hand)
 
     def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:

@@ -251,9 +251,7 @@ def holds_command(
         tables.say({**summary, "holds": len(found), "file": str(output)})
     else:
         out = tables.console()
-        errors = [each for each in outcomes.values() if isinstance(each, InvalidInputError)]
-        restless = sum(each.field == "placing" for each in errors)
-        tables.print_holds(result, trials, found, restless, SHOWN_HOLDS, out)
+        tables.print_holds(result, trials, found, SHOWN_HOLDS, out)
         out.print(f"{output} (in m, rad, N)", soft_wrap=True)
 
 

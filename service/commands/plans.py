@@ -76,6 +76,11 @@ def plan_command(
         request = msgspec.structs.replace(request, want=[w for w in request.want if w != "advice"])
     begun = perf_counter()
     with tables.waiting(f"planning {stance}", request):
+        if request.deadline is not None and _on_outlines(request):
+            from hand_models.rock import load_compiled
+
+            # the first process of a machine compiles, for longer than most deadlines
+            load_compiled()
         with planner.deadline.within(request.deadline):
             answer = answering.planned(request, robots)
             full = request.detail in (None, "full") and not brief
@@ -107,6 +112,12 @@ def plan_command(
     else:
         _print_files(written, answer.reply)
     return tables.ExitStatus.of(answer.reply.status)
+
+
+def _on_outlines(request: requests.PlanRequest) -> bool:
+    """Return whether a hand is on scanned or drawn rock."""
+    holds = [*request.stance.rocks.values(), *(hand.hold for hand in request.stance.hands)]
+    return any(isinstance(hold, requests.Mesh | requests.Profile) for hold in holds)
 
 
 def _print(

@@ -64,6 +64,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     callable
         Takes a `Job` and returns its `Answer`; keeps declared streams from call to call.
     """
+    from hand_models.rock import load_compiled
     from planner import deadline
     from service.answering import Streams, handle, robots_of
 
@@ -71,6 +72,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     scipy = ("linalg", "optimize", "spatial", "stats")
     for name in ("cvxpy", *(f"scipy.{part}" for part in scipy), "trimesh"):
         import_module(name)
+    load_compiled()
     robots = robots_of(robot)
     streams = Streams()
 

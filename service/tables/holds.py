@@ -136,7 +136,6 @@ def print_holds(
     result: Mapping[str, Any],
     trials: Sequence[HoldTrial],
     found: Sequence[Pair],
-    restless: int,
     shown: int,
     out: Console,
 ) -> None:
@@ -149,8 +148,6 @@ def print_holds(
     trials : sequence of HoldTrial
     found : sequence of (HoldTrial, FoundHold)
         Holds, the best first.
-    restless : int
-        Number of trials in which a closed hand comes to no rest.
     shown : int
         Number of holds that are printed.
     out : Console
@@ -191,10 +188,11 @@ def print_holds(
         f"{alone:,} of them along {way} alone"
     )
     if not found:
+        unrested = "no_rest", "unstable_rest"
         hint = "does z of the file point into the rock, as `crux rock` writes it?"
         if list(result["kinds"])[:1] == ["scan_border"]:
             hint = "is the scan full of holes? `crux rock` says what helps against them"
-        elif 2 * restless > result["refused"]:
+        elif 2 * sum(result["kinds"].get(kind, 0) for kind in unrested) > result["refused"]:
             hint = (
                 "closed hands come to rest nowhere; with --placing given they are tried at their "
                 "seats"
