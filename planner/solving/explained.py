@@ -102,7 +102,9 @@ def explained_plan(
         parts = _of_none(prepared, answer)
     if "robust" in question.want and prepared.needs_hands:
         # last: these take the longest
-        parts["robust"] = find_robust_load_factor(prepared, overloaded=checks.overloaded)
+        parts["robust"] = find_robust_load_factor(
+            prepared, checks.idle, solution, attempt, overloaded=checks.overloaded
+        )
         unfinished += late("robust") if parts["robust"] is None else ()
     if "open_loop" in question.want and isinstance(answer, Verified):
         passes = partial(execution_passes, prepared)
