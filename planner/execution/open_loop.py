@@ -11,8 +11,8 @@ random.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 from zlib import crc32
 
@@ -22,15 +22,19 @@ from hand_models.base import Array, InvalidInputError
 from hand_models.compliance import CompliantWrist, CompliantWrists, FloatingWrist
 from hand_models.fixed_wrist import closed_about, scattered_places
 from hand_models.hand import SettledHand
+from hand_models.wrench_spaces import WrenchSpace
 from planner import deadline
 from planner.deadline import DeadlineError
 from planner.execution.equilibrium import NEWTON_SETTINGS, LimbPull, equilibria
 from planner.prepare import PreparedStance, StanceConstraints, wrists_at
 from planner.programs import CAP_SLACK
 from planner.question import OpenLoopSettings
-from planner.result import HandPlan, OpenLoop, OpenLoopSample
+from planner.result import HandPlan, OpenLoop, OpenLoopSample, recover_floating_hand
 
-__all__ = ["execute", "find_open_loop"]
+__all__ = ["Passes", "execute", "find_open_loop"]
+
+Passes = Callable[[Sequence[SettledHand], Sequence[HandPlan], OpenLoopSample], bool]
+"""Returns whether closed hands, with their loads and wrists in equilibrium, pass the checks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +51,7 @@ EXECUTION_SETTINGS: Final = ExecutionSettings()
 
 
 def find_open_loop(
-    prepared: PreparedStance, hands: Sequence[HandPlan], idle: float
+    prepared: PreparedStance, hands: Sequence[HandPlan], idle: float, passes: Passes
 ) -> OpenLoop | None:
     """Return the utilisation over displaced hands if a plan is executed as it is.
 
@@ -59,6 +63,8 @@ def find_open_loop(
         Hands of the plan, in the order of the stance.
     idle : float
         Largest utilisation of joints of limbs without a hand, the same in every sample.
+    passes : callable
+        Check of each equilibrium; one that does not pass counts as none.
 
     Returns
     -------
@@ -72,7 +78,7 @@ def find_open_loop(
     widths = np.array([position, position, height, tilt, tilt, yaw])
     units = np.stack([_places(limb, settings) for limb in prepared.limbs], axis=1)
     try:
-        found, refused, reasons = execute(prepared, hands, widths * units, idle)
+        found, refused, reasons = execute(prepared, hands, widths * units, idle, passes)
     except DeadlineError:
         return None
     return OpenLoop.of(found, settings.seed, ranges, refused, reasons)
@@ -86,7 +92,11 @@ def _places(limb: str, settings: OpenLoopSettings) -> Array:
 
 
 def execute(
-    prepared: PreparedStance, hands: Sequence[HandPlan], displacements: Array, idle: float = 0.0
+    prepared: PreparedStance,
+    hands: Sequence[HandPlan],
+    displacements: Array,
+    idle: float = 0.0,
+    passes: Passes = lambda *_: True,
 ) -> tuple[list[OpenLoopSample], Counter[str], dict[str, str]]:
     """Execute a plan as it is on hands with given displacements.
 
@@ -100,6 +110,8 @@ def execute(
         Displacement of each of n hands on its rock in each of s samples: a twist in H [m, rad].
     idle : float, optional
         Largest utilisation of joints of limbs without a hand.
+    passes : callable, optional
+        Check of each equilibrium, as of `find_open_loop`.
 
     Returns
     -------
@@ -137,8 +149,9 @@ def execute(
     for first in range(0, len(whole), EXECUTION_SETTINGS.at_once):
         part = whole[first : first + EXECUTION_SETTINGS.at_once]
         found = _settled_on(prepared, hands, [there for _, there in part], idle)
-        for (k, _), sample in zip(part, found, strict=True):
-            samples[k] = sample
+        for (k, there), (sample, loads) in zip(part, found, strict=True):
+            if sample.found and passes(there, loads, sample):
+                samples[k] = sample
     return samples, refused, reasons
 
 
@@ -147,8 +160,8 @@ def _settled_on(
     hands: Sequence[HandPlan],
     closed: Sequence[Sequence[SettledHand]],
     idle: float,
-) -> list[OpenLoopSample]:
-    """Return the outcomes of samples whose hands have closed."""
+) -> list[tuple[OpenLoopSample, list[HandPlan]]]:
+    """Return the outcomes of samples whose hands have closed, and their loads in equilibrium."""
     question, wrists, tensions = prepared.question, [], []
     for there in closed:
         models = wrists_at(question.stance, there, question.limits.tendon_tension)
@@ -173,12 +186,14 @@ def _settled_on(
         for k in held
     }
     _prepare([pair for k in held for pair in zip(wrists[k], poses[k], strict=True)])
-    outcomes, cap = [OpenLoopSample(False)] * len(wrists), question.limits.utilisation + CAP_SLACK
+    none, cap = OpenLoopSample(False), question.limits.utilisation + CAP_SLACK
+    outcomes = [(none, list[HandPlan]())] * len(wrists)
     for k in held:
-        uses = map(_use, wrists[k], poses[k], prepared.hands.added)
+        spaces = [wrist.linearised(y) for wrist, y in zip(wrists[k], poses[k], strict=True)]
+        uses = map(_use, spaces, poses[k], prepared.hands.added)
         used, violations, drags = map(list, zip(*uses, strict=True))
         whole, dragged = max(*used, idle, 0.0), max(drags)
-        outcomes[k] = OpenLoopSample(
+        sample = OpenLoopSample(
             True,
             whole <= cap and max(violations) <= EXECUTION_SETTINGS.violation,
             whole,
@@ -186,23 +201,28 @@ def _settled_on(
             dragged if dragged > EXECUTION_SETTINGS.violation else 0.0,
             found.body[k].tolist(),
         )
+        loads = []
+        for i, (wrist, y) in enumerate(zip(wrists[k], poses[k], strict=True)):
+            limb, space = prepared.limbs[i], prepared.hands.added[i].on(spaces[i])
+            pose = replace(plans[i], twist=found.twists[k][i])
+            loads.append(recover_floating_hand(limb, closed[k][i], wrist, space, y, pose))
+        outcomes[k] = sample, loads
     return outcomes
 
 
 def _prepare(poses: Sequence[tuple[FloatingWrist, Array]]) -> None:
-    """Compute the loads of compliant wrists at their poses in one call, for `_use`."""
+    """Compute the loads of compliant wrists at their poses in one call."""
     pairs = [(wrist, y) for wrist, y in poses if isinstance(wrist, CompliantWrist)]
     if pairs:
         wrists, there = zip(*pairs, strict=True)
         CompliantWrists(wrists).prepare([y[None] for y in there])
 
 
-def _use(wrist: FloatingWrist, y: Array, added: StanceConstraints) -> tuple[float, float, float]:
+def _use(space: WrenchSpace, y: Array, added: StanceConstraints) -> tuple[float, float, float]:
     """Return a hand's utilisation, its largest violation of fingers' hard rows, and its drag [N].
 
     Without the margins that the plan was to keep.
     """
-    space = wrist.linearised(y)
     used = float(added.on(space).utilisations(y).max())
     over, rows = space.H @ y - space.h, space.rows[len(space.s) :]
     of_fingers = np.array([row.finger is not None for row in rows])

@@ -103,11 +103,11 @@ class Question:
         self._check_limits()
         self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
-        moving = [name for name, wrist in wrists.items() if wrist != "fixed"]
-        if "robust" in self.want and moving:
+        floating = [name for name, wrist in wrists.items() if wrist == "floating"]
+        if "robust" in self.want and floating:
             raise InvalidInputError(
-                f"'robust' requires fixed wrists on all hands; not fixed are {', '.join(moving)}: "
-                "fix these, or remove 'robust'",
+                "'robust' requires fixed or compliant wrists on all hands; floating are "
+                f"{', '.join(floating)}: change these, or remove 'robust'",
                 field="want",
             )
         self._check_open_loop()

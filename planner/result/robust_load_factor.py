@@ -36,8 +36,9 @@ class RobustLoadFactor(Struct, frozen=True):
     be held, the load factor is zero. A hand that was placed by contact comes to rest anew at each
     of its poses along x, y and turned about z, and is then moved by what contact leaves.
 
-    Tensions are planned anew for every draw: the load factor is that of a robot that knows where
-    its hands are.
+    Tensions, and where compliant wrists go, are planned anew for every draw: the load factor is
+    that of a robot that knows where its hands are. With compliant wrists each draw has places of
+    its own, and a deadline may leave fewer draws than places.
 
     Attributes
     ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,7 @@ from planner.solving.fixed_wrists import FixedSolution
 from planner.solving.robust import find_robust_load_factor
 from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
-from planner.solving.verified import Checks
+from planner.solving.verified import Checks, execution_passes
 
 __all__ = ["explained_plan", "reason_beyond", "unexplained"]
 
@@ -101,10 +102,13 @@ def explained_plan(
         parts = _of_none(prepared, answer)
     if "robust" in question.want and prepared.needs_hands:
         # last: these take the longest
-        parts["robust"] = find_robust_load_factor(prepared, overloaded=checks.overloaded)
+        parts["robust"] = find_robust_load_factor(
+            prepared, checks.idle, solution, attempt, overloaded=checks.overloaded
+        )
         unfinished += late("robust") if parts["robust"] is None else ()
     if "open_loop" in question.want and isinstance(answer, Verified):
-        parts["open_loop"] = find_open_loop(prepared, answer.by_hand(), checks.idle_use)
+        passes = partial(execution_passes, prepared)
+        parts["open_loop"] = find_open_loop(prepared, answer.by_hand(), checks.idle_use, passes)
         unfinished += late("open_loop") if parts["open_loop"] is None else ()
     if "spread" in question.want:
         parts["spread"] = find_spread(prepared, checks.idle, solution, attempt)

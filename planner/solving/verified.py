@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from hand_models.hand import SettledHand
 from planner import programs
 from planner.explanation import LimitUse, joint_name, oddities
 from planner.prepare import HandBatch, PreparedStance
@@ -16,15 +18,23 @@ from planner.result import (
     Finding,
     HandPlan,
     LoadRecovery,
+    OpenLoopSample,
     PlanArrays,
     recover_floating_hand,
 )
 from planner.solving.dual_bounds import is_least
 from planner.solving.objectives import CappedObjective
 from planner.solving.solution import ByHand, Failed, Solution, Verified
-from planner.verification import Check
+from planner.verification import Check, execution_problems
 
-__all__ = ["Checks", "idle_joints", "prepare_checks", "recover", "verify"]
+__all__ = [
+    "Checks",
+    "execution_passes",
+    "idle_joints",
+    "prepare_checks",
+    "recover",
+    "verify",
+]
 
 
 class Checks(NamedTuple):
@@ -165,3 +175,29 @@ def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Ver
     if not wrong:
         return recovered
     return Failed(solution, f"the solver's plan does not pass the checks: {wrong[0]}")
+
+
+def execution_passes(
+    prepared: PreparedStance,
+    closed: Sequence[SettledHand],
+    hands: Sequence[HandPlan],
+    sample: OpenLoopSample,
+) -> bool:
+    """Return whether an equilibrium of displaced hands passes the checks.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    closed : sequence of SettledHand
+        The hands, displaced and closed.
+    hands : sequence of HandPlan
+        Loads of the hands in equilibrium.
+    sample : OpenLoopSample
+        The outcome that is to be reported.
+    """
+    stance = prepared.question.stance
+    # where the hands are displaced, they have other wrenches than those that were given
+    free = tuple([replace(place, wrench=None) for place in stance.hands])
+    question = replace(prepared.question, stance=replace(stance, hands=free), present={})
+    check = Check(question, HandBatch.of(tuple(closed)), prepared.where)
+    return not execution_problems(check, hands, sample, prepared.wrench)

@@ -25,7 +25,7 @@ from hand_models.tendon import FingerTendon, TendonState, shear_stiffness
 from planner.prepare import HandBatch
 from planner.result import PlanArrays, WristPlan
 from planner.verification.joint_balance import Fingers, JointBalance
-from planner.verification.residuals import FINGER_COUNT, PartNames, allowed_errors
+from planner.verification.residuals import FINGER_COUNT, TOLERANCES, PartNames, allowed_errors
 from planner.verification.rolling_contacts import RestingContact, TileFace
 
 __all__ = ["recompute_floating"]
@@ -134,9 +134,7 @@ def _move(
         if contact is not None:
             slip, off = contact.slip(point, float(arm @ way), way)
             exact &= slip is not None
-            # [m] along the phalanx: the rock's radius is only known to some 1e-5 of itself, which
-            # rolling by millimetres shows
-            if not abs(off) <= 1e-6:
+            if not abs(off) <= TOLERANCES.contact:
                 found.append(
                     f"{name}: {PHALANGES[j]} contact is {off:.3g} m from where its tile bears"
                 )

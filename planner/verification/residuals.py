@@ -43,6 +43,13 @@ class VerificationTolerances:
     load: float = 1e-6  # of a tile, relative to the largest load of its hand
     utilisation: float = 1e-6
     near: float = 1e-9  # of any residual: the smallest error that is allowed of one
+    contact: float = 1e-5
+    """Of a contact's place on a floating or compliant hand, along its phalanx [m]: the rock's
+    radius is only known to some 1e-5 of itself. Contacts that roll as a wrist moves by 4 mm and 40
+    mrad are off by 2 micrometres, of hands that are displaced by 4 mm and 40 mrad by 5."""
+    pull: float = 1e-5
+    """Of a limb's pull against its hand's wrench in an executed plan: forces, and moments over
+    0.1 m [N]. Equilibria are sought to 1e-6 N, and limbs of 1e9 N/m round to 1e-8 N."""
 
 
 TOLERANCES: Final = VerificationTolerances()

@@ -17,6 +17,7 @@ from planner.prepare import PreparedStance, prepare_stance, settle_hand, wrists_
 from planner.question import LimbStiffness, Limits, OpenLoopSettings, Question
 from planner.result import HandPlan, OpenLoop, OpenLoopSample, Plan
 from planner.solving import KnownStance, plan
+from planner.solving.verified import execution_passes
 from service.answering import questions
 from service.commands.stances import read_request
 from tests.planner.floating.test_compliant_plan import asked
@@ -170,6 +171,44 @@ def test_a_tile_that_is_dragged_backwards_is_reported_with_its_force() -> None:
     assert not sample.holds
 
 
+@pytest.mark.parametrize("spoilt", ["twist", "body", "utilisation", "wrench"])
+def test_an_equilibrium_that_the_check_refuses_is_not_reported(spoilt: str) -> None:
+    prepared, answer = planned()
+
+    def passes(closed, hands, sample) -> bool:
+        assert execution_passes(prepared, closed, hands, sample)
+        first, *others = hands
+        if spoilt == "twist":
+            twist = first.wrist.twist + 1e-7
+            first = replace(first, wrist=replace(first.wrist, twist=twist))
+        elif spoilt == "wrench":
+            first = replace(first, wrench=first.wrench + 1e-3)
+        elif spoilt == "body":
+            twist = [each + 1e-7 for each in sample.body_twist]
+            sample = msgspec.structs.replace(sample, body_twist=twist)
+        else:
+            sample = msgspec.structs.replace(sample, utilisation=sample.utilisation - 1e-4)
+        return execution_passes(prepared, closed, [first, *others], sample)
+
+    samples, refused, _ = execute(prepared, hands_of(answer), some(4), passes=passes)
+    assert samples == [OpenLoopSample(False)]
+    assert not refused
+
+
+def test_all_equilibria_pass_the_check_wherever_hands_are_displaced() -> None:
+    for name in ("wall-300", "overhang"):
+        prepared, answer = planned(name)
+        displacements, checked = 2.0 * some(5, 16), []
+
+        def passes(closed, hands, sample, prepared=prepared, checked=checked) -> bool:
+            checked.append(execution_passes(prepared, closed, hands, sample))
+            return checked[-1]
+
+        execute(prepared, hands_of(answer), displacements, passes=passes)
+        assert len(checked) > 12
+        assert all(checked)
+
+
 def test_a_mirrored_stance_has_the_mirrored_outcome() -> None:
     prepared, answer = planned()
     hands = hands_of(answer)
@@ -276,7 +315,7 @@ def test_a_hand_that_cannot_close_is_counted_and_spoils_its_sample_alone() -> No
 def test_a_deadline_leaves_it_out() -> None:
     prepared, answer = planned()
     with within(1e-6):
-        assert find_open_loop(prepared, hands_of(answer), 0.0) is None
+        assert find_open_loop(prepared, hands_of(answer), 0.0, lambda *_: True) is None
 
 
 def test_without_a_plan_there_is_nothing_to_execute() -> None:

@@ -419,6 +419,6 @@ def test_robust_is_told_of_fixed_wrists_only():
     with pytest.raises(InvalidInputError, match="requires fixed wrists") as caught:
         answering.answer_wrench_space(asked)
     assert caught.value.field == "want"
-    with pytest.raises(InvalidInputError, match="requires fixed wrists") as caught:
+    with pytest.raises(InvalidInputError, match="requires fixed or compliant") as caught:
         answering.answer_plan(msgspec.structs.replace(request, stance=stance, want=["robust"]))
     assert caught.value.field == "want"
