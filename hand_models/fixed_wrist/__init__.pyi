@@ -16,6 +16,11 @@ from .hold_trials import (
     ranked_holds as ranked_holds,
     try_holds as try_holds,
 )
+from .kept_hands import (
+    ClosedPlacement as ClosedPlacement,
+    read_hands as read_hands,
+    write_hands as write_hands,
+)
 from .placing import (
     ALONG_FINGERS as ALONG_FINGERS,
     SEAT_RULES as SEAT_RULES,

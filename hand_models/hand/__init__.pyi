@@ -9,7 +9,12 @@ from .names import (
 )
 from .placement import Placement as Placement, PlacementKey as PlacementKey
 from .seating import Seating as Seating
-from .settled_hand import SettledHand as SettledHand, SettledTile as SettledTile
+from .settled_hand import (
+    HandPostures as HandPostures,
+    SettledHand as SettledHand,
+    SettledPalm as SettledPalm,
+    SettledTile as SettledTile,
+)
 from .settling import seated as seated, settle_hands as settle_hands
 from .spinyhand import (
     NearbyClosure as NearbyClosure,

@@ -149,6 +149,12 @@ class SpinyHand(HandModel):
         )
         return [next(rough if scan else smooth) for scan in scanned]
 
+    def keep(self, closed: Iterable[tuple[Placement, SettledHand]]) -> None:
+        """Keep hands that were closed before, for `settle_each` to find by their placements."""
+        for placement, settled in closed:
+            store = self.settled_scans if placement.hold.scanned else self.settled
+            store.keep([(PlacementKey(placement), settled)])
+
     def _known_or_settled(
         self, store: BoundedStore[Hashable, SettledHand], placements: Sequence[Placement]
     ) -> list[SettledHand | InvalidInputError]:
