@@ -38,8 +38,7 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     from hand_models.fixed_wrist import ScatterSettings, robustness
 
     few = functools.partial(robustness, draws=8)
-    for module in ("hand_models.fixed_wrist.hold_trials", "service.answering.hand_spaces"):
-        monkeypatch.setattr(f"{module}.robustness", few)
+    monkeypatch.setattr("service.answering.hand_spaces.robustness", few)
     monkeypatch.setattr("planner.solving.robust.SCATTER_SETTINGS", ScatterSettings(places=8))
 
 

@@ -8,9 +8,12 @@ from .contact_rest import (
 )
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
+    HOLD_RANKS as HOLD_RANKS,
     FoundHold as FoundHold,
+    HoldRank as HoldRank,
     HoldTrial as HoldTrial,
     grid_of_trials as grid_of_trials,
+    ranked_holds as ranked_holds,
     try_holds as try_holds,
 )
 from .placing import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -20,18 +20,32 @@ from hand_models.base import (
 from hand_models.finger import CONTACT_KINDS
 from hand_models.fixed_wrist.contact_rest import placed_by_contact
 from hand_models.fixed_wrist.placing import ALONG_FINGERS, approach_frame
-from hand_models.fixed_wrist.pure_forces import TRIAL_WAYS, force_directions
-from hand_models.fixed_wrist.seat_scatter import robustness
+from hand_models.fixed_wrist.pure_forces import TRIAL_WAYS, force_directions, pure_reaches
+from hand_models.fixed_wrist.seat_scatter import SCATTER_SETTINGS, Robustness, robustness
 from hand_models.fixed_wrist.seat_search import best_seats
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
 from hand_models.rock import Mesh
 from hand_models.tile import Surface
 
-__all__ = ["AT_BORDER", "FoundHold", "HoldTrial", "grid_of_trials", "try_holds"]
+__all__ = [
+    "AT_BORDER",
+    "HOLD_RANKS",
+    "FoundHold",
+    "HoldRank",
+    "HoldTrial",
+    "grid_of_trials",
+    "ranked_holds",
+    "try_holds",
+]
 
 AT_BORDER: Final = "the scan ends, or has a hole, within a finger's reach"
 """Message for a place where a finger may reach the scan's border, so that no hand is tried."""
+
+HoldRank = Literal["robust", "share", "pure", "support"]
+
+HOLD_RANKS: Final = get_args(HoldRank)
+"""Measures by which holds are ranked (`ranked_holds`); each breaks the ties of those before it."""
 
 
 class HoldTrial(NamedTuple):
@@ -69,20 +83,19 @@ class FoundHold(NamedTuple):
     support : ndarray, shape (5,)
         Largest force in each of `TRIAL_WAYS`, whatever the other components [N]; NaN if the wrench
         space is empty.
-    pure : float
-        Largest pull-off with every other component zero [N]; NaN if there is none.
-    worst, tenth, hundredth : ndarray, shape (5,), or None
-        The same forces over a scatter of the place (`Robustness`) [N]; None if not asked for.
+    pure : ndarray, shape (5,)
+        Largest force in each of `TRIAL_WAYS` with every other component zero [N]; NaN if the wrench
+        space has no such force.
+    robust : Robustness or None
+        The same two forces over a scatter of the place; None if not asked for.
     """
 
     pose: Pose
     rule: str
     backed_off: float
     support: Array
-    pure: float
-    worst: Array | None = None
-    tenth: Array | None = None
-    hundredth: Array | None = None
+    pure: Array
+    robust: Robustness | None = None
 
 
 def grid_of_trials(
@@ -200,7 +213,8 @@ def try_holds(
     seat: str = "rest",
     *,
     placing: str = "given",
-    robust: bool = False,
+    samples: int = 0,
+    force: float = SCATTER_SETTINGS.force,
 ) -> list[FoundHold | InvalidInputError]:
     """Close hands at places, all together, and return the forces that they can hold.
 
@@ -214,8 +228,11 @@ def try_holds(
         Rule for the seat: 'rest' as the grasp seats the hand, 'best' by `best_seats`.
     placing : {'given', 'contact'}, optional
         'contact' to move each hand from its seat to where it rests on the rock.
-    robust : bool, optional
-        True to compute the forces over a scatter of each place, too.
+    samples : int, optional
+        Number of places about each one at which the hand is tried, too; none by default. A hand
+        with the seat 'rest' is seated anew at each (`closed_about`).
+    force : float, optional
+        Force that a hand is to hold at these, for their share that does [N].
 
     Returns
     -------
@@ -242,7 +259,7 @@ def try_holds(
     spaces = iter(wrench_spaces([each for each in outcomes if isinstance(each, SettledHand)]))
     found: list[FoundHold | InvalidInputError] = []
     directions = force_directions()
-    for outcome in outcomes:
+    for placement, outcome in zip(placements, outcomes, strict=True):
         if isinstance(outcome, InvalidInputError):
             found.append(outcome)
             continue
@@ -250,17 +267,60 @@ def try_holds(
         if _at_border(hand, outcome):
             found.append(InvalidInputError(AT_BORDER, field="place.point"))
             continue
-        support, pure = np.full(len(TRIAL_WAYS), math.nan), math.nan
+        support = pure = np.full(len(TRIAL_WAYS), math.nan)
         try:
             support = np.array([space.support(way) for way in directions])
-            ends = space.capability(directions[0])
-            pure = math.nan if ends is None else ends[1]
+            pure = pure_reaches(space, directions)
         except EmptySetError:
             pass
         seating = outcome.seating
         made = FoundHold(seating.pose.inverse(), seating.rule, seating.backed_off, support, pure)
-        if robust:
-            left = robustness(hand, outcome, directions)
-            made = made._replace(worst=left.worst, tenth=left.tenth, hundredth=left.hundredth)
+        if samples:
+            robust = robustness(
+                hand,
+                outcome,
+                directions,
+                samples,
+                at=placement.at if seat == "rest" else None,
+                pure=directions,
+                force=force,
+            )
+            made = made._replace(robust=robust)
         found.append(made)
     return found
+
+
+def ranked_holds(
+    found: Sequence[FoundHold | InvalidInputError], by: HoldRank = "robust", way: str = "-fz"
+) -> list[int]:
+    """Return the indices of places where a hand holds something in any way, the best first.
+
+    Parameters
+    ----------
+    found : sequence of FoundHold or InvalidInputError
+        Results of `try_holds`.
+    by : {'robust', 'share', 'pure', 'support'}, optional
+        The pure force that nine in ten samples have, the share of the samples that hold the wanted
+        force, or the largest force without a scatter: pure, or whatever the other components. Ties
+        are broken by the others, in this order. A place without samples comes after those with.
+    way : str, optional
+        Direction of the force: one of `TRIAL_WAYS`.
+    """
+    if by not in HOLD_RANKS:
+        raise InvalidInputError(f"must be one of {', '.join(HOLD_RANKS)}, got {by!r}", field="by")
+    if way not in TRIAL_WAYS:
+        raise InvalidInputError(f"must be one of {', '.join(TRIAL_WAYS)}, got {way!r}", field="way")
+    k, ranks = list(TRIAL_WAYS).index(way), []
+    for i, each in enumerate(found):
+        if isinstance(each, InvalidInputError) or not each.support.max() >= SCATTER_SETTINGS.force:
+            continue
+        robust = each.robust
+        values = {
+            "robust": -math.inf if robust is None else float(robust.pure_tenth[k]),
+            "share": -math.inf if robust is None else float(robust.share[k]),
+            "pure": -math.inf if math.isnan(each.pure[k]) else float(each.pure[k]),
+            "support": float(each.support[k]),
+        }
+        order = values.pop(by), *values.values()
+        ranks.append(([-value for value in order], i))
+    return [i for _, i in sorted(ranks)]

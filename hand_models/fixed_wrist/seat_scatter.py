@@ -6,12 +6,14 @@ hands, nor on their order, nor on the machine.
 
 A hand that was placed by contact (`contact_rest`) comes to rest anew at each place along x, y and
 turned about z. Only there it is moved along z and turned about x and y, by what contact leaves.
+So is a hand whose seat's frame on the rock is given: it is seated anew at each place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 from zlib import crc32
 
@@ -80,7 +82,8 @@ class Robustness(NamedTuple):
     tenth, hundredth : ndarray, shape (k,)
         Value that is exceeded at nine in ten places, and at 99 in a hundred.
     contact : tuple of float, optional
-        Half width along z [m], and about x and y [rad], of a hand that was placed by contact.
+        Half width along z [m], and about x and y [rad], of a hand that was placed by contact or is
+        seated anew.
     pure_tenth : ndarray, shape (j,)
         Largest *pure* force in each of j directions, every other component zero, that nine in ten
         places have (the order statistic, never between two places) [N]. A place counts as zero
@@ -113,6 +116,7 @@ def robustness(
     seed: int = 0,
     scatter: tuple[float, float] | None = None,
     *,
+    at: Pose | None = None,
     pure: ArrayLike | None = None,
     force: float = SCATTER_SETTINGS.force,
 ) -> Robustness:
@@ -131,6 +135,9 @@ def robustness(
     scatter : tuple of float, optional
         Half width of a uniform scatter along each axis of H [m], and about each axis through the
         middle of the palm [rad]. As in the hand's parameters by default.
+    at : Pose, optional
+        Frame on the hold on which the hand was seated, to seat it anew at each place
+        (`closed_about`).
     pure : array_like, shape (j, 6), optional
         Directions of forces on the rock, in H, for pure forces; none by default, as a place takes
         two linear programs for each line.
@@ -154,7 +161,7 @@ def robustness(
     check_positive(force, "N", "force")
     there: list[SettledHand] = []
     places = scattered_places("", draws, seed)
-    for outcomes in closed_about(hand, settled, places, (position, angle)):
+    for outcomes in closed_about(hand, settled, places, (position, angle), at=at):
         there += [each for each in outcomes if isinstance(each, SettledHand)]
     ways, reaches = np.atleast_2d(np.asarray(directions, dtype=float)), []
     alone = np.zeros((0, 6)) if pure is None else np.atleast_2d(np.asarray(pure, dtype=float))
@@ -181,7 +188,7 @@ def robustness(
         worst=hundredth,
         tenth=tenth,
         hundredth=hundredth,
-        contact=None if settled.seating.offset is None else hand.contact_scatter,
+        contact=hand.contact_scatter if at or settled.seating.offset else None,
         pure_tenth=np.percentile(held, SCATTER_SETTINGS.tenth, axis=0, method="inverted_cdf"),
         share=(held >= force).mean(axis=0),
         force=force,
@@ -216,6 +223,7 @@ def closed_about(
     places: Array,
     scatter: tuple[float, float],
     contact_scatter: tuple[float, float] | None = None,
+    at: Pose | None = None,
 ) -> Iterator[Sequence[SettledHand | InvalidInputError]]:
     """Close a hand again at places near its place, 64 at a time.
 
@@ -226,11 +234,14 @@ def closed_about(
     settled : SettledHand
     places : ndarray, shape (n, 6)
         Along and about each axis of H, in units of ``scatter``; of a hand that was placed by
-        contact, those along z and about x and y in units of ``contact_scatter``.
+        contact or is seated anew, those along z and about x and y in units of ``contact_scatter``.
     scatter : tuple of float
         Unit along an axis [m], and about an axis [rad].
     contact_scatter : tuple of float, optional
         The same of what contact leaves; that of the hand's parameters by default.
+    at : Pose, optional
+        Frame on the hold on which a hand was seated (`Placement`): at each place along x and y and
+        turned about z the hand is seated anew, and then moved by what contact leaves.
 
     Yields
     ------
@@ -239,11 +250,12 @@ def closed_about(
     """
     at_once = 64  # hands that are closed together
     start = Placement(settled.hold, settled.surface, settled.grasp, settled.seating.pose)
-    frames_of: Callable[[Array, tuple[float, float]], Sequence[Pose | InvalidInputError]] = (
-        _posed
-        if settled.seating.offset is None
-        else _ContactFrames(hand, settled, contact_scatter or hand.contact_scatter)
-    )
+    left = contact_scatter or hand.contact_scatter
+    frames_of: Callable[[Array, tuple[float, float]], Sequence[Pose | InvalidInputError]] = _posed
+    if settled.seating.offset is not None:
+        frames_of = _ContactFrames(hand, settled, left)
+    elif at is not None:
+        frames_of = partial(_seated_frames, hand, settled, left, at)
     for first in range(0, len(places), at_once):
         frames = frames_of(places[first : first + at_once], scatter)
         there = [
@@ -259,6 +271,34 @@ def _posed(places: Array, scatter: tuple[float, float]) -> Sequence[Pose]:
     """Return the frames of a hand at its places, in that where it was put."""
     position, angle = scatter
     return [Pose(position * by[:3], turns_about(angle * by[3:])) for by in places]
+
+
+def _parted(
+    places: Array, scatter: tuple[float, float], left: tuple[float, float]
+) -> tuple[Sequence[Pose], Sequence[Pose]]:
+    """Return the frames of moves along x and y and about z, and those that contact leaves."""
+    wrist = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
+    return _posed(places * wrist, scatter), _posed(places * (1.0 - wrist), left)
+
+
+def _seated_frames(
+    hand: SpinyHand,
+    settled: SettledHand,
+    left: tuple[float, float],
+    at: Pose,
+    places: Array,
+    scatter: tuple[float, float],
+) -> list[Pose | InvalidInputError]:
+    """Return the frames of a hand that is seated anew at its places, in that where it was put."""
+    moved, more = _parted(places, scatter, left)
+    start = Placement(settled.hold, settled.surface, settled.grasp, None)
+    seats = hand.settle_each([start._replace(at=at @ each) for each in moved])
+    return [
+        settled.seating.pose @ seat.seating.pose.inverse() @ by
+        if isinstance(seat, SettledHand)
+        else seat
+        for seat, by in zip(seats, more, strict=True)
+    ]
 
 
 class _ContactFrames:
@@ -284,9 +324,7 @@ class _ContactFrames:
     def __call__(
         self, places: Array, scatter: tuple[float, float]
     ) -> list[Pose | InvalidInputError]:
-        wrist = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])
-        moved = _posed(places * wrist, scatter)
-        left = _posed(places * (1.0 - wrist), self._left)
+        moved, left = _parted(places, scatter, self._left)
         assert self._rest.hold_in_hand is not None
         starts = [
             self._rest._replace(hold_in_hand=each.inverse() @ self._rest.hold_in_hand)

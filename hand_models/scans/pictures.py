@@ -69,8 +69,9 @@ def plot_holds(
     best: Sequence[Pose],
     path: Path,
     title: str,
+    label: str,
 ) -> None:
-    """Draw rock, the pull-off that a hand holds at points, and the directions of the best hands.
+    """Draw rock, what the best hand holds at points, and the directions of the best hands.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def plot_holds(
     points : ndarray, shape (n, 3)
         Points with a hand, in the rock's frame [m].
     values : ndarray, shape (n,)
-        Largest pull-off at each point [N].
+        What the best hand at each point holds.
     refused : ndarray, shape (m, 3)
         Points where no hand can be, or where its wrench space is empty [m].
     best : sequence of Pose
@@ -87,6 +88,8 @@ def plot_holds(
     path : Path
         File of the picture; its ending chooses the format.
     title : str
+    label : str
+        Meaning of the values, with their unit.
     """
     axes, _ = _paint(*rock, "gray", title)
     style: dict[str, Any] = {"s": 36, "cmap": "plasma", "edgecolors": "white", "linewidths": 0.5}
@@ -95,7 +98,7 @@ def plot_holds(
         y, x = refused[:, 1], refused[:, 0]
         axes.plot(y, x, "x", color="tab:cyan", markersize=5, label="no hold")
     _rank(axes, best, 0.06 * float(np.ptp(rock.vertices[:, :2], axis=0).max()))
-    _write(axes, shown, "largest pull-off of any hand there [N]", path)
+    _write(axes, shown, label, path)
 
 
 def _write(axes: Axes, colours: Any, label: str, path: Path) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import click
 import msgspec
@@ -18,9 +17,6 @@ from service import processes, tables
 from service.commands import options
 
 if TYPE_CHECKING:
-    import numpy as np
-    from rich.console import Console
-
     from hand_models import fixed_wrist
     from hand_models.hand import Placing
     from hand_models.parameters import ParameterTable
@@ -29,6 +25,9 @@ if TYPE_CHECKING:
     Pair = tuple[fixed_wrist.HoldTrial, fixed_wrist.FoundHold]
 
 __all__ = ["holds_command"]
+
+SHOWN_HOLDS: Final = 10
+"""Number of the best holds that are printed, and drawn."""
 
 
 @click.command("holds")
@@ -82,12 +81,44 @@ __all__ = ["holds_command"]
     "forty times as long.",
 )
 @click.option(
-    "--robust",
-    type=click.IntRange(0),
-    default=10,
+    "--samples",
+    type=click.IntRange(0, 1024),
+    default=8,
     show_default=True,
     metavar="N",
-    help="Of the best N tell also what is left where the hand is a little elsewhere.",
+    help="Places about each one at which the hand is tried, too; 0 leaves them out.",
+)
+@click.option(
+    "--robust",
+    type=click.IntRange(0),
+    default=100,
+    show_default=True,
+    metavar="N",
+    help="Of the N places that are best without samples, samples are tried.",
+)
+@click.option(
+    "--direction",
+    type=click.Choice(["-fz", "-fx", "+fx", "-fy", "+fy"]),
+    default="-fz",
+    show_default=True,
+    help="Of the force on the rock that is wanted, in the hand's frame H; -fz pulls the hand off.",
+)
+@click.option(
+    "--force",
+    type=options.FiniteRange(0.0, 1e6, min_open=True),
+    default=0.1,
+    show_default=True,
+    metavar="N",
+    help="Wanted force along the direction alone, for the share of samples that hold it.",
+)
+@click.option(
+    "--sort",
+    "by",
+    type=click.Choice(["robust", "share", "pure", "support"]),
+    show_default="robust; pure without samples",
+    help="robust: the force along the direction alone that nine in ten samples hold; share: the "
+    "samples that hold --force; pure: the force alone where the hand is put; support: with "
+    "whatever other forces and moments.",
 )
 @options.workers_options
 @options.hand_option
@@ -102,7 +133,11 @@ def holds_command(
     surface: str,
     seat: Literal["rest", "best"],
     placing: Placing,
+    samples: int,
     robust: int,
+    direction: str,
+    force: float,
+    by: fixed_wrist.HoldRank | None,
     parallel: options.WorkersOption,
     hand: ParameterTable | None,
     picture: Path | None,
@@ -111,13 +146,21 @@ def holds_command(
     """Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).
 
     A hand is closed at every point of a grid, at several angles of its wrist; it approaches against
-    the mean normal of the rock under its palm. Holds are sorted by their largest pull-off. Each has
-    a `place` for a request's hand whose hold is this rock.
+    the mean normal of the rock under its palm. Holds are sorted by the pull-off, with every other
+    force and moment zero, that nine in ten samples of where the hand comes to the rock hold. Each
+    has a `place` for a request's hand whose hold is this rock.
     """
     from hand_models import fixed_wrist, parameters
     from hand_models.rock import Mesh, read_mesh
     from hand_models.tile import Surface
 
+    samples = samples if robust else 0
+    if by in ("robust", "share") and not samples:
+        raise InvalidInputError(
+            f"{by} requires samples: give --samples above 0, or sort by pure or support",
+            field="--sort",
+        )
+    sort = by or ("robust" if samples else "pure")
     Surface.named(surface)
     tables.write_alone(output)
     numbers = parameters.hand_table() if hand is None else parameters.own_hand(hand)
@@ -146,61 +189,68 @@ def holds_command(
         TemporaryFile(dir=output.parent).close()
 
     outcomes: dict[int, Outcome] = {}
-    scattered: dict[int, Outcome] = {}
+    sampled: dict[int, Outcome] = {}
     best: list[int] = []
     broken: processes.Interrupted | CruxError | None = None
-    # a trial takes as long as 15 plans, and with a search for the seat or the rest 40 times that
+    # a trial takes as long as 15 plans, with a search for the seat or the rest 40 times that; a
+    # sample takes as long as one to two trials
     searches = (seat == "best") + (placing == "contact")
-    on, count = parallel.place(15 * (40 * searches or 1) * len(trials))
+    closings = len(trials) + samples * min(robust, len(trials))
+    on, count = parallel.place(15 * (40 * searches or 1) * closings)
     try:
         with processes.HoldTrials(
-            mesh, surface, numbers, seat=seat, placing=placing, on=on, workers=count
+            mesh, surface, numbers, seat=seat, placing=placing, force=force, on=on, workers=count
         ) as tried:
             _keep(f"trying {len(trials):,} places", trials, tried.each(trials), outcomes)
-            best = [i for i, _ in _sorted(outcomes)[:robust]]
+            best = _ranked(outcomes, sort, direction)[: robust if samples else 0]
             again = [trials[i] for i in best]
-            title = f"scattering the best {len(best)}"
-            _keep(title, again, tried.each(again, robust=True), scattered)
+            title = f"sampling the best {len(best)}"
+            _keep(title, again, tried.each(again, samples=samples), sampled)
     except (processes.Interrupted, CruxError) as error:
         if not outcomes:
             raise
         broken = error
-    for k, each in scattered.items():
+    for k, each in sampled.items():
         # after a lost worker the hold keeps its first result
         outcomes[best[k]] = outcomes[best[k]] if isinstance(each, InvalidInputError) else each
-    found = [(trials[i], each) for i, each in _sorted(outcomes)]
-    refused = Counter(
-        _reason(each) for each in outcomes.values() if isinstance(each, InvalidInputError)
-    )
+    found = [
+        (trials[i], each)
+        for i in _ranked(outcomes, sort, direction)
+        if not isinstance(each := outcomes[i], InvalidInputError)
+    ]
     result = {
         "v": 1,
         "rock": str(rock),
-        "units": {"length": "m", "angle": "rad", "force": "N"},
+        "units": {"length": "m", "angle": "rad", "force": "N", "share": "1"},
         "trials": len(trials),
         "tried": len(outcomes),
-        "refused": refused.total(),
-        "reasons": dict(refused.most_common()),
-        "refusals": _refusals(trials, outcomes),
+        "samples": samples,
+        "direction": direction,
+        "force": force,
+        "sort": sort,
+        **tables.refusals_json(trials, outcomes),
         "warnings": list(mesh.oddities),
-        "holds": [_entry(trial, each, placing) for trial, each in found],
+        "holds": [tables.hold_json(trial, each, placing) for trial, each in found],
     }
     with tables.writing(output, "--output"), whole_file(output) as part:
         part.write_bytes(msgspec.json.format(msgspec.json.encode(result)))
     if broken is not None:
         kept = (
-            f"{len(outcomes):,} of {len(trials):,} places were tried, {len(scattered)} of the best "
-            f"scattered; what they hold is in {output}"
+            f"{len(outcomes):,} of {len(trials):,} places were tried, {len(sampled)} of the best "
+            f"sampled; what they hold is in {output}"
         )
         if isinstance(broken, CruxError):
             raise CruxError(f"{broken.message}; {kept}")
         raise processes.Interrupted(kept)
     if picture is not None:
-        _draw(mesh, trials, found, picture, rock.name)
+        _draw(mesh, trials, found, sort, direction, picture, rock.name)
     if as_json:
         summary = {name: value for name, value in result.items() if name != "refusals"}
         tables.say({**summary, "holds": len(found), "file": str(output)})
     else:
-        _print(trials, found, refused, mesh.oddities, output, tables.console())
+        out = tables.console()
+        tables.print_holds(result, trials, found, SHOWN_HOLDS, out)
+        out.print(f"{output} (in m, rad, N)", soft_wrap=True)
 
 
 def _keep(
@@ -219,139 +269,47 @@ def _keep(
             report(len(outcomes), len(trials))
 
 
-def _sorted(outcomes: Mapping[int, Outcome]) -> list[tuple[int, fixed_wrist.FoundHold]]:
-    """Return indices and holds of trials that hold something, the largest pull-off first."""
-    # [N] a smaller force is nothing
-    least = 0.1
-    pairs = [
-        (i, each)
-        for i, each in sorted(outcomes.items())
-        if not isinstance(each, InvalidInputError) and each.support.max() >= least
-    ]
-    return sorted(pairs, key=lambda pair: -pair[1].support[0])
+def _ranked(outcomes: Mapping[int, Outcome], by: fixed_wrist.HoldRank, direction: str) -> list[int]:
+    """Return the indices of trials that hold something, the best first."""
+    from hand_models.fixed_wrist import ranked_holds
 
-
-def _reason(error: InvalidInputError) -> str:
-    """Return why a hand cannot be at a place, without the numbers."""
-    words = str(error).split(":")[-1] if error.field is None else error.message
-    return " ".join("…" if any(map(str.isdigit, word)) else word for word in words.split())
-
-
-def _refusals(
-    trials: Sequence[fixed_wrist.HoldTrial], outcomes: Mapping[int, Outcome]
-) -> list[dict[str, Any]]:
-    """Return the points where hands cannot be, with the number of trials for each reason."""
-    found: dict[tuple[float, float, float], Counter[str]] = {}
-    for i, each in sorted(outcomes.items()):
-        if isinstance(each, InvalidInputError):
-            found.setdefault(trials[i].point, Counter())[_reason(each)] += 1
-    return [{"point": point, "reasons": dict(reasons)} for point, reasons in found.items()]
-
-
-def _entry(
-    trial: fixed_wrist.HoldTrial, found: fixed_wrist.FoundHold, placing: Placing
-) -> dict[str, Any]:
-    """Return a hold as JSON values."""
-    from hand_models import fixed_wrist
-
-    def by_way(values: np.ndarray | None) -> dict[str, float | None] | None:
-        if values is None:
-            return None
-        return {
-            way: value if math.isfinite(value) else None
-            for way, value in zip(fixed_wrist.TRIAL_WAYS, values.tolist(), strict=True)
-        }
-
-    return {
-        "place": {
-            "point": trial.point,
-            "approach": trial.approach,
-            "wrist_angle": trial.wrist_angle,
-            "frame": "rock",
-        },
-        "placing": placing,
-        "grasp": {"outer_rotation": trial.outer_rotation},
-        "pose": {
-            "position": found.pose.position.tolist(),
-            "orientation": found.pose.quaternion().tolist(),
-        },
-        "seating": {"rule": found.rule, "backed_off": found.backed_off},
-        "support": by_way(found.support),
-        "pure_pull_off": found.pure if math.isfinite(found.pure) else None,
-        "worst": by_way(found.worst),
-        "tenth": by_way(found.tenth),
-        "hundredth": by_way(found.hundredth),
-    }
+    tried = sorted(outcomes)
+    return [tried[k] for k in ranked_holds([outcomes[i] for i in tried], by, direction)]
 
 
 def _draw(
-    mesh: Any, trials: list[fixed_wrist.HoldTrial], found: list[Pair], path: Path, name: str
-) -> None:
-    import numpy as np
-
-    from hand_models.scans import plot_holds
-
-    most: dict[tuple[float, float, float], float] = {}
-    for trial, each in found:
-        most.setdefault(trial.point, each.support[0])
-    none = np.array(
-        [point for point in dict.fromkeys(t.point for t in trials) if point not in most]
-    )
-    points, values = np.array(list(most)).reshape(-1, 3), np.array(list(most.values()))
-    best = [each.pose for _, each in _shown(found)]
-    with tables.writing(path):
-        plot_holds(
-            mesh.triangles, points, values, none.reshape(-1, 3), best, path, f"holds on {name}"
-        )
-
-
-def _shown(found: list[Pair]) -> list[Pair]:
-    """Return the best holds: those that are printed, and drawn."""
-    return found[:10]
-
-
-def _finite(value: float) -> str:
-    return f"{value:.1f}" if math.isfinite(value) else "-"
-
-
-def _print(
+    mesh: Any,
     trials: list[fixed_wrist.HoldTrial],
     found: list[Pair],
-    refused: Counter[str],
-    oddities: Sequence[str],
-    output: Path,
-    out: Console,
+    by: fixed_wrist.HoldRank,
+    direction: str,
+    path: Path,
+    name: str,
 ) -> None:
-    """Print the best holds, and why hands cannot be at other places."""
-    from hand_models.fixed_wrist import AT_BORDER
-    from service.tables import name
+    """Draw holds; nine in ten samples have a force where nine in ten hold, so shares are drawn."""
+    import numpy as np
 
-    degree = 180.0 / math.pi
-    columns = (
-        name("x, y, z mm", "0.point", lambda at: ", ".join(f"{1e3 * x:z.0f}" for x in at)),
-        tables.number("wrist °", "0.wrist_angle", ".0f", scale=degree),
-        tables.number("outer °", "0.outer_rotation", ".0f", scale=degree),
-        tables.number("pull N", "1.support.0", "z.1f"),
-        tables.number("alone", "1.pure", _finite),
-        tables.number("shear N", lambda row: row[1].support[1:].min(), "z.1f"),
-        tables.number("9 in 10", "1.tenth.0", _finite),
-        tables.number("99 in 100", "1.hundredth.0", _finite),
-    )
-    tables.print_rows(_shown(found), columns, out)
-    points = len({trial.point for trial in trials})
-    pulled = sum(each.support[0] > 0.0 for _, each in found)
-    out.print(
-        f"{len(trials):,} trials at {points:,} points: {len(found):,} hold something, {pulled:,} "
-        "of them also where they are pulled off (pull; shear is the least to any side)"
-    )
-    if not found:
-        open_rock = [reason for reason, _ in refused.most_common(1)] == [AT_BORDER]
-        out.print(
-            "nothing holds: is the scan full of holes? `crux rock` says what helps against them"
-            if open_rock
-            else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
+    from hand_models.fixed_wrist import TRIAL_WAYS
+    from hand_models.scans import plot_holds
+
+    k, first = list(TRIAL_WAYS).index(direction), dict[tuple[float, float, float], float]()
+    for trial, each in found:
+        share = 0.0 if each.robust is None else 100.0 * each.robust.share[k]
+        values = {"pure": np.fmax(each.pure[k], 0.0), "support": each.support[k]}
+        first.setdefault(trial.point, float(values.get(by, share)))
+    labels = {
+        "pure": f"force along {direction} alone [N], 0 without any",
+        "support": f"largest force along {direction} [N]",
+    }
+    none = [point for point in dict.fromkeys(t.point for t in trials) if point not in first]
+    with tables.writing(path):
+        plot_holds(
+            mesh.triangles,
+            np.array(list(first)).reshape(-1, 3),
+            np.array(list(first.values())),
+            np.array(none).reshape(-1, 3),
+            [each.pose for _, each in found[:SHOWN_HOLDS]],
+            path,
+            f"holds on {name}: the best hand at each point",
+            labels.get(by, f"samples that hold the force along {direction} alone [%]"),
         )
-    tables.print_warnings(oddities, out)
-    for reason, count in refused.most_common(3):
-        out.print(f"{count:,} refused: {reason}")
-    out.print(f"{output} (in m, rad, N)", soft_wrap=True)

@@ -45,6 +45,8 @@ class HoldTrials:
         strongest grip.
     placing : {'given', 'contact'}, optional
         Whether a hand stays where it is seated, or is moved to where it rests on the rock.
+    force : float
+        Force that a hand is to hold at sampled places, for their share that does [N].
     on : str or distributed.Client, optional
         Where trials run: ``processes`` of this machine, ``here`` for this process alone,
         ``tcp://HOST:PORT`` of a Dask scheduler or its client, ``dask:local`` for a Dask cluster on
@@ -66,11 +68,12 @@ class HoldTrials:
         *,
         seat: Literal["rest", "best"] = "rest",
         placing: Placing = "given",
+        force: float,
         on: str | Client = "processes",
         workers: int | None = None,
     ) -> None:
         self._quick = seat == "rest" and placing == "given"
-        make = partial(_trying, rock, surface, hand, seat, placing)
+        make = partial(_trying, rock, surface, hand, seat, placing, force)
         self._pool = pool_on(on, workers, Setting(make=make))
 
     def __enter__(self) -> Self:
@@ -80,16 +83,15 @@ class HoldTrials:
     def __exit__(self, *error: object) -> None:
         self._pool.__exit__(*error)
 
-    def each(self, trials: Sequence[HoldTrial], *, robust: bool = False) -> Found:
+    def each(self, trials: Sequence[HoldTrial], *, samples: int = 0) -> Found:
         """Yield the index of each place with the outcome of its trial, batch by batch.
 
         Parameters
         ----------
         trials : sequence of HoldTrial
             Places and grasps to try.
-        robust : bool, optional
-            True to sample places near each one, too (Monte Carlo samples), and add the reach that
-            is left.
+        samples : int, optional
+            Number of places near each one at which the hand is tried, too; none by default.
 
         Yields
         ------
@@ -99,11 +101,11 @@ class HoldTrials:
             What the hand can hold there; an error where the hand cannot be there, or where its
             worker died.
         """
-        # one that is searched for, or scattered, is many already; some fingers take ten times as
+        # one that is searched for, or sampled, is many already; some fingers take ten times as
         # long as most, and so do the batches that they are in
-        most = 128 if self._quick and not robust else 1
+        most = max(128 // (1 + samples), 1) if self._quick else 1
         batches = _batches(trials, most, self._pool.width)
-        payloads = (pickle.dumps(([trials[i] for i in batch], robust)) for batch in batches)
+        payloads = (pickle.dumps(([trials[i] for i in batch], samples)) for batch in batches)
         for batch, answer in zip(
             batches, answered(payloads, self._pool, Format.MSGPACK), strict=True
         ):
@@ -136,6 +138,7 @@ def _trying(
     numbers: ParameterTable,
     seat: Literal["rest", "best"],
     placing: Placing,
+    force: float,
 ) -> Callable[[bytes], Answer]:
     """Return the function that tries a batch of places; called once in each process."""
     from hand_models.fixed_wrist import try_holds
@@ -146,9 +149,16 @@ def _trying(
 
     def answer(payload: bytes) -> Answer:
         start = time.perf_counter()
-        trials, robust = pickle.loads(payload)
+        trials, samples = pickle.loads(payload)
         found = try_holds(
-            hand, rock, surface_there, trials, seat=seat, placing=placing, robust=robust
+            hand,
+            rock,
+            surface_there,
+            trials,
+            seat=seat,
+            placing=placing,
+            samples=samples,
+            force=force,
         )
         encoding = "application/python-serialized-object"
         return Answer(pickle.dumps(found), encoding, seconds=time.perf_counter() - start)

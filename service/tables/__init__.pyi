@@ -7,6 +7,11 @@ from .hands import (
     print_wrench_space as print_wrench_space,
     survey_json as survey_json,
 )
+from .holds import (
+    hold_json as hold_json,
+    print_holds as print_holds,
+    refusals_json as refusals_json,
+)
 from .layout import (
     console as console,
     in_order as in_order,

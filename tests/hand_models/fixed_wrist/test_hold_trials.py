@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from hand_models import Grasp, InvalidInputError, place
+from hand_models import Grasp, InvalidInputError, Pose, place
+from hand_models.base import turns_about
 from hand_models.fixed_wrist import (
     TRIAL_WAYS,
     FoundHold,
     HoldTrial,
+    Robustness,
     approach_frame,
     grid_of_trials,
-    robustness,
+    ranked_holds,
+    scattered_places,
     try_holds,
     wrench_space,
 )
@@ -77,6 +80,9 @@ def test_what_is_found_is_what_a_hand_placed_there_can_carry(wall):
         for way, reach in zip(TRIAL_WAYS, each.support, strict=True):
             axis, sign = DIRECTIONS[way]
             assert space.support(sign * np.eye(6)[axis]) == pytest.approx(reach, rel=1e-9)
+        for (axis, sign), pure in zip(DIRECTIONS.values(), each.pure, strict=True):
+            ends = space.capability(sign * np.eye(6)[axis])
+            assert np.isnan(pure) if ends is None else pure == pytest.approx(ends[1], abs=1e-6)
     # where fingers point outward at the border they are too near it
     assert 2 <= held < len(trials)
 
@@ -105,18 +111,72 @@ def test_the_grid_does_not_depend_on_how_finely_triangles_tell_the_rock():
         np.testing.assert_allclose(np.hstack(one), np.hstack(other), atol=1e-12)
 
 
-@pytest.mark.slow
-def test_robust_is_that_of_the_hand(wall):
-    trial = HoldTrial((0.1, 0.1, 0.0), (0.0, 0.0, 1.0), 0.3, 0.0)
-    (found,) = try_holds(HAND, wall, ROCK, [trial], robust=True)
+def test_robust_is_that_of_the_hand_seated_anew_near_its_place():
+    """At each sample the seat is found again; only contact's own scatter moves it from there."""
+    log, grasp = Mesh(*cylinder_mesh(0.3, length=0.5), anywhere=True), Grasp(math.pi)
+    trial = HoldTrial((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, math.pi)
+    (found,) = try_holds(HAND, log, ROCK, [trial], samples=4, force=40.0)
     assert isinstance(found, FoundHold)
     at = approach_frame(trial.point, trial.approach, trial.wrist_angle)
-    hand = HAND.settle(wall, ROCK, Grasp(), at=at)
-    ways = [sign * np.eye(6)[axis] for axis, sign in DIRECTIONS.values()]
-    left = robustness(HAND, hand, ways)
-    np.testing.assert_allclose(found.worst, left.worst)
-    np.testing.assert_allclose(found.tenth, left.tenth)
-    assert (left.worst <= left.tenth + 1e-9).all()
+    ways = np.array([sign * np.eye(6)[axis] for axis, sign in DIRECTIONS.values()])
+    supports, pure = [], []
+    for x, y, z, roll, pitch, yaw in scattered_places("", 4, 0):
+        moved = at @ Pose(0.002 * np.array([x, y, 0.0]), turns_about([0.0, 0.0, 0.02 * yaw]))
+        supports.append(np.zeros(5))
+        pure.append(np.zeros(5))
+        try:
+            seat = HAND.settle(log, ROCK, grasp, at=moved).seating.pose
+            left = Pose(
+                np.array([0.0, 0.0, 0.25e-3 * z]), turns_about([3e-3 * roll, 3e-3 * pitch, 0.0])
+            )
+            space = wrench_space(HAND.settle(log, ROCK, grasp, left.inverse() @ seat))
+        except InvalidInputError:
+            continue
+        supports[-1] = np.array([space.support(way) for way in ways])
+        ends = [space.capability(way) for way in ways]
+        pure[-1] = np.array([0.0 if each is None else max(each[1], 0.0) for each in ends])
+    assert np.any(np.array(pure) > 40.0)
+    tenth = np.percentile(supports, 10.0, axis=0)
+    np.testing.assert_allclose(found.robust.tenth, tenth, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.robust.pure_tenth, np.min(pure, axis=0), rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(found.robust.share, (np.array(pure) >= 40.0).mean(axis=0))
+    assert found.robust.contact == (0.25e-3, 3e-3)
+
+
+def test_holds_are_ranked_by_each_measure():
+    """Three holds, each first by another measure; one without samples; one that cannot be."""
+
+    def hold(pure: float, support: float, tenth: float | None, share: float = 0.0) -> FoundHold:
+        robust = None
+        if tenth is not None:
+            numbers = (np.full(5, value) for value in (0.0, 0.0, 0.0, tenth, share))
+            worst, quantile, hundredth, pure_tenth, shares = numbers
+            robust = Robustness(
+                4, 0, 0.002, 0.02, 0, worst, quantile, hundredth, None, pure_tenth, shares
+            )
+        return FoundHold(
+            Pose.identity(), "palm", 0.0, np.full(5, support), np.full(5, pure), robust
+        )
+
+    nan = math.nan
+    found = [
+        hold(nan, 90.0, None),
+        hold(5.0, 7.0, 0.0, 0.25),
+        InvalidInputError("in rock"),
+        hold(9.0, 9.0, 0.0, 0.5),
+        hold(3.0, 4.0, 2.0, 1.0),
+        hold(-1.0, 0.05, 0.0),
+        hold(nan, nan, 0.0),
+        hold(nan, 8.0, 0.0, 0.5),
+    ]
+    assert ranked_holds(found) == [4, 3, 7, 1, 0]
+    assert ranked_holds(found, "share") == [4, 3, 7, 1, 0]
+    assert ranked_holds(found, "pure") == [3, 1, 4, 7, 0]
+    assert ranked_holds(found, "support", "+fy") == [0, 3, 7, 1, 4]
+    for given in ({"by": "luck"}, {"way": "+fz"}):
+        with pytest.raises(InvalidInputError, match="must be one of") as caught:
+            ranked_holds(found, **given)
+        assert caught.value.field == next(iter(given))
 
 
 @pytest.mark.parametrize(("spacing", "angles", "field"), [(0.0, 1, "spacing"), (0.1, 0, "angles")])

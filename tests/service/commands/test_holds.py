@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 from collections import Counter
 from collections.abc import Iterator
@@ -35,11 +36,10 @@ def rock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.usefixtures("few_places")
-def test_holds_are_written_sorted_told_and_drawn(rock, tmp_path, capfd):
+def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):
     output, picture = tmp_path / "holds.json", tmp_path / "holds.png"
     twice = ["--outer-rotation", "0"]  # which is no other hand
-    options = ["-o", str(output), *COARSE, *twice, "--robust", "1", "--workers", "1"]
+    options = ["-o", str(output), *COARSE, *twice, "--samples", "2", "--workers", "1"]
     assert run_command_line(["holds", str(rock), *options, "--plot", str(picture)]) == DONE
     out, _ = capfd.readouterr()
     assert max(map(len, out.splitlines()[:-1])) <= 80
@@ -48,16 +48,66 @@ def test_holds_are_written_sorted_told_and_drawn(rock, tmp_path, capfd):
     told = json.loads(output.read_text(encoding="utf-8"))
     held = told["holds"]
     assert (told["trials"], told["tried"]) == (16, 16)
-    assert told["units"] == {"length": "m", "angle": "rad", "force": "N"}
+    assert told["units"] == {"length": "m", "angle": "rad", "force": "N", "share": "1"}
     assert "x, y, z mm" in out
     assert out.splitlines()[-1] == f"{output} (in m, rad, N)"
     assert len(held) + told["refused"] <= 16
     check_refusals(told)
-    reaches = [hold["support"]["-fz"] for hold in held]
-    assert reaches == sorted(reaches, reverse=True)
-    first, *others = held
-    assert first["worst"]["-fz"] <= first["tenth"]["-fz"]
-    assert all(hold["worst"] is None for hold in others)
+    assert (told["samples"], told["direction"], told["force"]) == (2, "-fz", 0.1)
+    assert told["sort"] == "robust"
+    assert {hold["samples"] for hold in held} == {2}
+    assert ranks(held) == sorted(ranks(held), reverse=True)
+    for hold in held:
+        assert hold["pure_pull_off"] == hold["pure"]["-fz"]
+        assert (hold["pure_tenth"]["-fz"] >= 0.1) == (hold["share"]["-fz"] == 1.0)
+        assert 0.0 <= hold["pure_tenth"]["-fz"] <= max(hold["tenth"]["-fz"], 0.0)
+
+
+MEASURES = ("pure_tenth", "share", "pure", "support")
+
+
+def ranks(holds: list[dict], way: str = "-fz", order: tuple[str, ...] = MEASURES) -> list:
+    """Measures of holds along a direction; without a value, below any other."""
+    none = -math.inf
+    return [
+        [none if hold[key] is None or hold[key][way] is None else hold[key][way] for key in order]
+        for hold in holds
+    ]
+
+
+@pytest.mark.parametrize(
+    ("more", "order"),
+    [
+        (["--samples", "0"], ("pure", "support")),
+        (["--samples", "0", "--sort", "support"], ("support", "pure")),
+        (["--samples", "0", "--direction", "-fx"], ("pure", "support")),
+    ],
+)
+def test_holds_are_sorted_as_asked_for(rock, tmp_path, capfd, more, order):
+    output = tmp_path / "holds.json"
+    options = ["-o", str(output), *COARSE, "--workers", "1", *more]
+    assert run_command_line(["holds", str(rock), *options]) == DONE
+    held = json.loads(output.read_text(encoding="utf-8"))["holds"]
+    way = "-fx" if "-fx" in more else "-fz"
+    found = ranks(held, way, order)
+    assert len(found) > 1
+    assert found == sorted(found, reverse=True)
+    assert {hold["samples"] for hold in held} == {0}
+    assert all(hold["share"] is hold["pure_tenth"] is hold["tenth"] is None for hold in held)
+    out, _ = capfd.readouterr()
+    assert f"along {way}" in out
+    assert "share %" not in out
+
+
+def test_only_the_best_are_sampled_if_asked_for(rock, tmp_path):
+    """The first comes first with samples, too: those without have no robust force."""
+    output = tmp_path / "holds.json"
+    options = ["-o", str(output), *COARSE, "--workers", "1", "--samples", "2", "--robust", "1"]
+    assert run_command_line(["holds", str(rock), *options]) == DONE
+    held = json.loads(output.read_text(encoding="utf-8"))["holds"]
+    assert [hold["samples"] for hold in held] == [2] + [0] * (len(held) - 1)
+    nominal = ranks(held, order=("pure", "support"))
+    assert nominal == sorted(nominal, reverse=True)
 
 
 def check_refusals(told: dict) -> None:
@@ -74,7 +124,7 @@ def check_refusals(told: dict) -> None:
 def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
     """At the rim of a wall fingers reach over its border; each trial is tried again."""
     output = tmp_path / "holds.json"
-    options = [*COARSE, "--robust", "0", "--workers", "1"]
+    options = [*COARSE, "--samples", "0", "--workers", "1"]
     assert run_command_line(["holds", str(rock), "-o", str(output), *options]) == DONE
     told = json.loads(output.read_text(encoding="utf-8"))
     check_refusals(told)
@@ -100,7 +150,7 @@ def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
 
 def test_a_plan_is_made_with_a_hold_that_was_proposed(rock, tmp_path, capfd):
     output = tmp_path / "holds.json"
-    options = ["-o", str(output), *COARSE, "--robust", "0", "--workers", "1", "--json"]
+    options = ["-o", str(output), *COARSE, "--samples", "0", "--workers", "1", "--json"]
     assert run_command_line(["holds", str(rock), *options]) == DONE
     told = result(capfd)
     best = json.loads(output.read_text(encoding="utf-8"))["holds"][0]
@@ -130,7 +180,7 @@ def test_a_hold_by_contact_is_where_a_plan_places_the_hand_by_contact(tmp_path, 
     log, output = tmp_path / "log.ply", tmp_path / "holds.json"
     trimesh.Trimesh(vertices, faces, process=False).export(log)
     grid = ["--spacing", "0.31", "--angles", "1", "--outer-rotation", "3.14159265"]
-    options = ["-o", str(output), *grid, "--robust", "0", "--workers", "1"]
+    options = ["-o", str(output), *grid, "--samples", "0", "--workers", "1"]
     found = {}
     for placing in ("given", "contact"):
         assert run_command_line(["holds", str(log), *options, "--placing", placing]) == DONE
@@ -169,13 +219,13 @@ def test_what_was_tried_is_kept_when_the_rest_is_broken_off(rock, tmp_path, monk
             yield each
 
     monkeypatch.setattr(processes.HoldTrials, "each", broken)
-    with pytest.raises(Interrupted, match="8 of 16 places were tried, 0 of the best scattered; "):
-        run_command_line(["holds", str(rock), "-o", str(output), *COARSE])
+    with pytest.raises(Interrupted, match="8 of 16 places were tried, 0 of the best sampled; "):
+        run_command_line(["holds", str(rock), "-o", str(output), *COARSE, "--samples", "0"])
     told = json.loads(output.read_text(encoding="utf-8"))
     assert (told["trials"], told["tried"]) == (16, 8)
-    reaches = [hold["support"]["-fz"] for hold in told["holds"]]
-    assert reaches
-    assert reaches == sorted(reaches, reverse=True)
+    found = ranks(told["holds"], order=("pure", "support"))
+    assert found
+    assert found == sorted(found, reverse=True)
 
 
 @pytest.mark.slow
@@ -193,7 +243,7 @@ def test_holds_are_the_same_wherever_hands_are_tried(more, rock, tmp_path, capfd
     found = []
     for where in (["--workers", "1"], more):
         output = tmp_path / f"{len(found)}.json"
-        options = ["-o", str(output), *COARSE, "--robust", "2", "--json", *where]
+        options = ["-o", str(output), *COARSE, "--robust", "2", "--samples", "4", "--json", *where]
         assert run_command_line(["holds", str(rock), *options]) == DONE
         assert capfd.readouterr().err == ""
         found.append(output.read_bytes())
@@ -209,11 +259,9 @@ def test_what_was_tried_is_kept_when_the_cluster_is_gone(rock, tmp_path, capfd, 
         raise CruxError("the Dask scheduler is gone")
 
     monkeypatch.setattr(processes.HoldTrials, "each", broken)
-    assert (
-        run_command_line(["holds", str(rock), "-o", str(output), *COARSE, "--workers", "1"])
-        == FAILED
-    )
-    kept = "1 of 16 places were tried, 0 of the best scattered; what they hold is in"
+    options = ["-o", str(output), *COARSE, "--workers", "1", "--samples", "1", "--robust", "2"]
+    assert run_command_line(["holds", str(rock), *options]) == FAILED
+    kept = "1 of 16 places were tried, 0 of the best sampled; what they hold is in"
     assert f"the Dask scheduler is gone; {kept}" in complaint(capfd)
     assert json.loads(output.read_text(encoding="utf-8"))["tried"] == 1
 
@@ -236,6 +284,10 @@ def test_what_cannot_be_is_told_in_a_line(rock, tmp_path, capfd):
     for arguments, words in (
         ([str(tmp_path / "none.ply"), "-o", output], "no such file"),
         ([str(rock), "-o", output, "--surface", "cheese"], "cheese"),
+        (
+            [str(rock), "-o", output, "--samples", "0", "--sort", "share"],
+            "--sort: share requires samples: give --samples above 0, or sort by pure or support",
+        ),
         ([str(rock), "-o", output, "--spacing", "0"], "spacing"),
         (
             [str(rock), "-o", output, "--spacing", "nan"],
