@@ -16,6 +16,7 @@ from .errors import (
     InvalidFieldError as InvalidFieldError,
     InvalidInputError as InvalidInputError,
     LimitError as LimitError,
+    RefusedPlaceError as RefusedPlaceError,
     SolverError as SolverError,
     UnsupportedError as UnsupportedError,
     check_positive as check_positive,

@@ -14,6 +14,7 @@ __all__ = [
     "InvalidFieldError",
     "InvalidInputError",
     "LimitError",
+    "RefusedPlaceError",
     "SolverError",
     "UnsupportedError",
     "check_positive",
@@ -77,6 +78,24 @@ class InvalidFieldError(InvalidInputError, ValueError):
     Being a ``ValueError`` too, it can be raised while msgspec decodes a struct; msgspec then adds
     the part's path in the message.
     """
+
+
+class RefusedPlaceError(InvalidInputError):
+    """A place on rock at which a hand cannot be.
+
+    Parameters
+    ----------
+    message : str
+    reason : str
+        Short name of the reason, the same for all hands, fingers and numbers: ``scan_border``,
+        ``palm_in_rock``, ``finger_in_rock``, ``no_equilibrium``, ``tendon_slack``, ``no_rest`` or
+        ``unstable_rest``.
+    field : str, optional
+    """
+
+    def __init__(self, message: str, *, reason: str, field: str | None = None) -> None:
+        super().__init__(message, field=field)
+        self.reason = reason
 
 
 class UnsupportedError(InvalidInputError):

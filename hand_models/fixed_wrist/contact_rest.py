@@ -25,7 +25,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices, InvalidInputError, Pose, go_on, turns_about
+from hand_models.base import (
+    Array,
+    Indices,
+    InvalidInputError,
+    Pose,
+    RefusedPlaceError,
+    go_on,
+    turns_about,
+)
 from hand_models.hand import FINGERS, Placement, Seating, SettledHand, SpinyHand
 from hand_models.wrench_spaces import WRENCH_SCALE
 
@@ -347,12 +355,13 @@ class _Search:
         grasp = self._starts[i].grasp
         tension = grasp.closing_tension or self._hand.closing_tension
         off, deeper = np.abs(np.array(CONTACT_SETTINGS.ways)[[0, -1]]) * 1e3
-        return InvalidInputError(
+        return RefusedPlaceError(
             f"a hand closed at {tension:g} N comes to rest nowhere from {off:g} mm off its pose to "
             f"{deeper:g} mm deeper, tilted by at most {1e3 * self._hand.seat_tilt:.3g} mrad: its "
             "net force along z and its moments about x and y are nowhere zero together, as on flat "
             "rock where no fingers oppose each other; use 'given', or give another pose, "
             "grasp.outer_rotation or grasp.closing_tension",
+            reason="no_rest",
             field="placing",
         )
 
@@ -377,8 +386,9 @@ def _nails() -> InvalidInputError:
 
 
 def _unstable(stiffness: float) -> InvalidInputError:
-    return InvalidInputError(
+    return RefusedPlaceError(
         f"the closed hand does not stay where its net force is zero (its least stiffness there is "
         f"{stiffness:.3g} N/m): use 'given', or another grasp or place",
+        reason="unstable_rest",
         field="placing",
     )

@@ -15,6 +15,7 @@ from hand_models.base import (
     LimitError,
     Pose,
     Progress,
+    RefusedPlaceError,
     check_positive,
 )
 from hand_models.finger import CONTACT_KINDS
@@ -265,7 +266,8 @@ def try_holds(
             continue
         space = next(spaces)
         if _at_border(hand, outcome):
-            found.append(InvalidInputError(AT_BORDER, field="place.point"))
+            refused = RefusedPlaceError(AT_BORDER, reason="scan_border", field="place.point")
+            found.append(refused)
             continue
         support = pure = np.full(len(TRIAL_WAYS), math.nan)
         try:

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import Array, InvalidInputError, RefusedPlaceError
 from hand_models.finger import (
     CONTACT_KINDS,
     JOINT_STOPS,
@@ -231,8 +231,9 @@ def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> I
     """Return why a finger cannot close."""
     name = FINGERS[finger]
     if not refused.depth > 0.0:
-        return InvalidInputError(
+        return RefusedPlaceError(
             f"no equilibrium found for {name} on this rock: move or rotate the hand slightly",
+            reason="no_equilibrium",
             field="hold",
         )
     how = "even with its joints fully open"
@@ -241,8 +242,10 @@ def _no_way(placed: PlacedHands, index: int, finger: int, refused: Refused) -> I
     lift = "move the hand away from the rock"
     if math.isfinite(refused.lift):
         lift = f"lifted by {1e3 * refused.lift:.1f} mm along -z of the hand it would be clear"
-    return InvalidInputError(
-        f"the hold stands {1e3 * refused.depth:.1f} mm inside {name} {how}; {lift}", field="hold"
+    return RefusedPlaceError(
+        f"the hold stands {1e3 * refused.depth:.1f} mm inside {name} {how}; {lift}",
+        reason="finger_in_rock",
+        field="hold",
     )
 
 

@@ -12,7 +12,7 @@ from collections.abc import Hashable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from hand_models.base import InvalidInputError, go_on
+from hand_models.base import InvalidInputError, RefusedPlaceError, go_on
 from hand_models.finger import CONTACT_KINDS, JOINT_STOPS, PHALANGES, ClosedPhalanx
 from hand_models.hand.closed_fingers import ClosedFingers, close_fingers
 from hand_models.hand.finger_frames import STACK_ROWS
@@ -146,9 +146,10 @@ def _in_palm(hand: HandModel, depth: float) -> InvalidInputError:
     # along z of the hand, which may be nearly along the rock
     far = -depth > hand.finger.reach
     stands = "deep" if far else f"{-1e3 * depth:.1f} mm"
-    return InvalidInputError(
+    return RefusedPlaceError(
         f"the hold stands {stands} inside the palm; at most {1e3 * hand.spine_travel:g} mm "
         "(the spines' travel) is possible: move the hand away from the rock along its -z",
+        reason="palm_in_rock",
         field="hold",
     )
 
@@ -180,10 +181,11 @@ def _too_slack(
         least = math.ceil(100.0 * needed[i, finger, joint]) / 100.0
         yield (
             i,
-            InvalidInputError(
+            RefusedPlaceError(
                 f"must be at least {least:g} N, at which the {PHALANGES[joint]} joint of "
                 f"{FINGERS[finger]} has closed on this hold, "
                 f"got {tensions[i]:g} N",
+                reason="tendon_slack",
                 field="grasp.closing_tension",
             ),
         )
@@ -197,8 +199,9 @@ def _too_slack(
     for i in _closed_by_more(placed, laid, slack, tensions):
         yield (
             i,
-            InvalidInputError(
+            RefusedPlaceError(
                 f"must be larger: at {tensions[i]:g} N no finger touches the rock",
+                reason="tendon_slack",
                 field="grasp.closing_tension",
             ),
         )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,6 +20,9 @@ from hand_models.rock import Triangles
 from hand_models.scans.rock import ScannedRock
 
 __all__ = ["plot_holds", "plot_rock"]
+
+REFUSAL_MARKERS: Final = ("x", "s", "^", "D", "v", "+", "o", "*", "p")
+"""Markers of points without a hold, in the order of their kinds."""
 
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
@@ -65,7 +69,7 @@ def plot_holds(
     rock: Triangles,
     points: Array,
     values: Array,
-    refused: Array,
+    refused: Mapping[str, Array],
     best: Sequence[Pose],
     path: Path,
     title: str,
@@ -81,8 +85,8 @@ def plot_holds(
         Points with a hand, in the rock's frame [m].
     values : ndarray, shape (n,)
         What the best hand at each point holds.
-    refused : ndarray, shape (m, 3)
-        Points where no hand can be, or where its wrench space is empty [m].
+    refused : mapping of str to ndarray, shape (m, 3)
+        Points without a hold [m], by the kind of reason; each kind has a marker of its own.
     best : sequence of Pose
         H of the best hands in the rock's frame, the best first.
     path : Path
@@ -94,9 +98,9 @@ def plot_holds(
     axes, _ = _paint(*rock, "gray", title)
     style: dict[str, Any] = {"s": 36, "cmap": "plasma", "edgecolors": "white", "linewidths": 0.5}
     shown = axes.scatter(points[:, 1], points[:, 0], c=values, norm=_scale(values), **style)
-    if len(refused):
-        y, x = refused[:, 1], refused[:, 0]
-        axes.plot(y, x, "x", color="tab:cyan", markersize=5, label="no hold")
+    for marker, (kind, at) in zip(cycle(REFUSAL_MARKERS), refused.items(), strict=False):
+        size: dict[str, Any] = {"markersize": 6, "markeredgewidth": 1.5, "fillstyle": "none"}
+        axes.plot(at[:, 1], at[:, 0], marker, color="tab:cyan", label=kind, **size)
     _rank(axes, best, 0.06 * float(np.ptp(rock.vertices[:, :2], axis=0).max()))
     _write(axes, shown, label, path)
 

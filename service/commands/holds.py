@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     Outcome = fixed_wrist.FoundHold | InvalidInputError
     Pair = tuple[fixed_wrist.HoldTrial, fixed_wrist.FoundHold]
+    Point = tuple[float, float, float]
 
 __all__ = ["holds_command"]
 
@@ -243,7 +245,7 @@ def holds_command(
             raise CruxError(f"{broken.message}; {kept}")
         raise processes.Interrupted(kept)
     if picture is not None:
-        _draw(mesh, trials, found, sort, direction, picture, rock.name)
+        _draw(mesh, trials, outcomes, found, sort, direction, picture, rock.name)
     if as_json:
         summary = {name: value for name, value in result.items() if name != "refusals"}
         tables.say({**summary, "holds": len(found), "file": str(output)})
@@ -280,6 +282,7 @@ def _ranked(outcomes: Mapping[int, Outcome], by: fixed_wrist.HoldRank, direction
 def _draw(
     mesh: Any,
     trials: list[fixed_wrist.HoldTrial],
+    outcomes: Mapping[int, Outcome],
     found: list[Pair],
     by: fixed_wrist.HoldRank,
     direction: str,
@@ -292,24 +295,49 @@ def _draw(
     from hand_models.fixed_wrist import TRIAL_WAYS
     from hand_models.scans import plot_holds
 
-    k, first = list(TRIAL_WAYS).index(direction), dict[tuple[float, float, float], float]()
+    k = list(TRIAL_WAYS).index(direction)
+    first: dict[Point, float] = {}
     for trial, each in found:
-        share = 0.0 if each.robust is None else 100.0 * each.robust.share[k]
+        share = math.nan if each.robust is None else 100.0 * each.robust.share[k]
         values = {"pure": np.fmax(each.pure[k], 0.0), "support": each.support[k]}
         first.setdefault(trial.point, float(values.get(by, share)))
     labels = {
         "pure": f"force along {direction} alone [N], 0 without any",
         "support": f"largest force along {direction} [N]",
     }
-    none = [point for point in dict.fromkeys(t.point for t in trials) if point not in first]
+    marks = _marks(trials, outcomes, first)
+    known = {point: value for point, value in first.items() if not math.isnan(value)}
     with tables.writing(path):
         plot_holds(
             mesh.triangles,
-            np.array(list(first)).reshape(-1, 3),
-            np.array(list(first.values())),
-            np.array(none).reshape(-1, 3),
+            np.array(list(known)).reshape(-1, 3),
+            np.array(list(known.values())),
+            {f"{words} ({len(at)})": np.array(at) for words, at in marks},
             [each.pose for _, each in found[:SHOWN_HOLDS]],
             path,
             f"holds on {name}: the best hand at each point",
             labels.get(by, f"samples that hold the force along {direction} alone [%]"),
         )
+
+
+def _marks(
+    trials: list[fixed_wrist.HoldTrial],
+    outcomes: Mapping[int, Outcome],
+    values: Mapping[Point, float],
+) -> list[tuple[str, list[Point]]]:
+    """Return points without a value by what they are, in words; the kind with most points first.
+
+    A point without a hold has the kind of reason of most of its trials.
+    """
+    kinds: dict[Point, Counter[str]] = {}
+    for i, outcome in sorted(outcomes.items()):
+        if trials[i].point not in values:
+            kinds.setdefault(trials[i].point, Counter())[tables.refusal_kind(outcome)] += 1
+    marked: dict[str, list[Point]] = {}
+    for point, counts in kinds.items():
+        words = tables.REFUSAL_WORDS[counts.most_common(1)[0][0]]
+        marked.setdefault(words, []).append(point)
+    unknown = [point for point, value in values.items() if math.isnan(value)]
+    if unknown:
+        marked["a hand holds something; no samples were tried"] = unknown
+    return sorted(marked.items(), key=lambda each: -len(each[1]))

@@ -8,8 +8,10 @@ from .hands import (
     survey_json as survey_json,
 )
 from .holds import (
+    REFUSAL_WORDS as REFUSAL_WORDS,
     hold_json as hold_json,
     print_holds as print_holds,
+    refusal_kind as refusal_kind,
     refusals_json as refusals_json,
 )
 from .layout import (

@@ -5,25 +5,37 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import Array, InvalidInputError, RefusedPlaceError
 from hand_models.fixed_wrist import (
-    AT_BORDER,
     SCATTER_SETTINGS,
     TRIAL_WAYS,
     FoundHold,
     HoldRank,
     HoldTrial,
 )
-from service.tables.layout import name, number, print_rows, print_warnings
+from service.tables.layout import name, number, print_rows, print_warnings, text
 
 if TYPE_CHECKING:
     from hand_models.hand import Placing
 
-__all__ = ["hold_json", "print_holds", "refusals_json"]
+__all__ = ["REFUSAL_WORDS", "hold_json", "print_holds", "refusal_kind", "refusals_json"]
+
+REFUSAL_WORDS: Final = {
+    "scan_border": "the scan ends, or has a hole, within a finger's reach",
+    "palm_in_rock": "rock is inside the palm",
+    "finger_in_rock": "rock is inside a finger even with its joints fully open",
+    "tendon_slack": "the closing tension does not close the fingers",
+    "no_equilibrium": "no equilibrium of a finger was found",
+    "no_rest": "the closed hand comes to rest nowhere near its seat",
+    "unstable_rest": "the closed hand does not stay where its net force is zero",
+    "other": "other reasons: see reasons in the file",
+    "holds_nothing": "a hand can be there, but holds nothing in any direction",
+}
+"""Kinds of reasons why there is no hold at a place, in words (`RefusedPlaceError.reason`)."""
 
 Pair = tuple[HoldTrial, FoundHold]
 
@@ -84,21 +96,33 @@ def refusals_json(
     Returns
     -------
     dict
-        Number of ``refused`` trials, by reason (``reasons``), and by point and reason
-        (``refusals``).
+        Number of ``refused`` trials, by kind (``kinds``), by reason (``reasons``), and by point
+        with both (``refusals``).
     """
+    kinds: dict[tuple[float, float, float], Counter[str]] = {}
     found: dict[tuple[float, float, float], Counter[str]] = {}
     for i, each in sorted(outcomes.items()):
         if isinstance(each, InvalidInputError):
-            found.setdefault(trials[i].point, Counter())[_reason(each)] += 1
+            point = trials[i].point
+            kinds.setdefault(point, Counter())[refusal_kind(each)] += 1
+            found.setdefault(point, Counter())[_reason(each)] += 1
     reasons = sum(found.values(), Counter[str]())
     return {
         "refused": reasons.total(),
+        "kinds": dict(sum(kinds.values(), Counter[str]()).most_common()),
         "reasons": dict(reasons.most_common()),
         "refusals": [
-            {"point": point, "reasons": dict(reasons)} for point, reasons in found.items()
+            {"point": point, "kinds": dict(kinds[point]), "reasons": dict(reasons)}
+            for point, reasons in found.items()
         ],
     }
+
+
+def refusal_kind(found: FoundHold | InvalidInputError) -> str:
+    """Return the key of `REFUSAL_WORDS` that says why there is no hold at a place."""
+    if not isinstance(found, InvalidInputError):
+        return "holds_nothing"
+    return found.reason if isinstance(found, RefusedPlaceError) else "other"
 
 
 def _reason(error: InvalidInputError) -> str:
@@ -162,15 +186,19 @@ def print_holds(
         f"{alone:,} of them along {way} alone"
     )
     if not found:
-        open_rock = list(result["reasons"])[:1] == [AT_BORDER]
+        open_rock = list(result["kinds"])[:1] == ["scan_border"]
         out.print(
             "nothing holds: is the scan full of holes? `crux rock` says what helps against them"
             if open_rock
             else "nothing holds: does z of the file point into the rock, as `crux rock` writes it?",
         )
     print_warnings(result["warnings"], out)
-    for reason, count in [*result["reasons"].items()][:3]:
-        out.print(f"{count:,} refused: {reason}")
+    idle = result["tried"] - result["refused"] - len(found)
+    without = result["kinds"] | ({"holds_nothing": idle} if idle else {})
+    if without:
+        rows = [(kind, f"{count:,}", REFUSAL_WORDS[kind]) for kind, count in without.items()]
+        columns = [name("kind", "0"), number("places", "1"), text("why", "2")]
+        print_rows(rows, columns, out, "places without a hold")
 
 
 def _finite(value: float) -> str:

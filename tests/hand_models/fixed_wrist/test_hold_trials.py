@@ -1,14 +1,16 @@
 """Holds that are proposed on a rock are those of hands that are placed there one by one."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
 import trimesh
 
-from hand_models import Grasp, InvalidInputError, Pose, place
-from hand_models.base import turns_about
+from hand_models import Cylinder, Grasp, InvalidInputError, Pose, place
+from hand_models.base import RefusedPlaceError, turns_about
 from hand_models.fixed_wrist import (
+    AT_BORDER,
     TRIAL_WAYS,
     FoundHold,
     HoldTrial,
@@ -20,6 +22,7 @@ from hand_models.fixed_wrist import (
     try_holds,
     wrench_space,
 )
+from hand_models.hand import Placement
 from hand_models.rock import Mesh
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.rocks import cylinder_mesh, fractal_wall
@@ -141,6 +144,27 @@ def test_robust_is_that_of_the_hand_seated_anew_near_its_place():
     np.testing.assert_allclose(found.robust.pure_tenth, np.min(pure, axis=0), rtol=1e-5, atol=1e-6)
     np.testing.assert_array_equal(found.robust.share, (np.array(pure) >= 40.0).mean(axis=0))
     assert found.robust.contact == (0.25e-3, 3e-3)
+
+
+def test_each_refused_place_has_its_kind():
+    corners = np.array([[-0.3, -0.3, 0.0], [0.3, -0.3, 0.0], [0.3, 0.3, 0.0], [-0.3, 0.3, 0.0]])
+    flat = Mesh(corners, np.array([[0, 2, 1], [0, 3, 2]]), anywhere=True)
+    trial = HoldTrial((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 0.0)
+    (resting,) = try_holds(HAND, flat, ROCK, [trial], placing="contact")
+    assert resting.reason == "no_rest"
+    (outside,) = try_holds(HAND, flat, ROCK, [trial._replace(point=(0.25, 0.0, 0.0))])
+    assert (outside.reason, outside.message) == ("scan_border", AT_BORDER)
+    deep = Placement(flat, ROCK, Grasp(), Pose(np.array([0.0, 0.0, -0.02]), np.eye(3)))
+    tilted = Pose(np.array([0.0, 0.0, 0.03]), turns_about([0.0, 0.4, 0.0]))
+    slack = Placement(Cylinder(0.3), ROCK, Grasp(math.pi, closing_tension=1.0), None)
+    found = HAND.settle_each([deep, deep._replace(hold_in_hand=tilted), slack])
+    assert [each.reason for each in found] == ["palm_in_rock", "finger_in_rock", "tendon_slack"]
+
+
+def test_a_refused_place_keeps_its_kind_on_the_way_from_a_worker():
+    error = RefusedPlaceError("is in the way", reason="palm_in_rock", field="hold")
+    there = pickle.loads(pickle.dumps(error))
+    assert (there.reason, there.kind, str(there)) == (error.reason, "invalid", str(error))
 
 
 def test_holds_are_ranked_by_each_measure():

@@ -11,19 +11,48 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from hand_models.base import Pose
-from hand_models.scans import Hole, ScannedRock, pictures, plot_rock
+from hand_models.rock import Triangles
+from hand_models.scans import Hole, ScannedRock, pictures, plot_holds, plot_rock
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """Figures that are drawn."""
+    figures: list[Figure] = []
+
+    def kept(*args: object, **kwargs: object) -> Figure:
+        figures.append(Figure(*args, **kwargs))  # type: ignore[arg-type]
+        return figures[-1]
+
+    monkeypatch.setattr(pictures, "Figure", kept)
+    return figures
+
+
+def test_points_without_a_hold_have_a_marker_for_each_kind(
+    tmp_path: Path, made: list[Figure]
+) -> None:
+    corners = np.array([(x, y, 0.01 * x) for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
+    rock = Triangles(corners, np.array([(0, 1, 2), (1, 3, 2)]))
+    kinds = {
+        "rock is inside the palm (2)": np.array([(0.1, 0.2, 0.0), (0.3, 0.4, 0.0)]),
+        "the scan ends (1)": np.array([(0.9, -0.8, 0.0)]),
+    }
+    held = np.array([(0.0, 0.0, 0.0)])
+    plot_holds(rock, held, np.array([50.0]), kinds, [], tmp_path / "holds.png", "holds", "share")
+    (figure,) = made
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == list(kinds)
+    lines = {line.get_label(): line for line in figure.axes[0].lines}
+    for kind, points in kinds.items():
+        # y of the rock's frame to the right, x up
+        np.testing.assert_array_equal(lines[kind].get_xydata(), points[:, [1, 0]])
+    assert len({line.get_marker() for line in lines.values()}) == len(kinds)
+    assert [axes.get_ylabel() for axes in figure.axes][1] == "share"
 
 
 def test_widths_of_holes_do_not_lie_on_each_other_nor_the_legend_on_the_rock(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, made: list[Figure]
 ) -> None:
-    made: list[Figure] = []
-
-    def kept(*args: object, **kwargs: object) -> Figure:
-        made.append(Figure(*args, **kwargs))  # type: ignore[arg-type]
-        return made[-1]
-
-    monkeypatch.setattr(pictures, "Figure", kept)
     corners = np.array([(x, y, 0.01 * x) for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
     places = np.random.default_rng(0).uniform(-0.3, 0.3, (12, 3))
     holes = tuple(Hole(0.2 - 0.01 * i, place) for i, place in enumerate(places))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import signal
 from collections import Counter
 from collections.abc import Iterator
@@ -112,16 +113,17 @@ def test_only_the_best_are_sampled_if_asked_for(rock, tmp_path):
 
 def check_refusals(told: dict) -> None:
     """Every refused trial is counted once, at its point and under its reason."""
-    by_reason: Counter[str] = Counter()
-    for refusal in told["refusals"]:
-        by_reason.update(refusal["reasons"])
-    assert by_reason == told["reasons"]
-    assert by_reason.total() == told["refused"]
+    for key in ("reasons", "kinds"):
+        counts: Counter[str] = Counter()
+        for refusal in told["refusals"]:
+            counts.update(refusal[key])
+        assert counts == told[key]
+        assert counts.total() == told["refused"]
     points = [tuple(refusal["point"]) for refusal in told["refusals"]]
     assert len({*points}) == len(points)
 
 
-def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
+def test_file_and_table_say_why_hands_cannot_be_at_places(rock, tmp_path, capfd):
     """At the rim of a wall fingers reach over its border; each trial is tried again."""
     output = tmp_path / "holds.json"
     options = [*COARSE, "--samples", "0", "--workers", "1"]
@@ -129,6 +131,11 @@ def test_the_file_says_why_hands_cannot_be_at_places(rock, tmp_path):
     told = json.loads(output.read_text(encoding="utf-8"))
     check_refusals(told)
     assert 0 < told["reasons"][AT_BORDER] < told["trials"] == told["tried"]
+    assert told["kinds"]["scan_border"] == told["reasons"][AT_BORDER]
+    table = capfd.readouterr().out.split("places without a hold")[1]
+    idle = told["tried"] - told["refused"] - len(told["holds"])
+    for kind, count in (told["kinds"] | ({"holds_nothing": idle} if idle else {})).items():
+        assert re.search(rf"^ {kind} +{count} ", table, re.MULTILINE)
     held = {tuple(hold["place"]["point"]) for hold in told["holds"]}
     mesh = Mesh(*read_mesh(rock), hand_table(), anywhere=True)
     radius = 0.5 * hand_table().scalar("palm", "length")
