@@ -24,8 +24,10 @@ from .placing import (
     place as place,
 )
 from .pure_forces import (
+    FORCE_TOLERANCE as FORCE_TOLERANCE,
     TRIAL_WAYS as TRIAL_WAYS,
     force_directions as force_directions,
+    impossible_forces as impossible_forces,
     pure_reaches as pure_reaches,
 )
 from .row_layout import (

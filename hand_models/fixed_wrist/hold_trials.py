@@ -21,8 +21,14 @@ from hand_models.base import (
 from hand_models.finger import CONTACT_KINDS
 from hand_models.fixed_wrist.contact_rest import placed_by_contact
 from hand_models.fixed_wrist.placing import ALONG_FINGERS, approach_frame
-from hand_models.fixed_wrist.pure_forces import TRIAL_WAYS, force_directions, pure_reaches
-from hand_models.fixed_wrist.seat_scatter import SCATTER_SETTINGS, Robustness, robustness
+from hand_models.fixed_wrist.pure_forces import (
+    FORCE_TOLERANCE,
+    TRIAL_WAYS,
+    force_directions,
+    impossible_forces,
+    pure_reaches,
+)
+from hand_models.fixed_wrist.seat_scatter import Robustness, robustness
 from hand_models.fixed_wrist.seat_search import best_seats
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import FINGERS, Grasp, Placement, SettledHand, SpinyHand
@@ -97,6 +103,14 @@ class FoundHold(NamedTuple):
     support: Array
     pure: Array
     robust: Robustness | None = None
+
+    @property
+    def cannot(self) -> dict[str, str]:
+        """Forces that the hand cannot exert alone, by direction, in words (`impossible_forces`)."""
+        pure, support = (
+            dict(zip(TRIAL_WAYS, each.tolist(), strict=True)) for each in (self.pure, self.support)
+        )
+        return impossible_forces(pure, support)
 
 
 def grid_of_trials(
@@ -215,7 +229,7 @@ def try_holds(
     *,
     placing: str = "given",
     samples: int = 0,
-    force: float = SCATTER_SETTINGS.force,
+    force: float = FORCE_TOLERANCE,
 ) -> list[FoundHold | InvalidInputError]:
     """Close hands at places, all together, and return the forces that they can hold.
 
@@ -314,7 +328,7 @@ def ranked_holds(
         raise InvalidInputError(f"must be one of {', '.join(TRIAL_WAYS)}, got {way!r}", field="way")
     k, ranks = list(TRIAL_WAYS).index(way), []
     for i, each in enumerate(found):
-        if isinstance(each, InvalidInputError) or not each.support.max() >= SCATTER_SETTINGS.force:
+        if isinstance(each, InvalidInputError) or not each.support.max() >= FORCE_TOLERANCE:
             continue
         robust = each.robust
         values = {

@@ -30,7 +30,7 @@ from hand_models.base import (
     turns_about,
 )
 from hand_models.fixed_wrist.contact_rest import contact_slopes, rests_on_rock
-from hand_models.fixed_wrist.pure_forces import pure_reaches
+from hand_models.fixed_wrist.pure_forces import FORCE_TOLERANCE, pure_reaches
 from hand_models.fixed_wrist.space import wrench_spaces
 from hand_models.hand import Placement, SettledHand, SpinyHand
 
@@ -56,9 +56,6 @@ class ScatterSettings:
     """Percentile that is exceeded at nine in ten places."""
     hundredth: float = 1.0
     """Percentile that stands for the worst place, which would depend on the number of places."""
-    force: float = 0.1
-    """Smallest force that counts as held [N]: the weight of 10 g, far above what linear programs
-    leave undecided, and far below any load of a hand."""
 
 
 SCATTER_SETTINGS = ScatterSettings()
@@ -105,7 +102,7 @@ class Robustness(NamedTuple):
     contact: tuple[float, float] | None = None
     pure_tenth: Array = np.zeros(0)
     share: Array = np.zeros(0)
-    force: float = SCATTER_SETTINGS.force
+    force: float = FORCE_TOLERANCE
 
 
 def robustness(
@@ -118,7 +115,7 @@ def robustness(
     *,
     at: Pose | None = None,
     pure: ArrayLike | None = None,
-    force: float = SCATTER_SETTINGS.force,
+    force: float = FORCE_TOLERANCE,
 ) -> Robustness:
     """Close a hand again at places near its place, and return quantiles of what it reaches there.
 

@@ -108,8 +108,10 @@ def plot_holds(
 def _write(axes: Axes, colours: Any, label: str, path: Path) -> None:
     """Write the picture, with a legend if anything has a label and what colours mean."""
     figure: Any = axes.figure
-    if axes.get_legend_handles_labels()[0]:
-        figure.legend(loc="outside lower center", ncols=2)
+    labels = axes.get_legend_handles_labels()[1]
+    if labels:
+        wide = max(map(len, labels)) > 40  # two columns of so many letters fill the picture
+        figure.legend(loc="outside lower center", ncols=1 if wide else 2)
     figure.colorbar(colours, ax=axes, shrink=0.7, label=label)
     with whole_file(path) as part:
         figure.savefig(part, dpi=150)

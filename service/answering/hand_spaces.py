@@ -9,7 +9,13 @@ import numpy as np
 
 from hand_models.base import Array, EmptySetError, InvalidInputError, LimitError
 from hand_models.finger import PHALANGES
-from hand_models.fixed_wrist import Robustness, force_directions, robustness, tension_limits
+from hand_models.fixed_wrist import (
+    Robustness,
+    force_directions,
+    impossible_forces,
+    robustness,
+    tension_limits,
+)
 from hand_models.hand import FINGERS, SettledHand, SettledTile, closing_sequence, nearby_closures
 from hand_models.wrench_spaces import WrenchSpace
 from planner import WristPlan, deadline, resting_hand
@@ -238,6 +244,10 @@ def _add_views(
         )
         reply.dimension = space.dimension if space.listed else None
         reply.capability = _capability(space)
+        reply.cannot = impossible_forces(
+            {way: end.pure for way, end in reply.capability.items()},
+            {way: end.extent for way, end in reply.capability.items()},
+        )
     except EmptySetError:
         reply.vertices = [] if want is None or "vertices" in want else None
         reply.half_spaces = reply.dimension = reply.capability = None

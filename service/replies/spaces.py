@@ -196,6 +196,9 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
       the count would cost too much.
     - ``capability``: reach along each axis, by sign and axis such as ``+fx``; null where the hand
       can exert no wrench.
+    - ``cannot``: sentences that say which forces on the rock the hand cannot exert alone, with
+      every other component zero: by ``-fz`` (pull-off) and ``-fx`` to ``+fy`` (shear); empty where
+      it can exert them all, null where it can exert no wrench.
     - ``warnings``: sentences about what was left out.
     - ``robust``: reach over places near the given one; only with ``"want": ["robust"]``.
     """
@@ -214,6 +217,7 @@ class WrenchSpaceReply(StanceReply, kw_only=True):
     half_spaces: HalfSpacesReply | None
     dimension: int | None
     capability: dict[str, AxisCapability] | None
+    cannot: dict[str, str] | None = None
     warnings: list[str] = []
     robust: RobustCapability | UnsetType = UNSET
 

@@ -62,6 +62,8 @@ def print_wrench_space(reply: replies.WrenchSpaceReply, out: Console) -> None:
     for warning in reply.warnings:
         out.print(warning)
     _print_capability(reply.capability, out)
+    for sentence in (reply.cannot or {}).values():
+        out.print(sentence)
 
 
 def print_robust(robust: replies.RobustCapability, out: Console) -> None:

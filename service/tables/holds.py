@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.console import Console
 
 from hand_models.base import Array, InvalidInputError, RefusedPlaceError
 from hand_models.fixed_wrist import (
-    SCATTER_SETTINGS,
+    FORCE_TOLERANCE,
     TRIAL_WAYS,
     FoundHold,
     HoldRank,
@@ -70,6 +70,7 @@ def hold_json(trial: HoldTrial, found: FoundHold, placing: Placing) -> dict[str,
         "support": _by_way(found.support),
         "pure": pure,
         "pure_pull_off": pure["-fz"],
+        "cannot": found.cannot,
         "samples": 0 if robust is None else robust.draws,
         **{key: None if robust is None else _by_way(getattr(robust, key)) for key in quantiles},
     }
@@ -160,7 +161,7 @@ def print_holds(
         number("outer °", "0.outer_rotation", ".0f", scale=degree),
         number("pure N", f"1.pure.{k}", _finite),
         number("support N", f"1.support.{k}", "z.1f"),
-        number("shear N", lambda row: row[1].support[1:].min(), "z.1f"),
+        name("cannot", lambda row: _ways(row[1].cannot)),
     ]
     if result["samples"]:
         columns[3:3] = [
@@ -178,7 +179,8 @@ def print_holds(
         "support": f"the largest force along {way} with whatever else",
     }
     out.print(f"sorted by {words[by]}")
-    least = SCATTER_SETTINGS.force
+    out.print("cannot: directions in H, of pull-off and shear, without any force alone")
+    least = FORCE_TOLERANCE
     alone = sum(each.pure[k] >= least for _, each in found)
     points = len({trial.point for trial in trials})
     out.print(
@@ -199,6 +201,14 @@ def print_holds(
         rows = [(kind, f"{count:,}", REFUSAL_WORDS[kind]) for kind, count in without.items()]
         columns = [name("kind", "0"), number("places", "1"), text("why", "2")]
         print_rows(rows, columns, out, "places without a hold")
+
+
+def _ways(ways: Iterable[str]) -> str:
+    """Return directions of forces in short: ``-z ±x +y``."""
+    signs: dict[str, str] = {}
+    for way in ways:
+        signs[way[-1]] = "±" if way[-1] in signs else way[0]
+    return " ".join(f"{sign}{axis}" for axis, sign in signs.items()) or "-"
 
 
 def _finite(value: float) -> str:

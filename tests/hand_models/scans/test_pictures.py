@@ -35,12 +35,15 @@ def test_points_without_a_hold_have_a_marker_for_each_kind(
     rock = Triangles(corners, np.array([(0, 1, 2), (1, 3, 2)]))
     kinds = {
         "rock is inside the palm (2)": np.array([(0.1, 0.2, 0.0), (0.3, 0.4, 0.0)]),
-        "the scan ends (1)": np.array([(0.9, -0.8, 0.0)]),
+        "the scan ends, or has a hole, within a finger's reach (1)": np.array([(0.9, -0.8, 0.0)]),
     }
     held = np.array([(0.0, 0.0, 0.0)])
     plot_holds(rock, held, np.array([50.0]), kinds, [], tmp_path / "holds.png", "holds", "share")
     (figure,) = made
+    FigureCanvasAgg(figure).draw()
     (legend,) = figure.legends
+    box = legend.get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
     assert [text.get_text() for text in legend.get_texts()] == list(kinds)
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     for kind, points in kinds.items():

@@ -231,6 +231,9 @@ def test_a_wrench_space_and_its_views_agree() -> None:
             extent = (factor * vertices[:, i]).max()
             assert reach.extent == pytest.approx(extent, abs=1e-6)
             assert reach.pure is None or reach.pure <= reach.extent + 1e-6
+    for way in ("-fz", "-fx", "+fx", "-fy", "+fy"):
+        able = reply.capability[way].pure is not None and reply.capability[way].pure >= 0.1
+        assert (way in reply.cannot) != able
     assert {row.kind for row in reply.rows} == {"limit", "hard"}
     assert all(row.constant == 0.0 for row in reply.rows if row.kind == "hard")
 
@@ -298,6 +301,7 @@ def test_a_hand_that_can_carry_nothing_still_tells_its_seating_and_rows() -> Non
     assert reply.half_spaces is None
     assert reply.dimension is None
     assert reply.capability is None
+    assert reply.cannot is None
     assert reply.rows
 
 

@@ -59,6 +59,8 @@ def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):
     assert {hold["samples"] for hold in held} == {2}
     assert ranks(held) == sorted(ranks(held), reverse=True)
     for hold in held:
+        for way, reach in hold["pure"].items():
+            assert (way in hold["cannot"]) == (reach is None or reach < 0.1)
         assert hold["pure_pull_off"] == hold["pure"]["-fz"]
         assert (hold["pure_tenth"]["-fz"] >= 0.1) == (hold["share"]["-fz"] == 1.0)
         assert 0.0 <= hold["pure_tenth"]["-fz"] <= max(hold["tenth"]["-fz"], 0.0)
