@@ -318,7 +318,8 @@ def ranked_holds(
     by : {'robust', 'share', 'pure', 'support'}, optional
         The pure force that nine in ten samples have, the share of the samples that hold the wanted
         force, or the largest force without a scatter: pure, or whatever the other components. Ties
-        are broken by the others, in this order. A place without samples comes after those with.
+        are broken by the others, in this order. A pure force below zero, or none, counts as zero. A
+        place without samples comes after those with.
     way : str, optional
         Direction of the force: one of `TRIAL_WAYS`.
     """
@@ -334,7 +335,7 @@ def ranked_holds(
         values = {
             "robust": -math.inf if robust is None else float(robust.pure_tenth[k]),
             "share": -math.inf if robust is None else float(robust.share[k]),
-            "pure": -math.inf if math.isnan(each.pure[k]) else float(each.pure[k]),
+            "pure": float(np.fmax(each.pure[k], 0.0)),
             "support": float(each.support[k]),
         }
         order = values.pop(by), *values.values()

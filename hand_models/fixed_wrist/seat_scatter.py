@@ -185,7 +185,7 @@ def robustness(
         worst=hundredth,
         tenth=tenth,
         hundredth=hundredth,
-        contact=hand.contact_scatter if at or settled.seating.offset else None,
+        contact=None if at is None and settled.seating.offset is None else hand.contact_scatter,
         pure_tenth=np.percentile(held, SCATTER_SETTINGS.tenth, axis=0, method="inverted_cdf"),
         share=(held >= force).mean(axis=0),
         force=force,

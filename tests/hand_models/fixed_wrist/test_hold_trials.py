@@ -192,11 +192,13 @@ def test_holds_are_ranked_by_each_measure():
         hold(-1.0, 0.05, 0.0),
         hold(nan, nan, 0.0),
         hold(nan, 8.0, 0.0, 0.5),
+        # a pure force below zero is no better than none
+        hold(-1.0, 5.0, None),
     ]
-    assert ranked_holds(found) == [4, 3, 7, 1, 0]
-    assert ranked_holds(found, "share") == [4, 3, 7, 1, 0]
-    assert ranked_holds(found, "pure") == [3, 1, 4, 7, 0]
-    assert ranked_holds(found, "support", "+fy") == [0, 3, 7, 1, 4]
+    assert ranked_holds(found) == [4, 3, 7, 1, 0, 8]
+    assert ranked_holds(found, "share") == [4, 3, 7, 1, 0, 8]
+    assert ranked_holds(found, "pure") == [3, 1, 4, 7, 0, 8]
+    assert ranked_holds(found, "support", "+fy") == [0, 3, 7, 1, 8, 4]
     for given in ({"by": "luck"}, {"way": "+fz"}):
         with pytest.raises(InvalidInputError, match="must be one of") as caught:
             ranked_holds(found, **given)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import signal
 from collections import Counter
@@ -70,12 +69,13 @@ MEASURES = ("pure_tenth", "share", "pure", "support")
 
 
 def ranks(holds: list[dict], way: str = "-fz", order: tuple[str, ...] = MEASURES) -> list:
-    """Measures of holds along a direction; without a value, below any other."""
-    none = -math.inf
-    return [
-        [none if hold[key] is None or hold[key][way] is None else hold[key][way] for key in order]
-        for hold in holds
-    ]
+    """Measures of holds along a direction; −1 without samples, 0 without a pure force."""
+
+    def measure(hold: dict, key: str) -> float:
+        value = -1.0 if hold[key] is None else hold[key][way]
+        return max(value or 0.0, 0.0) if key == "pure" else value
+
+    return [[measure(hold, key) for key in order] for hold in holds]
 
 
 @pytest.mark.parametrize(
