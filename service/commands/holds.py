@@ -223,7 +223,7 @@ def holds_command(
     result = {
         "v": 1,
         "rock": str(rock),
-        "units": {"length": "m", "angle": "rad", "force": "N"},
+        "units": {"length": "m", "angle": "rad", "force": "N", "share": "1"},
         "trials": len(trials),
         "tried": len(outcomes),
         "samples": samples,

@@ -48,7 +48,7 @@ def test_holds_are_written_sorted_and_drawn(rock, tmp_path, capfd):
     told = json.loads(output.read_text(encoding="utf-8"))
     held = told["holds"]
     assert (told["trials"], told["tried"]) == (16, 16)
-    assert told["units"] == {"length": "m", "angle": "rad", "force": "N"}
+    assert told["units"] == {"length": "m", "angle": "rad", "force": "N", "share": "1"}
     assert "x, y, z mm" in out
     assert out.splitlines()[-1] == f"{output} (in m, rad, N)"
     assert len(held) + told["refused"] <= 16
