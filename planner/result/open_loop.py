@@ -45,7 +45,8 @@ class OpenLoop(Struct, frozen=True):
     In each sample every hand is displaced on its rock, on its own, and closes there. Its pose in
     the body frame B stays: the rock moves instead. Tensions go to the planned ones, and each limb
     pulls its wrist toward the planned pose target with the stance's limb stiffness. Body and wrists
-    settle where they balance the body wrench.
+    settle where they balance the body wrench. Each equilibrium is verified, its stability is not;
+    one that does not pass counts as none. Quantiles and shares are statistics of the samples.
 
     Attributes
     ----------

@@ -3,7 +3,8 @@
 Nothing is shared with the search for the equilibrium. Tile loads, tendons and wrenches of all hands
 are recomputed from the poses of the wrists, law by law, as of any plan. The hands must balance the
 body wrench, and each limb must pull its hand as the hand pulls the rock. Limits may be exceeded:
-the reported utilisation is compared with the recomputed one.
+the reported utilisation, and the force by which a tile is dragged, are compared with the
+recomputed ones.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def execution_problems(
     found, arrays = list[str](), PlanArrays.of(hands)
     with np.errstate(invalid="ignore", over="ignore"):
         joints = check.joints(found, arrays.wrenches, body_wrench)
-        residuals, _, used = check.recompute(found, arrays, joints)
+        residuals, again, used = check.recompute(found, arrays, joints)
         allowed = allowed_errors(check.known, arrays)
         for residual in residuals:
             if residual.kind == "zero":
@@ -48,6 +49,10 @@ def execution_problems(
     worst, said = max(float(used.max()), check.idle(joints), 0.0), sample.utilisation
     if said is None or not abs(worst - said) <= TOLERANCES.utilisation * max(1.0, worst):
         found.append(f"utilisation is {worst:.8g}, not {said}")
+    rubs = check.settled.tiles.holding(again.loads)[0].values
+    dragged = max(-float(rubs.min()), 0.0)
+    if sample.dragged is None or not abs(dragged - sample.dragged) <= TOLERANCES.dragged:
+        found.append(f"a tile is dragged backwards by {dragged:.6g} N, not {sample.dragged}")
     found.extend(check.unbalanced(arrays.wrenches, body_wrench))
     found.extend(_unequal_pulls(check, arrays, np.array(sample.body_twist, dtype=float)))
     return found

@@ -50,6 +50,9 @@ class VerificationTolerances:
     pull: float = 1e-5
     """Of a limb's pull against its hand's wrench in an executed plan: forces, and moments over
     0.1 m [N]. Equilibria are sought to 1e-6 N, and limbs of 1e9 N/m round to 1e-8 N."""
+    dragged: float = 2e-3
+    """Of the force by which a tile is dragged backwards in an executed plan [N]: up to 1e-3 N is
+    reported as none."""
 
 
 TOLERANCES: Final = VerificationTolerances()

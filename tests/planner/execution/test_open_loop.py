@@ -171,7 +171,7 @@ def test_a_tile_that_is_dragged_backwards_is_reported_with_its_force() -> None:
     assert not sample.holds
 
 
-@pytest.mark.parametrize("spoilt", ["twist", "body", "utilisation", "wrench"])
+@pytest.mark.parametrize("spoilt", ["twist", "body", "utilisation", "wrench", "dragged"])
 def test_an_equilibrium_that_the_check_refuses_is_not_reported(spoilt: str) -> None:
     prepared, answer = planned()
 
@@ -186,6 +186,8 @@ def test_an_equilibrium_that_the_check_refuses_is_not_reported(spoilt: str) -> N
         elif spoilt == "body":
             twist = [each + 1e-7 for each in sample.body_twist]
             sample = msgspec.structs.replace(sample, body_twist=twist)
+        elif spoilt == "dragged":
+            sample = msgspec.structs.replace(sample, dragged=sample.dragged + 0.01)
         else:
             sample = msgspec.structs.replace(sample, utilisation=sample.utilisation - 1e-4)
         return execution_passes(prepared, closed, [first, *others], sample)
