@@ -1,4 +1,4 @@
-from .boundary import stretch_minima as stretch_minima
+from .boundary import stretch_minima as stretch_minima, strung as strung
 from .outlines import Outlines as Outlines
 from .polyline import PolylineSection as PolylineSection
 from .section import (
