@@ -26,6 +26,14 @@ LONG = ("test_golden.py", "test_dispatcher.py", "test_service.py", "test_cli.py"
 """Files whose tests take longest together, which one process each goes through."""
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile in one process, before many would at once."""
+    if not hasattr(config, "workerinput"):
+        from hand_models.rock import load_compiled
+
+        load_compiled()
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with what takes long, so that no process is left alone with it at the end."""

@@ -8,7 +8,6 @@ edges' names, without comparing coordinates.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError, go_on
 from hand_models.rock.surface import Triangles
+from hand_models.sections import strung
 
 __all__ = [
     "TriangleCells",
@@ -26,7 +26,6 @@ __all__ = [
     "cut",
     "edges_of",
     "grouped",
-    "strung",
     "unstrung",
     "weld",
     "without_spikes",
@@ -249,11 +248,6 @@ def cut(
     some = np.arange(len(faces)) if some is None else some
     plane = np.array([origin, s_axis, t_axis])
     return unstrung(*plane_cut(vertices, faces, some, plane, reach))
-
-
-def strung(pieces: Sequence[Array]) -> tuple[Array, Indices]:
-    """Return the points of polylines one after another, and the index at which each ends."""
-    return np.ascontiguousarray(np.concatenate(pieces)), np.cumsum([len(each) for each in pieces])
 
 
 def unstrung(points: Array, ends: Indices) -> list[Array]:

@@ -1,5 +1,9 @@
-from .boundary import stretch_minima as stretch_minima
-from .finger_rock import NO_STRIPS as NO_STRIPS, FingerRock as FingerRock, RockStrips as RockStrips
+from .boundary import stretch_minima as stretch_minima, strung as strung
+from .finger_rock import (
+    NO_STRIPS as NO_STRIPS,
+    FingerRock as FingerRock,
+    RockStrips as RockStrips,
+)
 from .outlines import Outlines as Outlines
 from .polyline import PolylineSection as PolylineSection
 from .section import (

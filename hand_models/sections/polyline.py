@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
-from hand_models.sections.boundary import Boundary
+from hand_models.base import Array, Indices
+from hand_models.sections.boundary import Boundary, strung
 from hand_models.sections.first_contact import TurningFaces
 from hand_models.sections.section import Complexes, Face, Flags, Rest, Section, Vector2
 
@@ -64,6 +64,11 @@ class PolylineSection(Section):
     def boundary(self) -> Boundary:
         """Search structure of the polylines, made when first used; `highest` does not need it."""
         return Boundary(self.pieces)
+
+    @cached_property
+    def _strung(self) -> tuple[Array, Indices]:
+        """Points of the pieces, one after another, and the index at which each piece ends."""
+        return strung(self.pieces)
 
     def rest(self, joint: complex, face: Face, low: float, high: float) -> Rest | None:
         found = self.rests(np.array([joint]), face, low, high)
@@ -119,25 +124,6 @@ class PolylineSection(Section):
         ndarray, shape (n,)
             Infinite for a window without rock [m].
         """
-        least = np.full(len(low), math.inf)
-        # what all windows hold is looked at once, and what none does not at all
-        inner, outer = (low.max(), high.min()), (low.min(), high.max())
-        for piece in self.pieces:
-            s, t = piece[:, 0], piece[:, 1]
-            always = (s >= inner[0]) & (s <= inner[1])
-            np.minimum(least, t[always].min(initial=math.inf), out=least)
-            some = (~always & (s >= outer[0]) & (s <= outer[1])).nonzero()[0]
-            between = (s[some] >= low[:, None]) & (s[some] <= high[:, None])
-            apart = np.where(between, t[some], math.inf).min(axis=1, initial=math.inf)
-            np.minimum(least, apart, out=least)
-            first, last = np.minimum(s[:-1], s[1:]), np.maximum(s[:-1], s[1:])
-            for bound in (low, high):
-                crossed = ((last >= bound.min()) & (first < bound.max())).nonzero()[0]
-                after = crossed + 1
-                window, which = (
-                    (s[crossed] < bound[:, None]) != (s[after] < bound[:, None])
-                ).nonzero()
-                i, j = crossed[which], after[which]
-                part = (bound[window] - s[i]) / (s[j] - s[i])
-                np.minimum.at(least, window, t[i] + part * (t[j] - t[i]))
-        return least
+        from hand_models.sections.compiled_polylines import highest_rock
+
+        return highest_rock(*self._strung, np.ascontiguousarray(low), np.ascontiguousarray(high))

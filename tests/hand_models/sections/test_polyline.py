@@ -11,6 +11,7 @@ from hypothesis import given, strategies as st
 
 from hand_models.rock import Profile
 from hand_models.sections import Disc, Face, PolylineSection, Rest
+from hand_models.sections.boundary import Boundary
 from tests.suite.helpers.rocks import distance
 from tests.suite.helpers.shares import given_some
 
@@ -136,6 +137,26 @@ def test_where_rock_ends_nothing_is_touched():
     assert stub.rest(0.01 + 0j, FACE, 0.0, HIGH) is None
     assert stub.clearance((0.01, 0.05)) > 0.0
     assert stub.clearance((-0.05, 0.05)) == pytest.approx(-0.03)
+
+
+@given(seeds)
+def test_the_nearest_segment_is_found_among_all(seed):
+    rng = np.random.default_rng(seed)
+    pieces = [
+        np.cumsum(10.0 ** rng.uniform(-4.0, -1.0) * rng.normal(size=(n, 2)), axis=0)
+        for n in rng.integers(2, 60, rng.integers(1, 4))
+    ]
+    points = rng.normal(size=(30, 2)) * 10.0 ** rng.uniform(-3.0, 0.0)
+    start = np.concatenate([piece[:-1] for piece in pieces])
+    step = np.concatenate([np.diff(piece, axis=0) for piece in pieces])
+    along = ((points[:, None] - start) * step).sum(axis=2) / (step**2).sum(axis=1)
+    places = start + np.clip(along, 0.0, 1.0)[..., None] * step
+    want = np.linalg.norm(points[:, None] - places, axis=2)
+    segment, part, away = Boundary(pieces).nearest(points @ [1.0, 1j])
+    np.testing.assert_allclose(np.abs(away), want.min(axis=1), atol=1e-14)
+    np.testing.assert_allclose(want[np.arange(30), segment], want.min(axis=1), atol=1e-14)
+    found = start[segment] + part[:, None] * step[segment]
+    np.testing.assert_allclose((points - found) @ [1.0, 1j], away, atol=1e-14)
 
 
 def test_the_highest_rock_in_a_strip_counts_places_between_vertices():

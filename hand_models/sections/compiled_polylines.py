@@ -1,0 +1,83 @@
+"""Search the polylines that bound rock: nearest segments, and the highest place (compiled).
+
+Several polylines are an array of their points, one after another, and the index at which each ends.
+Segments are counted through all of them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hand_models.base import Array, Indices, compiled
+
+__all__ = ["highest_rock", "nearest_segments"]
+
+
+@compiled()
+def _from_segment(begin: Array, end: Array, point: Array) -> tuple[float, float, float]:
+    """Return the part of a segment nearest to a point, and the vector from there to the point."""
+    x, y = point[0] - begin[0], point[1] - begin[1]
+    u, v = end[0] - begin[0], end[1] - begin[1]
+    part = min(max((x * u + y * v) / (u * u + v * v), 0.0), 1.0)
+    return part, x - part * u, y - part * v
+
+
+@compiled("f2", "i1", "f2")
+def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Indices, Array, Array]:
+    """Return the nearest segment to each point; see `Boundary.nearest`."""
+    longest, begin = 1e-9, 0  # [m] or else the longest segment
+    for end in ends:
+        for i in range(begin, end - 1):
+            x, y = vertices[i + 1, 0] - vertices[i, 0], vertices[i + 1, 1] - vertices[i, 1]
+            longest = max(longest, math.sqrt(x * x + y * y))
+        begin = end
+    segments, parts = np.zeros(len(points), dtype=np.intp), np.zeros(len(points))
+    away = np.empty((len(points), 2))
+    nearest = 0
+    for i in range(len(points)):
+        point = points[i]
+        # the segment nearest to the point before is near to this one
+        _, x, y = _from_segment(vertices[nearest], vertices[nearest + 1], point)
+        least = math.sqrt(x * x + y * y) * (1.0 + 1e-12) + 1e-15  # [m] it is found once more
+        square, begin = math.inf, 0
+        for piece in range(len(ends)):
+            at, begin = begin, ends[piece]
+            while at < begin - 1:
+                x, y = point[0] - vertices[at, 0], point[1] - vertices[at, 1]
+                # what is within so many segments of a vertex that is farther is farther, too
+                beyond = math.sqrt(x * x + y * y) - least
+                if beyond > longest:
+                    at += int(beyond / longest)
+                    continue
+                part, x, y = _from_segment(vertices[at], vertices[at + 1], point)
+                if x * x + y * y < square:
+                    square = x * x + y * y
+                    least = min(least, math.sqrt(square))
+                    nearest, segments[i], parts[i] = at, at - piece, part
+                    away[i, 0], away[i, 1] = x, y
+                at += 1
+    return segments, parts, away
+
+
+@compiled("f2", "i1", "f1", "f1")
+def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Array:
+    """Return the least t of polylines in each window low ≤ s ≤ high, or infinity."""
+    least = np.full(len(low), math.inf)
+    for i in range(len(low)):
+        begin = 0
+        for end in ends:
+            for at in range(begin, end):
+                s, t = vertices[at]
+                if low[i] <= s <= high[i]:
+                    least[i] = min(least[i], t)
+                if at + 1 == end:
+                    continue
+                s_after, t_after = vertices[at + 1]
+                for bound in (low[i], high[i]):
+                    if (s < bound) != (s_after < bound):
+                        part = (bound - s) / (s_after - s)
+                        least[i] = min(least[i], t + part * (t_after - t))
+            begin = end
+    return least
