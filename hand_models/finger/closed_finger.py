@@ -167,13 +167,16 @@ def _axes(shape: PhalanxShape, q: Array) -> Complexes:
 
 def _refused(shape: PhalanxShape, rock: FingerRock, q: Array) -> Refused:
     """Return how deep rock is in a finger, and the lift that would clear it."""
-    places, most = _axes(shape, q), JOINT_COUNT * shape.end
+    from hand_models.finger.phalanx_gaps import rock_distances
+
+    places, most = _axes(shape, q).ravel(), JOINT_COUNT * shape.end
     outline = Outlines.of([rock], 2.0 * most + shape.end, shape.spacing)
+    sides = [values[0] for values in (outline.points, outline.centres, outline.radii)]
 
     def depth(lift: float, *, how_far: bool = False) -> float:
         """Return how deep rock is in the finger; where it is, only asked ``how_far`` exactly."""
         lifted = places - 1j * lift
-        away = np.abs(lifted[..., None] - outline.points[0]).min(axis=-1)
+        away = rock_distances(lifted, *sides)
         near = float(shape.radius - away.min())
         if near > 0.0 and not how_far:
             return near

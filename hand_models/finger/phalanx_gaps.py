@@ -28,7 +28,7 @@ from hand_models.base import Array, Indices, compiled
 from hand_models.finger.path_state import AROUND_FIELDS, SETTINGS_RECORD, SHAPE_FIELDS, Record
 from hand_models.sections import Complexes, Flags
 
-__all__ = ["near_points", "phalanx_beside", "put_around"]
+__all__ = ["near_points", "phalanx_beside", "put_around", "rock_distances"]
 
 
 @compiled()
@@ -222,6 +222,27 @@ def near_points(
             found[kept] = found[i]
             kept += 1
     return found[:kept]
+
+
+@compiled("c1", "c1", "c1", "f1")
+def rock_distances(places: Complexes, points: Complexes, centres: Complexes, radii: Array) -> Array:
+    """Return the distance of each of m places from the nearest point of rock, shape (m,) [m].
+
+    Parameters
+    ----------
+    places : ndarray of complex, shape (m,)
+        x + i z [m].
+    points, centres, radii : ndarray
+        Rock in the finger's plane, a row of `Outlines`.
+    """
+    found = np.full(len(places), math.inf)
+    each = len(points) // len(centres)
+    for k in range(len(places)):
+        for block in range(len(centres)):
+            if _size(centres[block] - places[k]) - radii[block] < found[k]:
+                for i in range(block * each, block * each + each):
+                    found[k] = min(found[k], _size(points[i] - places[k]))
+    return found
 
 
 @compiled()
