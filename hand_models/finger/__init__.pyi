@@ -9,7 +9,7 @@ from .closure_loads import stays as stays, tendon_loads as tendon_loads
 from .fingernail import Fingernail as Fingernail
 from .model import PHALANGES as PHALANGES, FingerModel as FingerModel
 from .path_state import OpenFinger as OpenFinger
-from .phalanx_gaps import middle_of_bed as middle_of_bed
+from .phalanx_shape import middle_of_bed as middle_of_bed
 from .sequential_closure import (
     CONTACT_KINDS as CONTACT_KINDS,
     ClosedPhalanx as ClosedPhalanx,

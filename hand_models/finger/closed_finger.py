@@ -7,20 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hand_models.base import Array
-from hand_models.finger.closing import follow
+from hand_models.base import Array, Indices
 from hand_models.finger.model import PHALANGES, FingerModel
 from hand_models.finger.path_state import (
     JOINT_COUNT,
-    Around,
-    Codes,
-    Drive,
     OpenFinger,
-    PathState,
+    Records,
+    drives,
     held_share,
-    take,
 )
-from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out
+from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
 from hand_models.finger.settings import CONTACT_CODES
 from hand_models.finger.settled_finger import JOINT_STOPS, Contact, SettledFinger
 from hand_models.sections import Complexes, Face, FingerRock, Flags, Outlines, Section
@@ -106,16 +102,18 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
         In the order of ``closings``; `Refused` for a finger that starts inside the rock even with
         its joints fully open, or that finds no equilibrium.
     """
+    from hand_models.finger.closing import follow
+
     shape = PhalanxShape.of(model)
     rocks = [closing.rock for closing in closings]
     rock = Outlines.of(rocks, model.reach + model.tile_length, shape.spacing)
-    drive = Drive.of(model, closings)
-    lower, straight = drive.lower, np.clip(0.0, drive.lower, drive.upper)
+    drive = drives(model, closings)
+    lower, straight = drive["lower"], np.clip(0.0, drive["lower"], drive["upper"])
     blocked = _in_rock(rock, shape, drive, rocks, straight)
     bent = blocked.nonzero()[0]
     shut = blocked.copy()
     shut[bent] = _in_rock(
-        take(rock, bent), shape, take(drive, bent), [rocks[i] for i in bent], lower[bent]
+        _some(rock, bent), shape, drive[bent], [rocks[i] for i in bent], lower[bent]
     )
     found = [
         _refused(shape, each, q) if starts and each.sections else None
@@ -125,22 +123,27 @@ def close_all(model: FingerModel, closings: Sequence[OpenFinger]) -> list[Closed
     if not len(going):
         return [each for each in found if each is not None]
     start = np.where(blocked[:, None], lower, straight)[going]
-    rock, drive = take(rock, going), take(drive, going)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        path = follow(rock, shape, drive, start)
+    path = follow(_some(rock, going), shape, drive[going], start)
     closed = _closed(model, [closings[i] for i in going.tolist()], *path)
     return [next(closed) if each is None else each for each in found]
+
+
+def _some(rock: Outlines, fingers: Indices) -> Outlines:
+    """Return the rock under some of the fingers."""
+    return Outlines._make(values[fingers] for values in rock)
 
 
 def _in_rock(
     rock: Outlines,
     shape: PhalanxShape,
-    drive: Drive,
+    drive: Records,
     rocks: Sequence[FingerRock],
     q: Array,
 ) -> Flags:
     """Return which fingers turned by q have rock in them, at their sides or all over."""
-    found = Around.of(rock, shape, drive, q).gap.min(axis=1) < -shape.closes
+    from hand_models.finger.closing import around_rock
+
+    found = around_rock(rock, shape, drive, q)["gap"].min(axis=1) < -shape.closes
     for i in (~found).nonzero()[0].tolist():
         found[i] = _inside(rocks[i], _axes(shape, q[i])).any()
     return np.asarray(found)
@@ -164,13 +167,16 @@ def _axes(shape: PhalanxShape, q: Array) -> Complexes:
 
 def _refused(shape: PhalanxShape, rock: FingerRock, q: Array) -> Refused:
     """Return how deep rock is in a finger, and the lift that would clear it."""
-    places, most = _axes(shape, q), JOINT_COUNT * shape.end
+    from hand_models.finger.phalanx_gaps import rock_distances
+
+    places, most = _axes(shape, q).ravel(), JOINT_COUNT * shape.end
     outline = Outlines.of([rock], 2.0 * most + shape.end, shape.spacing)
+    sides = [values[0] for values in (outline.points, outline.centres, outline.radii)]
 
     def depth(lift: float, *, how_far: bool = False) -> float:
         """Return how deep rock is in the finger; where it is, only asked ``how_far`` exactly."""
         lifted = places - 1j * lift
-        away = np.abs(lifted[..., None] - outline.points[0]).min(axis=-1)
+        away = rock_distances(lifted, *sides)
         near = float(shape.radius - away.min())
         if near > 0.0 and not how_far:
             return near
@@ -189,20 +195,20 @@ def _refused(shape: PhalanxShape, rock: FingerRock, q: Array) -> Refused:
 def _closed(
     model: FingerModel,
     closings: Sequence[OpenFinger],
-    state: PathState,
-    around: Around,
+    state: Records,
+    around: Records,
     rests: Flags,
 ) -> Iterator[ClosedFinger | Refused]:
     """Yield fingers as they are at the ends of their paths."""
-    share, places = held_share(state, around), around.place
-    joints, _ = fan_out(state.q, model.joint_spacing)
-    angles = np.cumsum(state.q, axis=1)
-    tilts = np.angle(around.push) - 0.5 * np.pi
+    share, places = held_share(state, around), around["place"]
+    joints, _ = fan_out(state["q"], model.joint_spacing)
+    angles = np.cumsum(state["q"], axis=1)
+    tilts = np.angle(around["push"]) - 0.5 * np.pi
     for row, closing in enumerate(closings):
         if not rests[row]:
             yield Refused(0.0, np.nan)
             continue
-        mode, stop = state.mode[row], state.stop[row]
+        mode, stop = state["mode"][row], state["stop"][row]
         caught = share[row] > 0.0
         stops, bears = _stops(mode != CONTACT_CODES.off, caught, stop)
         caught &= bears
@@ -226,17 +232,17 @@ def _closed(
                     rise,
                     tilt,
                     phi,
-                    float(around.across[row, j]) if caught[j] else 0.0,
+                    float(around["across"][row, j]) if caught[j] else 0.0,
                 )
             )
         finger, of_tile = SettledFinger(model, tuple(contacts)), closing.base_tile
         shears = finger.shears(closing.tension, of_tile)
         normals = finger.normals(shears, of_tile)
         torques = finger.stop_torques(shears, normals, of_tile)
-        yield ClosedFinger(finger, shears, normals, torques, tuple(state.touches[row].tolist()))
+        yield ClosedFinger(finger, shears, normals, torques, tuple(state["touches"][row].tolist()))
 
 
-def _stops(presses: Flags, caught: Flags, stop: Codes) -> tuple[list[int], Flags]:
+def _stops(presses: Flags, caught: Flags, stop: Indices) -> tuple[list[int], Flags]:
     """Return what holds each joint, by code, and which phalanges bear.
 
     A joint is held by the contact of its own phalanx, or by that of a later one whose own joint

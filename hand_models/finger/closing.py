@@ -31,31 +31,59 @@ ends where one that is tightened slowly would.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from hand_models.base import Array, go_on
-from hand_models.finger.contact_states import contact_states, forces_on
+from hand_models.base import Array, compiled, go_on
+from hand_models.finger.contact_states import LINEARISED_FIELDS, contact_states, put_forces
 from hand_models.finger.path_state import (
+    AROUND_FIELDS,
+    CODE_RECORD,
+    DRIVE_FIELDS,
     JOINT_COUNT,
-    Around,
-    Drive,
-    PathState,
-    choose,
-    held_share,
-    put,
-    take,
-    times,
+    SETTINGS_RECORD,
+    SHAPE_FIELDS,
+    STATE_FIELDS,
+    Record,
+    Records,
+    open_states,
 )
-from hand_models.finger.phalanx_gaps import PhalanxShape
-from hand_models.finger.settings import CONTACT_CODES, SETTINGS
+from hand_models.finger.phalanx_gaps import put_around
+from hand_models.finger.phalanx_shape import PhalanxShape
+from hand_models.finger.settings import SETTINGS
 from hand_models.sections import Flags, Outlines
 
-__all__ = ["follow"]
+__all__ = ["around_rock", "follow"]
+
+
+def around_rock(rock: Outlines, shape: PhalanxShape, drive: Records, q: Array) -> Records:
+    """Return gaps, engagement and lever arms of n fingers at joint angles, with derivatives.
+
+    Parameters
+    ----------
+    rock : Outlines
+        Rock in the plane of each finger.
+    shape : PhalanxShape
+    drive : ndarray, shape (n,)
+        Records of `DRIVE_FIELDS`.
+    q : ndarray, shape (n, 3)
+        Joint angles [rad].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Records of `AROUND_FIELDS`.
+    """
+    found, bar = np.zeros(len(q), AROUND_FIELDS), shape.record
+    for i, own in enumerate(zip(*rock, strict=True)):
+        put_around(SETTINGS_RECORD, bar, drive["depth"][i], q[i], found[i : i + 1], *own)
+    return found
 
 
 def follow(
-    rock: Outlines, shape: PhalanxShape, drive: Drive, q: Array
-) -> tuple[PathState, Around, Flags]:
+    rock: Outlines, shape: PhalanxShape, drive: Records, q: Array
+) -> tuple[Records, Records, Flags]:
     """Follow the closing paths of n fingers up to their closing tensions.
 
     Parameters
@@ -63,170 +91,263 @@ def follow(
     rock : Outlines
         Rock in the plane of each finger.
     shape : PhalanxShape
-    drive : Drive
+    drive : ndarray, shape (n,)
+        Records of `DRIVE_FIELDS`.
     q : ndarray, shape (n, 3)
         Joint angles at the start [rad].
 
     Returns
     -------
-    state : PathState
-        State of each finger at the end of its path.
-    around : Around
-        Gaps, engagement and lever arms there.
+    states : ndarray, shape (n,)
+        State of each finger at the end of its path, records of `STATE_FIELDS`.
+    around : ndarray, shape (n,)
+        Gaps, engagement and lever arms there, records of `AROUND_FIELDS`.
     resting : ndarray of bool, shape (n,)
         Whether each finger came to rest.
     """
-    end, beside = state, around = PathState.at(q), Around.of(rock, shape, drive, q)
-    resting, going = np.zeros(len(q), dtype=bool), np.arange(len(q))
-    slow = np.zeros(len(q), dtype=np.intp)
+    states, around = open_states(q), around_rock(rock, shape, drive, q)
+    resting = np.zeros(len(q), dtype=bool)
+    for i, own in enumerate(zip(*rock, strict=True)):
+        one = slice(i, i + 1)
+        states[one], around[one], resting[i] = _followed(
+            own, shape.record, drive[one], states[one], around[one]
+        )
+    return states, around, resting
+
+
+def _followed(
+    rock: tuple[Any, ...], shape: Records, drive: Records, state: Records, around: Records
+) -> tuple[Records, Records, bool]:
+    """Return a finger at the end of its path, what is around it, and whether it came to rest."""
+    after, there, trial = state.copy(), around.copy(), state.copy()
+    now = np.zeros(1, LINEARISED_FIELDS)
+    fixed = (SETTINGS_RECORD, CODE_RECORD, shape, drive)
+    depth, slow = drive["depth"][0], 0
+    most = 0.1 * SETTINGS.most_damping * drive["torque"][0]
     for step in range(SETTINGS.most_increments):
         go_on()
         balance = SETTINGS.balance if step <= SETTINGS.long_path else SETTINGS.late_balance
-        after, rests = _increment(shape, drive, state, around, balance)
-        slow = np.where(after.damping > 0.1 * SETTINGS.most_damping * drive.torque, slow + 1, 0)
-        ends = rests | (slow > SETTINGS.patience)
-        if ends.any():
-            resting[going[rests]] = True
-            put(end, going[ends], take(after, ends))
-            put(beside, going[ends], take(around, ends))
-            going, slow = going[~ends], slow[~ends]
-            rock, drive, around = take(rock, ~ends), take(drive, ~ends), take(around, ~ends)
-            state, after = take(state, ~ends), take(after, ~ends)
-            if not len(going):
-                break
-        there = Around.of(rock, shape, drive, after.q)
-        state, around = _judged(shape, drive, state, around, after, there)
-    return end, beside, resting
+        least = _begun(SETTINGS_RECORD, CODE_RECORD, state, around, trial)
+        contact_states(*fixed, trial, around, least, now)
+        rests = _increment(*fixed, state, around, now, balance, after)
+        slow = slow + 1 if after["damping"][0] > most else 0
+        if rests or slow > SETTINGS.patience:
+            return after, around, rests
+        put_around(SETTINGS_RECORD, shape, depth, after["q"][0], there, *rock)
+        put_forces(SETTINGS_RECORD, CODE_RECORD, drive, after, there, now)
+        if _judged(*fixed, state, around, after, there, now):
+            state, after, around, there = after, state, there, around
+    return state, around, False
 
 
-def _increment(
-    shape: PhalanxShape, drive: Drive, state: PathState, around: Around, balanced: float
-) -> tuple[PathState, Flags]:
-    """Return where fingers come to next, and which of them are at their ends."""
-    code = CONTACT_CODES
-    stride, slack = state.stride, shape.closes
-    caught = held_share(state, around) > 0.0
-    # how far a phalanx may be off the rock
-    least = np.where(caught, state.least, np.inf)
-    # spines hold no longer than rock is within their travel
-    mode = np.where((state.mode == code.held) & ~caught, code.off, state.mode).astype(np.int8)
-    begun = state._replace(mode=mode)
-    now = contact_states(drive, begun, around, least, shape.length, slack)
-    mode, stop, spines, active = now.mode, now.stop, now.spines, now.active
-    damped, size, turn, normals = now.damped, now.size, now.turn, now.normals
-    move, grow = turn[..., 0], turn[..., 1]
-    # spines that were pulled off, and where
-    pulled = now.off > state.off
-    # the least gap is that of the path, to which an increment first brings back the joints
-    near = np.where(mode == code.held, np.inf, np.maximum(around.gap, now.gap).clip(0.0))
-    least = np.where(caught, np.minimum(state.least, near), state.least)
-    least = np.where(~caught & (spines == code.caught), np.inf, least)
-    least = np.where(pulled, np.maximum(around.gap, 0.0), least)
-    lost = (spines == code.pulled) & (around.gap > least + SETTINGS.lost_gap * shape.length)
-    spines = np.where(lost, code.lost, spines).astype(np.int8)
-    curved = (np.einsum("ni,nij,nj->n", move, damped, move) < 0.0) & (size > SETTINGS.damped_turn)
-    waits = curved | ~now.settled
-    waits &= state.damping < SETTINGS.most_damping * drive.torque
-    turns_back = (move * state.step).sum(axis=1) < -0.3 * (state.step**2).sum(axis=1)
-    turns_back &= (size > 100.0 * SETTINGS.still_turn) & ~waits
-    # as far as the joints may turn, whose arms are of one, two and three phalanges
-    air = ~active.any(axis=1)
-    clear = around.gap.min(axis=1) / (0.5 * JOINT_COUNT * (JOINT_COUNT + 1) * shape.end)
-    most = np.where(air, np.maximum(clear, SETTINGS.first_stride), SETTINGS.most_stride)
-    most = np.minimum(stride, most)
-    rate = times(around.d_gap, grow)
-    opens = caught & (mode == code.off) & (rate > 0.0) & (now.gap < state.least)
-    until = np.where(~active & (rate < 0.0), (now.gap + 2.0 * slack) / -rate, np.inf).min(axis=1)
-    end = drive.end
-    target = np.where(state.s < drive.closing, drive.closing, end)
-    more = np.minimum(target - state.s, SETTINGS.most_tension * drive.closing)
-    fastest = np.abs(grow).max(axis=1).clip(SETTINGS.rounding)
-    more = np.minimum(more, (most - size).clip(0.0) / fastest)
-    more = np.minimum(more, until.clip(0.0))
-    # and no contact pushes across a gap, or pulls where nothing holds it
-    force, rate = normals[..., 0], normals[..., 1]
-    ends = np.where(mode == code.held, rate > 0.0, (mode == code.on) & ~now.caught & (rate < 0.0))
-    until = np.where(ends, -force / rate, np.inf).min(axis=1)
-    more = np.minimum(more, until.clip(SETTINGS.least_tension * drive.closing))
-    # where a gap begins to grow, its least is to be that of the path, not of an increment beside it
-    beside = (size > SETTINGS.path_turn) & opens.any(axis=1) & ~air
-    more = np.where(waits | turns_back | beside | (size > most) | (now.clear < 1.0), 0.0, more)
-    part = np.minimum(now.clear, most / np.maximum(size, SETTINGS.still_turn))
-    part *= np.where(turns_back, 0.5, 1.0)
-    step = np.where(waits[:, None], 0.0, part[:, None] * move + more[:, None] * grow)
-    normals = np.where(active, normals[..., 0] + more[:, None] * normals[..., 1], 0.0)
-    left = now.torque + more[:, None] * now.slope
-    left -= times(now.stiffness, step) + times(around.b, normals)
-    floor = SETTINGS.least_damping * drive.torque
-    shrinks = (size < 0.5 * np.abs(state.step).max(axis=1)) | (state.s < end)
-    damping = np.where(shrinks & ~turns_back, _falls(state.damping, floor), state.damping)
-    tougher = _grows(state.damping, SETTINGS.damping, drive)
-    rests = (state.s >= end) & ~waits & now.settled
-    rests &= size < np.where(state.damping > 0.0, SETTINGS.damped_turn, SETTINGS.still_turn)
-    rests &= state.damping * size < balanced * drive.torque
-    s = state.s + more
-    first = (mode == code.on) & np.isnan(state.touches)
-    touches = np.where(first, state.s[:, None], state.touches)
-    after = PathState(
-        q=state.q + np.where(rests[:, None], 0.0, step),
-        s=np.where(np.abs(target - s) < SETTINGS.rounding, target, s),
-        mode=mode,
-        stop=stop,
-        spines=spines,
-        been=(state.been | (mode == code.on)) & (around.share > now.off),
-        off=now.off,
-        least=least,
-        normals=normals,
-        touches=touches,
-        damping=np.where(waits | turns_back, tougher, damping),
-        stride=stride,
-        step=step,
-        left=np.where(stop != 0, 0.0, left),
-    )
-    stays = state._replace(damping=tougher, step=step, spines=spines, off=now.off, least=least)
-    return choose(waits, stays, after), rests
+@compiled()
+def _caught(settings: Record, state: Record, around: Record, j: int) -> bool:
+    """Return whether spines of a tile grip the rock: φ − ψ is above the least share."""
+    return bool(1.0 - max(1.0 - around.share[j] + state.off[j], 0.0) > settings.least_share)
 
 
-def _judged(
-    shape: PhalanxShape,
-    drive: Drive,
-    state: PathState,
-    around: Around,
-    after: PathState,
-    there: Around,
-) -> tuple[PathState, Around]:
-    """Return fingers after an increment, or before it where its linearisation does not hold."""
-    forces = forces_on(drive, after, there)
-    left = forces.torque - times(there.b, after.normals)
-    left = np.where(after.stop != 0, 0.0, left)
-    wrong = np.abs(left - after.left).max(axis=1)
-    damped, moved = np.abs(after.left).max(axis=1), np.abs(after.step).max(axis=1)
-    deeper = np.minimum(around.gap, 0.0) - np.minimum(there.gap, 0.0)
-    too_far = wrong > SETTINGS.path_torque * drive.torque
-    too_far &= wrong > SETTINGS.damped_torque * damped
-    air = (state.mode == CONTACT_CODES.off).all(axis=1)
-    most = np.where(air, SETTINGS.air_depth, SETTINGS.rock_depth)
-    too_far |= deeper.max(axis=1) > most * shape.length
-    too_far &= moved > 2.0 * SETTINGS.least_stride
-    stride = np.where(wrong < SETTINGS.exact_torque * drive.torque, 2.0, 1.3) * after.stride
-    # a damped increment that was as foreseen may be damped less
-    falls = (wrong <= 0.05 * damped + SETTINGS.rounding * drive.torque) & (moved > 0.0)
-    falls &= (after.s >= drive.end) & (after.damping <= state.damping)
-    less = _falls(after.damping, SETTINGS.least_damping * drive.torque)
-    damping = np.where(falls, less, after.damping)
-    good = after._replace(stride=np.minimum(stride, SETTINGS.most_stride), damping=damping)
-    tougher = _grows(after.damping, 0.5 * SETTINGS.damping, drive)
-    damping = np.where(after.s > state.s, after.damping, tougher)
-    back = state._replace(stride=np.maximum(0.3 * moved, SETTINGS.least_stride), damping=damping)
-    return choose(too_far, back, good), choose(too_far, around, there)
+@compiled(SETTINGS_RECORD.dtype, CODE_RECORD.dtype, STATE_FIELDS, AROUND_FIELDS, STATE_FIELDS)
+def _begun(settings: Record, code: Record, state: Record, around: Record, trial: Record) -> Array:
+    """Write the state with which an increment begins; return the gaps that spines keep [m]."""
+    settings, code, state, around, trial = settings[0], code[0], state[0], around[0], trial[0]
+    trial.s, trial.damping, trial.stride = state.s, state.damping, state.stride
+    least = np.empty(JOINT_COUNT)
+    for j in range(JOINT_COUNT):
+        caught = _caught(settings, state, around, j)
+        # how far a phalanx may be off the rock
+        least[j] = state.least[j] if caught else np.inf
+        # spines hold no longer than rock is within their travel
+        lets = state.mode[j] == code.held and not caught
+        trial.mode[j] = code.off if lets else state.mode[j]
+        trial.q[j], trial.stop[j], trial.spines[j] = state.q[j], state.stop[j], state.spines[j]
+        trial.been[j], trial.off[j] = state.been[j], state.off[j]
+        trial.normals[j] = state.normals[j]
+    return least
 
 
-def _grows(damping: Array, least: float, drive: Drive) -> Array:
+@compiled()
+def _grows(settings: Record, drive: Record, damping: float, least: float) -> float:
     """Return more damping; from a least on, in parts of the proximal joint's torque."""
-    most = SETTINGS.most_damping * drive.torque
-    return np.clip(SETTINGS.damping_growth * damping, least * drive.torque, most)
+    more = max(settings.damping_growth * damping, least * drive.torque)
+    return float(min(more, settings.most_damping * drive.torque))
 
 
-def _falls(damping: Array, floor: Array) -> Array:
+@compiled()
+def _falls(settings: Record, drive: Record, damping: float) -> float:
     """Return less damping; none below a floor."""
-    return np.where(damping < floor, 0.0, 0.4 * damping)
+    return 0.0 if damping < settings.least_damping * drive.torque else 0.4 * damping
+
+
+@compiled()
+def _curved(move: Array, damped: Array) -> bool:
+    """Return whether the damped joints leave where they are along the torques that move them."""
+    work = 0.0
+    for i in range(JOINT_COUNT):
+        for k in range(JOINT_COUNT):
+            work += move[i] * damped[i, k] * move[k]
+    return work < 0.0
+
+
+@compiled()
+def _product(A: Array, x: Array, i: int) -> float:
+    """Return component i of A x."""
+    total = 0.0
+    for k in range(JOINT_COUNT):
+        total += A[i, k] * x[k]
+    return total
+
+
+@compiled(
+    *(SETTINGS_RECORD.dtype, CODE_RECORD.dtype, SHAPE_FIELDS, DRIVE_FIELDS),
+    *(STATE_FIELDS, AROUND_FIELDS, LINEARISED_FIELDS, "f0", STATE_FIELDS),
+)
+def _increment(
+    settings: Record,
+    code: Record,
+    shape: Record,
+    drive: Record,
+    state: Record,
+    around: Record,
+    now: Record,
+    balanced: float,
+    after: Record,
+) -> bool:
+    """Write where a finger comes to next; return whether it is at its end."""
+    settings, code, shape, drive = settings[0], code[0], shape[0], drive[0]
+    state, around, now, after = state[0], around[0], now[0], after[0]
+    size, move, grow = now.size, now.turn[:, 0], now.turn[:, 1]
+    waits = _curved(move, now.damped) and size > settings.damped_turn
+    waits = (waits or not now.settled) and state.damping < settings.most_damping * drive.torque
+    along, square, before = 0.0, 0.0, 0.0
+    for i in range(JOINT_COUNT):
+        along += move[i] * state.step[i]
+        square += state.step[i] ** 2
+        before = max(before, abs(state.step[i]))
+    turns_back = along < -0.3 * square and size > 100.0 * settings.still_turn and not waits
+    # as far as the joints may turn, whose arms are of one, two and three phalanges
+    air = not now.active.any()
+    most = settings.most_stride
+    if air:
+        clear = around.gap.min() / (0.5 * JOINT_COUNT * (JOINT_COUNT + 1) * shape.end)
+        most = max(clear, settings.first_stride)
+    most = min(state.stride, most)
+    target = drive.closing if state.s < drive.closing else drive.end
+    more = min(target - state.s, settings.most_tension * drive.closing)
+    fastest = max(np.abs(grow).max(), settings.rounding)
+    more = min(more, max(most - size, 0.0) / fastest)
+    opens = False
+    forced = np.inf
+    for j in range(JOINT_COUNT):
+        caught, mode = _caught(settings, state, around, j), now.mode[j]
+        # the least gap is that of the path, to which an increment first brings back the joints
+        after.least[j] = state.least[j] if caught else np.inf
+        if caught and mode != code.held:
+            after.least[j] = min(state.least[j], max(around.gap[j], now.gap[j], 0.0))
+        if not caught and now.spines[j] != code.caught:
+            after.least[j] = state.least[j]
+        # spines that were pulled off, and where
+        if now.off[j] > state.off[j]:
+            after.least[j] = max(around.gap[j], 0.0)
+        after.spines[j] = now.spines[j]
+        lost = around.gap[j] > after.least[j] + settings.lost_gap * shape.length
+        if now.spines[j] == code.pulled and lost:
+            after.spines[j] = code.lost
+        rate = _product(around.d_gap, grow, j)
+        opens |= caught and mode == code.off and rate > 0.0 and now.gap[j] < state.least[j]
+        if not now.active[j] and rate < 0.0:
+            more = min(more, max((now.gap[j] + 2.0 * shape.closes) / -rate, 0.0))
+        # and no contact pushes across a gap, or pulls where nothing holds it
+        force, rate = now.normals[j, 0], now.normals[j, 1]
+        pulls = mode == code.on and not now.caught[j] and rate < 0.0
+        if rate > 0.0 if mode == code.held else pulls:
+            forced = min(forced, -force / rate)
+    more = min(more, max(forced, settings.least_tension * drive.closing))
+    # where a gap begins to grow, its least is to be that of the path, not of an increment beside it
+    beside = size > settings.path_turn and opens and not air
+    if waits or turns_back or beside or size > most or now.clear < 1.0:
+        more = 0.0
+    part = min(now.clear, most / max(size, settings.still_turn)) * (0.5 if turns_back else 1.0)
+    shrinks = (size < 0.5 * before or state.s < drive.end) and not turns_back
+    tougher = _grows(settings, drive, state.damping, settings.damping)
+    rests = state.s >= drive.end and not waits and now.settled != 0
+    still = settings.damped_turn if state.damping > 0.0 else settings.still_turn
+    rests = rests and size < still and state.damping * size < balanced * drive.torque
+    after.s, after.stride, after.damping = state.s, state.stride, tougher
+    for j in range(JOINT_COUNT):
+        after.q[j], after.step[j], after.off[j] = state.q[j], 0.0, now.off[j]
+    if waits:
+        for j in range(JOINT_COUNT):
+            after.mode[j], after.stop[j], after.been[j] = (
+                state.mode[j],
+                state.stop[j],
+                state.been[j],
+            )
+            after.normals[j], after.touches[j] = state.normals[j], state.touches[j]
+            after.left[j] = state.left[j]
+        return rests
+    s = state.s + more
+    after.s = target if abs(target - s) < settings.rounding else s
+    if not turns_back:
+        after.damping = _falls(settings, drive, state.damping) if shrinks else state.damping
+    for j in range(JOINT_COUNT):
+        after.mode[j], after.stop[j] = now.mode[j], now.stop[j]
+        on = now.mode[j] == code.on
+        after.been[j] = (state.been[j] or on) and around.share[j] > now.off[j]
+        after.touches[j] = state.s if on and np.isnan(state.touches[j]) else state.touches[j]
+        after.step[j] = part * move[j] + more * grow[j]
+        if not rests:
+            after.q[j] += after.step[j]
+        after.normals[j] = now.normals[j, 0] + more * now.normals[j, 1] if now.active[j] else 0.0
+    for j in range(JOINT_COUNT):
+        left = now.torque[j] + more * now.slope[j] - _product(now.stiffness, after.step, j)
+        left -= _product(around.b, after.normals, j)
+        after.left[j] = 0.0 if now.stop[j] != 0 else left
+    return rests
+
+
+@compiled(
+    *(SETTINGS_RECORD.dtype, CODE_RECORD.dtype, SHAPE_FIELDS, DRIVE_FIELDS),
+    *(STATE_FIELDS, AROUND_FIELDS, STATE_FIELDS, AROUND_FIELDS, LINEARISED_FIELDS),
+)
+def _judged(
+    settings: Record,
+    code: Record,
+    shape: Record,
+    drive: Record,
+    state: Record,
+    around: Record,
+    after: Record,
+    there: Record,
+    forces: Record,
+) -> bool:
+    """Return whether an increment is as its linearisation says; write the next stride and damping.
+
+    They are written to the state after the increment, or to that before it where it is not.
+    """
+    settings, code, shape, drive = settings[0], code[0], shape[0], drive[0]
+    state, around, after, there, forces = state[0], around[0], after[0], there[0], forces[0]
+    wrong, damped, moved, deeper, air = 0.0, 0.0, 0.0, -np.inf, True
+    for j in range(JOINT_COUNT):
+        left = forces.torque[j] - _product(there.b, after.normals, j)
+        left = 0.0 if after.stop[j] != 0 else left
+        wrong, damped = max(wrong, abs(left - after.left[j])), max(damped, abs(after.left[j]))
+        moved = max(moved, abs(after.step[j]))
+        deeper = max(deeper, min(around.gap[j], 0.0) - min(there.gap[j], 0.0))
+        air = air and state.mode[j] == code.off
+    too_far = wrong > settings.path_torque * drive.torque
+    too_far = too_far and wrong > settings.damped_torque * damped
+    too_far |= deeper > (settings.air_depth if air else settings.rock_depth) * shape.length
+    if too_far and moved > 2.0 * settings.least_stride:
+        if after.s > state.s:
+            state.damping = after.damping
+        else:
+            state.damping = _grows(settings, drive, after.damping, 0.5 * settings.damping)
+        state.stride = max(0.3 * moved, settings.least_stride)
+        return False
+    growth = 2.0 if wrong < settings.exact_torque * drive.torque else 1.3
+    after.stride = min(growth * after.stride, settings.most_stride)
+    # a damped increment that was as foreseen may be damped less
+    falls = wrong <= 0.05 * damped + settings.rounding * drive.torque and moved > 0.0
+    if falls and after.s >= drive.end and after.damping <= state.damping:
+        after.damping = _falls(settings, drive, after.damping)
+    return True

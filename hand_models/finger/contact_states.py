@@ -1,4 +1,4 @@
-"""Find the contact states of closing fingers in one increment: a complementarity problem.
+"""Find the contact state of a finger in one increment: a complementarity problem (compiled).
 
 A contact state says which phalanges touch the rock or are held by their spines, which joints are at
 their limits, and which spines are caught. For a given contact state the linearised torques give the
@@ -9,318 +9,373 @@ would pass a limit is switched, and the state is solved again, until nothing swi
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+import math
+from typing import Final
 
 import numpy as np
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array, compiled
 from hand_models.finger.path_state import (
+    AROUND_FIELDS,
+    CODE_RECORD,
+    DRIVE_FIELDS,
     JOINT_COUNT,
-    UNIT_MATRIX,
-    Around,
-    Codes,
-    Drive,
-    PathState,
-    held_share,
-    largest,
-    put,
-    take,
-    times,
+    SETTINGS_RECORD,
+    SHAPE_FIELDS,
+    STATE_FIELDS,
+    Record,
 )
-from hand_models.finger.settings import CONTACT_CODES, SETTINGS
-from hand_models.sections import Flags
-from hand_models.tile import pull_strength
 
-__all__ = ["Linearised", "contact_states", "forces_on"]
+__all__ = ["LINEARISED_FIELDS", "contact_states", "put_forces"]
 
-CODE_DIGITS: Final = 3 ** np.arange(4 * JOINT_COUNT)
-"""Place values (base 3) that turn a contact state into one integer."""
+LINEARISED_FIELDS: Final = np.dtype(
+    [
+        *((name, int, (JOINT_COUNT,)) for name in ("mode", "stop", "spines")),
+        ("off", float, (JOINT_COUNT,)),
+        ("settled", int),
+        *((name, int, (JOINT_COUNT,)) for name in ("active", "caught")),
+        *((name, float, (JOINT_COUNT,)) for name in ("torque", "slope", "shears")),
+        *((name, float, (JOINT_COUNT, JOINT_COUNT)) for name in ("stiffness", "damped")),
+        *((name, float, (JOINT_COUNT, 2)) for name in ("turn", "normals")),
+        *((name, float) for name in ("size", "clear")),
+        ("gap", float, (JOINT_COUNT,)),
+    ]
+)
+"""Linearised solution of a finger in its contact state.
+
+``mode``, ``stop``, ``spines``, ``off``: contact of each phalanx, stop of each joint, spines of each
+tile and ψ, as in `STATE_FIELDS`. ``settled``: whether the contact state needs no further switch.
+``active``, ``caught``: whether each phalanx has a contact, and whether spines of its tile hold on
+the rock. ``torque``, ``slope``: torque of springs, tendon and drag on each joint [N·m], and its
+derivative by the path parameter s [m]. ``shears``: shear of each tile [N]. ``stiffness``:
+−∂(torque)/∂q, contact forces included [N·m/rad]; ``damped``: with damping. ``turn``, ``normals``:
+turns of the joints [rad] and normal loads of the contacts [N], in this increment and per newton of
+s. ``size``: the largest turn [rad]. ``clear``: part of the turn, at most 1, before another phalanx
+reaches the rock. ``gap``: gaps after the part of the turn that ``clear`` and the stride allow [m].
+"""
 
 
-class Forces(NamedTuple):
-    """Torques and shears of n fingers in their contact states, and derivatives of the torques.
+@compiled()
+def _held(settings: Record, share: float, off: float) -> float:
+    """Return the share of a tile's spines that grip the rock, φ − ψ."""
+    held = 1.0 - max(1.0 - share + off, 0.0)
+    return held if held > settings.least_share else 0.0
 
-    Attributes
-    ----------
-    torque : ndarray, shape (n, 3)
-        Torque on each joint of springs, tendon and drag [N·m].
-    slope : ndarray, shape (n, 3)
-        Derivative of ``torque`` by the path parameter s [m].
-    stiffness : ndarray, shape (n, 3, 3)
-        −∂(torque)/∂q [N·m/rad], contact forces included, for the joint angles q.
-    shears : ndarray, shape (n, 3)
-        Shear of each tile [N].
+
+@compiled()
+def _write_forces(
+    settings: Record, code: Record, drive: Record, state: Record, around: Record, found: Record
+) -> None:
+    """Write the torques of springs, tendons and drag on a finger in its contact state."""
+    f, closing = min(state.s, drive.closing), state.s < drive.closing
+    # share of the drag across gaps
+    part = 0.0
+    if state.s > drive.closing:
+        part = (state.s - drive.closing) / (settings.catching_part * drive.closing)
+    normals, d_shears, grows = np.empty(JOINT_COUNT), np.empty(JOINT_COUNT), np.empty(JOINT_COUNT)
+    for j in range(JOINT_COUNT):
+        off = state.mode[j] == code.off
+        share = _held(settings, around.share[j], state.off[j])
+        dragged = state.been[j] or state.mode[j] == code.on
+        # where a joint's stop carries what a phalanx does, its spines are drawn in by nothing
+        bears = share > 0.0 and (not off or state.stop[j] == 0)
+        drag = 0.0
+        if bears:
+            drag = drive.drag[j] * (1.0 if dragged else part)
+        found.shears[j], d_shears[j] = drag * share * f, drag * f
+        # per newton of s
+        grows[j] = 0.0
+        if closing:
+            grows[j] = drag * share
+        elif bears and not dragged:
+            grows[j] = drive.drag[j] / settings.catching_part * share
+        normals[j] = 0.0 if off else state.normals[j]
+    for i in range(JOINT_COUNT):
+        torque = f * drive.pull[i] - (drive.preload[i] + drive.stiffness[i] * state.q[i])
+        slope = drive.pull[i] if closing else 0.0
+        for j in range(JOINT_COUNT):
+            torque += around.a[i, j] * found.shears[j]
+            slope += around.a[i, j] * grows[j]
+        found.torque[i], found.slope[i] = torque, slope
+        for k in range(JOINT_COUNT):
+            stiffness = drive.stiffness[i] if i == k else 0.0
+            for j in range(JOINT_COUNT):
+                stiffness += normals[j] * around.d_b[i, j, k]
+                stiffness -= found.shears[j] * around.d_a[i, j, k]
+                stiffness -= around.a[i, j] * d_shears[j] * around.d_share[j, k]
+            found.stiffness[i, k] = stiffness
+
+
+@compiled(
+    *(SETTINGS_RECORD.dtype, CODE_RECORD.dtype),
+    *(DRIVE_FIELDS, STATE_FIELDS, AROUND_FIELDS, LINEARISED_FIELDS),
+)
+def put_forces(
+    settings: Record, code: Record, drive: Record, state: Record, around: Record, found: Record
+) -> None:
+    """Write torque, slope, stiffness and shears of a finger in its contact state.
+
+    Arguments are arrays of one record: as of `contact_states`.
     """
-
-    torque: Array
-    slope: Array
-    stiffness: Array
-    shears: Array
+    _write_forces(settings[0], code[0], drive[0], state[0], around[0], found[0])
 
 
-class Linearised(NamedTuple):
-    """Linearised solution of n fingers in their contact states, a row for each finger.
+@compiled()
+def _eliminate(A: Array, b: Array) -> None:
+    """Solve A x = b by elimination with pivots; x takes the place of b."""
+    n = len(A)
+    for column in range(n):
+        pivot = column
+        for i in range(column + 1, n):
+            if abs(A[i, column]) > abs(A[pivot, column]):
+                pivot = i
+        for k in range(n):
+            A[column, k], A[pivot, k] = A[pivot, k], A[column, k]
+        for k in range(b.shape[1]):
+            b[column, k], b[pivot, k] = b[pivot, k], b[column, k]
+        for i in range(column + 1, n):
+            factor = A[i, column] / A[column, column]
+            for k in range(column + 1, n):
+                A[i, k] -= factor * A[column, k]
+            for k in range(b.shape[1]):
+                b[i, k] -= factor * b[column, k]
+    for i in range(n - 1, -1, -1):
+        for k in range(b.shape[1]):
+            for j in range(i + 1, n):
+                b[i, k] -= A[i, j] * b[j, k]
+            b[i, k] /= A[i, i]
 
-    Attributes
-    ----------
-    mode, stop, spines : ndarray of int, shape (n, 3)
-        Contact of each phalanx, stop of each joint, spines of each tile; codes as in `PathState`.
-    off : ndarray, shape (n, 3)
-        ψ, share of each tile's spines that were pulled off.
-    settled : ndarray of bool, shape (n,)
-        Whether the contact state needs no further switch.
-    active, caught : ndarray of bool, shape (n, 3)
-        Whether each phalanx has a contact, and whether spines of its tile hold on the rock.
-    torque, slope : ndarray, shape (n, 3)
-        Torque on each joint [N·m], and its slope per newton of the path parameter s [m].
-    stiffness : ndarray, shape (n, 3, 3)
-        −∂(torque)/∂q [N·m/rad].
-    damped : ndarray, shape (n, 3, 3)
-        ``stiffness`` plus damping.
-    turn, normals : ndarray, shape (n, 3, 2)
-        Turns of the joints [rad] and normal loads of the contacts [N]: in this increment, and per
-        newton of s.
-    size : ndarray, shape (n,)
-        The largest turn [rad].
-    clear : ndarray, shape (n,)
-        Part of the turn, at most 1, before another phalanx reaches the rock.
-    gap : ndarray, shape (n, 3)
-        Gaps after the part of the turn that ``clear`` and the stride allow [m].
+
+@compiled()
+def _solve(
+    settings: Record,
+    drive: Record,
+    state: Record,
+    around: Record,
+    apart: Array,
+    found: Record,
+) -> None:
+    """Write turns of joints and normals of contacts: now, and per newton.
+
+    ``apart``: how far contacts are from where they should be [m].
     """
+    n = JOINT_COUNT
+    A, b = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 3))
+    # how much damping takes off the forces of contacts that come back to the rock
+    part = drive.torque / (drive.torque + 4.0 * state.damping)
+    for i in range(n):
+        if state.stop[i] != 0:
+            A[i, i] = 1.0
+            b[i, 0] = (drive.upper[i] if state.stop[i] > 0 else drive.lower[i]) - state.q[i]
+        else:
+            b[i, 0], b[i, 1] = found.torque[i], found.slope[i]
+            for k in range(n):
+                A[i, k] = found.damped[i, k]
+                if found.active[k]:
+                    A[i, n + k] = around.b[i, k]
+        if found.active[i]:
+            for k in range(n):
+                A[n + i, k] = around.d_gap[i, k]
+            A[n + i, n + i] = -settings.contact_compliance * part
+            # contacts come back to the rock at once, what damping needs for that is no force
+            b[n + i, 2] = -apart[i]
+        else:
+            A[n + i, n + i] = 1.0
+    _eliminate(A, b)
+    for i in range(n):
+        found.turn[i, 0], found.turn[i, 1] = b[i, 0] + b[i, 2], b[i, 1]
+        found.normals[i, 0] = b[n + i, 0] + part * b[n + i, 2]
+        found.normals[i, 1] = b[n + i, 1]
 
-    mode: Codes
-    stop: Codes
-    spines: Codes
-    off: Array
-    settled: Flags
-    active: Flags
-    caught: Flags
-    torque: Array
-    slope: Array
-    stiffness: Array
-    damped: Array
-    turn: Array
-    normals: Array
-    size: Array
-    clear: Array
-    gap: Array
+
+@compiled()
+def _over(
+    settings: Record, drive: Record, j: int, share: float, shear: float, normal: float
+) -> float:
+    """Return by how much a contact pulls more than it holds [N], not above 0 where it holds."""
+    pull = -normal
+    if pull <= settings.rounding:
+        return 0.0
+    if share == 0.0:
+        return float(pull - settings.rounding)
+    least = max(share, settings.rounding)
+    shears, pulls = shear / least, pull / least
+    most, weakest, steepest, exponent, friction = drive.limits
+    ratio = min(max(math.atan2(pulls, shears) / steepest, 0.0), 1.0)
+    strength = most - (most - weakest) * ratio**exponent
+    # the drag that a pull needs at last: without a tension nothing would stay that springs pull
+    drag = drive.drag[j] * drive.closing
+    beyond = max(math.hypot(shears, pulls) - strength, friction * pulls - drag)
+    return float(least * beyond - settings.rounding)
 
 
+@compiled()
+def _largest(values: Array) -> int:
+    """Return the index of the largest value, −1 if none is above zero."""
+    at = int(np.argmax(values))
+    return at if values[at] > 0.0 else -1
+
+
+@compiled()
+def _code(state: Record, around: Record) -> int:
+    """Return a number for a contact state."""
+    code = 0
+    for j in range(JOINT_COUNT):
+        code = 3 * code + state.mode[j]
+        code = 3 * code + state.stop[j] + 1
+        code = 3 * code + state.spines[j]
+        code = 3 * code + (1 if around.share[j] > state.off[j] else 0)
+    return code
+
+
+@compiled()
+def _try(
+    settings: Record,
+    code: Record,
+    shape: Record,
+    drive: Record,
+    state: Record,
+    around: Record,
+    least: Array,
+    found: Record,
+) -> None:
+    """Write what becomes of a finger in its contact state, and this after the next switch."""
+    gives, slack, nothing = settings.held_gap * shape.length, shape.closes, np.zeros(JOINT_COUNT)
+    _write_forces(settings, code, drive, state, around, found)
+    apart, share = nothing.copy(), nothing.copy()
+    for j in range(JOINT_COUNT):
+        for k in range(JOINT_COUNT):
+            found.damped[j, k] = found.stiffness[j, k] + (state.damping if j == k else 0.0)
+        found.active[j] = state.mode[j] != code.off
+        apart[j] = around.gap[j] - (least[j] if state.mode[j] == code.held else 0.0)
+        share[j] = _held(settings, around.share[j], state.off[j])
+        found.caught[j] = share[j] > 0.0
+    _solve(settings, drive, state, around, apart, found)
+    # gaps that close, by no more than the first of them has room
+    size, clear, change = 0.0, 1.0, nothing.copy()
+    for j in range(JOINT_COUNT):
+        size = max(size, abs(found.turn[j, 0]))
+        for k in range(JOINT_COUNT):
+            change[j] += around.d_gap[j, k] * found.turn[k, 0]
+        far = around.gap[j] > settings.near_gap * shape.length
+        if far and not found.active[j] and change[j] < 0.0:
+            clear = min(clear, around.gap[j] / -change[j])
+    found.size, found.clear = size, clear
+    part = min(clear, state.stride / max(size, settings.still_turn))
+    # damped joints may be slow in leaving where they should not be
+    slow = state.damping > settings.slow_damping * drive.torque
+    over, cannot, moves = nothing.copy(), nothing.copy(), nothing.copy()
+    settled = True
+    pushes, closes = np.zeros(JOINT_COUNT, np.bool_), np.zeros(JOINT_COUNT, np.bool_)
+    for j in range(JOINT_COUNT):
+        normal, caught, mode = found.normals[j, 0], found.caught[j], state.mode[j]
+        active = found.active[j]
+        gap = around.gap[j] + part * change[j]
+        found.gap[j] = gap
+        if active:
+            # contacts that would pull more than they hold, or push across a gap
+            if not (caught and (part < 1.0 or size > settings.balance_turn)):
+                over[j] = _over(settings, drive, j, share[j], found.shears[j], normal)
+            pushes[j] = mode == code.held and normal > settings.rounding
+            # contacts that joints cannot bring to the rock, as others or stops are in the way
+            if mode == code.on:
+                cannot[j] = settings.contact_compliance * normal - gives
+        else:
+            # gaps that would close, or grow beyond what spines let them
+            nears = change[j] < 0.0 and around.gap[j] > settings.near_gap * shape.length
+            closes[j] = not nears and gap < -slack and (change[j] < 0.0 or not slow)
+            if closes[j]:
+                moves[j] = -gap
+            elif caught and gap > least[j] + gives and (change[j] > 0.0 or not slow):
+                moves[j] = gap - least[j]
+        settled &= not (over[j] > 0.0 or pushes[j] or moves[j] > 0.0 or cannot[j] > 0.0)
+        found.mode[j], found.stop[j], found.spines[j] = mode, state.stop[j], state.spines[j]
+        found.off[j] = state.off[j]
+        there = state.q[j] + part * found.turn[j, 0]
+        if state.stop[j] != 0:
+            balance = found.torque[j]
+            for k in range(JOINT_COUNT):
+                balance -= found.damped[j, k] * found.turn[k, 0]
+                balance -= around.b[j, k] * found.normals[k, 0] * found.active[k]
+            if state.stop[j] * balance < -settings.rounding * drive.torque:
+                found.stop[j], settled = 0, False
+        elif there > drive.upper[j] + settings.still_turn:
+            found.stop[j], settled = 1, False
+        elif there < drive.lower[j] - settings.still_turn:
+            found.stop[j], settled = -1, False
+    found.settled = settled
+    for j in range(JOINT_COUNT):
+        if pushes[j]:
+            found.mode[j] = code.off
+    # of contacts one at a time, the worst
+    one = _largest(over)
+    if one >= 0:
+        if found.caught[one]:
+            found.spines[one], found.off[one] = code.pulled, around.share[one]
+        if not found.caught[one] or state.mode[one] == code.held:
+            found.mode[one] = code.off
+    one = _largest(cannot)
+    if one >= 0:
+        found.mode[one] = code.off
+    one = _largest(moves)
+    if one >= 0:
+        found.mode[one] = code.on if closes[one] else code.held
+        if closes[one] and found.spines[one] == code.lost:
+            found.spines[one], found.off[one] = code.caught, 0.0
+
+
+@compiled(
+    *(SETTINGS_RECORD.dtype, CODE_RECORD.dtype, SHAPE_FIELDS, DRIVE_FIELDS),
+    *(STATE_FIELDS, AROUND_FIELDS, "f1", LINEARISED_FIELDS),
+)
 def contact_states(
-    drive: Drive, state: PathState, around: Around, least: Array, length: float, slack: float
-) -> Linearised:
-    """Return the contact state of each finger for its next increment, with its linearised solution.
+    settings: Record,
+    code: Record,
+    shape: Record,
+    drive: Record,
+    state: Record,
+    around: Record,
+    least: Array,
+    found: Record,
+) -> None:
+    """Write the contact state of a finger for its next increment, with its linearised solution.
 
     Active-set iteration: contacts are switched until they agree with their forces and gaps, 20
     times at most.
 
     Parameters
     ----------
-    drive : Drive
-    state : PathState
-        Joint angles, and the contact states to begin with.
-    around : Around
+    settings, code, shape, drive : record
+        `FingerSettings`, `ContactCodes`, `PhalanxShape`, and a record of `DRIVE_FIELDS`.
+    state : record of `STATE_FIELDS`
+        Joint angles, and the contact state to begin with, which is written over.
+    around : record of `AROUND_FIELDS`
         Gaps, engagement and lever arms at these angles.
-    least : ndarray, shape (n, 3)
+    least : ndarray, shape (3,)
         Gaps that spines keep from growing, infinite for tiles without caught spines [m].
-    length : float
-        Length of a tile [m].
-    slack : float
-        Tolerance on negative gaps [m].
+    found : record of `LINEARISED_FIELDS`
+        What is written.
     """
-    rows = np.arange(len(state.s))
-    found = own = _tried(drive, state, around, least, length, slack)
-    codes = np.stack([_code(state, around), _code(own, around)])
+    settings, code, shape, drive = settings[0], code[0], shape[0], drive[0]
+    state, around, found = state[0], around[0], found[0]
     most_switches, longest_circle = 20, 4
+    codes, count = np.empty(most_switches + 1, np.intp), 2
+    codes[0] = _code(state, around)
+    _try(settings, code, shape, drive, state, around, least, found)
+    codes[1] = _code(found, around)
     for left in range(most_switches - 1, 0, -1):
-        # those that go round in a circle, and are now as they will be when the tries are used up
-        ends = own.settled.copy()
-        for period in range(1, len(codes)):
-            if left % period == 0:
-                ends |= codes[-1] == codes[-1 - period]
-        go = (~ends).nonzero()[0]
-        if not len(go):
+        if found.settled:
             break
-        rows, own, codes = rows[go], take(own, go), codes[-longest_circle:, go]
-        drive, around, least = take(drive, go), take(around, go), least[go]
-        state = take(state, go)._replace(
-            mode=own.mode, stop=own.stop, spines=own.spines, off=own.off
-        )
-        own = _tried(drive, state, around, least, length, slack)
-        put(found, rows, own)
-        codes = np.concatenate([codes, _code(own, around)[None]])
-    return found
-
-
-def _code(state: PathState | Linearised, around: Around) -> Indices:
-    """Return a number for each contact state."""
-    holds = around.share > state.off
-    digits = np.concatenate([state.mode, state.stop + 1, state.spines, holds], axis=1)
-    return np.asarray(digits @ CODE_DIGITS)
-
-
-def _tried(
-    drive: Drive, state: PathState, around: Around, least: Array, length: float, slack: float
-) -> Linearised:
-    """Return what becomes of fingers in their contact states, and these after the next switch."""
-    mode, stop, spines, off = state.mode, state.stop, state.spines, state.off
-    code, gives = CONTACT_CODES, SETTINGS.held_gap * length
-    forces = forces_on(drive, state, around)
-    damped = forces.stiffness + state.damping[:, None, None] * UNIT_MATRIX
-    active, held = mode != code.off, stop != 0
-    apart = around.gap - np.where(mode == code.held, least, 0.0)
-    turn, normals = _solve(drive, state, around, forces, damped, active, apart)
-    size = np.abs(turn[..., 0]).max(axis=1)
-    # gaps that close, by no more than the first of them has room
-    change = times(around.d_gap, turn[..., 0])
-    nears = ~active & (change < 0.0) & (around.gap > SETTINGS.near_gap * length)
-    clear = np.where(nears, around.gap / -change, 1.0).min(axis=1).clip(0.0, 1.0)
-    part = np.minimum(clear, state.stride / np.maximum(size, SETTINGS.still_turn))[:, None]
-    # contacts that would pull more than they hold, or push across a gap
-    share = held_share(state, around)
-    caught = share > 0.0
-    over = _over(drive, share, active, forces.shears, normals[..., 0])
-    over = np.where(caught & ((part < 1.0) | (size > SETTINGS.balance_turn)[:, None]), 0.0, over)
-    pushes = (mode == code.held) & (normals[..., 0] > SETTINGS.rounding)
-    # gaps that would close, or grow beyond what spines let them
-    gap = around.gap + part * change
-    # damped joints may be slow in leaving where they should not be
-    slow = (state.damping > SETTINGS.slow_damping * drive.torque)[:, None]
-    closes = ~active & ~nears & (gap < -slack) & ((change < 0.0) | ~slow)
-    grows = ~active & caught & (gap > least + gives) & ((change > 0.0) | ~slow)
-    balance = forces.torque - times(damped, turn[..., 0])
-    balance -= times(around.b, np.where(active, normals[..., 0], 0.0))
-    frees = held & (stop * balance < -SETTINGS.rounding * drive.torque[:, None])
-    there = state.q + part * turn[..., 0]
-    high = ~held & (there > drive.upper + SETTINGS.still_turn)
-    low = ~held & (there < drive.lower - SETTINGS.still_turn)
-    # contacts that joints cannot bring to the rock, as others or stops are in the way
-    gap_left = SETTINGS.contact_compliance * normals[..., 0] - gives
-    cannot = np.where(active & (mode == code.on), gap_left, 0.0)
-    switches = (over > 0.0) | pushes | closes | grows | frees | high | low | (cannot > 0.0)
-    settled = ~switches.any(axis=1)
-    if not settled.all():
-        # of contacts one at a time, the worst
-        one = largest(over)
-        spines = np.where(one & caught, code.pulled, spines).astype(np.int8)
-        off = np.where(one & caught, around.share, off)
-        mode = np.where((one & ~caught) | (one & (mode == code.held)) | pushes, code.off, mode)
-        mode = np.where(largest(cannot), code.off, mode)
-        one = largest(np.where(closes, -gap, np.where(grows, gap - least, 0.0)))
-        mode = np.where(one, np.where(closes, code.on, code.held), mode).astype(np.int8)
-        again = one & closes & (spines == code.lost)
-        spines = np.where(again, code.caught, spines).astype(np.int8)
-        off = np.where(again, 0.0, off)
-        stop = np.where(frees, 0, np.where(high, 1, np.where(low, -1, stop))).astype(np.int8)
-    return Linearised(
-        mode,
-        stop,
-        spines,
-        off,
-        settled,
-        active,
-        caught,
-        forces.torque,
-        forces.slope,
-        forces.stiffness,
-        damped,
-        turn,
-        normals,
-        size,
-        clear,
-        gap,
-    )
-
-
-def forces_on(drive: Drive, state: PathState, around: Around) -> Forces:
-    """Return the torques of springs, tendons and drag on fingers in their contact states.
-
-    Parameters
-    ----------
-    drive : Drive
-    state : PathState
-        Joint angles, path parameter and contact states.
-    around : Around
-        Gaps, engagement and lever arms at these angles.
-
-    Returns
-    -------
-    Forces
-    """
-    mode, f = state.mode, np.minimum(state.s, drive.closing)[:, None]
-    share = held_share(state, around)
-    caught = share > 0.0
-    closing = (state.s < drive.closing)[:, None]
-    catching = SETTINGS.catching_part * drive.closing[:, None]
-    dragged = state.been | (mode == CONTACT_CODES.on)
-    # where a joint's stop carries what a phalanx does, its spines are drawn in by nothing
-    bears = (mode != CONTACT_CODES.off) | (state.stop == 0)
-    across = (state.s - drive.closing)[:, None].clip(0.0) / catching
-    part = np.where(dragged, 1.0, across) * bears
-    drag = np.where(caught, drive.drag * part, 0.0)
-    shears = drag * share * f
-    d_shears = (drag * f)[..., None] * around.d_share
-    # per newton of s
-    late = caught & bears & ~dragged
-    grows = np.where(closing, drag, np.where(late, drive.drag * f / catching, 0.0))
-    grows = grows * share
-    normals = np.where(mode != CONTACT_CODES.off, state.normals, 0.0)
-    stiffness = (
-        UNIT_MATRIX * drive.stiffness[:, None, :]
-        + np.einsum("nj,nijk->nik", normals, around.d_b)
-        - np.einsum("nj,nijk->nik", shears, around.d_a)
-        - around.a @ d_shears
-    )
-    springs = drive.preload + drive.stiffness * state.q
-    torque = f * drive.pull - springs + times(around.a, shears)
-    slope = np.where(closing, drive.pull, 0.0) + times(around.a, grows)
-    return Forces(torque, slope, stiffness, shears)
-
-
-def _solve(
-    drive: Drive,
-    state: PathState,
-    around: Around,
-    forces: Forces,
-    damped: Array,
-    active: Flags,
-    apart: Array,
-) -> tuple[Array, Array]:
-    """Return turns of joints and normals of contacts, (n, 3, 2): now, and per newton.
-
-    ``apart``: how far contacts are from where they should be [m].
-    """
-    n, stop = len(state.s), state.stop
-    held = (stop != 0)[..., None]
-    joints, contacts = slice(JOINT_COUNT), slice(JOINT_COUNT, 2 * JOINT_COUNT)
-    A, b = np.zeros((n, contacts.stop, contacts.stop)), np.zeros((n, contacts.stop, 3))
-    A[:, joints, joints] = np.where(held, UNIT_MATRIX, damped)
-    A[:, joints, contacts] = np.where(held, 0.0, around.b * active[:, None, :])
-    A[:, contacts, joints] = np.where(active[..., None], around.d_gap, 0.0)
-    # how much damping takes off the forces of contacts that come back to the rock
-    part = drive.torque / (drive.torque + 4.0 * state.damping)
-    gives = -SETTINGS.contact_compliance * part[:, None, None] * UNIT_MATRIX
-    A[:, contacts, contacts] = np.where(active[..., None], gives, UNIT_MATRIX)
-    limit = np.where(stop > 0, drive.upper, drive.lower)
-    b[:, joints, 0] = np.where(held[..., 0], limit - state.q, forces.torque)
-    b[:, joints, 1] = np.where(held[..., 0], 0.0, forces.slope)
-    # contacts come back to the rock at once, what damping needs for that is no force on them
-    b[:, contacts, 2] = np.where(active, -apart, 0.0)
-    found = np.asarray(np.linalg.solve(A, b), dtype=float)
-    found[:, joints, 0] += found[:, joints, 2]
-    found[:, contacts, 0] += part[:, None] * found[:, contacts, 2]
-    return found[:, joints, :2], found[:, contacts, :2]
-
-
-def _over(drive: Drive, share: Array, active: Flags, shears: Array, normals: Array) -> Array:
-    """Return by how much contacts pull more than they hold [N], not above 0 where they hold."""
-    pull = np.maximum(-normals, 0.0)
-    caught, share = share > 0.0, np.maximum(share, SETTINGS.rounding)
-    most, least, steepest, exponent, friction = (drive.limits[:, i, None] for i in range(5))
-    shear, pulls = shears / share, pull / share
-    strength = pull_strength(most, least, steepest, exponent, np.arctan2(pulls, shear))
-    # the drag that a pull needs at last: without a tension nothing would stay that springs pull
-    drag = drive.drag * drive.closing[:, None]
-    beyond = np.maximum(np.hypot(shear, pulls) - strength, friction * pulls - drag)
-    over = np.where(caught, share * beyond, pull)
-    return np.where(active & (pull > SETTINGS.rounding), over - SETTINGS.rounding, 0.0)
+        # those that go round in a circle, and are now as they will be when the tries are used up
+        circles = False
+        for period in range(1, min(count - 1, longest_circle) + 1):
+            if left % period == 0:
+                circles |= codes[count - 1] == codes[count - 1 - period]
+        if circles:
+            break
+        for j in range(JOINT_COUNT):
+            state.mode[j], state.stop[j] = found.mode[j], found.stop[j]
+            state.spines[j], state.off[j] = found.spines[j], found.off[j]
+        _try(settings, code, shape, drive, state, around, least, found)
+        codes[count] = _code(found, around)
+        count += 1

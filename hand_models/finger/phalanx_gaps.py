@@ -1,14 +1,10 @@
-"""Gaps between the phalanges of fingers and rock, and the places where contact forces act.
-
-A phalanx is a bar of circular section about its *axis*: straight under the tile, lifted so that
-the tile's face is flat at its height, and from the tile's far end on down to the next joint. So
-the tile is flat, its corners are round, and the phalanx ends in a disc about the next joint, with
-the frame's radius.
+"""Gaps between the phalanges of a finger and rock, and where contact forces act (compiled).
 
 Rock is a set of points along its boundary, each with its length w. A point's depth g is its
-distance from the axis less the bar's radius. Phalanx and rock touch where g is zero. So that the
-contact does not jump from one bump to another as the phalanx turns, the *gap* is the level h to
-which a bed of springs between phalanx and rock would sink under a small, fixed energy,
+distance from a phalanx's axis less the bar's radius (`hand_models.finger.phalanx_shape`). Phalanx
+and rock touch where g is zero. So that the contact does not jump from one bump to another as the
+phalanx turns, the *gap* is the level h to which a bed of springs between phalanx and rock would
+sink under a small, fixed energy,
 
     Σ w max(0, h − g)² = tile length × fine²,
 
@@ -23,349 +19,379 @@ sides, at the face's end on rock under that end. The place changes without a jum
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Iterable
-from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hand_models.base import BASE_TOLERANCES, Array, Indices
-from hand_models.finger.model import FingerModel
-from hand_models.sections import SECTION_SETTINGS, Complexes, Flags, Outlines, stretch_minima
+from hand_models.base import Array, Indices, compiled
+from hand_models.finger.path_state import AROUND_FIELDS, SETTINGS_RECORD, SHAPE_FIELDS, Record
+from hand_models.sections import Complexes, Flags
 
-__all__ = [
-    "Beside",
-    "NearPoints",
-    "PhalanxShape",
-    "fan_out",
-    "middle_of_bed",
-    "nearest_points",
-]
-
-Pressed = TypeVar("Pressed", float, NDArray[Any])
-
-Values = TypeVar("Values", Array, Complexes)
+__all__ = ["near_points", "phalanx_beside", "put_around", "rock_distances"]
 
 
-class Beside(NamedTuple):
-    """Gap and contact force of phalanges beside rock, arrays of one shape (...).
+@compiled()
+def _clipped(value: float, low: float, high: float) -> float:
+    return min(max(value, low), high)
 
-    Complex numbers are (along, above) in the phalanx's axes: real part along it from its joint,
-    imaginary part toward the rock.
 
-    Attributes
-    ----------
-    gap : ndarray
-        Distance from phalanx to rock [m]; negative where rock is inside the phalanx.
-    tile_gap : ndarray
-        Distance from the tile's face to the rock [m].
-    place : ndarray of complex
-        Place where the contact's force acts [m].
-    push : ndarray of complex
-        Unit vector of the contact's force, toward the rock.
+@compiled()
+def _size(way: complex) -> float:
+    """Return the length of a way, in a third of the time of `abs`, which minds extremes."""
+    return math.sqrt(way.real * way.real + way.imag * way.imag)
+
+
+@compiled()
+def _from_tile(shape: Record, seen: complex, lift: float) -> complex:
+    """Return the way to a point from the axis under the tile."""
+    return seen - complex(_clipped(seen.real, shape.near, shape.far), lift)
+
+
+@compiled()
+def _from_axis(shape: Record, seen: complex, bare: bool) -> tuple[complex, float]:
+    """Return the way to a point from the axis; and how far from under the tile it is [m].
+
+    The axis of a bare frame has no lift. Its points are infinitely far from under the tile.
     """
+    lift = 0.0 if bare else shape.lift
+    from_tile = _from_tile(shape, seen, lift)
+    corner, step = complex(shape.far, lift), complex(shape.end - shape.far, -lift)
+    square = step.real * step.real + step.imag * step.imag
+    beyond, part = seen - corner, 0.0
+    if square > 0.0:
+        part = _clipped((beyond * step.conjugate()).real / square, 0.0, 1.0)
+    beyond -= part * step
+    distance = _size(from_tile)
+    away = from_tile if distance <= _size(beyond) else beyond
+    return away, math.inf if bare else distance
 
-    gap: Array
-    tile_gap: Array
-    place: Complexes
-    push: Complexes
+
+@compiled()
+def _alone(shape: Record, length: float) -> float:
+    """Return how far a bed of springs sinks if it rests on a single point of rock [m].
+
+    ``length``: boundary length w that the point represents [m].
+    """
+    root = shape.fine * math.sqrt(shape.length)
+    return float(min(root / math.sqrt(length), shape.far))
 
 
-class NearPoints(NamedTuple):
-    """Points of rock that phalanges may press on, sorted by phalanx.
+@compiled()
+def _level(settings: Record, shape: Record, depths: Array, lengths: Array, first: int) -> float:
+    """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it.
 
-    Attributes
+    ``first``: index of the least depth.
+    """
+    root = shape.fine * math.sqrt(shape.length)
+    level = depths[first] + _alone(shape, lengths[first])
+    for _ in range(20):
+        loads, energy = 0.0, 0.0
+        for i in range(len(depths)):
+            sunk = max(level - depths[i], 0.0)
+            loads += lengths[i] * sunk
+            energy += lengths[i] * sunk * sunk
+        norm = math.sqrt(energy)
+        step = (root - norm) * norm / max(loads, 1e-30)
+        if abs(step) <= settings.sum_rounding * shape.far:
+            break
+        level += step
+    return float(level)
+
+
+@compiled("c1", "f1", "b1", SETTINGS_RECORD.dtype, SHAPE_FIELDS, "c0", "c0", "f0")
+def phalanx_beside(
+    points: Complexes,
+    lengths: Array,
+    bare: Flags,
+    settings: Record,
+    shape: Record,
+    joint: complex,
+    u: complex,
+    depth: float,
+) -> tuple[float, float, complex, complex]:
+    """Return gap, and place and direction of the contact force, of a phalanx beside rock.
+
+    Parameters
     ----------
     points : ndarray of complex, shape (p,)
-        x + i z of each point in its finger's F [m].
+        x + i z of points of rock in the finger frame F [m].
     lengths : ndarray, shape (p,)
         Length w of the rock's boundary that each point represents [m].
-    phalanx : ndarray of int, shape (p,)
-        Index of each point's phalanx.
-    first : ndarray of int
-        Index of the first point of each phalanx; every phalanx has at least one point.
     bare : ndarray of bool, shape (p,)
         True for rock that the bare frame meets, beside the tiles.
-    """
-
-    points: Complexes
-    lengths: Array
-    phalanx: Indices
-    first: Indices
-    bare: Flags
-
-    def of_poses(self, count: int) -> NearPoints:
-        """Return the points repeated for ``count`` poses of all phalanges, pose after pose."""
-        poses = np.arange(count)[:, None]
-        return NearPoints(
-            np.tile(self.points, count),
-            np.tile(self.lengths, count),
-            (self.phalanx + len(self.first) * poses).ravel(),
-            (self.first + len(self.points) * poses).ravel(),
-            np.tile(self.bare, count),
-        )
-
-    def sums(self, values: Values) -> Values:
-        """Return the sum of values (p,) over the points of each phalanx, one number per phalanx."""
-        total: Values = np.add.reduceat(values, self.first)
-        return total
-
-    def least(self, values: Array) -> Array:
-        """Return the least of values (p,) over the points of each phalanx, one per phalanx."""
-        return np.asarray(np.minimum.reduceat(values, self.first))
-
-
-class PhalanxShape(NamedTuple):
-    """Dimensions of a phalanx that meets rock, measured from its joint [m].
-
-    Attributes
-    ----------
-    near, far : float
-        Begin and end of the tile's face along the phalanx.
-    end : float
-        End of the phalanx: distance to the next joint.
-    lift : float
-        Height of the bar's axis under the tile, above the line of the joints.
-    radius : float
-        Radius of the bar.
-    travel : float
-        Distance that spines reach out of the tile.
-    """
-
-    near: float
-    far: float
-    end: float
-    lift: float
-    radius: float
-    travel: float
-
-    @classmethod
-    def of(cls, model: FingerModel) -> PhalanxShape:
-        """Return the shape of the phalanges of a finger model."""
-        radius = min(model.frame_radius, model.tile_height)
-        lift = model.tile_height - radius
-        return cls(*model.tile_range, model.joint_spacing, lift, radius, model.spine_travel)
-
-    @property
-    def length(self) -> float:
-        """Length of the tile [m]."""
-        return self.far - self.near
-
-    @property
-    def spacing(self) -> float:
-        """Largest spacing of the points that represent rock [m]."""
-        # so near that the round end of a phalanx slides over points as over the rock between
-        return self.length / 192
-
-    @property
-    def fine(self) -> float:
-        """Smoothing length of the gap [m].
-
-        The gap differs from the least distance to the rock by about this length at most.
-        """
-        return self.length / 4800.0
-
-    @property
-    def closes(self) -> float:
-        """Tolerance on negative gaps: rock inside a phalanx by less counts as touching [m]."""
-        return self.length / 2.4e6
-
-    def beside(self, near: NearPoints, joint: Complexes, u: Complexes, depth: Array) -> Beside:
-        """Return gaps, and places and directions of contact forces, of phalanges beside rock.
-
-        Parameters
-        ----------
-        near : NearPoints
-            Points of rock near all phalanges, from `nearest_points`.
-        joint, u : ndarray of complex, shape (...)
-            x + i z of each phalanx's joint [m], and the unit vector along the phalanx.
-        depth : ndarray, shape (...)
-            Depth to which each tile is pressed into its bed of springs [m].
-
-        Returns
-        -------
-        Beside
-            Arrays of the same shape (...).
-        """
-        of = near.phalanx
-        seen = (near.points - joint.ravel()[of]) * u.ravel().conj()[of]
-        away, from_tile = self._from_axis(seen, near.bare)
-        size = np.abs(away)
-        depths = size - self.radius
-        gap = self._level(depths, near) - self.fine
-        pressed = np.maximum((gap + depth.ravel())[of] - depths, 0.0) * near.lengths
-        tiny = 1e-30  # divides what is zero
-        total = np.maximum(near.sums(pressed), tiny)
-        out = away / np.maximum(size, tiny)
-        place = near.sums(pressed * (seen - away + self.radius * out)) / total
-        push = near.sums(pressed * out) / total
-        return Beside(
-            gap.reshape(u.shape),
-            (near.least(from_tile) - self.radius).reshape(u.shape),
-            place.reshape(u.shape),
-            (push / np.maximum(np.abs(push), tiny)).reshape(u.shape),
-        )
-
-    def may_press(self, seen: Complexes, near: NearPoints, within: Array) -> NearPoints:
-        """Return the points on which `beside` depends, a subset of those given.
-
-        Parameters
-        ----------
-        seen : ndarray of complex, shape (p,)
-            Points in the axes of their phalanges [m].
-        near : NearPoints
-            The same points, in the finger frame F.
-        within : ndarray
-            Margin of each phalanx: its tile's depth plus the largest further motion [m].
-        """
-        away, from_tile = self._from_axis(seen, near.bare)
-        size = np.abs(away)
-        # the bed sinks no lower than with any point alone
-        least = near.least(size + self.alone(near.lengths)) + within
-        chosen = size <= least[near.phalanx]
-        chosen |= from_tile <= (near.least(from_tile) + within)[near.phalanx]
-        count = np.bincount(near.phalanx[chosen], minlength=len(near.first))
-        return NearPoints(
-            near.points[chosen],
-            near.lengths[chosen],
-            near.phalanx[chosen],
-            np.cumsum(count) - count,
-            near.bare[chosen],
-        )
-
-    def _from_axis(self, seen: Complexes, bare: Flags) -> tuple[Complexes, Array]:
-        """Return the way to points from the axis; and how far from under the tile they are [m].
-
-        The axis of a bare frame has no lift. Its points are infinitely far from under the tile.
-        """
-        lift = np.where(bare, 0.0, self.lift) if bare.any() else np.array(self.lift)
-        from_tile = seen - (np.clip(seen.real, self.near, self.far) + 1j * lift)
-        corner, step = self.far + 1j * lift, (self.end - self.far) - 1j * lift
-        length = np.hypot(self.end - self.far, lift)
-        part = ((seen - corner) * step.conj()).real / length**2
-        beyond = seen - (corner + np.clip(part, 0.0, 1.0) * step)
-        distance = np.abs(from_tile)
-        away = np.where(distance <= np.abs(beyond), from_tile, beyond)
-        return away, np.where(bare, np.inf, distance)
-
-    def alone(self, lengths: Array) -> Array:
-        """Return how far a bed of springs sinks if it rests on a single point of rock [m].
-
-        ``lengths``: boundary length w that each point represents [m].
-        """
-        return np.asarray(np.minimum(self._root / np.sqrt(lengths), self.far))
-
-    @property
-    def _root(self) -> float:
-        """Root of the energy that sinks a bed to its level."""
-        return self.fine * math.sqrt(self.length)
-
-    def _level(self, depths: Array, near: NearPoints) -> Array:
-        """Return the level h to which the bed sinks [m]; ‖√w max(0, h − g)‖ is convex in it."""
-        root = self._root
-        first = stretch_minima(depths, near.first)
-        level = depths[first] + self.alone(near.lengths[first])
-        for _ in range(20):
-            sunk = np.maximum(level[near.phalanx] - depths, 0.0)
-            load = near.lengths * sunk
-            norm = np.sqrt(near.sums(load * sunk))
-            step = (root - norm) * norm / np.maximum(near.sums(load), 1e-30)
-            # each as far as it needs, whatever others do
-            going = np.abs(step) > BASE_TOLERANCES.rounding * self.far
-            level = np.where(going, level + step, level)
-            if not going.any():
-                break
-        return np.asarray(level)
-
-
-def middle_of_bed(
-    reaches: Iterable[Pressed], bends: Iterable[float | Pressed], depth: float | Pressed
-) -> Pressed:
-    """Return the offset from a face's first touch to its bed's centre of pressure [m].
-
-    The offset is positive toward the face's end. The rock is a parabola on either side of the
-    touch; the tile's end may cut the pressed part short.
-
-    Parameters
-    ----------
-    reaches : pair of float or of ndarray
-        Length of the pressed part toward the beginning of the face, and toward its end [m].
-    bends : pair of float
-        Curvature of the rock on either side [1/m].
+    settings, shape : record
+        As of `put_around`.
+    joint, u : complex
+        x + i z of the phalanx's joint [m], and the unit vector along the phalanx.
     depth : float
-        Depth to which the bed is pressed in at the touch [m].
-    """
-    load: Any = 0.0
-    moment: Any = 0.0
-    for side, reach, bend in zip((-1.0, 1.0), reaches, bends, strict=True):
-        square = reach * reach
-        load = load + reach * (depth - bend / 6.0 * square)
-        moment = moment + square * (side * depth / 2.0 - side * bend / 8.0 * square)
-    found: Pressed = moment / load
-    return found
-
-
-def fan_out(q: Array, spacing: float) -> tuple[Complexes, Complexes]:
-    """Return the joints and directions of phalanges for joint angles (forward kinematics).
-
-    Parameters
-    ----------
-    q : ndarray, shape (..., 3)
-        Joint angles, each relative to the phalanx before it [rad].
-    spacing : float
-        Distance between joints [m].
+        Depth to which the tile is pressed into its bed of springs [m].
 
     Returns
     -------
-    joints, directions : ndarray of complex, shape (..., 3)
-        x + i z of each joint in the finger frame F, the first at the origin [m]; unit vector along
-        each phalanx.
+    gap, tile_gap : float
+        Distance from the phalanx to the rock, negative where rock is inside the phalanx; and from
+        the tile's face [m].
+    place, push : complex
+        Place where the contact's force acts [m], and its unit vector toward the rock, in the
+        phalanx's axes: real part along it from its joint, imaginary part toward the rock.
     """
-    u = np.exp(1j * np.cumsum(q, axis=-1))
-    joints = np.zeros(u.shape, dtype=complex)
-    joints[..., 1:] = spacing * np.cumsum(u[..., :-1], axis=-1)
-    return joints, u
+    settings, shape = settings[0], shape[0]
+    ways, depths = np.empty_like(points), np.empty_like(lengths)
+    tile_gap, first = math.inf, 0
+    back = u.conjugate()
+    for i in range(len(points)):
+        ways[i], from_tile = _from_axis(shape, (points[i] - joint) * back, bare[i])
+        depths[i] = _size(ways[i]) - shape.radius
+        tile_gap = min(tile_gap, from_tile - shape.radius)
+        if depths[i] < depths[first]:
+            first = i
+    gap = _level(settings, shape, depths, lengths, first) - shape.fine
+    # divides what is zero
+    tiny = 1e-30
+    total, place, push = 0.0, 0.0j, 0.0j
+    for i in range(len(points)):
+        pressed = (gap + depth - depths[i]) * lengths[i]
+        if pressed > 0.0:
+            out = ways[i] / max(depths[i] + shape.radius, tiny)
+            total += pressed
+            place += pressed * ((points[i] - joint) * back - ways[i] + shape.radius * out)
+            push += pressed * out
+    total = max(total, tiny)
+    push /= total
+    return gap, tile_gap, place / total, push / max(_size(push), tiny)
 
 
-def nearest_points(
-    rock: Outlines, shape: PhalanxShape, q: Array, depth: Array, turn: float = 0.0
-) -> NearPoints:
-    """Return the points of rock that phalanges of fingers may press on.
+@compiled("c1", "f1", "b1", "c1", "f1", "f1", SHAPE_FIELDS, "c0", "c0", "f0")
+def near_points(
+    points: Complexes,
+    lengths: Array,
+    bare: Flags,
+    centres: Complexes,
+    radii: Array,
+    longest: Array,
+    shape: Record,
+    joint: complex,
+    u: complex,
+    within: float,
+) -> Indices:
+    """Return the points of rock on which a phalanx's gap and contact depend.
 
     Parameters
     ----------
-    rock : Outlines
-        Rock in the plane of each of the n fingers.
-    shape : PhalanxShape
-    q : ndarray, shape (n, 3)
-        Joint angles [rad].
-    depth : ndarray, shape (n, 3)
-        Depth to which each tile is pressed into its bed of springs [m].
-    turn : float, optional
-        Largest further turn of any joint for which the points must still do [rad].
+    points, lengths, bare, centres, radii, longest : ndarray
+        Rock in the finger's plane, a row of `Outlines`.
+    shape : record
+        As of `put_around`.
+    joint, u : complex
+        As of `phalanx_beside`.
+    within : float
+        Margin: the tile's depth and the largest further motion [m].
     """
-    joints, u = fan_out(q, shape.end)
-    # two points may come nearer to each other by the way of each
-    arms = 2.0 * q.shape[-1] * (shape.end + shape.radius + depth)
-    within = depth + turn * arms
-    # blocks that may hold points which press, or are nearest to the tile
-    blocks = (rock.centres[:, None] - joints[..., None]) * u.conj()[..., None]
-    radii, chosen = rock.radii[:, None] + shape.lift, np.zeros(blocks.shape, dtype=bool)
-    alone = shape.alone(rock.longest)[:, None]
-    for end, sinks in ((shape.end, alone), (shape.far, 0.0 * alone)):
-        away = np.abs(blocks - np.clip(blocks.real, shape.near, end))
-        most = (away + radii + sinks).min(axis=-1) + within
-        chosen |= away - radii <= most[..., None]
-    blocks_each = rock.centres.shape[-1]
-    phalanx, block = np.divmod(np.flatnonzero(chosen), blocks_each)
-    block += phalanx // q.shape[-1] * blocks_each
-    each = SECTION_SETTINGS.points_per_circle
-    points = rock.points.reshape(-1, each)[block].ravel()
-    lengths = rock.lengths.reshape(-1, each)[block].ravel()
-    bare = rock.bare.reshape(-1, each)[block].ravel()
-    count = each * np.bincount(phalanx, minlength=q.size)
-    phalanx = np.repeat(phalanx, each)
-    near = NearPoints(points, lengths, phalanx, np.cumsum(count) - count, bare)
-    seen = (points - joints.ravel()[phalanx]) * u.ravel().conj()[phalanx]
-    return shape.may_press(seen, near, within.ravel())
+    shape, back, count = shape[0], u.conjugate(), len(centres)
+    each = len(points) // count
+    # distance of blocks from the whole axis, and from that under the tile
+    whole, tile = np.empty(count), np.empty(count)
+    most, most_tile = math.inf, math.inf
+    for block in range(count):
+        seen = (centres[block] - joint) * back
+        radius = radii[block] + shape.lift
+        to_end = _size(seen - _clipped(seen.real, shape.near, shape.end))
+        to_far = _size(seen - _clipped(seen.real, shape.near, shape.far))
+        whole[block], tile[block] = to_end - radius, to_far - radius
+        if to_end + radius < most:
+            most = min(most, to_end + radius + _alone(shape, longest[block]))
+        most_tile = min(most_tile, to_far + radius)
+    found = np.empty(len(points), np.intp)
+    size, from_tile = np.empty_like(lengths), np.empty_like(lengths)
+    # the bed sinks no lower than with any point alone
+    least, least_tile, taken = math.inf, math.inf, 0
+    for block in range(count):
+        if whole[block] > most + within and tile[block] > most_tile + within:
+            continue
+        for i in range(block * each, block * each + each):
+            away, from_tile[taken] = _from_axis(shape, (points[i] - joint) * back, bare[i])
+            size[taken], found[taken] = _size(away), i
+            if size[taken] < least:
+                least = min(least, size[taken] + _alone(shape, lengths[i]))
+            least_tile = min(least_tile, from_tile[taken])
+            taken += 1
+    kept = 0
+    for i in range(taken):
+        if size[i] <= least + within or from_tile[i] <= least_tile + within:
+            found[kept] = found[i]
+            kept += 1
+    return found[:kept]
+
+
+@compiled("c1", "c1", "c1", "f1")
+def rock_distances(places: Complexes, points: Complexes, centres: Complexes, radii: Array) -> Array:
+    """Return the distance of each of m places from the nearest point of rock, shape (m,) [m].
+
+    Parameters
+    ----------
+    places : ndarray of complex, shape (m,)
+        x + i z [m].
+    points, centres, radii : ndarray
+        Rock in the finger's plane, a row of `Outlines`.
+    """
+    found = np.full(len(places), math.inf)
+    each = len(points) // len(centres)
+    for k in range(len(places)):
+        for block in range(len(centres)):
+            if _size(centres[block] - places[k]) - radii[block] < found[k]:
+                for i in range(block * each, block * each + each):
+                    found[k] = min(found[k], _size(points[i] - places[k]))
+    return found
+
+
+@compiled()
+def _near_strips(
+    shape: Record, places: Complexes, joint: complex, u: complex, reach: float
+) -> Indices:
+    """Return the places of the strips' rock next to a tile that spines may reach.
+
+    ``reach``: how much farther than the nearest they may be [m].
+    """
+    away, back = np.empty(len(places)), u.conjugate()
+    for i in range(len(places)):
+        away[i] = _size(_from_tile(shape, (places[i] - joint) * back, shape.lift))
+    near = np.flatnonzero(away <= away.min() + reach)
+    # half a millimetre apart: what is under the tile, and some millimetres on both sides
+    most = 64
+    if len(near) > most:
+        near = near[away[near] <= np.sort(away[near])[most - 1]]
+    return near
+
+
+@compiled()
+def _engaged(settings: Record, gap: float, travel: float) -> float:
+    """Return the share of spines that reach the rock, as `hand_models.tile.engaged_share` does."""
+    if gap <= 0.0:
+        return 1.0
+    share = 1.0 - gap / travel if gap < travel else 0.0
+    return share if share > settings.least_share else 0.0
+
+
+@compiled()
+def _on_rock(
+    places: Complexes,
+    behind: Array,
+    near: Indices,
+    across: Array,
+    settings: Record,
+    shape: Record,
+    joint: complex,
+    u: complex,
+    tile_gap: float,
+) -> tuple[float, float]:
+    """Return the share of a tile's spines that reach the rock, and the middle of these [m].
+
+    In each of the strips across a tile its spines reach the rock or not.
+    """
+    strips, least = len(across), math.inf
+    if strips == 1:
+        share = _engaged(settings, tile_gap, shape.travel)
+        return share, across[0] * share / max(share, settings.sum_rounding)
+    if tile_gap >= shape.travel:
+        return 0.0, 0.0
+    away, farther = np.empty(len(near)), np.full(strips, math.inf)
+    for i in range(len(near)):
+        seen = (places[near[i]] - joint) * u.conjugate()
+        away[i] = _size(_from_tile(shape, seen, shape.lift))
+        least = min(least, away[i])
+    for i in range(len(near)):
+        # no spine reaches beyond its travel
+        if away[i] - least + tile_gap < shape.travel:
+            for k in range(strips):
+                farther[k] = min(farther[k], away[i] + behind[near[i], k])
+    total, middle = 0.0, 0.0
+    for k in range(strips):
+        part = _engaged(settings, tile_gap + (farther[k] - least), shape.travel)
+        total += part
+        middle += part * across[k]
+    return total / strips, middle / max(total, settings.sum_rounding)
+
+
+@compiled(
+    *(SETTINGS_RECORD.dtype, SHAPE_FIELDS, "f1", "f1", AROUND_FIELDS),
+    *("c1", "f1", "c1", "f1", "f1", "b1", "c1", "f2", "f1"),
+)
+def put_around(
+    settings: Record,
+    shape: Record,
+    depth: Array,
+    q: Array,
+    found: Record,
+    points: Complexes,
+    lengths: Array,
+    centres: Complexes,
+    radii: Array,
+    longest: Array,
+    bare: Flags,
+    places: Complexes,
+    behind: Array,
+    across: Array,
+) -> None:
+    """Write gaps, engagement and lever arms at joint angles, and their finite differences.
+
+    Parameters
+    ----------
+    settings, shape : record
+        `FingerSettings` and `PhalanxShape`.
+    depth : ndarray, shape (3,)
+        Depth to which each tile is pressed into its bed of springs [m].
+    q : ndarray, shape (3,)
+        Joint angles [rad].
+    found : record of `AROUND_FIELDS`
+        What is written.
+    points, lengths, centres, radii, longest, bare, places, behind, across : ndarray
+        Rock in the finger's plane, a row of `Outlines`.
+    """
+    count, turn, bar, found = len(q), settings[0].derivative_turn, shape[0], found[0]
+    joints = np.zeros((count + 1, count), np.complex128)
+    u = np.zeros_like(joints)
+    # as it stands, and with each joint in turn by a small step
+    for pose in range(count + 1):
+        angle, joint = 0.0, 0.0j
+        for j in range(count):
+            angle += q[j] + (turn if pose == j + 1 else 0.0)
+            joints[pose, j], u[pose, j] = joint, cmath.exp(1j * angle)
+            joint += bar.end * u[pose, j]
+    for j in range(count):
+        # two points may come nearer to each other by the way of each
+        within = depth[j] + turn * 2.0 * count * (bar.end + bar.radius + depth[j])
+        near = near_points(
+            points, lengths, bare, centres, radii, longest, shape, joints[0, j], u[0, j], within
+        )
+        near_at, near_lengths, near_bare = points[near], lengths[near], bare[near]
+        strips = np.empty(0, np.intp)
+        # by the joints before it and its own
+        for pose in range(j + 2):
+            joint, along = joints[pose, j], u[pose, j]
+            gap, tile_gap, place, push = phalanx_beside(
+                near_at, near_lengths, near_bare, settings, shape, joint, along, depth[j]
+            )
+            reach = bar.travel - tile_gap + within
+            if pose == 0 and reach > 0.0 and len(across) > 1:
+                strips = _near_strips(bar, places, joint, along, reach)
+            share, middle = _on_rock(
+                places, behind, strips, across, settings[0], bar, joint, along, tile_gap
+            )
+            # a phalanx that presses aside, with its end, has its spines beside the rock
+            share = _engaged(settings[0], 1.0 - share * push.imag, 1.0)
+            if pose == 0:
+                found.gap[j], found.share[j] = gap, share
+                found.place[j], found.push[j], found.across[j] = place, push, middle
+            else:
+                found.d_gap[j, pose - 1] = (gap - found.gap[j]) / turn
+                found.d_share[j, pose - 1] = (share - found.share[j]) / turn
+            for i in range(j + 1):
+                # from joint i to contact j, in the axes of its force
+                arm = joint + place * along - joints[pose, i]
+                arm *= (push * along).conjugate()
+                if pose == 0:
+                    found.a[i, j], found.b[i, j] = -arm.real, -arm.imag
+                else:
+                    found.d_a[i, j, pose - 1] = (-arm.real - found.a[i, j]) / turn
+                    found.d_b[i, j, pose - 1] = (-arm.imag - found.b[i, j]) / turn

@@ -13,7 +13,7 @@ import math
 from typing import Final, NamedTuple
 
 from hand_models.finger.model import FingerModel
-from hand_models.finger.phalanx_gaps import PhalanxShape, middle_of_bed
+from hand_models.finger.phalanx_shape import PhalanxShape, middle_of_bed
 from hand_models.sections import Face, SmoothSection
 
 __all__ = ["CONTACT_KINDS", "ClosedPhalanx", "SequentialClosure"]

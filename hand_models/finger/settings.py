@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hand_models.base import BASE_TOLERANCES
+from hand_models.tile import LEAST_SHARE
 
-__all__ = ["CONTACT_CODES", "SETTINGS"]
+__all__ = ["CONTACT_CODES", "SETTINGS", "ContactCodes", "FingerSettings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +93,10 @@ class FingerSettings:
     """Compliance of contacts, which makes the forces of coincident contacts unique [m/N]."""
     rounding: float = BASE_TOLERANCES.force
     """Rounding of forces [N] and torques [N·m]."""
+    sum_rounding: float = BASE_TOLERANCES.rounding
+    """Rounding of sums, as a share of their terms."""
+    least_share: float = LEAST_SHARE
+    """Share of a tile's spines below which none hold."""
 
 
 CONTACT_CODES = ContactCodes()

@@ -15,6 +15,7 @@ from .spine_calibration import (
     within_law as within_law,
 )
 from .surface import (
+    LEAST_SHARE as LEAST_SHARE,
     Surface as Surface,
     engaged_share as engaged_share,
     pull_strength as pull_strength,

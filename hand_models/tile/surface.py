@@ -34,6 +34,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,7 +43,11 @@ from hand_models.base import Array, InvalidInputError
 from hand_models.parameters import ParameterTable, surface_table
 from hand_models.tile.half_planes import HalfPlane, inner_half_planes
 
-__all__ = ["Surface", "engaged_share", "pull_strength", "surface_names"]
+__all__ = ["LEAST_SHARE", "Surface", "engaged_share", "pull_strength", "surface_names"]
+
+LEAST_SHARE: Final = 1e-6
+"""Share of a tile's spines that counts as none: far less than one spine, and too little to divide
+loads by."""
 
 
 @dataclass(frozen=True)
@@ -323,8 +328,7 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
     off = np.asarray(gap, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(off > 0.0, np.minimum(1.0 - off / travel, 1.0), 1.0)
-    # a millionth counts as none: far less than one spine, and too little to divide loads by
-    return np.where(share > 1e-6, share, 0.0)
+    return np.where(share > LEAST_SHARE, share, 0.0)
 
 
 def _by_ratios(shear_limit: float, section: str, table: ParameterTable) -> dict[str, float]:

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from hand_models.finger.phalanx_gaps import (
-    NearPoints,
-    PhalanxShape,
-    fan_out,
-    nearest_points,
-)
+from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
 from hand_models.sections import Disc, FingerRock, Outlines, Wall
+from tests.suite.helpers import phalanges
 from tests.suite.helpers.hands import HAND
 
 MODEL = HAND.finger
@@ -21,28 +17,11 @@ DEPTH = 2e-4
 seeds = st.integers(0, 2**32 - 1)
 
 
-def all_of(points, lengths):
-    """All points, (..., p), as those that phalanges may press on."""
-    phalanx, along = np.divmod(np.arange(points.size), points.shape[-1])
-    return NearPoints(
-        points.ravel(),
-        lengths.ravel(),
-        phalanx,
-        np.flatnonzero(along == 0),
-        np.zeros(points.size, dtype=bool),
-    )
-
-
 def beside(section, angle, joint=0.0, depth=DEPTH):
     """A phalanx at an angle beside rock."""
     rock = Outlines.of([FingerRock(section)], 0.2, SHAPE.spacing)
     u = np.exp(1j * np.asarray(angle, dtype=float))
-    shape = u.shape
-    points = np.broadcast_to(rock.points[0], (*shape, rock.points.shape[1]))
-    lengths = np.broadcast_to(rock.lengths[0], points.shape)
-    joints = np.broadcast_to(np.asarray(joint, dtype=complex), shape)
-    every = all_of(points, lengths)
-    return SHAPE.beside(every, joints, u, np.broadcast_to(depth, shape))
+    return phalanges.beside(rock, SHAPE, np.asarray(joint, dtype=complex), u, np.asarray(depth))
 
 
 def flat(offset):
@@ -124,9 +103,8 @@ def bed(section, q, depth):
     """
     rock = Outlines.of([FingerRock(section)], 0.2, SHAPE.spacing)
     depths = np.full(3, depth)
-    near = nearest_points(rock, SHAPE, q[None], depths[None])
     joints, u = fan_out(q, SHAPE.end)
-    return SHAPE.beside(near, joints, u, depths), joints, u
+    return phalanges.beside(rock, SHAPE, joints, u, depths), joints, u
 
 
 @given(seeds)
@@ -187,13 +165,13 @@ def test_of_the_points_that_may_press_phalanges_are_as_beside_all_rock(seed):
     rng = np.random.default_rng(seed)
     r, turn = float(rng.uniform(0.003, 0.3)), float(rng.choice([0.0, 1e-7, 1e-3]))
     round_rock = Disc(complex(rng.uniform(0.0, 0.1), r + rng.uniform(0.0, 0.03)), r)
-    rock = Outlines.of([FingerRock(flat(H)), FingerRock(round_rock)], 0.2, SHAPE.spacing)
-    q, depth = rng.uniform(-0.1, 0.4, (2, 3)), rng.uniform(0.0, 5e-4, (2, 3))
-    near = nearest_points(rock, SHAPE, q, depth, turn)
-    joints, u = fan_out(q + turn * rng.uniform(-1.0, 1.0, (2, 3)), SHAPE.end)
-    found = SHAPE.beside(near, joints, u, depth)
-    shape = 2, 3, rock.points.shape[1]
-    every = all_of(*(np.broadcast_to(each[:, None], shape) for each in rock[:2]))
-    for value, want in zip(found, SHAPE.beside(every, joints, u, depth), strict=True):
-        np.testing.assert_allclose(value, want, rtol=1e-9, atol=1e-12)
-    assert len(near.points) < len(every.points)
+    q, depth = rng.uniform(-0.1, 0.4, 3), rng.uniform(0.0, 5e-4, 3)
+    for section in (flat(H), round_rock):
+        rock = Outlines.of([FingerRock(section)], 0.2, SHAPE.spacing)
+        within = depth + turn * 6.0 * (SHAPE.end + SHAPE.radius + depth)
+        near = phalanges.points_near(rock, SHAPE, *fan_out(q, SHAPE.end), within)
+        joints, u = fan_out(q + turn * rng.uniform(-1.0, 1.0, 3), SHAPE.end)
+        found = phalanges.beside(rock, SHAPE, joints, u, depth, near)
+        for value, want in zip(found, phalanges.beside(rock, SHAPE, joints, u, depth), strict=True):
+            np.testing.assert_allclose(value, want, rtol=1e-9, atol=1e-12)
+        assert sum(len(each) for each in near) < 3 * rock.points.shape[1]

@@ -7,7 +7,7 @@ unstable grows by more than a part within one and no joint turns by more than `L
 what touches, holds or stands at a limit is found by trying all that it may be.
 
 Only where a phalanx is beside the rock, and where and along which direction a contact's force acts
-(`PhalanxShape.beside`), is shared with what is compared.
+(`phalanx_beside`), is shared with what is compared.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.finger import FingerModel, OpenFinger
-from hand_models.finger.phalanx_gaps import PhalanxShape, fan_out, nearest_points
+from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
 from hand_models.sections import Outlines
 from hand_models.tile import engaged_share, pull_strength
+from tests.suite.helpers import phalanges
 
 INCREMENTS = 200
 """Of the tension."""
@@ -129,9 +130,8 @@ class PlainFinger:
     # Geometry and forces --------------------------------------------------------------------------
 
     def beside(self, q: np.ndarray) -> Beside:
-        near = nearest_points(self.rock, self.shape, q[None], self.depth[None])
         joints, u = fan_out(q, self.shape.end)
-        found = self.shape.beside(near, joints, u, self.depth)
+        found = phalanges.beside(self.rock, self.shape, joints, u, self.depth)
         share = engaged_share(found.tile_gap, self.shape.travel)
         share = engaged_share(1.0 - share * found.push.imag, 1.0)
         arms = (joints + found.place * u)[None, :] - joints[:, None]
