@@ -29,9 +29,9 @@ LONG = ("test_golden.py", "test_dispatcher.py", "test_service.py", "test_cli.py"
 def pytest_configure(config: pytest.Config) -> None:
     """Compile in one process, before many would at once."""
     if not hasattr(config, "workerinput"):
-        from hand_models.rock import load_compiled
+        from hand_models.hand import load_closing
 
-        load_compiled()
+        load_closing()
 
 
 @pytest.hookimpl(trylast=True)

@@ -137,7 +137,11 @@ def placed_by_contact(
     """
     offsets = [Pose.identity()] * len(settled) if offsets is None else offsets
     starts = [Placement(each.hold, each.surface, each.grasp, each.seating.pose) for each in settled]
-    nails = [_nails() if each.grasp.fingernail else None for each in settled]
+    clings = InvalidInputError(
+        "must be 'given' with grasp.fingernail: how a nail gives on its rock is not known",
+        field="placing",
+    )
+    nails = [clings if each.grasp.fingernail else None for each in settled]
     able = [i for i, error in enumerate(nails) if error is None]
     found = dict(zip(able, rests_on_rock(hand, [starts[i] for i in able]), strict=True))
     outcomes: list[SettledHand | InvalidInputError] = []
@@ -225,13 +229,7 @@ def rests_on_rock(
 
 
 class _Search:
-    """Search for the rests of hands of one model, which take their steps together.
-
-    Parameters
-    ----------
-    hand : SpinyHand
-    starts : sequence of Placement, length n
-    """
+    """Search for the rests of hands of one model, which take their steps together."""
 
     def __init__(self, hand: SpinyHand, starts: Sequence[Placement]) -> None:
         self._hand, self._starts, self.rounding = hand, starts, 0.0
@@ -390,13 +388,6 @@ def _moved(start: Placement, move: Pose) -> Placement:
     """Return the placement of a hand that has moved from its start."""
     assert start.hold_in_hand is not None
     return start._replace(hold_in_hand=move.inverse() @ start.hold_in_hand)
-
-
-def _nails() -> InvalidInputError:
-    return InvalidInputError(
-        "must be 'given' with grasp.fingernail: how a nail gives on its rock is not known",
-        field="placing",
-    )
 
 
 def _unstable(stiffness: float) -> InvalidInputError:

@@ -1,3 +1,4 @@
+from .closed_fingers import load_closing as load_closing
 from .finger_frames import FingerFrame as FingerFrame
 from .grasp import Grasp as Grasp, Placing as Placing, WristTravel as WristTravel
 from .model import HandModel as HandModel

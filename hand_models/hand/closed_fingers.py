@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
+from importlib import import_module
 from typing import Final
 
 import numpy as np
@@ -32,8 +33,9 @@ from hand_models.hand.model import HandModel
 from hand_models.hand.names import FINGERS
 from hand_models.hand.placement import PlacedHands, Placement
 from hand_models.hand.settled_hand import HandPostures
+from hand_models.rock import load_compiled
 
-__all__ = ["ClosedFingers", "close_fingers"]
+__all__ = ["ClosedFingers", "close_fingers", "load_closing"]
 
 FingerNumbers = list[float]
 """Numbers of a closed finger, phalanx by phalanx: three times the `PHALANX_NUMBERS`."""
@@ -123,6 +125,12 @@ class ClosedFingers:
                     torque.setflags(write=False)
                     stops.append((finger, joint, torque))
         return tuple(stops)
+
+
+def load_closing() -> None:
+    """Import what numba compiles to cut rock and to close fingers, so that no hand waits for it."""
+    load_compiled()
+    import_module("hand_models.finger.closing")
 
 
 def close_fingers(

@@ -77,10 +77,10 @@ def plan_command(
     begun = perf_counter()
     with tables.waiting(f"planning {stance}", request):
         if request.deadline is not None and _on_outlines(request):
-            from hand_models.rock import load_compiled
+            from hand_models.hand import load_closing
 
             # the first process of a machine compiles, for longer than most deadlines
-            load_compiled()
+            load_closing()
         with planner.deadline.within(request.deadline):
             answer = answering.planned(request, robots)
             full = request.detail in (None, "full") and not brief

@@ -64,7 +64,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     callable
         Takes a `Job` and returns its `Answer`; keeps declared streams from call to call.
     """
-    from hand_models.rock import load_compiled
+    from hand_models.hand import load_closing
     from planner import deadline
     from service.answering import Streams, handle, robots_of
 
@@ -72,7 +72,7 @@ def answering(robot: RobotFile | None, hand: ParameterTable | None) -> Callable[
     scipy = ("linalg", "optimize", "spatial", "stats")
     for name in ("cvxpy", *(f"scipy.{part}" for part in scipy), "trimesh"):
         import_module(name)
-    load_compiled()
+    load_closing()
     robots = robots_of(robot)
     streams = Streams()
 
