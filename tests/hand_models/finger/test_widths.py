@@ -9,7 +9,7 @@ import pytest
 from hypothesis import strategies as st
 
 from hand_models import Cylinder, Grasp, Pose, SettledHand
-from hand_models.finger.phalanx_gaps import PhalanxShape
+from hand_models.finger.phalanx_shape import PhalanxShape
 from hand_models.hand import FINGERS
 from hand_models.rock import Mesh, Profile
 from hand_models.rock.smoothing import Scale
