@@ -109,7 +109,8 @@ def certify(
     up_to = None
     if irreducible is not None:
         size = LOAD_UNIT * blocks_up_to(system, irreducible)
-        up_to = size if math.isfinite(size) else None
+        # [N] what is proven beyond is the reciprocal of a residual that is rounding alone
+        up_to = min(size, 1e9) if math.isfinite(size) else None
         irreducible = _in_order(irreducible, limits, spaces)
     return Certificate(
         utilisation=cap,

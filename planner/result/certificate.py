@@ -61,8 +61,8 @@ class CertificateOf(Struct, Generic[AnyVector, SetOfWrenches], frozen=True, kw_o
         the subset undecided.
     irreducible_up_to : float or None
         Largest loads for which the subset is proven to leave no balance [N]; at least 10⁶, far
-        beyond any strength, but nearly parallel rows may meet beyond. None if no loads of any size
-        balance the body, or there is no subset.
+        beyond any strength, but nearly parallel rows may meet beyond. 10⁹ if it is proven up to
+        there or farther. None if no loads of any size balance the body, or there is no subset.
     sufficient : sequence of LimitName or None
         Members of the subset whose removal alone makes the question feasible: within the cap, or at
         any utilisation. Empty if no single removal does. None if undecided, or if the subset has
