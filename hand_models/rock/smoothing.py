@@ -125,7 +125,7 @@ class Scale:
 def load_compiled() -> None:
     """Import what numba compiles of scanned and drawn rock, so that no cut waits for it.
 
-    The first process of a machine compiles, in some 20 s; others load in 0.3 s.
+    The first process of a machine compiles, in some 20 s; others load in 0.5 s.
     """
     for part in ("rock.compiled_cells", "rock.compiled_cuts", "rock.compiled_smoothing"):
         import_module(f"hand_models.{part}")

@@ -76,7 +76,7 @@ def plan_command(
         request = msgspec.structs.replace(request, want=[w for w in request.want if w != "advice"])
     begun = perf_counter()
     with tables.waiting(f"planning {stance}", request):
-        if request.deadline is not None and _on_outlines(request):
+        if request.deadline is not None:
             from hand_models.hand import load_closing
 
             # the first process of a machine compiles, for longer than most deadlines
@@ -112,12 +112,6 @@ def plan_command(
     else:
         _print_files(written, answer.reply)
     return tables.ExitStatus.of(answer.reply.status)
-
-
-def _on_outlines(request: requests.PlanRequest) -> bool:
-    """Return whether a hand is on scanned or drawn rock."""
-    holds = [*request.stance.rocks.values(), *(hand.hold for hand in request.stance.hands)]
-    return any(isinstance(hold, requests.Mesh | requests.Profile) for hold in holds)
 
 
 def _print(
