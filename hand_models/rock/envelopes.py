@@ -17,9 +17,6 @@ from hand_models.rock.triangles import bridge
 
 __all__ = ["Heights", "alike", "envelope_outlines"]
 
-GRID_LENGTH = 2e-5
-"""Points of outlines nearer to each other along s than this are one point of an envelope [m]."""
-
 
 class Heights(NamedTuple):
     """Heights t at which the rock of k strips begins, over places along s.
@@ -48,9 +45,32 @@ class Heights(NamedTuple):
         """
         points = np.concatenate([piece[:, 0] for strip in strips for piece in strip])
         between = np.arange(points.min(), points.max(), spacing)
-        cells = np.unique(np.round(np.concatenate([points, between]) / GRID_LENGTH))
-        s = GRID_LENGTH * cells
-        return cls(s, np.array([_first(strip, s) for strip in strips]))
+        s = np.unique(np.concatenate([points, between]))
+        s = s[np.diff(s, prepend=-np.inf) > BASE_TOLERANCES.rounding]
+        t = np.array([_first(strip, s) for strip in strips])
+        return cls(s, t)
+
+    def least(self, chosen: slice) -> tuple[Array, Array]:
+        """Return where the envelope of some strips has corners, and its t there, (m,) each [m].
+
+        Between two places the envelope may pass from one strip to another: there it has a corner.
+        """
+        t = self.t[chosen]
+        first = t.argmin(axis=0)
+        at = np.flatnonzero((first[1:] != first[:-1]) & np.isfinite(t.min(axis=0)[1:]))
+        at = at[np.isfinite(t[first[at], at + 1]) & np.isfinite(t[first[at + 1], at])]
+        here, there = first[at], first[at + 1]
+        before = t[there, at] - t[here, at]
+        after = t[here, at + 1] - t[there, at + 1]
+        crossing = before + after > 0.0
+        at, part = at[crossing], (before[crossing] / (before + after)[crossing])
+        left, right = t[:, at], t[:, at + 1]
+        with np.errstate(invalid="ignore"):
+            between = np.where(part > 0.0, left + part * (right - left), left)
+        between = np.where(np.isfinite(between), between, np.inf).min(axis=0)
+        s = np.concatenate([self.s, self.s[at] + part * (self.s[at + 1] - self.s[at])])
+        order = np.argsort(s, kind="stable")
+        return s[order], np.concatenate([t.min(axis=0), between])[order]
 
 
 def _first(pieces: Sequence[Array], at: Array) -> Array:
@@ -62,7 +82,8 @@ def _first(pieces: Sequence[Array], at: Array) -> Array:
         for run in np.split(np.arange(len(piece)), back + 1):
             s, t = piece[run].T
             if len(run) > 1 and s[-1] > s[0]:
-                low, high = np.searchsorted(at, [s[0] - 0.5 * GRID_LENGTH, s[-1] + GRID_LENGTH])
+                slack = BASE_TOLERANCES.length
+                low, high = np.searchsorted(at, [s[0] - slack, s[-1] + slack])
                 np.minimum(least[low:high], np.interp(at[low:high], s, t), out=least[low:high])
     return least
 
@@ -83,7 +104,6 @@ def alike(strips: Sequence[Sequence[Array]]) -> bool:
 def envelope_outlines(
     heights: Heights,
     middle: Sequence[Array],
-    peaks: Array,
     gap: float,
     chosen: slice = slice(None),
 ) -> list[Array]:
@@ -95,21 +115,12 @@ def envelope_outlines(
     middle : sequence of ndarray, shape (n, 2)
         Outlines of the middle strip; what overhangs hide there, if it reaches under them by more
         than ``gap``, is part of the result [m].
-    peaks : ndarray, shape (n, 2)
-        Points (s, t) of rock between the strips' middles, which may stand out of these [m].
     gap : float
         Ends no farther apart than this are joined [m].
     chosen : slice, optional
         Strips that count; all by default.
     """
-    s, t = heights.s, heights.t[chosen].min(axis=0)
-    at = np.searchsorted(s, peaks[:, 0])
-    inside = (at > 0) & (at < len(s))
-    higher = np.minimum(t[at[inside] - 1], t[at[inside]])
-    peaks = peaks[inside][peaks[inside, 1] < higher]
-    s, t = np.concatenate([s, peaks[:, 0]]), np.concatenate([t, peaks[:, 1]])
-    order = np.argsort(s, kind="stable")
-    s, t = s[order], t[order]
+    s, t = heights.least(chosen)
     hidden = [run for piece in middle for run in _hidden(piece, gap)]
     lips = np.array([run[end, 0] for run in hidden for end in (0, -1)])
     there = np.isfinite(t)

@@ -167,15 +167,6 @@ class Mesh(OutlinedHold):
         near = self._cells.within(axes, middle - beside, middle + beside)
         return bridge(cut(self.triangles, o, s, t, reach, near), self._scale.bridged_gap)
 
-    def _peaks(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, half: float) -> Array:
-        o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
-        axes = np.array([s, t, np.cross(t, s)])
-        most = np.array([self._scale.reach, self._scale.reach, half])
-        near = self._cells.within(axes, axes @ o - most, axes @ o + most)
-        corners = np.unique(self.triangles.faces[near])
-        places = (self.triangles.vertices[corners] - o) @ axes.T
-        return np.asarray(places[(np.abs(places) <= most).all(axis=1)])
-
     @cached_property
     def _cells(self) -> TriangleCells:
         return TriangleCells(self.triangles)

@@ -200,16 +200,17 @@ def _strips(
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
     if section is None:
         return NO_STRIPS
-    curves, own = section.pieces, heights.t[tiles]
-    least = own.min(axis=0)
-    depths = np.where(np.isfinite(own), own - np.where(np.isfinite(least), least, 0.0), np.inf)
-    places = np.concatenate(curves)
-    along, into = np.concatenate([np.gradient(curve, axis=0) for curve in curves]).T
+    places = np.concatenate(section.pieces)
+    least = np.interp(places[:, 0], *heights.least(tiles))
+    with np.errstate(invalid="ignore"):
+        own = np.array([np.interp(places[:, 0], heights.s, t) for t in heights.t[tiles]])
+        depths = np.maximum(own - least, 0.0)
+    depths = np.where(np.isfinite(own) & np.isfinite(least), depths, np.inf)
+    along, into = np.concatenate([np.gradient(curve, axis=0) for curve in section.pieces]).T
     upright = np.maximum(along / np.hypot(along, into), BASE_TOLERANCES.angle)
-    at = np.searchsorted(heights.s, places[:, 0]).clip(0, len(heights.s) - 1)
     # what is hidden under an overhang is known in the finger's plane only, and taken as alike
-    seen = places[:, 1] < least[at] + 1e-3
-    behind = np.where(seen, depths[:, at] * upright, 0.0)
+    seen = places[:, 1] < least + 1e-3
+    behind = np.where(seen, depths * upright, 0.0)
     return RockStrips(offsets[tiles], places[:, 0] + 1j * places[:, 1], behind.T)
 
 
@@ -254,15 +255,9 @@ class OutlinedHold(Hold):
         if alike(strips) or not any(strips):
             return FingerRock(self._smooth(middle))
         heights = Heights.of(strips, scale.spacing)
-        peaks = self._peaks(origin, s_axis, t_axis, 0.5 * scale.frame_width)
-        under = peaks[np.abs(peaks[:, 2]) <= 0.5 * scale.tile_width, :2]
-        tile = self._smooth(envelope_outlines(heights, middle, under, scale.bridged_gap, tiles))
-        frame = self._smooth(envelope_outlines(heights, middle, peaks[:, :2], scale.bridged_gap))
+        tile = self._smooth(envelope_outlines(heights, middle, scale.bridged_gap, tiles))
+        frame = self._smooth(envelope_outlines(heights, middle, scale.bridged_gap))
         return FingerRock(tile, frame, _strips(heights, tile, offsets, tiles))
-
-    def _peaks(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, half: float) -> Array:
-        """Return corners (s, t, y) of rock up to ``half`` beside a finger's plane, (n, 3) [m]."""
-        return np.zeros((0, 3))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
         curves = [smooth(run, self._scale) for run in runs]

@@ -62,8 +62,8 @@ def test_a_seated_palm_is_on_the_rock_or_off_it_in_a_pinch(seed):
             for side in (1.0, -1.0):
                 joint = HAND.inner_joint * [1.0, side, 1.0] + [0.0, 0.0, lift]
                 joint = seating.pose.inverse().apply(joint)
-                section = hold.section(joint, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
-                rest = section.rest(0j, face, model.joint_lower[0], model.joint_upper[0])
+                rock = hold.finger_rock(joint, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+                rest = rock.tile.rest(0j, face, model.joint_lower[0], model.joint_upper[0])
                 along.append(model.joint_spacing if rest is None else rest.distance)
             return float(np.mean(along))
 

@@ -153,6 +153,7 @@ def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAN
         for i, contact in enumerate(finger.contacts):
             u, n = turned(frame, contact.angle)
             place = joint + contact.along * u + (hand.finger.tile_height + contact.rise) * n
+            place = place + contact.across * frame.across
             np.testing.assert_allclose(settled.positions[row], place, atol=1e-12)
             drag, push = turned(frame, contact.angle + contact.tilt)
             np.testing.assert_allclose(settled.axes[row], [-drag, push, frame.across], atol=1e-12)
