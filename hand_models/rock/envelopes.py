@@ -2,7 +2,7 @@
 
 The rock in each strip is given by its outlines in the plane through the strip's middle. Seen along
 t, into the rock, each strip begins at a height t over every s; the least of them is the envelope.
-Rock that is hidden from there, under an overhang, is taken from the middle strip.
+What an overhang hides has no envelope.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hand_models.base import BASE_TOLERANCES, Array
-from hand_models.rock.triangles import bridge
 
-__all__ = ["Heights", "alike", "envelope_outlines"]
+__all__ = ["Heights", "alike", "envelope_outlines", "overhangs"]
 
 
 class Heights(NamedTuple):
@@ -101,46 +100,32 @@ def alike(strips: Sequence[Sequence[Array]]) -> bool:
     )
 
 
-def envelope_outlines(
-    heights: Heights,
-    middle: Sequence[Array],
-    gap: float,
-    chosen: slice = slice(None),
-) -> list[Array]:
-    """Return the outlines of what stands out first in strips, rock on their left.
+def envelope_outlines(heights: Heights, chosen: slice = slice(None)) -> list[Array]:
+    """Return the outlines (s, t) of what stands out first in strips, rock on their left [m].
 
-    Parameters
-    ----------
-    heights : Heights
-    middle : sequence of ndarray, shape (n, 2)
-        Outlines of the middle strip; what overhangs hide there, if it reaches under them by more
-        than ``gap``, is part of the result [m].
-    gap : float
-        Ends no farther apart than this are joined [m].
-    chosen : slice, optional
-        Strips that count; all by default.
+    ``chosen``: strips that count; all by default.
     """
     s, t = heights.least(chosen)
-    hidden = [run for piece in middle for run in _hidden(piece, gap)]
-    lips = np.array([run[end, 0] for run in hidden for end in (0, -1)])
     there = np.isfinite(t)
-    rise = np.abs(np.diff(np.where(there, t, 0.0)))
-    at_lip = (np.abs(s[:-1, None] - lips) <= gap).any(axis=1)
-    broken = (there[1:] != there[:-1]) | (at_lip & (rise > gap))
-    seen = [
+    ends = np.flatnonzero(there[1:] != there[:-1]) + 1
+    return [
         np.column_stack([s[run], t[run]])
-        for run in np.split(np.arange(len(s)), np.flatnonzero(broken) + 1)
+        for run in np.split(np.arange(len(s)), ends)
         if len(run) > 1 and there[run].all()
     ]
-    return bridge([*seen, *hidden], gap) if hidden else seen
 
 
-def _hidden(piece: Array, gap: float) -> list[Array]:
-    """Return the parts of an outline that cannot be seen along t, and reach under what can be."""
+def overhangs(pieces: Sequence[Array], gap: float) -> bool:
+    """Return True if an outline reaches back under what is seen by more than ``gap`` [m]."""
+    return any(_hidden(piece, gap) for piece in pieces)
+
+
+def _hidden(piece: Array, gap: float) -> bool:
     if (np.diff(piece[:, 0]) >= 0.0).all():
-        return []
-    first = _first([piece], piece[:, 0])
-    under = piece[:, 1] > first + BASE_TOLERANCES.length
+        return False
+    under = piece[:, 1] > _first([piece], piece[:, 0]) + BASE_TOLERANCES.length
     edges = np.flatnonzero(np.diff(under.astype(np.int8), prepend=0, append=0))
-    runs = [piece[max(begin - 1, 0) : end + 1] for begin, end in edges.reshape(-1, 2).tolist()]
-    return [run for run in runs if len(run) > 1 and np.ptp(run[:, 0]) > gap]
+    return any(
+        float(np.ptp(piece[max(begin - 1, 0) : end + 1, 0])) > gap
+        for begin, end in edges.reshape(-1, 2).tolist()
+    )

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 
 from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
-from hand_models.rock.envelopes import Heights, alike, envelope_outlines
+from hand_models.rock.envelopes import Heights, alike, envelope_outlines, overhangs
 from hand_models.rock.holds import Hold
 from hand_models.rock.triangles import unstrung
 from hand_models.sections import (
@@ -208,9 +208,7 @@ def _strips(
     depths = np.where(np.isfinite(own) & np.isfinite(least), depths, np.inf)
     along, into = np.concatenate([np.gradient(curve, axis=0) for curve in section.pieces]).T
     upright = np.maximum(along / np.hypot(along, into), BASE_TOLERANCES.angle)
-    # what is hidden under an overhang is known in the finger's plane only, and taken as alike
-    seen = places[:, 1] < least + 1e-3
-    behind = np.where(seen, depths * upright, 0.0)
+    behind = depths * upright
     return RockStrips(offsets[tiles], places[:, 0] + 1j * places[:, 1], behind.T)
 
 
@@ -233,6 +231,9 @@ class OutlinedHold(Hold):
     def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
         """Cut the hold with planes across a finger, and smooth their envelope to a tile's scale.
 
+        Where rock reaches back under an overhang by more than a bridged gap, the finger is met in
+        its own plane alone.
+
         Returns
         -------
         FingerRock
@@ -252,11 +253,12 @@ class OutlinedHold(Hold):
             for cut in self._cuts(origin, s_axis, t_axis, offsets)
         ]
         middle = strips[len(strips) // 2]
-        if alike(strips) or not any(strips):
+        hidden = any(overhangs(strip, scale.bridged_gap) for strip in strips)
+        if hidden or alike(strips) or not any(strips):
             return FingerRock(self._smooth(middle))
         heights = Heights.of(strips, scale.spacing)
-        tile = self._smooth(envelope_outlines(heights, middle, scale.bridged_gap, tiles))
-        frame = self._smooth(envelope_outlines(heights, middle, scale.bridged_gap))
+        tile = self._smooth(envelope_outlines(heights, tiles))
+        frame = self._smooth(envelope_outlines(heights))
         return FingerRock(tile, frame, _strips(heights, tile, offsets, tiles))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:

@@ -49,7 +49,7 @@ def test_the_next_plan_is_exact_and_as_good_as_a_new_search(name):
 def test_where_few_limits_bind_the_next_plan_is_found_all_the_same():
     question = complying(questions.question(read_request("boulders")))
     stance = KnownStance(question)
-    base = 0.8 * stance.prepared.wrench
+    base = 0.6 * stance.prepared.wrench
     now = stance.answer(base, 0.0).answer.solution.search
     for i in range(8):
         hands = stance.prepared.hands.turned(base + (1.0 + i) * np.eye(6)[0])
