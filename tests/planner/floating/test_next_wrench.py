@@ -55,7 +55,7 @@ def test_where_few_limits_bind_the_next_plan_is_found_all_the_same():
         hands = stance.prepared.hands.turned(base + (1.0 + i) * np.eye(6)[0])
         found = next_plan(hands, now, Budget(50))
         assert found is not None
-        assert hands.step(now.point, found.point.loads) < 0.1  # mm
+        assert hands.step(now.point, found.point.loads) < 0.3  # mm
         now = found
 
 
