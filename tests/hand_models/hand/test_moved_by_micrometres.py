@@ -25,7 +25,7 @@ path and left spines at a gap that the path does not have."""
 STEP = 0.01
 """Of a support at a micrometre, at most, in parts of its scale."""
 
-JUMPING = 0.1
+JUMPING = 0.15
 """Share of hands, at most, that have a larger step: a phalanx that comes within its spines' travel
 bears across the gap at once, and where two equilibria are close a finger ends in one or the other.
 """
