@@ -49,10 +49,11 @@ class Heights(NamedTuple):
         t = np.array([_first(strip, s) for strip in strips])
         return cls(s, t)
 
-    def least(self, chosen: slice) -> tuple[Array, Array]:
+    def least(self, chosen: slice = slice(None)) -> tuple[Array, Array]:
         """Return where the envelope of some strips has corners, and its t there, (m,) each [m].
 
-        Between two places the envelope may pass from one strip to another: there it has a corner.
+        ``chosen``: strips that count; all by default. Where the envelope passes from one strip to
+        another between two places, it has a corner.
         """
         t = self.t[chosen]
         first = t.argmin(axis=0)
@@ -100,12 +101,8 @@ def alike(strips: Sequence[Sequence[Array]]) -> bool:
     )
 
 
-def envelope_outlines(heights: Heights, chosen: slice = slice(None)) -> list[Array]:
-    """Return the outlines (s, t) of what stands out first in strips, rock on their left [m].
-
-    ``chosen``: strips that count; all by default.
-    """
-    s, t = heights.least(chosen)
+def envelope_outlines(s: Array, t: Array) -> list[Array]:
+    """Return the outlines (s, t) of an envelope (`Heights.least`), rock on their left [m]."""
     there = np.isfinite(t)
     ends = np.flatnonzero(there[1:] != there[:-1]) + 1
     return [

@@ -195,13 +195,17 @@ def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
 
 
 def _strips(
-    heights: Heights, section: PolylineSection | None, offsets: Array, tiles: slice
+    heights: Heights,
+    envelope: tuple[Array, Array],
+    section: PolylineSection | None,
+    offsets: Array,
+    tiles: slice,
 ) -> RockStrips:
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
     if section is None:
         return NO_STRIPS
     places = np.concatenate(section.pieces)
-    least = np.interp(places[:, 0], *heights.least(tiles))
+    least = np.interp(places[:, 0], *envelope)
     with np.errstate(invalid="ignore"):
         own = np.array([np.interp(places[:, 0], heights.s, t) for t in heights.t[tiles]])
         depths = np.maximum(own - least, 0.0)
@@ -257,9 +261,10 @@ class OutlinedHold(Hold):
         if hidden or alike(strips) or not any(strips):
             return FingerRock(self._smooth(middle))
         heights = Heights.of(strips, scale.spacing)
-        tile = self._smooth(envelope_outlines(heights, tiles))
-        frame = self._smooth(envelope_outlines(heights))
-        return FingerRock(tile, frame, _strips(heights, tile, offsets, tiles))
+        under = heights.least(tiles)
+        tile = self._smooth(envelope_outlines(*under))
+        frame = self._smooth(envelope_outlines(*heights.least()))
+        return FingerRock(tile, frame, _strips(heights, under, tile, offsets, tiles))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
         curves = [smooth(run, self._scale) for run in runs]
