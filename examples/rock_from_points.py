@@ -55,7 +55,7 @@ def main(file: Path) -> None:
         for limb, (across, up) in PLACES.items()
     )
     body = Pose(np.array([-0.45, 0.0, 0.0]), UP_THE_WALL)
-    answer = plan(Question(Stance(hands, body), load=Load(mass=35.0)))
+    answer = plan(Question(Stance(hands, body), load=Load(mass=30.0)))
     print(f"{answer.status}: utilisation {answer.utilisation:.2f}, {answer.reason}")
     for hand in answer.hands or ():
         tiles = [tile for finger in hand.fingers for tile in finger.tiles if tile.utilisation]
