@@ -171,17 +171,18 @@ def _refused(shape: PhalanxShape, rock: FingerRock, q: Array) -> Refused:
 
     places, most = _axes(shape, q).ravel(), JOINT_COUNT * shape.end
     outline = Outlines.of([rock], 2.0 * most + shape.end, shape.spacing)
-    sides = [values[0] for values in (outline.points, outline.centres, outline.radii)]
+    sides = outline.points[0], outline.centres[0], outline.radii[0]
 
     def depth(lift: float, *, how_far: bool = False) -> float:
         """Return how deep rock is in the finger; where it is, only asked ``how_far`` exactly."""
         lifted = places - 1j * lift
-        away = rock_distances(lifted, *sides)
-        near = float(shape.radius - away.min())
+        near = float(shape.radius - rock_distances(lifted, *sides, 0)[-1])
         if near > 0.0 and not how_far:
             return near
-        inside = _inside(rock, lifted)
-        return float(shape.radius - np.where(inside, -away, away).min())
+        inside = lifted[_inside(rock, lifted)]
+        if not len(inside):
+            return near
+        return float(shape.radius + rock_distances(inside, *sides, 1).max())
 
     now, low, high = max(depth(0.0, how_far=True), shape.closes), 0.0, most
     if depth(high) > 0.0:

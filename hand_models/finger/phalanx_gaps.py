@@ -49,22 +49,26 @@ def _from_tile(shape: Record, seen: complex, lift: float) -> complex:
 
 
 @compiled()
-def _from_axis(shape: Record, seen: complex, bare: bool) -> tuple[complex, float]:
-    """Return the way to a point from the axis; and how far from under the tile it is [m].
+def _from_axis(shape: Record, seen: complex, bare: bool) -> tuple[complex, float, float]:
+    """Return the way to a point from the axis, its length, and that from under the tile [m].
 
     The axis of a bare frame has no lift. Its points are infinitely far from under the tile.
     """
     lift = 0.0 if bare else shape.lift
-    from_tile = _from_tile(shape, seen, lift)
-    corner, step = complex(shape.far, lift), complex(shape.end - shape.far, -lift)
-    square = step.real * step.real + step.imag * step.imag
-    beyond, part = seen - corner, 0.0
-    if square > 0.0:
-        part = _clipped((beyond * step.conjugate()).real / square, 0.0, 1.0)
-    beyond -= part * step
-    distance = _size(from_tile)
-    away = from_tile if distance <= _size(beyond) else beyond
-    return away, math.inf if bare else distance
+    away = _from_tile(shape, seen, lift)
+    distance = from_tile = _size(away)
+    # a point over the tile is nearest to it
+    if seen.real > shape.far or seen.imag < lift:
+        corner, step = complex(shape.far, lift), complex(shape.end - shape.far, -lift)
+        square = step.real * step.real + step.imag * step.imag
+        beyond, part = seen - corner, 0.0
+        if square > 0.0:
+            part = _clipped((beyond * step.conjugate()).real / square, 0.0, 1.0)
+        beyond -= part * step
+        other = _size(beyond)
+        if other < distance:
+            away, distance = beyond, other
+    return away, distance, math.inf if bare else from_tile
 
 
 @compiled()
@@ -141,8 +145,8 @@ def phalanx_beside(
     tile_gap, first = math.inf, 0
     back = u.conjugate()
     for i in range(len(points)):
-        ways[i], from_tile = _from_axis(shape, (points[i] - joint) * back, bare[i])
-        depths[i] = _size(ways[i]) - shape.radius
+        ways[i], away, from_tile = _from_axis(shape, (points[i] - joint) * back, bare[i])
+        depths[i] = away - shape.radius
         tile_gap = min(tile_gap, from_tile - shape.radius)
         if depths[i] < depths[first]:
             first = i
@@ -190,28 +194,28 @@ def near_points(
     """
     shape, back, count = shape[0], u.conjugate(), len(centres)
     each = len(points) // count
-    # distance of blocks from the whole axis, and from that under the tile
-    whole, tile = np.empty(count), np.empty(count)
-    most, most_tile = math.inf, math.inf
+    # distance of blocks from the whole axis, which is no larger than that from under the tile
+    whole, most, most_tile = np.empty(count), math.inf, math.inf
     for block in range(count):
-        seen = (centres[block] - joint) * back
-        radius = radii[block] + shape.lift
+        seen, radius = (centres[block] - joint) * back, radii[block] + shape.lift
         to_end = _size(seen - _clipped(seen.real, shape.near, shape.end))
-        to_far = _size(seen - _clipped(seen.real, shape.near, shape.far))
-        whole[block], tile[block] = to_end - radius, to_far - radius
+        whole[block] = to_end - radius
         if to_end + radius < most:
             most = min(most, to_end + radius + _alone(shape, longest[block]))
-        most_tile = min(most_tile, to_far + radius)
+        if to_end + radius < most_tile:
+            to_far = _size(seen - _clipped(seen.real, shape.near, shape.far))
+            most_tile = min(most_tile, to_far + radius)
     found = np.empty(len(points), np.intp)
     size, from_tile = np.empty_like(lengths), np.empty_like(lengths)
     # the bed sinks no lower than with any point alone
     least, least_tile, taken = math.inf, math.inf, 0
     for block in range(count):
-        if whole[block] > most + within and tile[block] > most_tile + within:
+        if whole[block] > max(most, most_tile) + within:
             continue
         for i in range(block * each, block * each + each):
-            away, from_tile[taken] = _from_axis(shape, (points[i] - joint) * back, bare[i])
-            size[taken], found[taken] = _size(away), i
+            seen = (points[i] - joint) * back
+            _, size[taken], from_tile[taken] = _from_axis(shape, seen, bare[i])
+            found[taken] = i
             if size[taken] < least:
                 least = min(least, size[taken] + _alone(shape, lengths[i]))
             least_tile = min(least_tile, from_tile[taken])
@@ -224,8 +228,10 @@ def near_points(
     return found[:kept]
 
 
-@compiled("c1", "c1", "c1", "f1")
-def rock_distances(places: Complexes, points: Complexes, centres: Complexes, radii: Array) -> Array:
+@compiled("c1", "c1", "c1", "f1", "i0")
+def rock_distances(
+    places: Complexes, points: Complexes, centres: Complexes, radii: Array, each_place: int
+) -> Array:
     """Return the distance of each of m places from the nearest point of rock, shape (m,) [m].
 
     Parameters
@@ -234,10 +240,14 @@ def rock_distances(places: Complexes, points: Complexes, centres: Complexes, rad
         x + i z [m].
     points, centres, radii : ndarray
         Rock in the finger's plane, a row of `Outlines`.
+    each_place : int
+        0 if only the least of all distances is needed, which is much faster.
     """
     found = np.full(len(places), math.inf)
     each = len(points) // len(centres)
     for k in range(len(places)):
+        if k and not each_place:
+            found[k] = found[k - 1]
         for block in range(len(centres)):
             if _size(centres[block] - places[k]) - radii[block] < found[k]:
                 for i in range(block * each, block * each + each):
@@ -249,19 +259,11 @@ def rock_distances(places: Complexes, points: Complexes, centres: Complexes, rad
 def _near_strips(
     shape: Record, places: Complexes, joint: complex, u: complex, reach: float
 ) -> Indices:
-    """Return the places of the strips' rock next to a tile that spines may reach.
-
-    ``reach``: how much farther than the nearest they may be [m].
-    """
+    """Return the places of the strips' rock no farther from a tile than the nearest and reach."""
     away, back = np.empty(len(places)), u.conjugate()
     for i in range(len(places)):
         away[i] = _size(_from_tile(shape, (places[i] - joint) * back, shape.lift))
-    near = np.flatnonzero(away <= away.min() + reach)
-    # half a millimetre apart: what is under the tile, and some millimetres on both sides
-    most = 64
-    if len(near) > most:
-        near = near[away[near] <= np.sort(away[near])[most - 1]]
-    return near
+    return np.flatnonzero(away <= away.min() + reach)
 
 
 @compiled()

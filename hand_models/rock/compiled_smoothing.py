@@ -195,10 +195,27 @@ def _outward(curve: Array, closed: int) -> Array:
 
 
 @compiled()
-def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices) -> Array:
-    """Return how far raw points stand out of the points of a curve that are nearest to them.
+def _foot(curve: Array, at: int, x: float, y: float) -> float:
+    """Return the place on a curve nearest to a point, in steps; ``at``: its nearest vertex."""
+    least, place = math.inf, float(at)
+    for begin in (at - 1, at):
+        if 0 <= begin < len(curve) - 1:
+            u, v = curve[begin + 1, 0] - curve[begin, 0], curve[begin + 1, 1] - curve[begin, 1]
+            a, b = x - curve[begin, 0], y - curve[begin, 1]
+            part = min(max((a * u + b * v) / max(u * u + v * v, 1e-300), 0.0), 1.0)
+            away = (a - part * u) ** 2 + (b - part * v) ** 2
+            if away < least:
+                least, place = away, begin + part
+    return place
 
-    ``guesses``: for each raw point one of the curve that is near it.
+
+@compiled()
+def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices) -> Array:
+    """Return how far raw points stand out of a curve, by the steps of it that are nearest to them.
+
+    ``guesses``: for each raw point a point of the curve that is near it. Rows of the result, for
+    each step from one point of the curve to the next: the largest excess, and the largest part of
+    it that counts at the step's beginning and at its end, as far as it is from the other.
     """
     count, last = len(curve), curve[-1]
     longest = 1e-9  # [m] or else the longest step of the curve
@@ -213,7 +230,7 @@ def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices) -> Array
             so_far[i] = max(so_far[i], so_far[i - 1])
     for i in range(count - 1, 0, -1):
         yet[i - 1] = min(yet[i - 1], yet[i])
-    excess = np.zeros(count)
+    excess = np.zeros((3, count))
     for i in range(len(raw)):
         x, y = raw[i]
         along = u * x + v * y
@@ -234,9 +251,17 @@ def _excess(curve: Array, outward: Array, raw: Array, guesses: Indices) -> Array
                 if square > 16.0 * least:
                     steps = max(1, int((math.sqrt(square) - math.sqrt(least)) / longest))
                 at += way * steps
-        out = (x - curve[nearest, 0]) * outward[nearest, 0]
-        out += (y - curve[nearest, 1]) * outward[nearest, 1]
-        excess[nearest] = max(excess[nearest], out)
+        place = _foot(curve, nearest, x, y)
+        step = min(int(place), count - 1)
+        part, after = place - step, min(step + 1, count - 1)
+        out = 0.0
+        for k in range(2):
+            foot = curve[step, k] + part * (curve[after, k] - curve[step, k])
+            normal = outward[step, k] + part * (outward[after, k] - outward[step, k])
+            out += (raw[i, k] - foot) * normal
+        excess[0, step] = max(excess[0, step], out)
+        excess[1, step] = max(excess[1, step], (1.0 - part) * out)
+        excess[2, step] = max(excess[2, step], part * out)
     return excess
 
 
@@ -251,12 +276,24 @@ def _continued(values: Array, part: int, closed: int) -> Array:
 
 
 @compiled()
-def _highest(values: Array, part: int, closed: int) -> Array:
-    """Return the largest of each value and ``part`` on both sides of it, or zero."""
-    further, found = _continued(values, part, closed), np.zeros(len(values))
-    for k in range(2 * part + 1):
-        beside = further[k : k + len(values)]
-        for i in range(len(found)):
+def _highest(excess: Array, part: int, closed: int) -> Array:
+    """Return the largest excess within ``part`` steps of each point of a curve, or zero.
+
+    Over the last step of that it fades, so that it changes with a raw point's place without a jump.
+    """
+    count = excess.shape[1]
+    further, found = np.zeros((3, count + 2 * part + 1)), np.zeros(count)
+    for row in range(3):
+        for i in range(further.shape[1]):
+            step = i - part - 1
+            if closed:
+                further[row, i] = excess[row, step % count]
+            elif 0 <= step < count:
+                further[row, i] = excess[row, step]
+    for k in range(2 * part + 2):
+        row = 2 if k == 0 else 1 if k == 2 * part + 1 else 0
+        beside = further[row, k : k + count]
+        for i in range(count):
             found[i] = max(found[i], beside[i])
     return found
 
@@ -318,7 +355,7 @@ def smoothed(
     for _ in range(4):  # each time far less is left
         outward = _outward(curve, closed)
         excess = _excess(curve, outward, raw, guesses)
-        if excess.max() <= 1e-5:  # [m]
+        if excess[0].max() <= 1e-6:  # [m]
             break
         # two moving means whose widths add up to that of the maximum leave no point below it
         rise = _highest(excess, half, closed)

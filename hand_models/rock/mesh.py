@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from hand_models.base import Array, InvalidInputError, Pose, go_on, skew
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
-from hand_models.rock.smoothing import OutlinedHold
+from hand_models.rock.smoothing import Heights, OutlinedHold
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import (
     TriangleCells,
@@ -166,6 +166,13 @@ class Mesh(OutlinedHold):
         beside, middle = np.array([0.0, reach, reach]), axes @ o
         near = self._cells.within(axes, middle - beside, middle + beside)
         return bridge(cut(self.triangles, o, s, t, reach, near), self._scale.bridged_gap)
+
+    def _heights(self, plane: Array) -> Heights:
+        o, s, t = plane
+        beside = np.array([0.5 * self._scale.frame_width, self._scale.reach, self._scale.reach])
+        axes = np.array([skew(t) @ s, s, t])
+        near = self._cells.within(axes, axes @ o - beside, axes @ o + beside)
+        return self._heights_of(self.triangles, near, plane)
 
     @cached_property
     def _cells(self) -> TriangleCells:

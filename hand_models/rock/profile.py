@@ -18,9 +18,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, InvalidInputError
+from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
-from hand_models.rock.smoothing import OutlinedHold, Scale
+from hand_models.rock.smoothing import Heights, OutlinedHold, Scale
 from hand_models.rock.surface import Triangles, drawn_out
 from hand_models.sections import SECTION_SETTINGS
 
@@ -109,17 +109,16 @@ class Profile(OutlinedHold):
         pieces = np.linalg.solve(M, (outline - o[[0, 2]]).T).T
         return [pieces if determinant > 0.0 else pieces[::-1]]
 
-    def _cuts(
-        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, offsets: Array
-    ) -> list[list[Array]]:
-        """Return the outline under the finger in each plane: the first cut, moved along s."""
-        s, t = np.asarray(s_axis, dtype=float), np.asarray(t_axis, dtype=float)
-        M = np.array([[s[0], t[0]], [s[2], t[2]]])
-        if abs(np.linalg.det(M)) < SECTION_SETTINGS.parallel_sine:
-            return super()._cuts(origin, s_axis, t_axis, offsets)
-        first = self._pieces(origin, s_axis, t_axis)
-        shift = np.linalg.solve(M, np.cross(t, s)[[0, 2]])
-        return [[piece - y * shift for piece in first] for y in offsets.tolist()]
+    def _heights(self, plane: Array) -> Heights | None:
+        """Return heights of the outline under the finger, extruded as far as it reaches."""
+        o, s, t = plane
+        across = np.cross(t, s)
+        if np.hypot(*across[[0, 2]]) < BASE_TOLERANCES.relative:
+            return None
+        scale = self._scale
+        end = 2.0 * scale.reach + scale.frame_width
+        drawn = drawn_out(self._outline(float(o[1])), o[1] - end, o[1] + end)
+        return self._heights_of(drawn, np.arange(len(drawn.faces)), plane)
 
     def _along_axis(self, o: Array, s: Array, t: Array) -> list[Array]:
         """Return the straight rock in a plane that holds the direction of drawing."""

@@ -22,15 +22,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
+from typing import Final, NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from hand_models.base import BASE_TOLERANCES, Array, InvalidInputError
+from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError
 from hand_models.parameters import ParameterTable, hand_table, scan_table
-from hand_models.rock.envelopes import Heights, alike, envelope_outlines, overhangs
 from hand_models.rock.holds import Hold
+from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import unstrung
 from hand_models.sections import (
     NO_STRIPS,
@@ -41,7 +42,7 @@ from hand_models.sections import (
     strung,
 )
 
-__all__ = ["OutlinedHold", "Scale", "load_compiled", "smooth"]
+__all__ = ["Heights", "OutlinedHold", "Scale", "load_compiled", "smooth"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,9 @@ class Scale:
     tile_width, frame_width : float
         Widths of a finger's tiles and of its phalanges' frames.
     strip : float
-        Largest width of the strips in which rock is cut across them.
+        Largest width of the strips across a tile in which its spines reach the rock or not.
+    height_spacing : float
+        Distance of places along a finger at which heights of rock are taken.
     """
 
     tile: float
@@ -74,6 +77,7 @@ class Scale:
     tile_width: float
     frame_width: float
     strip: float
+    height_spacing: float
 
     @classmethod
     def of(cls, hand: ParameterTable | None = None) -> Scale:
@@ -105,21 +109,20 @@ class Scale:
             tile_width=hand.scalar("finger", "tile_width"),
             frame_width=hand.scalar("finger", "frame_width"),
             strip=table.scalar("cut", "strip"),
+            height_spacing=table.scalar("cut", "height_spacing"),
         )
 
     @property
-    def strips(self) -> tuple[Array, slice]:
-        """Return the middles of strips across a finger [m], and which are under its tiles.
-
-        An odd number is under the tiles, so that one is in the finger's plane; as many on either
-        side as it takes are under the frame beside them.
-        """
+    def lines(self) -> Array:
+        """Middles of equal strips across a tile, an odd number of them [m]."""
         half = math.ceil(0.5 * self.tile_width / self.strip - 0.5)
-        beside = math.ceil(0.5 * (self.frame_width - self.tile_width) / self.strip)
-        under = self.tile_width / (2 * half + 1) * np.arange(-half, half + 1)
-        width = 0.5 * (self.frame_width - self.tile_width) / max(beside, 1)
-        outer = 0.5 * self.tile_width + width * (np.arange(beside) + 0.5)
-        return np.concatenate([-outer[::-1], under, outer]), slice(beside, beside + 2 * half + 1)
+        return np.asarray(self.tile_width / (2 * half + 1) * np.arange(-half, half + 1))
+
+    @property
+    def places(self) -> Array:
+        """Places along a finger at which heights of rock are taken [m]."""
+        count = math.ceil(self.reach / self.height_spacing)
+        return np.asarray(self.reach / count * np.arange(-count, count + 1))
 
 
 def load_compiled() -> None:
@@ -127,8 +130,8 @@ def load_compiled() -> None:
 
     The first process of a machine compiles, in some 20 s; others load in 0.5 s.
     """
-    for part in ("rock.compiled_cells", "rock.compiled_cuts", "rock.compiled_smoothing"):
-        import_module(f"hand_models.{part}")
+    for part in ("cells", "cuts", "heights", "smoothing"):
+        import_module(f"hand_models.rock.compiled_{part}")
     for part in ("polylines", "contacts"):
         import_module(f"hand_models.sections.compiled_{part}")
 
@@ -194,26 +197,45 @@ def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     return unstrung(points, ends)
 
 
-def _strips(
-    heights: Heights,
-    envelope: tuple[Array, Array],
-    section: PolylineSection | None,
-    offsets: Array,
-    tiles: slice,
-) -> RockStrips:
+NO_OUTLINES: Final = np.zeros((0, 2)), np.zeros(0, dtype=np.intp), 0.0
+"""Result of `seen_outlines` where there is no rock in the plane."""
+
+
+class Heights(NamedTuple):
+    """Heights t at which rock begins over places s in equal steps, across a finger.
+
+    Attributes
+    ----------
+    tile, frame : ndarray, shape (g,)
+        Least t anywhere across the finger's tiles, and across its frames [m].
+    lines : ndarray, shape (k, g)
+        t in the middle of each strip across the tiles [m].
+    tile_ends, frame_ends : ndarray, shape (2, g, 2)
+        Where the rock ends beside places, across the tiles and across the frames (`rock_ends`).
+    """
+
+    tile: Array
+    frame: Array
+    lines: Array
+    tile_ends: Array
+    frame_ends: Array
+
+
+def _strips(scale: Scale, heights: Heights, section: PolylineSection | None) -> RockStrips:
     """Return how far the rock of each strip under a finger's tiles lies behind their envelope."""
     if section is None:
         return NO_STRIPS
     places = np.concatenate(section.pieces)
-    least = np.interp(places[:, 0], *envelope)
+    s = scale.places
+    at = np.clip(((places[:, 0] - s[0]) / (s[1] - s[0])).astype(np.intp), 0, len(s) - 2)
+    part = (places[:, 0] - s[at]) / (s[1] - s[0])
     with np.errstate(invalid="ignore"):
-        own = np.array([np.interp(places[:, 0], heights.s, t) for t in heights.t[tiles]])
-        depths = np.maximum(own - least, 0.0)
-    depths = np.where(np.isfinite(own) & np.isfinite(least), depths, np.inf)
+        depths = heights.lines - heights.tile
+        depths = depths[:, at] + part * (depths[:, at + 1] - depths[:, at])
     along, into = np.concatenate([np.gradient(curve, axis=0) for curve in section.pieces]).T
     upright = np.maximum(along / np.hypot(along, into), BASE_TOLERANCES.angle)
-    behind = depths * upright
-    return RockStrips(offsets[tiles], places[:, 0] + 1j * places[:, 1], behind.T)
+    behind = np.where(np.isfinite(depths), np.maximum(depths, 0.0) * upright, np.inf)
+    return RockStrips(scale.lines, places[:, 0] + 1j * places[:, 1], behind.T)
 
 
 class OutlinedHold(Hold):
@@ -233,10 +255,11 @@ class OutlinedHold(Hold):
         self._scale = Scale.of(hand)
 
     def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
-        """Cut the hold with planes across a finger, and smooth their envelope to a tile's scale.
+        """Cut the hold with a plane, raise the cut to what stands out beside it, and smooth it.
 
-        Where rock reaches back under an overhang by more than a bridged gap, the finger is met in
-        its own plane alone.
+        Seen along t, what stands out first anywhere across the tiles, and across the frames, is the
+        envelope that they meet. Where rock reaches back under an overhang in the finger's plane by
+        more than a bridged gap, the finger is met in this plane alone.
 
         Returns
         -------
@@ -248,37 +271,60 @@ class OutlinedHold(Hold):
         InvalidInputError
             If an outline is too long to be a surface of rock; the field is ``hold``.
         """
-        from hand_models.rock.compiled_smoothing import corners
+        from hand_models.rock.compiled_heights import (
+            least_heights,
+            raised_outlines,
+            seen_outlines,
+        )
 
-        scale = self._scale
-        offsets, tiles = scale.strips
-        strips = [
-            [corners(run)[0] for run in _reached(cut, scale)]
-            for cut in self._cuts(origin, s_axis, t_axis, offsets)
-        ]
-        middle = strips[len(strips) // 2]
-        hidden = any(overhangs(strip, scale.bridged_gap) for strip in strips)
-        if hidden or alike(strips) or not any(strips):
+        scale, slack = self._scale, BASE_TOLERANCES.length
+        middle = _reached(self._pieces(origin, s_axis, t_axis), scale)
+        points, stops, hidden = seen_outlines(*strung(middle)) if middle else NO_OUTLINES
+        plane = np.array([origin, s_axis, t_axis], dtype=float)
+        heights = self._heights(plane) if hidden <= scale.bridged_gap else None
+        if heights is None:
             return FingerRock(self._smooth(middle))
-        heights = Heights.of(strips, scale.spacing)
-        under = heights.least(tiles)
-        tile = self._smooth(envelope_outlines(*under))
-        frame = self._smooth(envelope_outlines(*heights.least()))
-        return FingerRock(tile, frame, _strips(heights, under, tile, offsets, tiles))
+        own = least_heights(points, stops, scale.places)
+        tiles, frames = (np.minimum(each, own) for each in heights[:2])
+        heights = heights._replace(tile=tiles, frame=frames)
+        gap, envelopes = (
+            scale.bridged_gap,
+            ((tiles, heights.tile_ends), (frames, heights.frame_ends)),
+        )
+        tile, frame = (
+            unstrung(*raised_outlines(points, scale.places, own, *each, gap, slack))
+            for each in envelopes
+        )
+        section = self._smooth(tile)
+        return FingerRock(section, self._smooth(frame), _strips(scale, heights, section))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
         curves = [smooth(run, self._scale) for run in runs]
         reached = [curve for curve in curves if curve is not None]
         return PolylineSection(reached) if reached else None
 
-    def _cuts(
-        self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike, offsets: Array
-    ) -> list[list[Array]]:
-        """Return the raw outlines in planes moved by ``offsets`` along t × s [m]."""
-        across = np.cross(np.asarray(t_axis), np.asarray(s_axis))
-        return [
-            self._pieces(np.asarray(origin) + y * across, s_axis, t_axis) for y in offsets.tolist()
-        ]
+    @abstractmethod
+    def _heights(self, plane: Array) -> Heights | None:
+        """Return heights of rock across a finger; None if the rock is alike across it.
+
+        ``plane``: origin [m] and axes s and t of the finger's plane, shape (3, 3).
+        """
+
+    def _heights_of(self, triangles: Triangles, some: Indices, plane: Array) -> Heights:
+        """Return heights of some triangles across a finger."""
+        from hand_models.rock.compiled_heights import heights_across, rock_ends
+
+        scale = self._scale
+        halves = 0.5 * np.array([scale.tile_width, scale.frame_width])
+        least = heights_across(
+            *triangles, some, plane, scale.places, halves, scale.lines, BASE_TOLERANCES.length
+        )
+        ends = np.full((2, 2, len(scale.places), 2), np.nan)
+        for row, half in enumerate(halves.tolist()):
+            if not np.isfinite(least[row]).all():
+                at = scale.places, half, least[row], scale.bridged_gap
+                ends[row] = rock_ends(*triangles, some, plane, *at)
+        return Heights(least[0], least[1], least[2:], ends[0], ends[1])
 
     @abstractmethod
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:

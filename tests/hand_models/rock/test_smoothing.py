@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 from hypothesis import given, strategies as st
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 
 from hand_models.rock import compiled_smoothing
 from hand_models.rock.smoothing import Scale, smooth
+from hand_models.sections import PolylineSection
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -22,18 +23,51 @@ def folded(rng: np.random.Generator) -> np.ndarray:
     return np.cumsum(steps, axis=0)
 
 
+def standing_out(curve, outward, raw):
+    """Places on a curve, in steps of it, nearest to raw points, and how far these stand out."""
+    places, outs = np.zeros(len(raw)), np.zeros(len(raw))
+    for i, point in enumerate(raw):
+        vertex, least = int(np.linalg.norm(point - curve, axis=1).argmin()), math.inf
+        for begin in range(max(vertex - 1, 0), min(vertex + 1, len(curve) - 1)):
+            along = curve[begin + 1] - curve[begin]
+            part = np.clip((point - curve[begin]) @ along / (along @ along), 0.0, 1.0)
+            away = point - curve[begin] - part * along
+            if np.linalg.norm(away) < least:
+                least, places[i] = np.linalg.norm(away), begin + part
+                outs[i] = away @ (outward[begin] + part * (outward[begin + 1] - outward[begin]))
+    return places, outs
+
+
+def raised(places, outs, count, part):
+    """Largest excess within so many steps of each point; over one step more it fades to none."""
+    near = np.clip(part + 1.0 - np.abs(np.arange(count)[:, None] - places), 0.0, 1.0)
+    return np.maximum((near * outs).max(axis=1), 0.0)
+
+
 @given(seeds)
-def test_a_raw_point_stands_out_of_the_point_of_the_curve_that_is_nearest(seed):
+def test_a_raw_point_stands_out_of_the_place_of_the_curve_that_is_nearest(seed):
     rng = np.random.default_rng(seed)
     curve = folded(rng)
     outward = rng.normal(size=curve.shape)
     raw = curve[rng.integers(0, len(curve), 80)] + rng.normal(0.0, 5e-4, (80, 2))
-    guesses = rng.integers(0, len(curve), 80)
-    nearest = np.linalg.norm(raw[:, None] - curve, axis=2).argmin(axis=1)
-    want = np.zeros(len(curve))
-    np.maximum.at(want, nearest, ((raw - curve[nearest]) * outward[nearest]).sum(axis=1))
-    got = compiled_smoothing._excess(curve, outward, raw, guesses)
+    excess = compiled_smoothing._excess(curve, outward, raw, rng.integers(0, len(curve), 80))
+    got = compiled_smoothing._highest(excess, 24, 0)
+    want = raised(*standing_out(curve, outward, raw), len(curve), 24)
     np.testing.assert_allclose(got, want, atol=1e-15)
+
+
+def test_a_line_that_begins_a_micrometre_on_is_smoothed_without_a_jump():
+    """Sampled at other places of its length, and with raw points nearest to other vertices."""
+    for seed in range(150):
+        rng, scale = np.random.default_rng(seed), Scale.of()
+        x = np.sort(rng.uniform(-0.1, 0.1, 120))
+        line = np.column_stack([x, np.cumsum(rng.normal(0.0, 5e-4, 120))])
+        one, other = (
+            smooth(np.vstack([line[0] + [first, 0.0], line[1:]]), scale) for first in (0.0, 1e-6)
+        )
+        count = min(len(one), len(other)) - 2
+        away = PolylineSection([one]).clearances(other[2:count] @ [1.0, 1.0j])
+        assert np.abs(away).max() < 1.5e-6
 
 
 @given(seeds)
@@ -52,12 +86,10 @@ def test_a_smoothed_line_is_fitted_twice_and_raised_by_what_stands_out(seed):
     for _ in range(4):
         step = np.gradient(curve, axis=0)
         outward = np.column_stack([step[:, 1], -step[:, 0]]) / np.hypot(*step.T)[:, None]
-        nearest = np.linalg.norm(raw[:, None] - curve, axis=2).argmin(axis=1)
-        excess = np.zeros(len(curve))
-        np.maximum.at(excess, nearest, ((raw - curve[nearest]) * outward[nearest]).sum(axis=1))
-        if excess.max() <= 1e-5:
+        places, outs = standing_out(curve, outward, raw)
+        if outs.max() <= 1e-6:
             break
-        up = maximum_filter1d(excess, 2 * half + 1, mode="nearest")
+        up = raised(places, outs, len(curve), half)
         for size in (2 * (half // 2) + 1, 2 * (half - half // 2) + 1):
             up = uniform_filter1d(up, size, mode="nearest")
         curve = curve + up[:, None] * outward

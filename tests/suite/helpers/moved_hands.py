@@ -26,7 +26,7 @@ MICROMETRE = 1e-6
 PLACES = 61
 """One micrometre apart."""
 
-LEAST = 0.01
+LEAST = 0.05
 """Scale of a support, at least, in parts of the largest of its kind (force or moment)."""
 
 DIRECTIONS = np.vstack([np.eye(6), -np.eye(6)])
