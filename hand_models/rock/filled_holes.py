@@ -50,16 +50,18 @@ def filled_cells(triangles: Triangles) -> list[FilledCells]:
     table = scan_table()
     least, steep, share = (table.scalar("filled", name) for name in ("least", "steep", "share"))
     vertices, faces = triangles
-    edges = edges_of(faces)
-    steps = np.abs(vertices[edges[:, 0]] - vertices[edges[:, 1]])
-    cliff = steps > steep * np.median(np.linalg.norm(steps, axis=1))
     found: list[FilledCells] = []
+    edges, cliff = np.empty((0, 2), np.intp), np.empty((0, 3), np.bool_)
     for axis in range(3):
         values, level, counts = np.unique(
             vertices[:, axis], return_inverse=True, return_counts=True
         )
         if counts.max() < least:
             continue
+        if not len(edges):
+            edges = edges_of(faces)
+            steps = np.abs(vertices[edges[:, 0]] - vertices[edges[:, 1]])
+            cliff = steps > steep * np.median(np.linalg.norm(steps, axis=1))
         ends = level[edges]
         leaves = ends[:, 0] != ends[:, 1]
         ways, cliffs = (
