@@ -11,10 +11,11 @@ import math
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["curve_places", "leaf_boxes", "lines_met", "triangles_in_box"]
+__all__ = ["curve_places", "leaf_boxes", "lines_met", "solid_triangles", "triangles_in_box"]
 
 LEAF_SIZE: Final = 8
 """Triangles in a leaf; what is found does not depend on it."""
@@ -37,6 +38,26 @@ def curve_places(vertices: Array, faces: Indices) -> Indices:
             for bit in range(bits):
                 places[i] |= (number >> bit & 1) << (3 * bit + k)
     return places
+
+
+@compiled("f2", "i2", "f0")
+def solid_triangles(vertices: Array, faces: Indices, least: float) -> NDArray[np.bool_]:
+    """Return True for each triangle that is higher over its longest edge than ``least`` [m]."""
+    solid = np.empty(len(faces), dtype=np.bool_)
+    edges, square = np.empty((3, 3)), np.empty(3)
+    for i in range(len(faces)):
+        square[:] = 0.0
+        for side in range(3):
+            a, b = faces[i, side], faces[i, (side + 1) % 3]
+            for k in range(3):
+                edges[side, k] = vertices[b, k] - vertices[a, k]
+                square[side] += edges[side, k] ** 2
+        area = 0.0  # twice, squared
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            area += (edges[0, m] * edges[1, n] - edges[0, n] * edges[1, m]) ** 2
+        solid[i] = area > least**2 * square.max() and square.max() > least**2
+    return solid
 
 
 @compiled("f2", "i2", "i1")

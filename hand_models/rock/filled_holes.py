@@ -50,21 +50,24 @@ def filled_cells(triangles: Triangles) -> list[FilledCells]:
     table = scan_table()
     least, steep, share = (table.scalar("filled", name) for name in ("least", "steep", "share"))
     vertices, faces = triangles
-    edges = edges_of(faces)
-    steps = np.abs(vertices[edges[:, 0]] - vertices[edges[:, 1]])
-    cliff = steps > steep * np.median(np.linalg.norm(steps, axis=1))
     found: list[FilledCells] = []
+    some = faces[:: max(1, len(faces) // 100_000)]  # so many or some more are enough
+    sides = vertices[some] - vertices[some[:, [1, 2, 0]]]
+    highest = steep * float(np.median(np.linalg.norm(sides, axis=2)))
     for axis in range(3):
         values, level, counts = np.unique(
             vertices[:, axis], return_inverse=True, return_counts=True
         )
-        if counts.max() < least:
+        along = vertices[:, axis]
+        if counts.max() < least or np.ptp(along[faces], axis=1).max() <= highest:
             continue
+        edges = edges_of(faces)
+        cliff = np.abs(along[edges[:, 0]] - along[edges[:, 1]]) > highest
         ends = level[edges]
         leaves = ends[:, 0] != ends[:, 1]
         ways, cliffs = (
             np.bincount(ends[which].ravel(), minlength=len(values))
-            for which in (leaves, leaves & cliff[:, axis])
+            for which in (leaves, leaves & cliff)
         )
         for k in np.flatnonzero((counts >= least) & (ways > 0) & (cliffs >= share * ways)):
             beyond = np.unique(ends[leaves & (ends == k).any(axis=1)])

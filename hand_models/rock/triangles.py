@@ -66,35 +66,51 @@ def grouped(some: Indices, parts: Indices) -> list[Indices]:
 def weld(triangles: Triangles) -> Triangles:
     """Merge coinciding vertices of a mesh, and drop triangles without area and duplicates.
 
-    Vertices coincide if their coordinates are equal when rounded to 1e-8 m.
+    Vertices coincide if their coordinates are equal when rounded to 1e-8 m. A triangle has no area
+    if it is no higher than that over its longest edge. Of duplicates the first is kept.
     """
-    import trimesh
+    from hand_models.rock.compiled_cells import solid_triangles
 
-    mesh = trimesh.Trimesh(*_merged(triangles), process=False)
+    # [m] far below what any scan resolves, above the rounding of coordinates of 10⁴ m
+    finest = 1e-8
+    vertices, faces = _merged(_used(triangles), finest)
     go_on()
-    solid = mesh.nondegenerate_faces()
+    faces = faces[solid_triangles(vertices, np.ascontiguousarray(faces), finest)]
     go_on()
-    mesh.update_faces(solid & mesh.unique_faces())
-    mesh.remove_unreferenced_vertices()
+    corners = np.sort(faces, axis=1)
+    if _repeated(corners):
+        faces = faces[np.sort(np.unique(corners, axis=0, return_index=True)[1])]
     go_on()
-    return Triangles(
-        np.array(mesh.vertices, dtype=float, order="C"), np.array(mesh.faces, np.intp, order="C")
-    )
+    return _used(Triangles(vertices, faces))
 
 
-def _merged(triangles: Triangles) -> Triangles:
+def _used(triangles: Triangles) -> Triangles:
+    """Return a mesh without the vertices that no triangle has."""
+    vertices, faces = triangles
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    return Triangles(vertices[used], (np.cumsum(used) - 1)[faces])
+
+
+def _repeated(rows: Indices) -> bool:
+    """Return True if any two rows (n, 3) may be equal: these have equal sums, and hardly others."""
+    # large odd numbers; products that overflow do so alike
+    weights = np.array([0x1E3779B97F4A7C15, 0x3C6EF372FE94F82B, 0x2545F4914F6CDD1D])
+    sums = np.sort(rows @ weights)
+    return bool((sums[1:] == sums[:-1]).any())
+
+
+def _merged(triangles: Triangles, finest: float) -> Triangles:
     """Return triangles with one vertex, the first, in place of those that coincide.
 
     Sorted by one coordinate after another, so that no step takes long.
     """
     vertices, faces = triangles
-    used = np.zeros(len(vertices), dtype=bool)
-    used[faces] = True
-    named = np.flatnonzero(used)
+    cells = np.round(vertices / finest).astype(np.int64)
     go_on()
-    # [m] far below what any scan resolves, above the rounding of coordinates of 10⁴ m
-    cells = np.round(vertices[named] / 1e-8).astype(np.int64)
-    order = np.arange(len(named))
+    if not _repeated(cells):
+        return triangles
+    order = np.arange(len(vertices))
     for column in cells.T:
         go_on()
         order = order[np.argsort(column[order], kind="stable")]
@@ -102,14 +118,10 @@ def _merged(triangles: Triangles) -> Triangles:
     begins = np.append(True, (np.diff(cells[order], axis=0) != 0).any(axis=1))
     # of each group the vertex that comes first: sorting has left equals in their order
     first = order[begins]
-    kept = np.zeros(len(named), dtype=bool)
-    kept[first] = True
-    place = np.empty(len(named), dtype=np.intp)
-    place[order] = (np.cumsum(kept) - 1)[first][np.cumsum(begins) - 1]
+    place = np.empty(len(vertices), dtype=np.intp)
+    place[order] = first[np.cumsum(begins) - 1]
     go_on()
-    numbers = np.zeros(len(vertices), dtype=np.intp)
-    numbers[named] = place
-    return Triangles(vertices[named[kept]], numbers[faces])
+    return _used(Triangles(vertices, place[faces]))
 
 
 def wound_alike(triangles: Triangles) -> Triangles:
@@ -124,7 +136,11 @@ def wound_alike(triangles: Triangles) -> Triangles:
         If a part is not orientable, as a Möbius strip; the field is ``faces``.
     """
     faces = triangles.faces
-    count = len(faces)
+    ends, count = edges_of(faces), len(faces)
+    ways = np.sort(ends[:, 0] * len(triangles.vertices) + ends[:, 1])
+    # where no edge runs the same way twice, all are wound alike
+    if (ways[1:] != ways[:-1]).all():
+        return triangles
     first, second, alike = _neighbours(faces)
     if alike.all():
         return triangles

@@ -9,15 +9,46 @@ are no holes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
 from hand_models.rock import connected, grouped
-from hand_models.scans.rock import Hole, Step
 
-__all__ = ["Gaps", "empty_circles"]
+__all__ = ["Gaps", "Hole", "Step", "empty_circles"]
+
+
+class Hole(NamedTuple):
+    """Part of the rock without points, seen along the view.
+
+    Attributes
+    ----------
+    width : float
+        Diameter of the widest circle without points whose centre is in the hole, across the
+        view [m].
+    place : ndarray, shape (3,)
+        Mean of the hole's corners, in the rock's frame [m].
+    """
+
+    width: float
+    place: Array
+
+
+class Step(NamedTuple):
+    """Jump along the view between neighbouring points, so large that it may hide rock.
+
+    Attributes
+    ----------
+    height : float
+        Height of the jump along the view [m].
+    place : ndarray, shape (3,)
+        Mean of the step's corners, in the rock's frame [m].
+    """
+
+    height: float
+    place: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,40 +57,30 @@ class Gaps:
 
     Attributes
     ----------
-    triangles : ndarray, shape (m, 3, 3)
-        Corners of each triangle [m].
+    points : ndarray, shape (n, 3)
+        [m]
+    corners : ndarray of int, shape (m, 3)
+        Points of each triangle.
     beside : ndarray of int, shape (m, 3)
-        Neighbour opposite to each corner, −1 for none.
+        Neighbours of each triangle, −1 for none.
     bridged : ndarray, shape (m,)
         Width that each triangle bridges [m]; infinite for slivers of the outline.
     area : ndarray, shape (m,)
         Area across z [m²].
     """
 
-    triangles: Array
-    beside: NDArray[np.int32]
+    points: Array
+    corners: Indices
+    beside: Indices
     bridged: Array
     area: Array
 
     @classmethod
-    def between(cls, triangles: Array, beside: NDArray[np.int32]) -> Gaps:
-        """Compute the width that each triangle bridges, and its area.
+    def between(cls, points: Array, corners: Indices, beside: Indices) -> Gaps:
+        """Compute the width that each triangle bridges, and its area; parameters as attributes."""
+        from hand_models.scans.compiled_triangulation import bridged_widths
 
-        Parameters
-        ----------
-        triangles : ndarray, shape (m, 3, 3)
-            Corners of each triangle [m].
-        beside : ndarray of int, shape (m, 3)
-            Neighbour opposite to each corner, −1 for none.
-        """
-        edges = _edges(triangles)
-        across, area = np.hypot(edges[..., 0], edges[..., 1]), _areas(edges)
-        # hardly any area, as a part of the longest edge's square
-        sliver = 2.0 * area <= 1e-6 * across.max(axis=1) ** 2
-        circle = np.where(sliver, 0.0, across.prod(axis=1) / np.where(sliver, 1.0, 2.0 * area))
-        width = np.maximum(circle, np.linalg.norm(edges, axis=2).max(axis=1))
-        width[sliver & (beside < 0).any(axis=1)] = np.inf
-        return cls(triangles, beside, width, area)
+        return cls(points, corners, beside, *bridged_widths(points, corners, beside))
 
     def open_(self, hole: float) -> NDArray[np.bool_]:
         """Return True for each triangle that bridges more than ``hole`` [m], shape (m,)."""
@@ -85,24 +106,24 @@ class Gaps:
         tuple of (tuple of Hole, tuple of Step)
             The widest hole and the highest step first.
         """
-        open_, beside, count = self.open_(hole), self.beside, len(self.triangles)
-        rows, side = np.nonzero(open_[:, None] & (beside >= 0) & open_[beside])
-        part = connected(np.column_stack([rows, beside[rows, side]]), count)
-        outside = np.zeros(count, dtype=bool)
+        open_ = self.open_(hole)
+        corners, beside = self.corners[open_], self.beside[open_]
+        number = np.cumsum(open_) - 1
+        rows, side = np.nonzero((beside >= 0) & open_[beside])
+        part = connected(np.column_stack([rows, number[beside[rows, side]]]), len(corners))
+        outside = np.zeros(len(corners), dtype=bool)
         outside[part[(beside < 0).any(axis=1)]] = True
-        groups = grouped(np.flatnonzero(open_ & ~outside[part]), part)
-        circle, rise = (
-            empty_circles(self.triangles),
-            np.abs(_edges(self.triangles)[..., 2]).max(axis=1),
-        )
+        groups = grouped(np.flatnonzero(~outside[part]), part)
         holes: list[Hole] = []
         steps: list[Step] = []
         for group in groups:
-            place = self.triangles[group].mean(axis=(0, 1))
-            if circle[group].max() > hole:
-                holes.append(Hole(float(circle[group].max()), place))
-            elif rise[group].max() > hole:
-                steps.append(Step(float(rise[group].max()), place))
+            triangles = self.points[corners[group]]
+            place, circle = triangles.mean(axis=(0, 1)), float(empty_circles(triangles).max())
+            rise = float(np.ptp(triangles[..., 2], axis=1).max())
+            if circle > hole:
+                holes.append(Hole(circle, place))
+            elif rise > hole:
+                steps.append(Step(rise, place))
         return (
             tuple(sorted(holes, key=lambda each: -each.width)),
             tuple(sorted(steps, key=lambda each: -each.height)),
@@ -125,9 +146,9 @@ def empty_circles(triangles: Array) -> Array:
     ndarray, shape (m,)
         [m]
     """
-    edges = _edges(triangles[:, :, :2])
+    edges = triangles[:, [1, 2, 0], :2] - triangles[:, :, :2]
     a, b, c = np.sort(np.linalg.norm(edges, axis=2), axis=1).T
-    twice = 2.0 * _areas(edges)
+    twice = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
     obtuse = a**2 + b**2 <= c**2
     tiny = np.finfo(float).tiny
     near = [
@@ -136,13 +157,3 @@ def empty_circles(triangles: Array) -> Array:
     ]
     circle = a * b * c / np.where(obtuse, 1.0, np.maximum(twice, tiny))
     return np.asarray(np.where(obtuse, np.maximum(*near), circle))
-
-
-def _edges(triangles: Array) -> Array:
-    return triangles[:, [1, 2, 0]] - triangles
-
-
-def _areas(edges: Array) -> Array:
-    """Return areas across z of triangles, by their edges (m, 3, 2 or 3), shape (m,)."""
-    cross = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    return np.asarray(0.5 * np.abs(cross))

@@ -7,8 +7,8 @@ import scipy
 
 from hand_models.base import Array, Indices, InvalidInputError, Pose
 from hand_models.rock import Triangles, connected, edges_of, filled_cells, grouped, weld
-from hand_models.scans.holes import empty_circles
-from hand_models.scans.rock import Hole, ScannedRock
+from hand_models.scans.holes import Hole, empty_circles
+from hand_models.scans.rock import ScannedRock
 from hand_models.scans.scan import Scan, areas_of, axes_along, in_scan, start_on
 
 __all__ = ["keep_triangles"]

@@ -47,8 +47,7 @@ def mesh_scan(
     scan : Scan
     spacing : float, optional
         Side of the squares across the view each of which keeps one point, that of median depth. By
-        default half the median distance between neighbours, or more where ``scan.toml`` allows
-        fewer points [m].
+        default half the median distance between neighbours, or more by ``scan.toml`` [m].
     hole : float, optional
         Width of the widest hole that is bridged, by default as in ``scan.toml`` [m]. In a file's
         triangles no hole is bridged, and wider ones are reported.
@@ -84,14 +83,15 @@ def mesh_scan(
         raise _nothing_left(scan, made, hole)
     filled = filled_cells(Triangles(points, made.corners))
     holes, drops = made.gaps.left(hole)
-    used, faces = np.unique(faces, return_inverse=True)
-    points, faces = points[used], faces.reshape(-1, 3)
+    used = np.zeros(len(points), dtype=bool)
+    used[faces] = True
+    points, faces = points[used], (np.cumsum(used) - 1)[faces]
     start = start_on(points, scan, middle, axes)
     report(steps, steps)
     return ScannedRock(
         vertices=points - start,
         # counterclockwise for who looks along z
-        faces=_clockwise(points, faces),
+        faces=faces[:, ::-1],
         pose=Pose(middle + axes @ start, axes),
         holes=tuple(each._replace(place=each.place - start) for each in holes),
         steps=tuple(each._replace(place=each.place - start) for each in drops),
@@ -101,6 +101,7 @@ def mesh_scan(
         outliers=scan.outliers,
         spacing=_spacing(points),
         filled=tuple(in_scan(cells, middle, axes) for cells in filled),
+        gaps=made.gaps,
     )
 
 
@@ -112,7 +113,7 @@ class Triangulated(NamedTuple):
     points : ndarray, shape (n, 3)
         Coordinates from ``middle`` along ``axes`` [m].
     corners : ndarray of int, shape (m, 3)
-        Points of each triangle.
+        Points of each triangle, counterclockwise over x and y.
     gaps : Gaps
         The width that each triangle bridges.
     middle : ndarray, shape (3,)
@@ -149,36 +150,35 @@ def triangulated(
     """
     axes = axes_along(scan.direction())
     middle = 0.5 * (scan.points.min(axis=0) + scan.points.max(axis=0))
-    points = (scan.points - middle) @ axes
+    # along the axes, but from the scan's origin: a crop of the scan has the same squares
+    points = scan.points @ axes
     _check_spread(points)
-    if spacing is None:
-        most = int(scan_table().scalar("mesh", "vertices"))
-        points = _fewer(points, 0.5 * _spacing(points), most)
-    else:
-        points = points[_kept(points, _length(spacing, "spacing"))]
+    side = _usual_side(points) if spacing is None else _length(spacing, "spacing")
+    points = points[_kept(points, side)] - middle @ axes
     report(1, SCAN_SETTINGS.mesh_steps)
     _check_spread(points, spacing)
-    try:
-        flat = scipy.spatial.Delaunay(points[:, :2])
-    except scipy.spatial.QhullError as error:
-        raise InvalidInputError(
-            f"the {len(points)} points cannot be joined to triangles across the view: give another "
-            f"view (Qhull said {str(error).splitlines()[0]})",
-            field="file",
-        ) from None
+    corners, beside = _joined(points)
     report(2, SCAN_SETTINGS.mesh_steps)
-    corners = flat.simplices.astype(np.intp)
-    return Triangulated(
-        points, corners, Gaps.between(points[corners], flat.neighbors), middle, axes
-    )
+    return Triangulated(points, corners, Gaps.between(points, corners, beside), middle, axes)
+
+
+def _joined(points: Array) -> tuple[Indices, Indices]:
+    """Return the Delaunay triangles of points across the view, and the neighbours of each."""
+    from hand_models.scans.compiled_triangulation import delaunay_triangles
+
+    across = points[:, :2] - points[:, :2].min(axis=0)
+    whole = np.rint(across / (across.max() * SCAN_SETTINGS.finest)).astype(np.intp)
+    centre = whole.mean(axis=0).astype(np.intp)
+    order = np.argsort(((whole - centre) ** 2).sum(axis=1), kind="stable")
+    corners, beside = delaunay_triangles(whole[order], centre)
+    return order[corners], beside
 
 
 def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputError:
     """Return an error that names why every triangle bridges more than a hole may be wide."""
     table, apart = scan_table(), _spacing(made.points)
     extent = float(np.ptp(made.points, axis=0).max())
-    corners = made.gaps.triangles
-    rise = float(np.median(np.ptp(corners[..., 2], axis=1)))
+    rise = float(np.median(np.ptp(made.points[made.corners, 2], axis=1)))
     what = "cells" if scan.heights else "points"
     message = f"{what} are {1e3 * apart:.3g} mm apart"
     open_ = f"and holes wider than {1e3 * hole:.3g} mm stay open: no triangle is left"
@@ -277,33 +277,42 @@ def _check_spread(points: Array, spacing: float | None = None) -> None:
 
 def _spacing(points: Array) -> float:
     """Return the median distance of a point to the nearest one across the view [m]."""
-    across = np.unique(points[:, :2], axis=0)
+    # points at one place count once
+    across = points[_kept(points, 0.0), :2]
     some = across[:: max(1, len(across) // 20_000)]  # so many or some more are enough
-    distance = np.asarray(scipy.spatial.cKDTree(across).query(some, k=2)[0])
+    tree = scipy.spatial.cKDTree(across, compact_nodes=False, balanced_tree=False)
+    distance = np.asarray(tree.query(some, k=2)[0])
     return float(np.median(distance[:, 1]))
 
 
-def _fewer(points: Array, side: float, most: int) -> Array:
-    """Return points one a square, of squares so large that no more than ``most`` are left."""
+def _usual_side(points: Array) -> float:
+    """Return the side of the squares that keep one point each if no spacing is asked for [m]."""
+    table = scan_table()
+    few, finest, most = (table.scalar("mesh", key) for key in ("vertices", "spacing", "most"))
+    side = 0.5 * _spacing(points)
     while True:
-        kept = points[_kept(points, side)]
-        if len(kept) <= most:
-            return kept
-        side *= max(1.15, math.sqrt(len(kept) / most))
+        limit = few if side < finest else most
+        count = 1 + np.count_nonzero(np.diff(np.sort(_squares(points, side))))
+        if count <= limit:
+            return side
+        wider = side * max(1.15, math.sqrt(count / limit))
+        side = min(wider, finest) if side < finest else wider
+
+
+def _squares(points: Array, side: float) -> Indices:
+    """Return the number of the square across the view in which each point is, shape (n,)."""
+    side = max(side, SCAN_SETTINGS.finest * max(np.ptp(points[:, 0]), np.ptp(points[:, 1])))
+    # a quarter of a side from the origin, rows of a grid are rarely on the squares' sides
+    x, y = (np.floor(points[:, k] / side + 0.25).astype(np.intp) for k in range(2))
+    return np.asarray((x - x.min()) * (np.ptp(y) + 1) + y - y.min())
 
 
 def _kept(points: Array, side: float) -> Indices:
-    """Return the point of median depth of each square that has any."""
-    place = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / side)
-    order = np.lexsort([points[:, 2], place[:, 1], place[:, 0]])
-    new = (np.diff(place[order], axis=0) != 0.0).any(axis=1)
-    begins = np.concatenate([[0], np.flatnonzero(new) + 1])
+    """Return the point of median depth of each square that has any, square by square."""
+    square = _squares(points, side)
+    # tilted by so little that only of points at one depth another comes first, whatever their order
+    order = np.argsort(points @ np.array([1e-6, 1.7e-6, 1.0]))
+    order = order[np.argsort(square[order], kind="stable")]
+    begins = np.flatnonzero(np.diff(square[order], prepend=-1))
     ends = np.append(begins[1:], len(order))
-    return np.sort(order[(begins + ends - 1) // 2])
-
-
-def _clockwise(points: Array, faces: Indices) -> Indices:
-    """Return faces that run clockwise over x and y."""
-    a, b, c = (points[faces[:, i], :2] for i in range(3))
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    return np.asarray(np.where(area[:, None] > 0.0, faces[:, ::-1], faces))
+    return np.asarray(order[(begins + ends - 1) // 2])

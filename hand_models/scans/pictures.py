@@ -10,7 +10,6 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
@@ -153,27 +152,26 @@ def _paint(
     vertices: Array, faces: Indices, palette: str, title: str
 ) -> tuple[Axes, ScalarMappable]:
     """Draw triangles as the scanner saw them, and return what their colours mean: heights [mm]."""
+    from hand_models.scans.compiled_pictures import seen_triangles
+
     axes = Figure(figsize=(8.0, 7.0), layout="constrained").add_subplot()
     axes.set_title(title, parse_math=False)
-    corners = vertices[faces]
-    # what is nearer to the scanner over what is behind it
-    corners = corners[np.argsort(-corners[:, :, 2].mean(axis=1), kind="stable")]
-    heights = -1e3 * corners[:, :, 2].mean(axis=1)
-    scale = _scale(np.percentile(heights, [0.5, 99.5]))
-    colours = ScalarMappable(scale, palette)
-    painted = np.array(colours.to_rgba(heights))
-    painted[:, :3] *= _brightness(corners)[:, None]
-    axes.add_collection(
-        PolyCollection(
-            list(corners[:, :, [1, 0]]),
-            facecolors=painted,
-            edgecolors="face",
-            linewidths=0.2,
-            rasterized=True,
-        ),
-        autolim=False,
-    )
     low, high = vertices.min(axis=0), vertices.max(axis=0)
+    pixel = (high - low)[:2].max() / 1200  # of the longer side, the picture has about as many
+    rows, columns = np.ceil((high - low)[:2] / pixel).astype(int) + 1
+    corners = vertices[faces]
+    place = (corners - low) / [pixel, pixel, 1.0]
+    seen = seen_triangles(place, int(rows), int(columns))
+    corners = corners[seen[seen >= 0]]
+    heights = -1e3 * corners[:, :, 2].mean(axis=1)
+    scale = _scale(np.percentile(heights, [0.5, 99.5]) if len(heights) else heights)
+    colours = ScalarMappable(scale, palette)
+    painted = np.ones((*seen.shape, 4))
+    painted[seen >= 0] = colours.to_rgba(heights)
+    painted[seen >= 0, :3] *= _brightness(corners)[:, None]
+    left, bottom = low[[1, 0]] - 0.5 * pixel
+    right, top = left + columns * pixel, bottom + rows * pixel
+    axes.imshow(painted, origin="lower", extent=(left, right, bottom, top))
     margin = 0.03 * (high - low)[:2].max()
     for axis, size in ((axes.xaxis, high[1] - low[1]), (axes.yaxis, high[0] - low[0])):
         count = round(8 * size / (high - low)[:2].max())

@@ -4,47 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-import trimesh
-from trimesh.exchange.ply import export_ply
 
 from hand_models.base import Array, Indices, Pose, whole_file
 from hand_models.rock import FilledCells
+from hand_models.scans.holes import Gaps, Hole, Step
+from hand_models.scans.scan import areas_of
 
-__all__ = ["Hole", "ScannedRock", "Step", "write_rock"]
-
-
-class Hole(NamedTuple):
-    """Part of the rock without points, seen along the view.
-
-    Attributes
-    ----------
-    width : float
-        Diameter of the widest circle without points whose centre is in the hole, across the
-        view [m].
-    place : ndarray, shape (3,)
-        Mean of the hole's corners, in the rock's frame [m].
-    """
-
-    width: float
-    place: Array
-
-
-class Step(NamedTuple):
-    """Jump along the view between neighbouring points, so large that it may hide rock.
-
-    Attributes
-    ----------
-    height : float
-        Height of the jump along the view [m].
-    place : ndarray, shape (3,)
-        Mean of the step's corners, in the rock's frame [m].
-    """
-
-    height: float
-    place: Array
+__all__ = ["ScannedRock", "write_rock"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +48,9 @@ class ScannedRock:
     kept, turned : bool
         True if the triangles are the file's; True if these were turned over because they faced
         away from the given view.
+    gaps : Gaps or None
+        What all triangles between the points bridge, also those that were left out; None for a
+        file's triangles.
     """
 
     vertices: Array
@@ -95,6 +66,7 @@ class ScannedRock:
     outliers: int = 0
     kept: bool = False
     turned: bool = False
+    gaps: Gaps | None = None
 
     @property
     def extent(self) -> Array:
@@ -104,6 +76,18 @@ class ScannedRock:
 
 def write_rock(rock: ScannedRock, path: Path) -> None:
     """Write scanned rock to a PLY file with normals [m], which `read_mesh` can read for a hold."""
-    mesh = trimesh.Trimesh(rock.vertices, rock.faces, process=False)
-    with whole_file(path) as part:
-        part.write_bytes(export_ply(mesh, vertex_normal=True))
+    vertices, faces = rock.vertices, rock.faces
+    # a vertex's normal is the mean of its triangles', by area
+    areas, corners = areas_of(vertices, faces), faces.T.ravel()
+    normals = np.array([np.bincount(corners, np.tile(a, 3), len(vertices)) for a in areas.T])
+    normals /= np.maximum(np.linalg.norm(normals, axis=0), np.finfo(float).tiny)
+    points = np.column_stack([vertices, normals.T]).astype("<f4")
+    triangles = np.full(len(faces), 3, [("count", "u1"), ("corners", "<i4", 3)])
+    triangles["corners"] = faces
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    header += [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
+    header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    with whole_file(path) as part, part.open("wb") as file:
+        file.write("\n".join([*header, "end_header", ""]).encode())
+        points.tofile(file)
+        triangles.tofile(file)

@@ -52,6 +52,8 @@ class ScanSettings:
     """Steps of meshing that are reported to a progress callback: thin, triangulate, find holes."""
     smallest_rock: float = 0.1
     """Size of the smallest rock that a hand is to grip, about a palm's length [m]."""
+    finest: float = 2.0**-30
+    """Part of the points' extent below which differences across the view are not seen."""
 
 
 SCAN_SETTINGS: Final = ScanSettings()

@@ -28,6 +28,10 @@ class SceneSettings:
     """Largest width of a hold, or lever of a moment, in multiples of the limbs' reach."""
     rock_length: float = 4.0
     """Length of rock that is drawn out, or along faces of an edge, from its crest [m]."""
+    rock_triangles: int = 400_000
+    """Triangles of rock from which on it is coarser for distances: each takes 4 µs and 1 kB."""
+    rock_cube: float = 0.008
+    """Side of the cubes that then keep one vertex each; capsules are rougher, 20 mm [m]."""
 
 
 SCENE_SETTINGS: Final = SceneSettings()

@@ -150,7 +150,13 @@ def _wedge(edge: Swept) -> Any:
 
 
 def _surface(vertices: Array, faces: Indices) -> Any:
-    """Return triangles."""
+    """Return triangles, of many no more than `SCENE_SETTINGS` says."""
+    if len(faces) > SCENE_SETTINGS.rock_triangles:
+        x, y, z = np.floor((vertices - vertices.min(axis=0)) / SCENE_SETTINGS.rock_cube).T
+        cubes = (x * (y.max() + 1.0) + y) * (z.max() + 1.0) + z
+        _, kept, cube = np.unique(cubes, return_index=True, return_inverse=True)
+        vertices, faces = vertices[kept], cube[faces]
+        faces = faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
     shape = coal.BVHModelOBBRSS()
     shape.beginModel(len(faces), len(vertices))
     shape.addVertices(np.ascontiguousarray(vertices, dtype=float))

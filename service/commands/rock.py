@@ -96,7 +96,9 @@ def _triple(_: click.Context, __: click.Parameter, text: str | None) -> tuple[fl
     "--spacing",
     type=float,
     help="Keep one point a square of that side across the view [m]; by default half the points' "
-    f"median distance, or as much more as leaves {SCAN_NUMBERS.scalar('mesh', 'vertices'):,.0f}.",
+    f"median distance, or as much more as leaves {SCAN_NUMBERS.scalar('mesh', 'vertices'):,.0f}, "
+    f"up to {SCAN_NUMBERS.scalar('mesh', 'spacing'):g}, or if that is not enough, as leaves "
+    f"{SCAN_NUMBERS.scalar('mesh', 'most'):,.0f}.",
 )
 @click.option(
     "--hole",

@@ -11,7 +11,7 @@ import trimesh
 
 from hand_models import Grasp, InvalidInputError, Mesh, Pose
 from hand_models.rock import read_mesh
-from hand_models.scans import mesh_scan, plot_rock, read_scan, write_rock
+from hand_models.scans import Scan, mesh_scan, plot_rock, read_scan, write_rock
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.scans import relief, wall, write_cloud
 
@@ -40,7 +40,8 @@ def test_normals_are_those_of_the_rock_toward_the_scanner(tmp_path):
     slope = np.column_stack([-0.2 * np.cos(20 * x), -np.ones_like(x), 0.2 * np.sin(25 * z)])
     want = slope / np.linalg.norm(slope, axis=1)[:, None] @ rock.pose.rotation
     inside = np.abs(rock.vertices[:, :2]).max(axis=1) < 0.11
-    normals = trimesh.Trimesh(rock.vertices, rock.faces, process=False).vertex_normals
+    write_rock(rock, tmp_path / "rock.ply")
+    normals = trimesh.load(tmp_path / "rock.ply", process=False).vertex_normals
     assert (normals * want).sum(axis=1)[inside].min() > 0.999
     assert normals[:, 2].max() < 0.0
 
@@ -92,15 +93,69 @@ def test_a_spacing_keeps_one_point_a_square(tmp_path):
     np.testing.assert_allclose(y, 1.0 - relief(x, z), atol=1e-12)
 
 
-@pytest.mark.slow
-def test_a_large_cloud_is_thinned_to_what_a_hand_can_be_placed_on(tmp_path):
-    x, z = np.random.default_rng(0).uniform(-0.6, 0.6, (2, 200_000))
-    points = np.column_stack([x, 1.0 - relief(x, z), z])
-    path = write_cloud(tmp_path / "cloud.pcd", points, "binary")
-    rock = mesh_scan(read_scan(path))
-    assert 60_000 < len(rock.vertices) <= 100_000
-    assert len(rock.faces) < 200_000
-    assert not rock.holes
+def cloud(side, count=400_000):
+    """Points at random places of a square wall that is seen from −y, in 32 bits [m]."""
+    x, z = np.random.default_rng(0).uniform(0.0, side, (2, count))
+    return np.column_stack([x, 1.0 - relief(x, z), z]).astype(np.float32).astype(float)
+
+
+def seen(points, **options):
+    """Rock of a cloud, seen along y."""
+    view = np.array([0.0, 1.0, 0.0])
+    return mesh_scan(Scan(points, len(points), view, np.zeros(3), None), **options)
+
+
+def squares(points, side):
+    return np.unique(np.floor(points[:, [0, 2]] / side + 0.25), axis=0)
+
+
+def test_a_large_cloud_keeps_a_point_every_2_mm_and_a_small_one_100_000():
+    large, small = seen(cloud(0.7)), seen(cloud(0.2))
+    assert len(large.vertices) == len(squares(cloud(0.7), 0.002)) > 100_000
+    assert 50_000 < len(small.vertices) <= 100_000
+    assert small.spacing < 0.001
+
+
+def test_a_grid_of_2_mm_loses_no_row():
+    points = np.stack(np.meshgrid(*2 * [0.002 * np.arange(400)], [1.0]), axis=-1)
+    assert len(seen(points.reshape(-1, 3)[:, [0, 2, 1]]).vertices) == 400**2
+
+
+def test_between_the_points_rock_is_as_far_off_as_its_curvature_makes_it():
+    """By half the largest second derivative, 5 / m, times the squared radius of the circles."""
+    rock = seen(cloud(0.7))
+    corners = rock.vertices[rock.faces][:, :, :2]
+    sides = [np.linalg.norm(corners[:, k - 2] - corners[:, k], axis=1) for k in range(3)]
+    edges = corners[:, 1:] - corners[:, :1]
+    area = np.abs(np.linalg.det(edges)) / 2.0
+    # around the rim a triangle's circle may reach beyond it
+    rim = np.abs(corners.mean(axis=1) - rock.vertices[:, :2].mean(axis=0)).max(axis=1) > 0.34
+    radius = (np.prod(sides, axis=0) / (4.0 * area))[~rim].max()
+    assert radius < 0.006
+    x, z = np.random.default_rng(1).uniform(0.02, 0.68, (2, 2000))
+    before = rock.pose.inverse().apply(np.column_stack([x, np.zeros_like(x), z]))
+    away = Mesh(rock.vertices, rock.faces).entries(before, (0, 0, 1))
+    assert np.abs(away - (1.0 - relief(x, z))).max() <= 0.5 * 5.0 * radius**2
+
+
+def test_the_order_of_points_does_not_matter():
+    points = cloud(0.7)
+    rock, other = seen(points), seen(np.random.default_rng(2).permutation(points))
+    np.testing.assert_array_equal(rock.vertices, other.vertices)
+    np.testing.assert_array_equal(rock.faces, other.faces)
+
+
+def test_a_crop_of_a_cloud_has_the_same_triangles():
+    points = cloud(0.5, 50_000)
+    part = points[points[:, 0] < 0.25]
+
+    def within(rock):
+        triangles = rock.pose.apply(rock.vertices.reshape(-1, 3))[rock.faces]
+        inner = triangles[triangles[:, :, 0].max(axis=1) < 0.22]
+        assert len(inner) > 10_000
+        return {tuple(sorted(map(tuple, each))) for each in np.round(inner, 9).tolist()}
+
+    assert within(seen(points, spacing=0.003)) == within(seen(part, spacing=0.003))
 
 
 def test_points_that_were_seen_twice_are_taken_once(tmp_path):
@@ -182,7 +237,9 @@ def test_a_hand_settles_on_real_terrain_that_is_made_a_wall(tmp_path):
     np.testing.assert_allclose(vertices, rock.vertices, atol=1e-7)
     np.testing.assert_array_equal(faces, rock.faces)
     settled = HAND.settle(Mesh(vertices, faces), ROCK, Grasp(0.0))
-    assert settled.palm.engaged
+    assert len(settled.tiles) > 8
+    # the palm hangs between fingers, or one tile of it engages
+    assert 0.0 < settled.palm.gaps.min() < 0.007
     plot_rock(rock, tmp_path / "rock.png", "terrain")
     assert (tmp_path / "rock.png").stat().st_size > 50_000
 

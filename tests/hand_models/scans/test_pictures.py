@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from hand_models.base import Pose
 from hand_models.rock import Triangles
 from hand_models.scans import Hole, ScannedRock, pictures, plot_holds, plot_rock
+from hand_models.scans.compiled_pictures import seen_triangles
 
 
 @pytest.fixture
@@ -51,6 +52,22 @@ def test_points_without_a_hold_have_a_marker_for_each_kind(
         np.testing.assert_array_equal(lines[kind].get_xydata(), points[:, [1, 0]])
     assert len({line.get_marker() for line in lines.values()}) == len(kinds)
     assert [axes.get_ylabel() for axes in figure.axes][1] == "share"
+
+
+def test_in_each_pixel_the_first_triangle_is_seen() -> None:
+    """Against the depth of every triangle's plane at every pixel."""
+    triangles = np.random.default_rng(0).uniform(-3.0, 23.0, (12, 3, 3))
+    rows, columns = 20, 17
+    middles = np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"), axis=-1)
+    depths = np.full((len(triangles), rows, columns), np.inf)
+    for depth, triangle in zip(depths, triangles, strict=True):
+        plane = np.column_stack([triangle[:, :2], np.ones(3)])
+        weights = np.insert(middles, 2, 1, axis=-1) @ np.linalg.inv(plane)
+        inside = (weights >= 0.0).all(axis=-1)
+        depth[inside] = (weights @ triangle[:, 2])[inside]
+    want = np.where(np.isfinite(depths.min(axis=0)), depths.argmin(axis=0), -1)
+    assert (want < 0).any()
+    np.testing.assert_array_equal(seen_triangles(triangles, rows, columns), want)
 
 
 def test_widths_of_holes_do_not_lie_on_each_other_nor_the_legend_on_the_rock(

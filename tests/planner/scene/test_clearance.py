@@ -1,5 +1,6 @@
 """The least distances about a stance, held against points all along the capsules."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,12 +8,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import Pose
-from hand_models.rock import Cylinder, Edge, Ellipsoid, Mesh, Plane, Profile, Sphere
+from hand_models.rock import Cylinder, Edge, Ellipsoid, Mesh, Plane, Profile, Sphere, Triangles
+from hand_models.rock.surface import grid
 from planner.prepare import posture
 from planner.prepare.settled_stance import settle_stance
 from planner.question import Question, Stance
 from planner.robots import Robot, robosimian
-from planner.scene import clearance, link_findings, scene_of
+from planner.scene import clearance, link_findings, scene_of, solids
+from planner.scene.scene import SCENE_SETTINGS
 from planner.solving import plan
 from service.answering.questions import question
 from service.commands.stances import read_request
@@ -111,6 +114,21 @@ def test_rock_of_triangles_and_outlines_is_as_near_as_the_log_that_they_show():
         hands = tuple(replace(hand, hold_in_hand=given) for hand in stance.hands)
         found.append(clearance(scene(replace(stance, hands=hands)), None).body_rock.distance)
     assert found[1:] == pytest.approx([found[0]] * 2, abs=1e-4)
+
+
+def test_rock_of_many_triangles_is_as_near_but_for_a_cube(monkeypatch):
+    """Vertices merged in cubes of 8 mm move by less than the diagonal."""
+    many = replace(SCENE_SETTINGS, rock_triangles=0)
+    monkeypatch.setattr(solids, "SCENE_SETTINGS", many)
+    x, y = np.meshgrid(np.arange(-1.0, 1.0, 0.01), np.arange(-1.0, 1.0, 0.003), indexing="ij")
+    fine = grid(np.stack([x, y, 0.02 * np.sin(30.0 * x) * np.cos(20.0 * y)], axis=-1))
+    fine = Triangles(fine.vertices, fine.faces[:, ::-1])
+    stance = on_wall(Mesh(*fine))
+    found = clearance(scene(stance), None).body_rock
+    monkeypatch.undo()
+    solids.ROCK_SHAPES.clear()
+    want = clearance(scene(stance), None).body_rock
+    assert 0.0 < abs(found.distance - want.distance) < math.sqrt(3.0) * many.rock_cube
 
 
 def test_what_was_not_measured_is_said():
