@@ -25,7 +25,7 @@ path and left spines at a gap that the path does not have."""
 STEP = 0.01
 """Of a support at a micrometre, at most, in parts of its scale."""
 
-JUMPING = 0.15
+JUMPING = 0.12
 """Share of hands, at most, that have a larger step: a phalanx that comes within its spines' travel
 bears across the gap at once, and where two equilibria are close a finger ends in one or the other.
 """
@@ -77,7 +77,7 @@ def test_most_hands_hold_alike_at_all_of_61_places():
             flipping.append(seed)
         elif scan.steps().max() > STEP:
             jumping.append(seed)
-    assert len(flipping) <= 1, flipping
+    assert len(flipping) <= 2, flipping
     assert len(jumping) <= JUMPING * 200, jumping
 
 
