@@ -22,6 +22,11 @@ def _between(part: float, low: float, high: float) -> float:
 
 
 @compiled()
+def _inverse(length: float) -> float:
+    return 1.0 / length if length > 0.0 else 0.0
+
+
+@compiled()
 def _part(low: float, high: float, at: float) -> float:
     return (at - low) / (high - low) if high > low else 0.0
 
@@ -99,7 +104,7 @@ def heights_across(
     axes = _axes(plane)
     least = np.full((len(halves) + len(lines), len(s)), math.inf)
     step, widest = s[1] - s[0], halves.max()
-    apart = lines[1] - lines[0] if len(lines) > 1 else 1.0
+    per_line = 1.0 / (lines[1] - lines[0]) if len(lines) > 1 else 1.0
     corners = np.empty((3, 3))
     for one in some:
         if not _seen(vertices, faces[one], plane[0], axes, (widest, s[-1]), corners):
@@ -113,31 +118,32 @@ def heights_across(
             a, b = b, a
         first = max(math.ceil((a[0] - s[0] - slack) / step), 0)
         last = min(math.floor((c[0] - s[0] + slack) / step), len(s) - 1)
+        whole, early, late = _inverse(c[0] - a[0]), _inverse(b[0] - a[0]), _inverse(c[0] - b[0])
         for at in range(first, last + 1):
-            # one edge crosses the line s = const from the first corner to the last, or both others
-            whole, early, late = (
-                _part(a[0], c[0], s[at]),
-                _part(a[0], b[0], s[at]),
-                _part(b[0], c[0], s[at]),
-            )
-            low, low_t = _between(whole, a[1], c[1]), _between(whole, a[2], c[2])
+            # the edge from the first corner to the last crosses the line s = const, and another
+            part = (s[at] - a[0]) * whole
+            low, low_t = _between(part, a[1], c[1]), _between(part, a[2], c[2])
             if s[at] <= b[0]:
-                high, high_t = _between(early, a[1], b[1]), _between(early, a[2], b[2])
+                part = (s[at] - a[0]) * early
+                high, high_t = _between(part, a[1], b[1]), _between(part, a[2], b[2])
             else:
-                high, high_t = _between(late, b[1], c[1]), _between(late, b[2], c[2])
+                part = (s[at] - b[0]) * late
+                high, high_t = _between(part, b[1], c[1]), _between(part, b[2], c[2])
             if high < low:
                 low, low_t, high, high_t = high, high_t, low, low_t
+            width = _inverse(high - low)
             for i in range(len(halves)):
                 bottom, top = max(low, -halves[i]), min(high, halves[i])
                 if bottom <= top:
-                    here = _between(_part(low, high, bottom), low_t, high_t)
-                    there = _between(_part(low, high, top), low_t, high_t)
+                    here = _between((bottom - low) * width, low_t, high_t)
+                    there = _between((top - low) * width, low_t, high_t)
                     least[i, at] = min(least[i, at], here, there)
-            begin = max(math.ceil((low - slack - lines[0]) / apart), 0)
-            end = min(math.floor((high + slack - lines[0]) / apart), len(lines) - 1)
+            begin = max(math.ceil((low - slack - lines[0]) * per_line), 0)
+            end = min(math.floor((high + slack - lines[0]) * per_line), len(lines) - 1)
             for line in range(begin, end + 1):
-                here = _between(_part(low, high, lines[line]), low_t, high_t)
-                least[len(halves) + line, at] = min(least[len(halves) + line, at], here)
+                i = len(halves) + line
+                here = _between((lines[line] - low) * width, low_t, high_t)
+                least[i, at] = min(least[i, at], here)
     return least
 
 
