@@ -225,7 +225,7 @@ def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]
     found, ends = np.empty((3 * len(points), 2)), np.empty_like(stops)
     hidden, total, start = 0.0, 0, 0
     for piece in range(len(stops)):
-        begin, lip, under, back = total, 0.0, False, False
+        begin, lip, turned, under, back = total, 0.0, 0.0, False, False
         for i in range(start, stops[piece]):
             s, t = points[i]
             if total == begin:
@@ -261,11 +261,12 @@ def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]
                 hidden = max(hidden, lip - s)
                 continue
             # it comes back out over rock that it has passed
+            turned = turned if back else before[0]
             back = True
+            hidden = max(hidden, turned - s)
             top = found[total - 1]
             while total > begin and found[total - 1, 0] > s:
                 top = found[total - 1]
-                hidden = max(hidden, top[0] - s)
                 total -= 1
             if total > begin:
                 low = found[total - 1]
