@@ -92,9 +92,11 @@ def farthest(
         if excess <= kept:
             break
     else:
+        worst = grasp.limits[int(found.limiting[0])].label
         raise EmptySetError(
-            "no wrist pose within every limit found toward this wrench, the best exceeds a limit "
-            f"by {100.0 * excess:.2g} % of its capacity: try another start or preload"
+            f"found no wrist pose that keeps every limit toward the wrench {d.tolist()} in H; the "
+            f"best exceeds one by {100.0 * excess:.2g} % (limit of the largest load: {worst}): "
+            "start at another pose of the wrist, or change the closing tension of the grasp"
         )
     binding = float(found.utilisation[0]) >= 1.0 - kept
     return Farthest(

@@ -189,7 +189,7 @@ def contact_slopes(hand: SpinyHand, placement: Placement) -> Array:
 def rests_on_rock(
     hand: SpinyHand, starts: Sequence[Placement], slopes: Array | None = None
 ) -> list[Pose | InvalidInputError]:
-    """Return the rest of each hand, in the frame where it starts. Its stability is not checked.
+    """Return the pose in which each hand comes to rest on its rock, whether stable or not.
 
     Parameters
     ----------
@@ -198,11 +198,14 @@ def rests_on_rock(
     starts : sequence of Placement, length n
         With poses of the holds.
     slopes : ndarray, shape (3, 3), optional
-        Derivatives to begin with, as `contact_slopes` of a hand nearby; computed by default.
+        Stiffness to begin with, as `contact_slopes` returns it for a hand nearby [N/m]; computed by
+        default.
 
     Returns
     -------
-    list of Pose or InvalidInputError
+    list of Pose or InvalidInputError, length n
+        In the order of ``starts``: the hand at rest in its frame H at the start; or an error that
+        is not raised, for a hand that cannot close or comes to rest nowhere near its start.
     """
     search, found = _Search(hand, starts), dict[int, Pose]()
 

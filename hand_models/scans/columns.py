@@ -157,7 +157,8 @@ def _meant(names: Sequence[str], width: int, path: Path) -> list[int]:
     if set(AXIS_NAMES) <= set(names):
         if len(names) > width:
             raise InvalidInputError(
-                f"{len(names)} columns have names, and the next line has {width} numbers: {path}"
+                f"{len(names)} columns have names ({', '.join(names)}), and the next line has "
+                f"{width} numbers; give each named column a number, or remove a name: {path}"
             )
         return [names.index(axis) for axis in AXIS_NAMES]
     angles = ("lat", "lon", "lng", "long", "latitude", "longitude")

@@ -169,7 +169,10 @@ def _hand(
     if message.place is not None:
         if pose is not None or in_hand is not None:
             which = "pose" if pose is not None else "hold.pose_in_hand"
-            raise InvalidInputError("give a place or a pose, not both", field=which)
+            raise InvalidInputError(
+                "must not be given with place, which seats the hand on the rock; remove one",
+                field=which,
+            )
         pose, hold_pose = hold_pose or Pose.identity(), None
         seat = _frame(message.place, pose)
         hold.check_place(seat)

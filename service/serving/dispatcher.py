@@ -101,7 +101,10 @@ class Dispatcher:
         if not self._pool.up:
             self.stop()
             self.close()
-            raise LostError("no worker starts; see the service's log")
+            raise LostError(
+                f"none of the {self._pool.workers} workers started; each one's last lines on "
+                "standard error of this process say why"
+            )
 
     def ask(self, query: zenoh.Query, key: str) -> None:
         """Put a query, which arrived at a key, into its queue; returns at once."""

@@ -61,7 +61,10 @@ def test_every_usual_table_has_the_points_that_were_written(text, encoding, tmp_
         ("id;longitude;latitude;h\n1;8.1;47.1;300\n2;8.2;47.2;301\n", "is in degrees"),
         ("a,b,c,d\n1,2,3,4\n5,6,7,8\n", "no columns are named x, y and z, got a, b, c, d"),
         ("x,y,z\n1,2,3\n4,5\n6,7,8\n", "line 3, '4,5', has 2 columns, 3 are needed"),
-        ("x,y,z,i\n1,2,3\n4,5,6\n6,7,8\n", "4 columns have names, and the next line has 3"),
+        (
+            "x,y,z,i\n1,2,3\n4,5,6\n6,7,8\n",
+            r"4 columns have names \(x, y, z, i\), and the next line has 3",
+        ),
         ("1 2\n3 4\n5 6\n", "no line has three numbers"),
         ("POINT (1 2 3)\nPOINT (4 5 6)\n", "no line has three numbers"),
         ("1 2 3\n4 5 6\n7 8 1e38\n", "write nan"),

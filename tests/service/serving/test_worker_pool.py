@@ -136,7 +136,7 @@ def test_a_service_for_which_no_process_can_be_started_says_so(
     config = zenoh_config(settings=["listen/endpoints:[]"], multicast=False)
     with (
         open_session(config) as session,
-        pytest.raises(LostError, match="no worker starts"),
+        pytest.raises(LostError, match="workers started"),
         PlanService(session, make=obedient),
     ):
         pass
