@@ -198,14 +198,12 @@ def rests_on_rock(
     starts : sequence of Placement, length n
         With poses of the holds.
     slopes : ndarray, shape (3, 3), optional
-        Stiffness to begin with, as `contact_slopes` returns it for a hand nearby [N/m]; computed by
-        default.
+        Stiffness to begin with, of a hand nearby (`contact_slopes`) [N/m]; computed by default.
 
     Returns
     -------
     list of Pose or InvalidInputError, length n
-        In the order of ``starts``: the hand at rest in its frame H at the start; or an error that
-        is not raised, for a hand that cannot close or comes to rest nowhere near its start.
+        In the order of ``starts``: H at rest in H at the start; an error, not raised, if none is.
     """
     search, found = _Search(hand, starts), dict[int, Pose]()
 

@@ -13,7 +13,14 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["heights_across", "least_heights", "raised_outlines", "rock_ends", "seen_outlines"]
+__all__ = [
+    "heights_across",
+    "least_heights",
+    "raised_outlines",
+    "rock_ends",
+    "seen_corners",
+    "seen_outlines",
+]
 
 
 @compiled()
@@ -123,7 +130,7 @@ def heights_across(
             # the edge from the first corner to the last crosses the line s = const, and another
             part = (s[at] - a[0]) * whole
             low, low_t = _between(part, a[1], c[1]), _between(part, a[2], c[2])
-            if s[at] <= b[0]:
+            if s[at] < b[0]:
                 part = (s[at] - a[0]) * early
                 high, high_t = _between(part, a[1], b[1]), _between(part, a[2], b[2])
             else:
@@ -298,6 +305,22 @@ def least_heights(points: Array, stops: Indices, s: Array) -> Array:
     return least
 
 
+@compiled("f2", "i1", "f0")
+def seen_corners(points: Array, stops: Indices, slack: float) -> Array:
+    """Return the points of outlines (`seen_outlines`) that no other outline hides, s ascending."""
+    order = np.argsort(points[:, 0], kind="mergesort")
+    if len(stops) < 2:
+        return points[order]
+    s, seen, begin = points[order, 0], np.ones(len(points), dtype=np.bool_), 0
+    for stop in stops:
+        least = least_heights(points[begin:stop], np.array([stop - begin]), s)
+        for i in range(len(s)):
+            own = begin <= order[i] < stop
+            seen[i] &= own or points[order[i], 1] <= least[i] + slack
+        begin = stop
+    return points[order[seen]]
+
+
 @compiled("f2", "f1", "f1", "f1", "f3", "f0", "f0")
 def raised_outlines(
     points: Array, s: Array, own: Array, least: Array, ends: Array, gap: float, slack: float
@@ -307,7 +330,7 @@ def raised_outlines(
     Parameters
     ----------
     points : ndarray, shape (n, 2)
-        Corners of all outlines in the plane, as from `seen_outlines` [m].
+        Corners of the outlines in the plane, as from `seen_corners` [m].
     s, own, least : ndarray, shape (g,)
         Places in equal steps, and t of the rock in the plane and of the envelope there; infinite
         without rock [m].
@@ -324,7 +347,6 @@ def raised_outlines(
         Corners of the plane's outlines, raised as the places on both sides are, these places, and
         the ends.
     """
-    order = np.argsort(points[:, 0], kind="mergesort")
     size = len(points) + 2 * len(s)
     found, parted = np.empty((size, 2)), np.zeros(size, dtype=np.bool_)
     total = corner = 0
@@ -334,19 +356,23 @@ def raised_outlines(
         if rock and alone and not np.isnan(ends[0, i, 0]):
             found[total], parted[total] = ends[0, i], True
             total += 1
-        while corner < len(order) and points[order[corner], 0] < s[i]:
-            here, t = points[order[corner]]
+        while corner < len(points) and points[corner, 0] < s[i]:
+            here, t = points[corner]
             corner += 1
-            weight, raised, beside = 0.0, 0.0, False
+            # by how much the plane is raised beside it, or what stands out where it has no rock
+            weights, raised, level = np.zeros(2), 0.0, 0.0
             for side in (i - 1, i):
                 if side >= 0 and least[side] < math.inf:
-                    beside = True
-                    near = 1.0 - min(abs(here - s[side]) / (s[1] - s[0]), 1.0)
+                    near = max(1.0 - abs(here - s[side]) / (s[1] - s[0]), 1e-12)
+                    weights[1] += near
+                    level += near * least[side]
                     if own[side] < math.inf:
-                        weight += near
+                        weights[0] += near
                         raised += near * (own[side] - least[side])
-            if beside:
-                found[total, 0], found[total, 1] = here, t - raised / max(weight, 1e-300)
+            if weights[1] > 0.0:
+                known = weights[0] > 0.0
+                t = t - raised / weights[0] if known else min(t, level / weights[1])
+                found[total, 0], found[total, 1] = here, t
                 total += 1
         if rock:
             found[total, 0], found[total, 1] = s[i], least[i]

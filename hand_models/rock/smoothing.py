@@ -274,6 +274,7 @@ class OutlinedHold(Hold):
         from hand_models.rock.compiled_heights import (
             least_heights,
             raised_outlines,
+            seen_corners,
             seen_outlines,
         )
 
@@ -285,6 +286,7 @@ class OutlinedHold(Hold):
         if heights is None:
             return FingerRock(self._smooth(middle))
         own = least_heights(points, stops, scale.places)
+        corners = seen_corners(points, stops, slack)
         tiles, frames = (np.minimum(each, own) for each in heights[:2])
         heights = heights._replace(tile=tiles, frame=frames)
         gap, envelopes = (
@@ -292,7 +294,7 @@ class OutlinedHold(Hold):
             ((tiles, heights.tile_ends), (frames, heights.frame_ends)),
         )
         tile, frame = (
-            unstrung(*raised_outlines(points, scale.places, own, *each, gap, slack))
+            unstrung(*raised_outlines(corners, scale.places, own, *each, gap, slack))
             for each in envelopes
         )
         section = self._smooth(tile)

@@ -128,6 +128,39 @@ def test_an_overhang_is_closed_by_an_upright_piece() -> None:
     np.testing.assert_allclose(points, [[-5, 1], [-3, 1], [-3, 0.2], [-3, 0], [0, 0]])
 
 
+def sheet(low: float, high: float, z: float) -> tuple[np.ndarray, np.ndarray]:
+    corners = np.array([[low, -0.3, z], [low, 0.3, z], [high, 0.3, z], [high, -0.3, z]])
+    return corners, np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def test_rock_behind_other_rock_changes_nothing() -> None:
+    front, faces = fractal_wall(2, size=0.4, count=61, height=0.004)
+    behind = fractal_wall(3, size=0.4, count=61, height=0.004)[0] + [0.0, 0.0, 0.03]
+    alone = Mesh(front, faces, anywhere=True).finger_rock(*LEVEL)
+    both = Mesh(np.vstack([behind, front]), np.vstack([faces, faces + len(front)]), anywhere=True)
+    for one, other in zip(alone.sections, both.finger_rock(*LEVEL).sections, strict=True):
+        np.testing.assert_allclose(np.vstack(other.pieces), np.vstack(one.pieces), atol=1e-12)
+
+
+def test_what_stands_out_beside_a_sliver_in_the_plane_is_met() -> None:
+    """Two sheets 6 mm before the plane's only rock, which is 0.2 mm wide."""
+    left, faces = sheet(-0.2, 0.2, 0.0)
+    beside = np.array([0.0, 0.304, 0.0])
+    ribs = [left + beside, left - beside]
+    sliver = left * [5e-4, 5e-3, 0.0] + [0.0101, 0.0, 0.006]
+    vertices, triangles = np.vstack([*ribs, sliver]), np.vstack([faces, faces + 4, faces + 8])
+    rock = Mesh(vertices, triangles, anywhere=True).finger_rock(*LEVEL)
+    for section in rock.sections:
+        np.testing.assert_allclose(np.vstack(section.pieces)[:, 1], 0.0, atol=1e-12)
+
+
+def test_a_place_on_an_edge_of_rock_has_rock() -> None:
+    for low, high in ((0.0, 0.2), (-0.2, 0.0)):
+        vertices, faces = sheet(low, high, 0.0)
+        found = heights(Triangles(vertices, faces), LEVEL)
+        np.testing.assert_array_equal(found[:, 200], 0.0)
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.2, -0.4])
 def test_rock_ends_where_its_triangles_do(turn: float) -> None:
     end, half = 0.0601, 0.0145
