@@ -173,7 +173,8 @@ def bridged_widths(points: Array, corners: Indices, beside: Indices) -> tuple[Ar
     width, area = np.empty(len(corners)), np.empty(len(corners))
     for i in range(len(corners)):
         a, b, c = points[corners[i, 0]], points[corners[i, 1]], points[corners[i, 2]]
-        twice = abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+        signed = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        twice = abs(signed)
         product, widest, longest = 1.0, 0.0, 0.0
         for p, q in ((a, b), (b, c), (c, a)):
             across = math.hypot(q[0] - p[0], q[1] - p[1])
@@ -182,7 +183,8 @@ def bridged_widths(points: Array, corners: Indices, beside: Indices) -> tuple[Ar
         # hardly any area, as a part of the longest edge's square
         if twice > 1e-6 * widest**2:
             longest = max(longest, product / twice)
-        elif beside[i].min() < 0:
+        elif beside[i].min() < 0 or signed <= 0.0:
+            # of points on a line, along the outline; rounding may have turned it over
             longest = math.inf
         width[i], area[i] = longest, 0.5 * twice
     return width, area

@@ -12,6 +12,7 @@ import trimesh
 from hand_models import Grasp, InvalidInputError, Mesh, Pose
 from hand_models.rock import read_mesh
 from hand_models.scans import Scan, mesh_scan, plot_rock, read_scan, write_rock
+from hand_models.scans.scan import areas_of
 from tests.suite.helpers.hands import HAND, ROCK
 from tests.suite.helpers.scans import relief, wall, write_cloud
 
@@ -136,6 +137,18 @@ def test_between_the_points_rock_is_as_far_off_as_its_curvature_makes_it():
     before = rock.pose.inverse().apply(np.column_stack([x, np.zeros_like(x), z]))
     away = Mesh(rock.vertices, rock.faces).entries(before, (0, 0, 1))
     assert np.abs(away - (1.0 - relief(x, z))).max() <= 0.5 * 5.0 * radius**2
+
+
+@pytest.mark.parametrize("turn", [0.3, 0.6435011])
+def test_along_the_outline_of_a_turned_grid_hardly_a_triangle_is_turned_over(turn):
+    rows = np.stack(np.meshgrid(np.arange(150), np.arange(150)), -1).reshape(-1, 2) * 0.004
+    c, s = np.cos(turn), np.sin(turn)
+    across = np.round(rows @ [[c, s], [-s, c]], 9)
+    depth = 1.0 + 0.01 * np.sin(30.0 * across[:, 0])
+    rock = seen(np.column_stack([across[:, 0], depth, across[:, 1]]))
+    areas = areas_of(rock.vertices, rock.faces)[:, 2]
+    assert -areas.sum() == pytest.approx(0.596**2, rel=1e-6)
+    assert (areas >= 0.0).sum() <= 5
 
 
 def test_the_order_of_points_does_not_matter():
