@@ -239,9 +239,9 @@ def _increment(
     forced = np.inf
     for j in range(JOINT_COUNT):
         caught, mode = _caught(settings, state, around, j), now.mode[j]
-        # the least gap is that of the path, to which an increment first brings back the joints
+        # the least gap is that of the path, not of joints that are on their way back to it
         after.least[j] = state.least[j] if caught else np.inf
-        if caught and mode != code.held:
+        if caught and mode != code.held and size <= settings.path_turn:
             after.least[j] = min(state.least[j], max(around.gap[j], now.gap[j], 0.0))
         if not caught and now.spines[j] != code.caught:
             after.least[j] = state.least[j]

@@ -18,14 +18,14 @@ from tests.suite.helpers.shares import given_some
 LOST = {3: 10, 14: 27, 21: 40, 36: 25, 52: 36, 76: 23, 87: 3, 122: 36, 144: 16, 191: 44}
 """Seeds of hands, and places at which spines were once taken as pulled off by an increment."""
 
-BESIDE = {19: 10, 71: 18, 115: 23}
-"""Seeds of hands, and places at which rock was once sampled anew, or an increment went past the
-path and left spines at a gap that the path does not have."""
+BESIDE = {19: 10, 51: 45, 61: 48, 71: 18, 115: 23, 146: 29}
+"""Seeds of hands, and places at which rock was once sampled anew, or joints on their way back to the
+path left spines at a gap that the path does not have."""
 
 STEP = 0.01
 """Of a support at a micrometre, at most, in parts of its scale."""
 
-JUMPING = 0.12
+JUMPING = 0.1
 """Share of hands, at most, that have a larger step: a phalanx that comes within its spines' travel
 bears across the gap at once, and where two equilibria are close a finger ends in one or the other.
 """
@@ -77,7 +77,7 @@ def test_most_hands_hold_alike_at_all_of_61_places():
             flipping.append(seed)
         elif scan.steps().max() > STEP:
             jumping.append(seed)
-    assert len(flipping) <= 2, flipping
+    assert len(flipping) <= 1, flipping
     assert len(jumping) <= JUMPING * 200, jumping
 
 
