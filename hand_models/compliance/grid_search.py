@@ -119,8 +119,8 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
         progress(total, total)
     if not held:
         raise EmptySetError(
-            f"none of {total} wrist poses of the grid is within every limit: raise per_axis, or "
-            "try another preload"
+            f"none of {total} wrist poses of the grid is within every limit: raise per_axis, "
+            f"which is {per_axis}, or try another preload"
         )
     return _pushed(grasp, box, outermost, total, held)
 
