@@ -64,7 +64,8 @@ class WristSearch:
             return scipy.spatial.ConvexHull(self.wrenches[:, components] * WRENCH_SCALE[components])
         except scipy.spatial.QhullError:
             raise EmptySetError(
-                f"the {len(self.wrenches)} wrenches found span no volume: raise per_axis"
+                f"the {len(self.wrenches)} wrenches found span no volume: raise per_axis, "
+                f"which is {round(self.tried ** (1.0 / self.poses.shape[1]))}"
             ) from None
 
     def support(self, direction: ArrayLike) -> float:

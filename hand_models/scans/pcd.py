@@ -75,7 +75,7 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     found = {words[0].upper(): words[1:] for words in named}
     if b"FIELDS" not in found or b"DATA" not in found:
         raise InvalidInputError(
-            f"not a PCD file, its header is missing: {path}; export it again with them"
+            f"not a PCD file, its header is missing: {path}; export it again as PCD"
         )
     # pypcd4 looks no farther than ten lines, comments apart
     if len(found) < len(named) or len(named) > 10:
