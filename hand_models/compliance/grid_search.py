@@ -64,7 +64,8 @@ class WristSearch:
             return scipy.spatial.ConvexHull(self.wrenches[:, components] * WRENCH_SCALE[components])
         except scipy.spatial.QhullError:
             raise EmptySetError(
-                f"the {len(self.wrenches)} wrenches found span no volume: raise per_axis"
+                f"the {len(self.wrenches)} wrenches found span no volume: raise per_axis, "
+                f"which is {round(self.tried ** (1.0 / self.poses.shape[1]))}"
             ) from None
 
     def support(self, direction: ArrayLike) -> float:
@@ -119,8 +120,8 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
         progress(total, total)
     if not held:
         raise EmptySetError(
-            f"none of {total} wrist poses of the grid is within every limit: raise per_axis, or "
-            "try another preload"
+            f"none of {total} wrist poses of the grid is within every limit: raise per_axis, "
+            f"which is {per_axis}, or try another preload"
         )
     return _pushed(grasp, box, outermost, total, held)
 

@@ -134,7 +134,7 @@ def _ellipsoid(grasp: CompliantGrasp, at: Array) -> tuple[WrenchSpace, Array, Ar
         found = _analytic_centre(space.A * units, space.b)
     if found is None:
         raise SolverError(
-            "no centre of the linearised set of wrist poses found; try another preload"
+            "no centre of the wrist poses within the limits found: try another preload"
         )
     y, hessian = found
     lengths, directions = np.linalg.eigh(hessian)

@@ -169,7 +169,8 @@ def limit(points: Array, measure: Measure) -> Limit:
     if result.status == 2:
         also = f" and F_x = {ratio:g} M_y" if measure == "shear" else ""
         raise EmptySetError(
-            f"{measure} cannot be measured: no wrench of the hull has F_z ≤ 0{also}"
+            f"{measure} cannot be measured: no wrench of the hull has F_z ≤ 0{also}: "
+            "measure another, or give another hull"
         )
     if result.status != 0 or result.x is None or result.fun is None:
         raise SolverError(

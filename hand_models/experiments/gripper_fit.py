@@ -247,7 +247,8 @@ class GripperFit:
         poses = pulled_off_poses(gripper, np.array([0.0, pull]))
         if len(poses) < 2:
             raise SolverError(
-                f"no equilibrium found for a pull of {pull:g} N (fig12.pull) on the gripper"
+                f"no equilibrium found for a pull of {pull:g} N (fig12.pull) on the gripper: "
+                "lower the pull"
             )
         loads, _ = gripper.finger_loads(poses)
         held = self.wrenches(gripper, fine=fine)

@@ -82,14 +82,19 @@ def write_hands(closed: Sequence[ClosedPlacement], path: Path) -> None:
         raise InvalidInputError("at least one hand is needed, got none", field="closed")
     hands = [each.hand for each in closed]
     first = hands[0]
-    if any(
-        each.hold is not first.hold or each.surface != first.surface or each.hand != first.hand
-        for each in hands
-    ):
-        raise InvalidInputError(
-            "must be on one rock, of one surface, with one hand: write a file for each",
-            field="closed",
-        )
+    for i, each in enumerate(hands):
+        same = {
+            "rock": each.hold is first.hold,
+            "surface": each.surface == first.surface,
+            "hand": each.hand == first.hand,
+        }
+        if not all(same.values()):
+            other = " and ".join(name for name in same if not same[name])
+            raise InvalidInputError(
+                f"must be on one rock, of one surface, with one hand; number {i} differs from "
+                f"number 0 in {other}: write a file for each",
+                field="closed",
+            )
     if not isinstance(first.hold, Mesh) or any(each.grasp.fingernail for each in hands):
         raise UnsupportedError(
             "only hands on meshes, without fingernail grasps, can be written to a file"

@@ -51,7 +51,9 @@ def approach_frame(
     )
     for value, field in ((z, "approach"), (above, "up")):
         if not value.any():
-            raise InvalidInputError("must be a direction, not zero", field=field)
+            raise InvalidInputError(
+                "must be a direction, not zero: give one such as [0, 0, 1]", field=field
+            )
     if not np.isfinite(wrist_angle):
         raise InvalidInputError(f"must be finite, got {wrist_angle}", field="wrist_angle")
     z, above = (value / np.abs(value).max() for value in (z, above))

@@ -92,7 +92,10 @@ def best_seats(
     """
     d = finite_vector(direction, 6, "direction")
     if not d.any():
-        raise InvalidInputError("must be the direction of a wrench, not zero", field="direction")
+        raise InvalidInputError(
+            "must be the direction of a wrench, not zero: give one such as [0, 0, -1, 0, 0, 0]",
+            field="direction",
+        )
     d = d / np.abs(d).max()
     for each in placements:
         if each.hold_in_hand is not None:

@@ -100,7 +100,10 @@ def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
     draw = ParameterSample(**tables)
     _check(draw, None)
     if not (list(draw.hand) or list(draw.surfaces)):
-        raise InvalidInputError("is empty; at least one entry of hand or surfaces is needed")
+        raise InvalidInputError(
+            "a sample must have at least one entry of hand or surfaces, got none: add one, "
+            "or remove the sample"
+        )
     return draw
 
 

@@ -10,6 +10,7 @@ and the nails meet the raw triangles.
 
 from __future__ import annotations
 
+import reprlib
 from functools import cached_property
 
 import numpy as np
@@ -155,7 +156,8 @@ class Mesh(OutlinedHold):
             nearest = np.linalg.norm(self.triangles.vertices, axis=1).min()
             raise InvalidInputError(
                 f"the nearest vertex is {nearest:.3g} m from the hold's origin, which is to be on "
-                f"the rock under the palm; at most {near:g} m is possible",
+                f"the rock under the palm; at most {near:g} m is possible: move "
+                "the origin onto the rock",
                 field="vertices",
             )
 
@@ -198,10 +200,16 @@ class Mesh(OutlinedHold):
 def _checked(vertices: ArrayLike, faces: ArrayLike, table: ParameterTable) -> tuple[Triangles, int]:
     """Return triangles, and how many vertices without numbers were left out that none names."""
     try:
-        points, corners = np.asarray(vertices, dtype=float), np.asarray(faces)
+        points = np.asarray(vertices, dtype=float)
     except (TypeError, ValueError):
         raise InvalidInputError(
-            "vertices must be three numbers each, and faces three indices", field="vertices"
+            f"must be three numbers [x, y, z] each, got {reprlib.repr(vertices)}", field="vertices"
+        ) from None
+    try:
+        corners = np.asarray(faces)
+    except (TypeError, ValueError):
+        raise InvalidInputError(
+            f"must be three indices [i, j, k] each, got {reprlib.repr(faces)}", field="faces"
         ) from None
     if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 3:
         raise InvalidInputError(

@@ -169,10 +169,16 @@ def _check_counts(content: bytes, path: Path) -> None:
             kind = line[2] if line[1] == "list" and len(line) > 2 else line[1]
             least[-1] += 2 if ascii_ else sizes.get(kind, 1)
     needed = sum(count * max(size, 1) for count, size in zip(counts, least, strict=True))
-    if not end or properties > most_properties or min(counts, default=0) < 0:
+    if not end:
+        raise InvalidInputError(f"no PLY header that ends: {path}; export it again")
+    if properties > most_properties:
         raise InvalidInputError(
-            f"no PLY header that ends, or one with more than {most_properties} properties or a "
-            f"count below 0: {path}; export it again"
+            f"the header may have at most {most_properties} properties, got {properties}: {path}; "
+            "export it again with fewer"
+        )
+    if min(counts, default=0) < 0:
+        raise InvalidInputError(
+            f"the header's counts must be 0 or more, got {min(counts)}: {path}; export it again"
         )
     if needed > len(rest) + 1:  # a text may end without a blank
         raise InvalidInputError(

@@ -11,6 +11,7 @@ under fingers that hook with their nails.
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Final
@@ -157,7 +158,9 @@ def _checked(points: ArrayLike, field: str, largest: float) -> Array:
     try:
         outline = np.asarray(points, dtype=float)
     except (TypeError, ValueError):
-        raise InvalidInputError("points must be two numbers each, [x, z]", field=field) from None
+        raise InvalidInputError(
+            f"points must be two numbers each, [x, z], got {reprlib.repr(points)}", field=field
+        ) from None
     most = 5000
     if outline.ndim != 2 or outline.shape[1:] != (2,) or not 2 <= len(outline) <= most:
         flat = outline.ndim == 2 and outline.shape[1] == 2

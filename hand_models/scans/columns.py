@@ -53,7 +53,10 @@ def read_columns(path: Path) -> RawScan:
         del lines[0]
     width = len(_cells(lines[0], style)) if lines else len(names or ())
     if width < len(AXIS_NAMES):
-        raise InvalidInputError(f"three columns are needed, the first line has {width}: {path}")
+        raise InvalidInputError(
+            f"three columns are needed, the first line has {width}: {path}; write x, y and z of a "
+            "point on each line"
+        )
     columns = [0, 1, 2] if names is None else _meant(names, width, path)
     if not lines:
         return RawScan(np.empty((0, 3)))
@@ -93,7 +96,8 @@ def _style(lines: Sequence[str], path: Path) -> _Style:
     best = max(ranks)
     if not best[0]:
         raise InvalidInputError(
-            f"no line has three numbers separated by commas, semicolons or spaces: {path}"
+            f"no line has three numbers separated by commas, semicolons or spaces: {path}; write "
+            "x, y and z of a point on each line"
         )
     return styles[ranks.index(best)]
 
@@ -190,8 +194,9 @@ def _check_unnamed(lines: Sequence[str], style: _Style, width: int, path: Path) 
         numbers = [int(cell) for cell in begin]
         if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
             raise InvalidInputError(
-                "the first column is the index of the point, not x: name the columns in the "
-                f"first line of {path}"
+                f"the first column is the index of the point, {numbers[0]} to "
+                f"{numbers[-1]}, not x: name the columns in the first line of {path}, such as "
+                "index,x,y,z"
             )
 
 

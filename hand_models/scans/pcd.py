@@ -42,7 +42,10 @@ def read_pcd(path: Path) -> RawScan:
     cloud = PointCloud.from_path(path)
     absent = [axis for axis in AXIS_NAMES if axis not in cloud.fields]
     if absent:
-        raise InvalidInputError(f"fields x, y and z are needed, {absent[0]} is missing: {path}")
+        raise InvalidInputError(
+            f"fields x, y and z are needed, {absent[0]} is missing: {path}; "
+            "export it again with them"
+        )
     points = np.column_stack([np.atleast_1d(cloud.pc_data[axis]) for axis in AXIS_NAMES]).astype(
         float
     )
@@ -71,11 +74,14 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     named = [words for words in lines if not words[0].startswith(b"#")]
     found = {words[0].upper(): words[1:] for words in named}
     if b"FIELDS" not in found or b"DATA" not in found:
-        raise InvalidInputError(f"not a PCD file, its header is missing: {path}")
+        raise InvalidInputError(
+            f"not a PCD file, its header is missing: {path}; export it again as PCD"
+        )
     # pypcd4 looks no farther than ten lines, comments apart
     if len(found) < len(named) or len(named) > 10:
         raise InvalidInputError(
-            f"the header must have at most 10 lines, each key once, got {len(named)}: {path}"
+            f"the header must have at most 10 lines, each key once, got {len(named)} lines "
+            f"with {len(found)} keys: {path}; remove the others"
         )
     try:
         sizes, counts = ([int(each) for each in found[name]] for name in (b"SIZE", b"COUNT"))
@@ -83,9 +89,11 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
         width, height, points = rows
         kind = found[b"DATA"][0]
     except (KeyError, IndexError, ValueError):
+        keys = (b"SIZE", b"COUNT", b"WIDTH", b"HEIGHT", b"POINTS", b"DATA")
+        got = ", ".join(f"{str(key, 'ascii')} {_words(found.get(key, [])) or '-'}" for key in keys)
         raise InvalidInputError(
             "the header must have SIZE, COUNT, WIDTH, HEIGHT and POINTS, all whole numbers, and a "
-            f"format after DATA: {path}"
+            f"format after DATA, got {got}: {path}; export it again"
         ) from None
     kinds, pose = found.get(b"TYPE", []), found.get(b"VIEWPOINT", UNKNOWN_VIEWPOINT)
     if len(kinds) != len(sizes) or not {*kinds} <= {b"F", b"I", b"U"}:

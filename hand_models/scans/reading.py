@@ -107,7 +107,7 @@ def read_scan(
         place = ", ".join(f"{x:g}" for x in raw.points[0])
         raise InvalidInputError(
             f"all {len(raw.points):,} points of {path} are at ({place}); a scan has points at "
-            "different places",
+            "different places: export it again",
             field="file",
         )
 
@@ -160,7 +160,9 @@ def _check_numbers(points: Array, read: int, path: Path) -> None:
         more = read - len(points)
         others = f", and {more} that are not finite" if more else ""
         raise InvalidInputError(
-            f"at least three points are needed, {path} has {len(points)}{others}", field="file"
+            f"at least three points are needed, {path} has {len(points)}{others}: export it again "
+            "with the points of the rock",
+            field="file",
         )
     largest = float(np.abs(points).max())
     most = 1e12  # what is beyond that is lost in rounding
@@ -262,13 +264,18 @@ def _scale(points: Array, unit: Unit, width: float | None) -> float:
     if width is None:
         return UNIT_METRES[unit]
     if unit != "m":
-        raise InvalidInputError("give a unit or a width, not both", field="width")
+        raise InvalidInputError(
+            f"a unit, {unit!r}, and a width, {width} m, are given, not both are possible: remove "
+            "the unit to scale by the width, or the width to keep the unit",
+            field="width",
+        )
     if not (math.isfinite(width) and width > 0.0):
         raise InvalidInputError(f"must be finite and above zero, got {width:g} m", field="width")
     longest = float(np.ptp(points, axis=0).max())
     if longest == 0.0:
         raise InvalidInputError(
-            f"all {len(points):,} points are equal; a scan has points at different places",
+            f"all {len(points):,} points are equal; a scan has points at different places: "
+            "export it again",
             field="file",
         )
     return width / longest
@@ -277,5 +284,7 @@ def _scale(points: Array, unit: Unit, width: float | None) -> float:
 def _unit_vector(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise InvalidInputError("must be a direction, not zero", field="view")
+        raise InvalidInputError(
+            "must be a direction, not zero: give one such as [0, 0, -1]", field="view"
+        )
     return np.asarray(vector / length)

@@ -146,7 +146,8 @@ def _check(text: StudyText, tried: Array, curves: list[dict[str, Any]]) -> None:
     if not both.any():
         raise InvalidInputError(
             f"exceeds a limit at every closing tension from {tried[0]:g} to {tried[-1]:g} N, on a "
-            f"surface of {strong.name} or on one of {weak.name}",
+            f"surface of {strong.name} or on one of {weak.name}: "
+            "take a stronger hand",
             field="hand",
         )
     for curve in (strong, weak):
