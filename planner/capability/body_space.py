@@ -344,7 +344,10 @@ def checked_axes(axes: Sequence[str]) -> tuple[str, str]:
         If a name is unknown, both are equal, or there are not two.
     """
     if len(axes) != 2:
-        raise InvalidInputError(f"two axes are needed, got {len(axes)}", field="axes")
+        raise InvalidInputError(
+            f"two axes are needed, got {len(axes)}; known are {', '.join(WRENCH_COMPONENTS)}",
+            field="axes",
+        )
     for i, axis in enumerate(axes):
         if axis not in WRENCH_COMPONENTS:
             raise InvalidInputError(

@@ -105,7 +105,8 @@ class ForceCap(Strict, frozen=True):
         for i, (low, high) in enumerate(most):
             if not low <= 0.0 <= high or low == high:
                 raise InvalidFieldError(
-                    f"must be least ≤ 0 ≤ largest, not both 0, got {low:g} to {high:g} N",
+                    "must go from 0 N or less to 0 N or more, not both 0, got "
+                    f"{low:g} to {high:g} N",
                     field=f"largest_force[{i}]",
                 )
             if any(0.0 < abs(end) < LEAST_LIMIT for end in (low, high)):
@@ -180,7 +181,7 @@ class Limits(Strict, frozen=True):
     def __post_init__(self) -> None:
         if not 0.0 < self.utilisation <= 1.0:
             raise InvalidFieldError(
-                f"must be in (0, 1], got {self.utilisation:g}", field="utilisation"
+                f"must be above 0 and at most 1, got {self.utilisation:g}", field="utilisation"
             )
         for name in ("tendon_tension", "tension_change"):
             most = getattr(self, name)
@@ -195,7 +196,8 @@ class Limits(Strict, frozen=True):
         cap = self.tendon_tension
         if cap is not None and self.least_tension > cap:
             raise InvalidFieldError(
-                f"must be at most tendon_tension ({cap:g} N), got {self.least_tension:g} N",
+                f"must be at most tendon_tension ({cap:g} N), got {self.least_tension:g} N; lower "
+                "it, or raise tendon_tension",
                 field="least_tension",
             )
         torque = self.joint_torque
@@ -211,9 +213,8 @@ class Limits(Strict, frozen=True):
         for limb, given in by_limb.items():
             each = given if isinstance(given, tuple) else (given,)
             idle = 0.0 if isinstance(given, tuple) else LEAST_LIMIT
-            wrong = [most for most in each if not (most == idle or LEAST_LIMIT <= most < math.inf)]
-            if wrong:
-                raise no_torque(wrong, "joint_torque" + (f".{limb}" if limb else ""))
+            if not all(most == idle or LEAST_LIMIT <= most < math.inf for most in each):
+                raise no_torque(each, "joint_torque" + (f".{limb}" if limb else ""))
 
 
 def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
@@ -222,13 +223,14 @@ def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
     Parameters
     ----------
     given : sequence of float
-        The invalid values.
+        The values, of which at least one is invalid.
     field : str
         Their field in the question.
     """
     return InvalidFieldError(
-        f"must be at least {LEAST_LIMIT:g} N·m, or in a list 0 for a joint without a motor "
-        f"(not all of a limb), got {', '.join(f'{most:g}' for most in given)}",
+        f"must be finite and at least {LEAST_LIMIT:g} N·m, or in a list 0 for a joint without a "
+        f"motor (not all of a limb), got {', '.join(f'{most:g}' for most in given)}; leave it out "
+        "to keep the robot's own limits",
         field=field,
     )
 

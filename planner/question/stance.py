@@ -202,7 +202,8 @@ class HandOnHold:
         if self.wrench is not None:
             if len(self.wrench) != 6:
                 raise InvalidInputError(
-                    f"6 components are needed, got {len(self.wrench)}", field="wrench"
+                    f"6 components are needed, as fx, fy, fz, mx, my, mz, got {len(self.wrench)}",
+                    field="wrench",
                 )
             given = [0.0 if value is None else value for value in self.wrench]
             checked_body_wrench(finite_vector(given, 6, "wrench"), "wrench")

@@ -147,7 +147,10 @@ def build_model(
     with errors_under("body"):
         tree.require(described.body)
     if not any(link.mass > 0.0 for link in tree.links.values()):
-        raise InvalidInputError("no link has a mass; at least one must", field="urdf")
+        raise InvalidInputError(
+            "no link has a mass; give at least one link an <inertial> with a mass above 0 kg",
+            field="urdf",
+        )
     locked = locked_joints(tree, described)
     joints = limb_joints(tree, described, locked)
     try:
@@ -220,7 +223,7 @@ def _mounted(
     if reach <= TOLERANCES.axis_distance:
         raise InvalidInputError(
             "the hand is on the axes of the limb's joints, which cannot move the hand; must "
-            "be away from them",
+            f"be away from them, got {mount.pose.position.tolist()} m; give another position",
             field=f"limbs.{limb}.position",
         )
     with errors_under(f"limbs.{limb}.torque_limit"):

@@ -92,7 +92,9 @@ def limb_joints(
             )
         if len(chains[limb]) > most:
             raise InvalidInputError(
-                f"a limb has at most {most} joints, got {len(chains[limb])}", field=field
+                f"a limb has at most {most} joints that move, got {len(chains[limb])}; lock some "
+                "in [locked]",
+                field=field,
             )
     _require_own(chains, described.locked)
     for limb, chain in chains.items():

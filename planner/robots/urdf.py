@@ -320,7 +320,7 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
         axis = np.array(_numbers(owner, given, "xyz", 3, TOLERANCES.frame_distance))
         length = np.linalg.norm(axis)
         if not length > 0.0:
-            raise InvalidInputError(f"{owner}: its axis must not be zero")
+            raise InvalidInputError(f"{owner}: its axis must not be zero, got {given.get('xyz')!r}")
         axis = axis / length
     lower, upper, effort = -math.inf, math.inf, 0.0
     limit = element.find("limit")
@@ -336,7 +336,7 @@ def _joint(element: ElementTree.Element, links: set[str]) -> JointElement:
             raise InvalidInputError(f"{owner}: effort must not be negative, got {effort:g} {unit}")
     if kind in ("revolute", "prismatic"):
         if limit is None:
-            raise InvalidInputError(f"{owner} is {kind} and has no <limit>; continuous needs none")
+            raise InvalidInputError(f"{owner} is {kind} and has no <limit>; give it one")
         for rating in ("effort", "velocity"):
             _numbers(owner, limit, rating, 1, sys.float_info.max)
         # URDF takes a limit that is left out for zero
@@ -381,7 +381,7 @@ def _link(element: ElementTree.Element) -> Link:
     at = _origin(owner, inertial)
     weight, tensor = inertial.find("mass"), inertial.find("inertia")
     if weight is None or tensor is None:
-        raise InvalidInputError(f"{owner}: <inertial> needs <mass> and <inertia>")
+        raise InvalidInputError(f"{owner}: <inertial> needs <mass> and <inertia>; add both")
     (mass,) = _numbers(owner, weight, "value", 1, TOLERANCES.link_mass)
     if mass < 0.0:
         raise InvalidInputError(f"{owner}: mass must not be negative, got {mass:g} kg")

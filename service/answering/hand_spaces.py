@@ -106,7 +106,7 @@ def answer_wrench_space(
         if hand.palm is not None:
             raise InvalidInputError(
                 f"'robust' requires fixed wrists on all hands; that of {request.limb} is not "
-                "fixed: fix it, or remove 'robust'",
+                "fixed: give it wrist 'fixed', or remove 'robust'",
                 field="want",
             )
         both_ways = np.vstack([np.eye(len(WRENCH_AXES)), -np.eye(len(WRENCH_AXES))])
@@ -217,7 +217,7 @@ def _add_views(
     """
     for i, name in enumerate(want or ()):
         if name in (want or ())[:i]:
-            raise InvalidInputError(f"{name} is given twice", field=f"want[{i}]")
+            raise InvalidInputError(f"{name} is given twice; give it once", field=f"want[{i}]")
     less = 'use fewer half_planes, or "lateral": false in the grasp'
     # candidates for one view: less than a second's work, and some megabytes of reply
     most = 30_000

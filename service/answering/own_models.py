@@ -108,13 +108,15 @@ def read_draws(path: Path) -> list[Draw]:
         given = raw.get("draws")
         if list(raw) != ["draws"] or not isinstance(given, list) or not given:
             raise InvalidInputError(
-                "must be a list of one or more, [[draws]], and the file's only entry", field="draws"
+                "must be a list of one or more tables, each as [[draws]], and the only entry of "
+                f"the file, which has {', '.join(raw) or 'none'}",
+                field="draws",
             )
         found = []
         for i, draw in enumerate(given):
             with errors_under(f"draws[{i}]"):
                 if not isinstance(draw, Mapping):
-                    raise InvalidInputError(f"must be a table of hand or surfaces, got {draw!r}")
+                    raise InvalidInputError(f"must be a table with hand or surfaces, got {draw!r}")
                 own_draw(draw)
             found.append(Draw(**draw))
     return found

@@ -257,7 +257,10 @@ def _check_output(file: Path, requests: str, resume: bool, is_table: bool) -> No
             field = "--resume" if resume else "-o"
             raise InvalidInputError(f"{file}: is a folder; give a file", field=field)
         if resume and not is_table and file.exists() and not file.is_file():
-            raise InvalidInputError(f"{file}: not a file; nothing to resume", field="--resume")
+            raise InvalidInputError(
+                f"{file}: not a file, so it has nothing to resume; leave out --resume",
+                field="--resume",
+            )
         given = os.fstat(sys.stdin.fileno()) if requests == "-" else os.stat(requests)
         if file.is_file() and os.path.samestat(file.stat(), given):
             raise InvalidInputError(

@@ -67,7 +67,10 @@ def plan_command(
     extras = [want for want, chosen in further.items() if chosen]
     request = options.with_extras(wanted.of(plain), *extras, whole=not as_json)
     if advice_folder is not None and request.detail not in (None, "full"):
-        raise InvalidInputError("--advice requires the full reply; remove detail", field="detail")
+        raise InvalidInputError(
+            f"--advice requires the full reply, got {request.detail!r}; remove detail",
+            field="detail",
+        )
     robots = own.robots
     brief = not as_json and tables.verbosity() < 0
     advised = "advice" in request.want

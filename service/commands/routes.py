@@ -66,7 +66,9 @@ def route_command(
     if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):
             if asked_for:
-                raise InvalidInputError("is for one route: requires -o DIR", field=option)
+                raise InvalidInputError(
+                    f"is for one route, whose output -o is a folder, got {output}", field=option
+                )
         return _many(_Routes(routes, own), output, resume, parallel, wanted, own, as_json)
     if len(routes) > 1 or Path(routes[0]).is_dir():
         raise InvalidInputError(
@@ -183,7 +185,9 @@ def _many(
     tables.write_alone(file)
     begun = perf_counter()
     if file.suffix.lower() == ".jsonl" and file.exists() and not file.is_file():
-        raise InvalidInputError(f"{file}: is no plain file; name another", field="-o")
+        raise InvalidInputError(
+            f"{file}: must be a file, not a device or pipe; name another", field="-o"
+        )
     sink = new_run(
         file, routes, bulk.route_columns, own, explained=not wanted.unexplained, resume=resume
     )

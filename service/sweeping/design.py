@@ -83,11 +83,13 @@ class Design:
             If there are too many points.
         """
         if not variations:
-            raise InvalidInputError("at least one is needed, got none", field="variations")
+            raise InvalidInputError(
+                "at least one is needed, got none; give a Variation", field="variations"
+            )
         count = math.prod(len(each.values) for each in variations) if samples is None else samples
         most = 100_000
         if not 1 <= count <= most:
-            change = "give another number of values" if samples is None else "change samples"
+            change = "give fewer values" if samples is None else "change samples"
             raise LimitError(f"must be 1 to {most:,} points, got {count:,}: {change}")
         asked = msgspec.structs.replace(
             request,

@@ -147,7 +147,9 @@ def word_of(value: Value) -> str:
 def _value(text: str, path: str) -> Value:
     """Return the number or word that a text is."""
     if not text:
-        raise InvalidInputError("has an empty value between its commas", field=path)
+        raise InvalidInputError(
+            "has an empty value between its commas; remove a comma, or add a value", field=path
+        )
     for kind in (int, float):
         try:
             return kind(text)

@@ -188,7 +188,7 @@ def test_a_body_wrench_has_six_numbers():
 
 def test_utilisation_caps_are_in_the_unit_interval():
     for value in [0.0, -0.1, 1.0001, NAN, INF]:
-        with pytest.raises(InvalidInputError, match=r"\(0, 1\]"):
+        with pytest.raises(InvalidInputError, match="above 0 and at most 1"):
             Limits(utilisation=value)
 
 

@@ -339,7 +339,8 @@ def test_a_limb_that_hangs_free_would_swing(wall_with_joints):
         ({"front_left": (1e-4,) + (0.0,) * 6}, r"at least 0.001 N·m, .* got 0.0001"),
         ({"front_left": (-1.0,) + (9.0,) * 6}, r"got -1"),
         (float("nan"), r"got nan"),
-        (float("inf"), r"got inf"),
+        (float("inf"), r"must be finite .* got inf; leave it out to keep the robot's own limits"),
+        ({"front_left": (4.0, float("inf"), 5.0)}, r"got 4, inf, 5;"),
     ],
 )
 def test_limits_that_are_none(given, words):

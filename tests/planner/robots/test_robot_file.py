@@ -329,7 +329,9 @@ def test_a_ring_of_links_is_no_robot():
 
 def test_a_robot_without_mass_is_refused():
     text = re.sub(r"<inertial>.*?</inertial>", "", TWO_LINK)
-    assert refused(text=text) == "urdf: no link has a mass; at least one must"
+    assert refused(text=text) == (
+        "urdf: no link has a mass; give at least one link an <inertial> with a mass above 0 kg"
+    )
 
 
 def test_limbs_that_share_a_joint_are_refused():
@@ -352,7 +354,7 @@ def test_a_limb_that_only_turns_its_hand_in_its_place_is_refused():
     toml, text = arm(1)
     assert refused(toml.replace("[0.1, 0.0, 0.0]", "[0.0, 0.0, 0.0]"), text) == (
         "limbs.arm.position: the hand is on the axes of the limb's joints, which cannot move the "
-        "hand; must be away from them"
+        "hand; must be away from them, got [0.0, 0.0, 0.0] m; give another position"
     )
 
 

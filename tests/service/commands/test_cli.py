@@ -194,7 +194,7 @@ def test_a_spread_over_draws_of_the_callers_own(stance_file, tmp_path, capfd):
         ("rock.shear_limit = { value = 90", "ice.a = { value = 90", "draws[1].surfaces.ice: unk"),
         ("[[draws]]", "[[sets]]", "draws: must be a list"),
         ("[[draws]]", "[[draws", "at line 2"),
-        (DRAWS, "draws = [3]", "draws[0]: must be a table of hand or surfaces, got 3"),
+        (DRAWS, "draws = [3]", "draws[0]: must be a table with hand or surfaces, got 3"),
         (DRAWS, "draws = [{hand = 3}]", "draws[0].hand: "),
     ],
 )

@@ -216,13 +216,13 @@ INVALID = [
         ("limits",),
         {"per_hand": {"front_left": {"largest_force": [1.0, [2.0, 5.0], None]}}},
         "limits.per_hand.front_left.largest_force[1]",
-        "must be least ≤ 0 ≤ largest, not both 0, got 2 to 5 N",
+        "must go from 0 N or less to 0 N or more, not both 0, got 2 to 5 N",
     ),
     (
         ("limits",),
         {"per_hand": {"front_left": {"largest_force": [[0.0, 0.0], None, None]}}},
         "limits.per_hand.front_left.largest_force[0]",
-        "must be least ≤ 0 ≤ largest, not both 0, got 0 to 0 N",
+        "must go from 0 N or less to 0 N or more, not both 0, got 0 to 0 N",
     ),
     (
         ("limits",),
