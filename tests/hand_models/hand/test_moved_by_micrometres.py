@@ -19,8 +19,8 @@ LOST = {3: 10, 14: 27, 21: 40, 36: 25, 52: 36, 76: 23, 87: 3, 122: 36, 144: 16, 
 """Seeds of hands, and places at which spines were once taken as pulled off by an increment."""
 
 BESIDE = {19: 10, 51: 45, 61: 48, 71: 18, 115: 23, 146: 29}
-"""Seeds of hands, and places at which rock was once sampled anew, or joints on their way back to the
-path left spines at a gap that the path does not have."""
+"""Seeds of hands, and places at which rock was once sampled anew, or joints on their way back to
+the path left spines at a gap that the path does not have."""
 
 STEP = 0.01
 """Of a support at a micrometre, at most, in parts of its scale."""
