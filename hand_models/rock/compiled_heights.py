@@ -298,8 +298,7 @@ def least_heights(points: Array, stops: Indices, s: Array) -> Array:
                 at += 1
             if at + 1 < stop and points[at, 0] <= s[i]:
                 low, high = points[at], points[at + 1]
-                width = high[0] - low[0]
-                part = (s[i] - low[0]) / width if width > 0.0 else 0.0
+                part = _part(low[0], high[0], s[i])
                 least[i] = min(least[i], low[1] + part * (high[1] - low[1]))
         start = stop
     return least

@@ -282,14 +282,9 @@ def _highest(excess: Array, part: int, closed: int) -> Array:
     Over the last step of that it fades, so that it changes with a raw point's place without a jump.
     """
     count = excess.shape[1]
-    further, found = np.zeros((3, count + 2 * part + 1)), np.zeros(count)
+    further, found = np.empty((3, count + 2 * part + 2)), np.zeros(count)
     for row in range(3):
-        for i in range(further.shape[1]):
-            step = i - part - 1
-            if closed:
-                further[row, i] = excess[row, step % count]
-            elif 0 <= step < count:
-                further[row, i] = excess[row, step]
+        further[row] = _continued(excess[row], part + 1, closed)
     for k in range(2 * part + 2):
         row = 2 if k == 0 else 1 if k == 2 * part + 1 else 0
         beside = further[row, k : k + count]

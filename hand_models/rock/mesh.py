@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hand_models.base import Array, InvalidInputError, Pose, go_on, skew
+from hand_models.base import Array, Indices, InvalidInputError, Pose, go_on, skew
 from hand_models.parameters import ParameterTable, scan_table
 from hand_models.rock.filled_holes import filled_cells
 from hand_models.rock.smoothing import Heights, OutlinedHold
@@ -163,18 +163,21 @@ class Mesh(OutlinedHold):
 
     def _pieces(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> list[Array]:
         """Return the cut through the triangles, small gaps bridged."""
-        o, s, t = (np.asarray(v, dtype=float) for v in (origin, s_axis, t_axis))
-        axes, reach = np.array([skew(s) @ t, s, t]), self._scale.reach
-        beside, middle = np.array([0.0, reach, reach]), axes @ o
-        near = self._cells.within(axes, middle - beside, middle + beside)
-        return bridge(cut(self.triangles, o, s, t, reach, near), self._scale.bridged_gap)
+        plane = np.array([origin, s_axis, t_axis], dtype=float)
+        o, s, t = plane
+        pieces = cut(self.triangles, o, s, t, self._scale.reach, self._near(plane, 0.0))
+        return bridge(pieces, self._scale.bridged_gap)
 
     def _heights(self, plane: Array) -> Heights:
-        o, s, t = plane
-        beside = np.array([0.5 * self._scale.frame_width, self._scale.reach, self._scale.reach])
-        axes = np.array([skew(t) @ s, s, t])
-        near = self._cells.within(axes, axes @ o - beside, axes @ o + beside)
+        near = self._near(plane, 0.5 * self._scale.frame_width)
         return self._heights_of(self.triangles, near, plane)
+
+    def _near(self, plane: Array, half: float) -> Indices:
+        """Return the triangles within reach of a plane's origin and so far from the plane [m]."""
+        origin, s, t = plane
+        axes, reach = np.array([skew(s) @ t, s, t]), self._scale.reach
+        beside, middle = np.array([half, reach, reach]), axes @ origin
+        return self._cells.within(axes, middle - beside, middle + beside)
 
     @cached_property
     def _cells(self) -> TriangleCells:

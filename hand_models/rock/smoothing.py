@@ -285,20 +285,19 @@ class OutlinedHold(Hold):
         heights = self._heights(plane) if hidden <= scale.bridged_gap else None
         if heights is None:
             return FingerRock(self._smooth(middle))
-        own = least_heights(points, stops, scale.places)
-        corners = seen_corners(points, stops, slack)
-        tiles, frames = (np.minimum(each, own) for each in heights[:2])
-        heights = heights._replace(tile=tiles, frame=frames)
-        gap, envelopes = (
-            scale.bridged_gap,
-            ((tiles, heights.tile_ends), (frames, heights.frame_ends)),
+        s, corners = scale.places, seen_corners(points, stops, slack)
+        own = least_heights(points, stops, s)
+
+        def envelope(least: Array, ends: Array) -> PolylineSection | None:
+            runs = raised_outlines(corners, s, own, least, ends, scale.bridged_gap, slack)
+            return self._smooth(unstrung(*runs))
+
+        heights = heights._replace(
+            tile=np.minimum(heights.tile, own), frame=np.minimum(heights.frame, own)
         )
-        tile, frame = (
-            unstrung(*raised_outlines(corners, scale.places, own, *each, gap, slack))
-            for each in envelopes
-        )
-        section = self._smooth(tile)
-        return FingerRock(section, self._smooth(frame), _strips(scale, heights, section))
+        tile = envelope(heights.tile, heights.tile_ends)
+        frame = envelope(heights.frame, heights.frame_ends)
+        return FingerRock(tile, frame, _strips(scale, heights, tile))
 
     def _smooth(self, runs: Sequence[Array]) -> PolylineSection | None:
         curves = [smooth(run, self._scale) for run in runs]
@@ -316,16 +315,17 @@ class OutlinedHold(Hold):
         """Return heights of some triangles across a finger."""
         from hand_models.rock.compiled_heights import heights_across, rock_ends
 
-        scale = self._scale
+        scale, s = self._scale, self._scale.places
         halves = 0.5 * np.array([scale.tile_width, scale.frame_width])
         least = heights_across(
-            *triangles, some, plane, scale.places, halves, scale.lines, BASE_TOLERANCES.length
+            *triangles, some, plane, s, halves, scale.lines, BASE_TOLERANCES.length
         )
-        ends = np.full((2, 2, len(scale.places), 2), np.nan)
+        ends = np.full((2, 2, len(s), 2), np.nan)
         for row, half in enumerate(halves.tolist()):
             if not np.isfinite(least[row]).all():
-                at = scale.places, half, least[row], scale.bridged_gap
-                ends[row] = rock_ends(*triangles, some, plane, *at)
+                ends[row] = rock_ends(
+                    *triangles, some, plane, s, half, least[row], scale.bridged_gap
+                )
         return Heights(least[0], least[1], least[2:], ends[0], ends[1])
 
     @abstractmethod
