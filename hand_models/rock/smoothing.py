@@ -130,7 +130,7 @@ def load_compiled() -> None:
 
     The first process of a machine compiles, in some 20 s; others load in 0.5 s.
     """
-    for part in ("cells", "cuts", "heights", "smoothing"):
+    for part in ("cells", "cuts", "heights", "outlines", "smoothing"):
         import_module(f"hand_models.rock.compiled_{part}")
     for part in ("polylines", "contacts"):
         import_module(f"hand_models.sections.compiled_{part}")
@@ -271,7 +271,7 @@ class OutlinedHold(Hold):
         InvalidInputError
             If an outline is too long to be a surface of rock; the field is ``hold``.
         """
-        from hand_models.rock.compiled_heights import (
+        from hand_models.rock.compiled_outlines import (
             least_heights,
             raised_outlines,
             seen_corners,
@@ -313,19 +313,16 @@ class OutlinedHold(Hold):
 
     def _heights_of(self, triangles: Triangles, some: Indices, plane: Array) -> Heights:
         """Return heights of some triangles across a finger."""
-        from hand_models.rock.compiled_heights import heights_across, rock_ends
+        from hand_models.rock.compiled_heights import heights_across, rock_ends, seen_triangles
 
         scale, s = self._scale, self._scale.places
         halves = 0.5 * np.array([scale.tile_width, scale.frame_width])
-        least = heights_across(
-            *triangles, some, plane, s, halves, scale.lines, BASE_TOLERANCES.length
-        )
+        seen = seen_triangles(*triangles, some, plane, float(halves.max()), scale.reach)
+        least = heights_across(seen, s, halves, scale.lines, BASE_TOLERANCES.length)
         ends = np.full((2, 2, len(s), 2), np.nan)
         for row, half in enumerate(halves.tolist()):
             if not np.isfinite(least[row]).all():
-                ends[row] = rock_ends(
-                    *triangles, some, plane, s, half, least[row], scale.bridged_gap
-                )
+                ends[row] = rock_ends(seen, s, half, least[row], scale.bridged_gap)
         return Heights(least[0], least[1], least[2:], ends[0], ends[1])
 
     @abstractmethod
