@@ -37,5 +37,7 @@ from .spread import (
     DrawnPlan as DrawnPlan,
     Influence as Influence,
     Quantiles as Quantiles,
+    SentPlan as SentPlan,
+    SentSpread as SentSpread,
     Spread as Spread,
 )

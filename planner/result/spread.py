@@ -11,7 +11,16 @@ from msgspec import Struct
 if TYPE_CHECKING:
     from hand_models.base import Array
 
-__all__ = ["SPREAD_SETTINGS", "DrawnPlan", "Influence", "Quantiles", "Spread", "SpreadSettings"]
+__all__ = [
+    "SPREAD_SETTINGS",
+    "DrawnPlan",
+    "Influence",
+    "Quantiles",
+    "SentPlan",
+    "SentSpread",
+    "Spread",
+    "SpreadSettings",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +70,51 @@ class Quantiles(Struct, frozen=True):
             (5.0, 50.0, 95.0) if len(there) >= SPREAD_SETTINGS.many_draws else (0.0, 50.0, 100.0)
         )
         return cls(*np.percentile(there, percents).tolist()) if there else None
+
+
+class SentPlan(Struct, frozen=True):
+    """What set-points of tensions do in one sample, verified; None for a missing value.
+
+    Attributes
+    ----------
+    utilisation : float or None
+        Utilisation where the body is in balance; None without a balance.
+    holds : bool
+        Whether the body is in balance within the cap on the utilisation, with no tile dragged
+        backwards.
+    """
+
+    utilisation: float | None = None
+    holds: bool = False
+
+
+class SentSpread(Struct, frozen=True):
+    """Statistics over samples in which a plan's tensions are set-points.
+
+    Attributes
+    ----------
+    holds, without : int
+        Number of samples that hold, and of samples without a balance (those among them in which a
+        hand cannot be closed).
+    utilisation : Quantiles or None
+        Over the samples with a balance; None if there are none.
+    utilisations : list of float or None
+        Value of each sample, in order.
+    """
+
+    holds: int
+    without: int
+    utilisation: Quantiles | None
+    utilisations: list[float | None]
+
+    @classmethod
+    def of(cls, plans: Sequence[SentPlan] | None) -> SentSpread | None:
+        """Compute the statistics over all samples; None where there are none."""
+        if plans is None:
+            return None
+        used = [each.utilisation for each in plans]
+        holds = sum(each.holds for each in plans)
+        return cls(holds, used.count(None), Quantiles.of(used), used)
 
 
 class Influence(Struct, frozen=True):
@@ -116,6 +170,16 @@ class Spread(Struct, frozen=True):
         factor, minus their means; equal numbers have their mean rank. Parameters that vary together
         share the variation that they explain, so shares do not add up to 1. Empty if the load
         factor varies by at most 1e-4 of its size, or fewer than three samples have one.
+    kept : SentSpread or None
+        Tensions (and pose targets) stay as planned, and nobody plans anew. Fixed wrists: palms and
+        lateral reactions are those of least utilisation that balance the body. Compliant and
+        floating wrists: equilibrium of the body on its limbs and hands, as in `OpenLoop`; requires
+        that all wrists move, and the limbs' stiffness. None without it, or without a plan.
+    feedback : SentSpread or None
+        A controller that knows no strength changes the planned tensions by the least sum of squares
+        with which hard rows and balance can be met; reactions as in ``kept``. Where the tensions
+        can be kept they are, so that a sample has the same value in both. None where a wrist moves
+        (there the limbs balance the body), or without a plan.
     """
 
     draws: int
@@ -129,6 +193,8 @@ class Spread(Struct, frozen=True):
     utilisations: list[float | None]
     load_factors: list[float | None]
     sensitive_to: list[Influence] = []
+    kept: SentSpread | None = None
+    feedback: SentSpread | None = None
 
     @classmethod
     def of(
@@ -137,6 +203,8 @@ class Spread(Struct, frozen=True):
         cap: float,
         refused: Mapping[str, int],
         drawn: Mapping[str, Array],
+        kept: Sequence[SentPlan] | None = None,
+        feedback: Sequence[SentPlan] | None = None,
     ) -> Spread:
         """Compute the statistics over the plans of all samples.
 
@@ -149,6 +217,8 @@ class Spread(Struct, frozen=True):
             Number of samples in which a hand cannot be closed, by limb.
         drawn : mapping of str to ndarray, shape (n,)
             Values of each uncertain parameter over the samples, by name.
+        kept, feedback : sequence of SentPlan, length n, optional
+            What the plan's tensions do in each sample, kept or balanced by feedback.
         """
         used, factors = [p.utilisation for p in plans], [p.load_factor for p in plans]
         some = any(factor is not None for factor in factors)
@@ -169,6 +239,8 @@ class Spread(Struct, frozen=True):
             utilisations=used,
             load_factors=factors,
             sensitive_to=influences,
+            kept=SentSpread.of(kept),
+            feedback=SentSpread.of(feedback),
         )
 
 

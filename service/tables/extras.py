@@ -16,8 +16,8 @@ from service.tables.layout import in_order, print_rows
 __all__ = [
     "print_advice",
     "print_open_loop",
+    "print_spread",
     "robust_sentence",
-    "spread_sentence",
     "with_interval",
     "words_of",
 ]
@@ -76,20 +76,37 @@ def with_interval(value: float, spread: Quantiles | None) -> str:
     return f"{value:.{more}f} ({_interval(spread)})"
 
 
-def spread_sentence(spread: Spread) -> str:
-    """Return a sentence about a Monte Carlo study of uncertain parameters.
+def print_spread(spread: Spread, out: Console) -> None:
+    """Print what a Monte Carlo study of uncertain parameters found, and how set-points fare in it.
 
     Parameters
     ----------
     spread : Spread
-        Results over all samples.
-
-    Returns
-    -------
-    str
-        In how many samples the stance is feasible, the parameter with the largest sensitivity with
-        its Spearman rank correlation, and how many samples have no plan or no load factor.
+        Plans of all samples, and what the question's plan does in them.
+    out : Console
+        Console to print on.
     """
+    out.print(_spread_sentence(spread))
+    answers = [("planned anew", spread), ("tensions kept", spread.kept)]
+    answers += [("balanced by feedback", spread.feedback)]
+    rows = [
+        (
+            words,
+            each.holds,
+            spread.draws - each.holds - each.without,
+            each.without,
+            "none" if each.utilisation is None else _interval(each.utilisation),
+        )
+        for words, each in answers
+        if each is not None
+    ]
+    if len(rows) > 1:
+        heads = ("feasible", "overloaded", "no balance", "utilisation")
+        print_rows(rows, in_order([f"{spread.draws} samples"], heads), out)
+
+
+def _spread_sentence(spread: Spread) -> str:
+    """Return in a sentence how many samples are feasible, and what the load factor hangs on."""
     said = f"feasible in {spread.holds} of {spread.draws} samples"
     if spread.cap < 1.0:
         said += f" within a utilisation of {spread.cap:g}"
