@@ -252,11 +252,12 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     axes.axvline(1.0, color="tab:red", linestyle="--", label="needed")
     if nominal is not None:
         axes.axvline(nominal, color="black", label="nominal")
-    said = f"feasible in {spread.holds} of {spread.draws} samples"
+    said, limit = f"feasible in {spread.holds} of {spread.draws} samples", spread.threshold
+    if limit is not None and limit.shear_limit is not None:
+        said = f"feasible where a tile on {limit.surface} holds {limit.shear_limit:.2g} N or more"
+        said += f": {limit.share:.0%} of its range"
     if spread.cap < 1.0:
-        said += f" within {spread.cap:g}"
-    if spread.sensitive_to:
-        said += f"; most sensitive to {spread.sensitive_to[0].quantity}"
+        said += f" (utilisation up to {spread.cap:g})"
     axes.set_title(said, fontsize=9, loc="left", pad=18.0)
     axes.set(xlabel="load factor [1]", ylabel="samples")
     axes.margins(x=0.04)

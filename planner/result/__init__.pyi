@@ -40,4 +40,5 @@ from .spread import (
     SentPlan as SentPlan,
     SentSpread as SentSpread,
     Spread as Spread,
+    StrengthThreshold as StrengthThreshold,
 )

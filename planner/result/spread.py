@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from msgspec import Struct
@@ -20,6 +21,7 @@ __all__ = [
     "SentSpread",
     "Spread",
     "SpreadSettings",
+    "StrengthThreshold",
 ]
 
 
@@ -29,9 +31,16 @@ class SpreadSettings:
 
     many_draws: int = 20  # of which 5 % are one; of fewer the extremes are reported
     least_variation: float = 1e-4  # of numbers, over the largest: less is the solver's error
+    chance: float = 4.0
+    """Over the number of samples, a squared correlation that one in twenty has by chance."""
+    least_rest: float = 1e-12
+    """Least product of squared sums of which a squared correlation is one: less is rounding."""
 
 
 SPREAD_SETTINGS: Final = SpreadSettings()
+
+STRENGTH: Final = ".shear_limit"
+"""How the names of strengths of a tile on a surface end."""
 
 
 class DrawnPlan(Struct, frozen=True):
@@ -118,7 +127,7 @@ class SentSpread(Struct, frozen=True):
 
 
 class Influence(Struct, frozen=True):
-    """Sensitivity of the load factor to one uncertain parameter (Spearman rank correlation).
+    """Sensitivity of the load factor to one uncertain parameter.
 
     Attributes
     ----------
@@ -126,10 +135,40 @@ class Influence(Struct, frozen=True):
         Name of the parameter as in parameter files: ``rock.shear_limit``,
         ``finger.pulley_radii[1]``.
     share : float
-        Squared rank correlation ρ² with the load factor, in [0, 1]; see `Spread`.
+        In [0, 1]: of ``sensitive_to`` the squared rank correlation ρ² with the load factor, of
+        ``rock_apart`` the share of the variance; see `Spread`.
+    source : str
+        Source of the values: ``calibrated`` where they were fitted to published data; ``paper``,
+        ``measured`` or ``assumed`` where nothing narrows them but what was known before (a prior).
     """
 
     quantity: str
+    share: float
+    source: str = ""
+
+
+class StrengthThreshold(Struct, frozen=True):
+    """Least strength of the rock with which a stance is feasible, all else as usual.
+
+    Attributes
+    ----------
+    surface : str
+        Name of the preset surface.
+    shear_limit : float or None
+        Least strength of a tile on it in shear [N], to about 1 %: the least of the assumed range
+        where the stance is feasible on all of it; None where it is feasible on none of it.
+    ratio : float or None
+        The same over the strength on the sandpaper of the calibration.
+    range : list of float, length 2
+        Assumed least and largest ratio, evenly distributed.
+    share : float
+        Share of this range on which the stance is feasible.
+    """
+
+    surface: str
+    shear_limit: float | None
+    ratio: float | None
+    range: list[float]
     share: float
 
 
@@ -170,6 +209,17 @@ class Spread(Struct, frozen=True):
         factor, minus their means; equal numbers have their mean rank. Parameters that vary together
         share the variation that they explain, so shares do not add up to 1. Empty if the load
         factor varies by at most 1e-4 of its size, or fewer than three samples have one.
+    rock_share : float or None
+        Share of the variance of the load factor that a quadratic function of the strengths of a
+        tile on all surfaces explains; None with too few samples.
+    rock_apart : list of Influence
+        The three other parameters that explain most of the rest: squared correlation of parameter
+        and load factor, both less what the strengths explain (partial correlation). Parameters that
+        explain no more than one in twenty does by chance, 4 over the number of samples, are left
+        out.
+    threshold : StrengthThreshold or None
+        Least strength of rock with which the stance is feasible; None with samples of the caller,
+        and where no hand is on rock of the range.
     kept : SentSpread or None
         Tensions (and pose targets) stay as planned, and nobody plans anew. Fixed wrists: palms and
         lateral reactions are those of least utilisation that balance the body. Compliant and
@@ -193,6 +243,9 @@ class Spread(Struct, frozen=True):
     utilisations: list[float | None]
     load_factors: list[float | None]
     sensitive_to: list[Influence] = []
+    rock_share: float | None = None
+    rock_apart: list[Influence] = []
+    threshold: StrengthThreshold | None = None
     kept: SentSpread | None = None
     feedback: SentSpread | None = None
 
@@ -205,6 +258,8 @@ class Spread(Struct, frozen=True):
         drawn: Mapping[str, Array],
         kept: Sequence[SentPlan] | None = None,
         feedback: Sequence[SentPlan] | None = None,
+        threshold: StrengthThreshold | None = None,
+        sources: Mapping[str, str] = MappingProxyType({}),
     ) -> Spread:
         """Compute the statistics over the plans of all samples.
 
@@ -219,10 +274,14 @@ class Spread(Struct, frozen=True):
             Values of each uncertain parameter over the samples, by name.
         kept, feedback : sequence of SentPlan, length n, optional
             What the plan's tensions do in each sample, kept or balanced by feedback.
+        threshold : StrengthThreshold, optional
+        sources : mapping of str to str, optional
+            Source of each uncertain parameter, by name.
         """
         used, factors = [p.utilisation for p in plans], [p.load_factor for p in plans]
         some = any(factor is not None for factor in factors)
-        influences = _influences(factors, drawn)
+        influences = [_sourced(each, sources) for each in _influences(factors, drawn)]
+        rock_share, apart = _apart(factors, drawn)
         carried = [
             0.0 if u is None and factor is None else factor
             for u, factor in zip(used, factors, strict=True)
@@ -239,6 +298,9 @@ class Spread(Struct, frozen=True):
             utilisations=used,
             load_factors=factors,
             sensitive_to=influences,
+            rock_share=rock_share,
+            rock_apart=[_sourced(each, sources) for each in apart],
+            threshold=threshold,
             kept=SentSpread.of(kept),
             feedback=SentSpread.of(feedback),
         )
@@ -262,6 +324,55 @@ def _influences(factors: Sequence[float | None], drawn: Mapping[str, Array]) -> 
             share = float((a @ b) ** 2 / ((a @ a) * (b @ b)))
             shares.setdefault(a.tobytes(), Influence(name, share))
     return sorted(shares.values(), key=lambda each: -each.share)[:3]  # the largest
+
+
+def _sourced(influence: Influence, sources: Mapping[str, str]) -> Influence:
+    return Influence(influence.quantity, influence.share, sources.get(influence.quantity, ""))
+
+
+def _apart(
+    factors: Sequence[float | None], drawn: Mapping[str, Array]
+) -> tuple[float | None, list[Influence]]:
+    """Return the strengths' share of the load factor's variance, and the others' of the rest."""
+    import numpy as np
+
+    there = [k for k, factor in enumerate(factors) if factor is not None]
+    if not there:
+        return None, []
+    found = np.array([factors[k] for k in there], dtype=float)
+    columns = [np.ones(len(there))]
+    others: dict[bytes, tuple[str, Array]] = {}
+    for name, values in drawn.items():
+        own = values[there]
+        if np.ptp(own) == 0.0:
+            continue
+        own = (own - own.mean()) / own.std()
+        if name.endswith(STRENGTH):
+            columns += [own, own**2]
+        else:
+            # a quantity that goes with one before says the same
+            others.setdefault(own.round(9).tobytes(), (name, own))
+    # two more than numbers that are fitted, or nothing is left
+    if len(there) < len(columns) + 2:
+        return None, []
+    if np.ptp(found) <= SPREAD_SETTINGS.least_variation * np.abs(found).max():
+        return None, []
+    explained = np.linalg.qr(np.column_stack(columns))[0]
+
+    def rest(values: Array) -> Array:
+        return np.asarray(values - explained @ (explained.T @ values))
+
+    left, whole = rest(found), found - found.mean()
+    chance = SPREAD_SETTINGS.chance / len(there)
+    shares = []
+    for name, own in others.values():
+        part = rest(own)
+        both = float(part @ part) * float(left @ left)
+        share = float(part @ left) ** 2 / both if both > SPREAD_SETTINGS.least_rest else 0.0
+        shares.append(Influence(name, share))
+    largest = sorted(shares, key=lambda each: -each.share)[:3]
+    share = 1.0 - float(left @ left) / float(whole @ whole)
+    return share, [each for each in largest if each.share > chance]
 
 
 def _centred_ranks(values: Array, least: float = 0.0) -> Array:

@@ -16,27 +16,46 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
 from typing import Final
+
+import scipy
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
-from hand_models.parameters import FITTED_SURFACE
+from hand_models.parameters import FITTED_SURFACE, ParameterTable, draw_table, surface_table
 from hand_models.tile import Surface
 from planner import deadline
-from planner.advice import Attempt
+from planner.advice import Attempt, StanceTrial
 from planner.deadline import DeadlineError
 from planner.execution import Passes, execute_closed, sent_plans, without_margins
 from planner.explanation import LimitUse
 from planner.prepare import PreparedStance
 from planner.programs import CAP_SLACK
 from planner.question import DrawnHand, drawn_hands, drawn_quantities
-from planner.result import DrawnPlan, HandPlan, SentPlan, Spread
+from planner.result import DrawnPlan, HandPlan, SentPlan, Spread, StrengthThreshold
 from planner.solving.solution import Solution
 
 __all__ = ["find_spread"]
 
 LATE: Final = "all samples were planned"
 """What a deadline may leave unfinished."""
+
+ROCK: Final = "rock"
+"""Preset surface whose strength has an assumed range."""
+
+
+@dataclass(frozen=True, slots=True)
+class ThresholdSettings:
+    """Settings of the search for the least strength of rock."""
+
+    accuracy: float = 0.01  # of the strength, far below what is known of any rock
+    none: float = 10.0
+    """Utilisation beyond the cap that stands for no plan: finite, so that it can be bracketed."""
+
+
+THRESHOLD_SETTINGS: Final = ThresholdSettings()
 
 
 def find_spread(
@@ -91,7 +110,8 @@ def find_spread(
             there = _with_hands(prepared, own) if len(own) == len(outcomes) else None
             if there is None:
                 continue
-            closed[k], plans[k] = own, _planned(prepared, there, idle, usual, attempt)
+            closed[k] = own
+            plans[k] = _planned(_tried(prepared, there, idle, usual, attempt))
             if fixed:
                 sent = there if bare is prepared else bare.with_hands(own)
                 kept[k], feedback[k] = sent_plans(sent, tensions, used)
@@ -99,17 +119,76 @@ def find_spread(
             found = execute_closed(prepared, hands, list(closed.values()), used, passes)
             for k, sample in zip(closed, found, strict=True):
                 kept[k] = SentPlan(sample.utilisation, sample.holds)
+        own_samples = question.draws is not None
+        threshold = None if own_samples else _threshold(prepared, idle, usual, attempt)
         deadline.check(LATE)
     except DeadlineError:
         return None
+    quantities = drawn_quantities(drawn, surfaces)
     return Spread.of(
         plans,
         question.limits.utilisation,
         refused,
-        drawn_quantities(drawn, surfaces),
+        quantities,
         kept if fixed or limbs_hold else None,
         feedback if fixed else None,
+        threshold,
+        {name: _source(drawn[0], name) for name in quantities},
     )
+
+
+def _source(drawn: DrawnHand, name: str) -> str:
+    """Return the source of an uncertain parameter, by its name in `drawn_quantities`."""
+    section, _, entry = name.partition(".")
+    entry, table = entry.split("[")[0], drawn.model.table
+    if section not in table.sections:
+        table = drawn.surfaces
+        section = section if entry in table.sections.get(section, {}) else "defaults"
+    return table.quantity(section, entry).source
+
+
+def _threshold(
+    prepared: PreparedStance, idle: Sequence[LimitUse], usual: Solution, attempt: Attempt
+) -> StrengthThreshold | None:
+    """Return the least strength of rock in its assumed range with which the stance is feasible."""
+    stance, table = prepared.question.stance, surface_table()
+    sandpaper = table.scalar(FITTED_SURFACE, "shear_limit")
+    least, most = draw_table().vector("ranges", "rock_ratio")
+    cap = prepared.question.limits.utilisation + CAP_SLACK
+
+    def on_rock(ratio: float) -> DrawnHand:
+        strength = table.quantity(ROCK, "shear_limit").changed(ratio * sandpaper)
+        own = ParameterTable({ROCK: {"shear_limit": strength}})
+        return DrawnHand(stance.robot.hand, table.replaced(own))
+
+    @cache
+    def beyond(weakness: float) -> float:
+        """Return by how much the utilisation exceeds the cap on rock of 1 / weakness."""
+        deadline.check(LATE)
+        own = [
+            hand
+            for hand in _settled(prepared, on_rock(1.0 / weakness))
+            if isinstance(hand, SettledHand)
+        ]
+        there = _with_hands(prepared, own) if len(own) == len(stance.hands) else None
+        if there is None:
+            return THRESHOLD_SETTINGS.none
+        used = _tried(prepared, there, idle, usual, attempt).utilisation
+        return min(used - cap, THRESHOLD_SETTINGS.none)
+
+    weakest = on_rock(least)
+    if all(weakest.surface(hand.surface) == hand.surface for hand in stance.hands):
+        return None
+    ratio: float | None = least
+    if beyond(1.0 / most) > 0.0:
+        ratio = None
+    elif beyond(1.0 / least) > 0.0:
+        # the utilisation is nearly linear in the weakness
+        accuracy = THRESHOLD_SETTINGS.accuracy / most
+        ratio = 1.0 / float(scipy.optimize.brentq(beyond, 1.0 / most, 1.0 / least, xtol=accuracy))
+    share = 0.0 if ratio is None else (most - ratio) / (most - least)
+    strength = None if ratio is None else ratio * sandpaper
+    return StrengthThreshold(ROCK, strength, ratio, [least, most], share)
 
 
 def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | InvalidInputError]:
@@ -138,19 +217,24 @@ def _with_hands(prepared: PreparedStance, settled: Sequence[SettledHand]) -> Pre
         return None
 
 
-def _planned(
+def _tried(
     prepared: PreparedStance,
     there: PreparedStance,
     idle: Sequence[LimitUse],
     usual: Solution,
     attempt: Attempt,
-) -> DrawnPlan:
-    """Return what the verified plan says of the same stance with a draw's hands."""
+) -> StanceTrial:
+    """Return the plan of the same stance with other hands."""
     pairs = zip(there.batch.hands, prepared.batch.hands, strict=True)
     # with its palms, a hand has other ways to carry
     alike = all(drawn.palm.engaged == own.palm.engaged for drawn, own in pairs)
-    trial = attempt(there, idle, usual if prepared.hands.floating and alike else None)
+    return attempt(there, idle, usual if prepared.hands.floating and alike else None)
+
+
+def _planned(trial: StanceTrial) -> DrawnPlan:
+    """Return what the verified plan says of the same stance with a draw's hands."""
     used, factor = trial.utilisation, trial.load_factor().factor
     if math.isinf(used):
         return DrawnPlan(load_factor=factor)
-    return DrawnPlan(used, factor, used <= there.question.limits.utilisation + CAP_SLACK)
+    cap = trial.prepared.question.limits.utilisation
+    return DrawnPlan(used, factor, used <= cap + CAP_SLACK)
