@@ -111,7 +111,9 @@ def explained_plan(
         parts["open_loop"] = find_open_loop(prepared, answer.by_hand(), checks.idle_use, passes)
         unfinished += late("open_loop") if parts["open_loop"] is None else ()
     if "spread" in question.want:
-        parts["spread"] = find_spread(prepared, checks.idle, solution, attempt)
+        hands = answer.by_hand() if isinstance(answer, Verified) else ()
+        passes = partial(execution_passes, prepared)
+        parts["spread"] = find_spread(prepared, checks.idle, solution, attempt, hands, passes)
         unfinished += late("spread") if parts["spread"] is None else ()
     if "clearance" in question.want:
         parts["clearance"] = _clearance(prepared)
