@@ -51,7 +51,7 @@ _listing = Lock()
 
 
 def enlist(store: Store) -> None:
-    """Register a cache for `stores`, for as long as its owner keeps it alive (weak reference)."""
+    """Register a cache in the statistics of `stores`, until the cache is garbage-collected."""
     with _listing:
         _stores.add(store)
 

@@ -39,7 +39,7 @@ class SearchBox:
     range: Array
 
     def poses(self, t: Array) -> Array:
-        """Return the poses ``centre + axes · t`` for m coordinates ``t``, shape (m, d)."""
+        """Return the m poses of the wrist at coordinates ``t``, both of shape (m, d)."""
         return np.asarray(self.centre + t @ self.axes.T)
 
     def grid(self, per_axis: int, start: int, end: int) -> Array:
@@ -50,7 +50,8 @@ class SearchBox:
         per_axis : int
             Poses along each axis.
         start, end : int
-            Indices of the first pose and after the last, of per_axis ** d poses.
+            First pose to return, and the one after the last, as indices among the
+            ``per_axis ** d`` poses of the grid.
 
         Returns
         -------
