@@ -25,7 +25,7 @@ class Claim:
     Attributes
     ----------
     claim : str
-        In the paper's words, or close to them, with the place.
+        Text of the claim in the paper's words, or close to them, with its place in the paper.
     claimed, got : str or float
         The paper's value and the model's.
     holds : bool
@@ -167,6 +167,11 @@ def part(progress: Progress, start: int, end: int, total: int) -> Progress:
     progress : Progress
         Callback of the whole work, called with (steps done, ``total``).
     start, end, total : int
-        The part begins and ends at these steps of the total.
+        Steps of the whole work at which the part begins and ends, and their number in all.
+
+    Returns
+    -------
+    Progress
+        Called with (steps done, steps in all) of the part; calls ``progress`` in proportion.
     """
     return lambda done, of: progress(start + (end - start) * done // of, total)
