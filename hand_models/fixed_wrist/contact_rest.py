@@ -178,8 +178,8 @@ def contact_slopes(hand: SpinyHand, placement: Placement) -> Array:
     Returns
     -------
     ndarray, shape (3, 3)
-        Derivative of (f_z, m_x, m_y) by (z, α, β), fingers closed anew; turns and moments counted
-        over 0.1 m.
+        Derivative of f_z, m_x, m_y (`closed_wrench`) by the hand's motion along z of H and its
+        turns about x and y, fingers closed anew; turns times 0.1 m, moments over 0.1 m.
     """
     search = _Search(hand, [placement])
     slopes = search.slopes(np.zeros((1, 3)), np.zeros(1, dtype=int))[0]
@@ -198,7 +198,7 @@ def rests_on_rock(
     starts : sequence of Placement, length n
         With poses of the holds.
     slopes : ndarray, shape (3, 3), optional
-        Stiffness to begin with, of a hand nearby (`contact_slopes`) [N/m]; computed by default.
+        First stiffness, that of a hand nearby (`contact_slopes`) [N/m]; computed by default.
 
     Returns
     -------

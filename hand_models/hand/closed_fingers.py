@@ -145,8 +145,8 @@ def close_fingers(
     ----------
     placed : PlacedHands
     laid : sequence of sequence of list of ClosedPhalanx, lengths n and 4
-        Phalanges of each finger that rest on smooth rock one after the other; the same list for
-        identical fingers.
+        For each finger its phalanges that rest on smooth rock (`SequentialClosure.lay`); the same
+        list for identical fingers.
     tensions : sequence of float, length n
         Closing tension of each hand [N].
     errors : dict of int to InvalidInputError

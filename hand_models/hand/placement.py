@@ -44,7 +44,7 @@ class Placement(NamedTuple):
 
 
 class PlacementKey:
-    """Hashable cache key of a placement: equal keys are hands that close alike.
+    """Hashable cache key of a placement: hands of equal keys close alike.
 
     Poses are compared by their bytes. The hash is computed once.
     """
@@ -174,7 +174,8 @@ class PlacedHands:
         Returns
         -------
         Section or None
-            `Hold.raw_section` in a fingernail grasp, else what stands out across the tiles.
+            `Hold.raw_section` in a fingernail grasp, else the envelope of the rock across the
+            width of the tiles.
         """
         hold, grasp = self.placements[index].hold, self.placements[index].grasp
         hand_in_hold = self.seatings[index].pose.inverse()

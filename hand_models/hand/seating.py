@@ -243,7 +243,7 @@ class RockUnder:
         return PolylineSection(pieces) if pieces else None
 
     def top(self, x: Array) -> Array:
-        """Return z of the highest rock under the palm, for places of the frame along x of the hand.
+        """Return z of the highest rock under the palm, for places of the frame ``at`` along x.
 
         Parameters
         ----------

@@ -194,7 +194,7 @@ class SettledHand:
         joint, and the torque against its stop at zero tension [N·m] and per newton [m].
     palm : SettledPalm
     sets : BoundedStore of float to WrenchSpace
-        Cache of `fixed_wrist.wrench_spaces` by the largest tension [N], the last few.
+        Cache of the hand's last wrench spaces (`fixed_wrist`), by the largest tension [N].
     """
 
     hand: HandModel

@@ -66,7 +66,7 @@ class ClosingSequence(NamedTuple):
 
 
 def resting_tensions(model: FingerModel, turns: Array, losses: Array) -> Array:
-    """Return the tendon tensions that balance the joints' springs at angles q: (p + K q) / (M r).
+    """Return the tensions (p + K q) / (M r) that balance the springs of joints at angles q.
 
     Parameters
     ----------

@@ -191,7 +191,7 @@ def even_quantiles(count: int, ranges: int) -> Array:
     Returns
     -------
     ndarray, shape (count, ranges)
-        In (0, 1).
+        Quantiles in (0, 1): a row for each sample, a column for each range.
     """
     ratio = 1.0
     for _ in range(64):

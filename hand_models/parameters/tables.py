@@ -85,7 +85,7 @@ class ParameterTable:
     Parameters
     ----------
     sections : mapping of str to mapping of str to Quantity
-        Not to be changed afterwards.
+        Quantities by section, then by name; not to be changed afterwards.
     """
 
     def __init__(self, sections: Mapping[str, Mapping[str, Quantity]]) -> None:
