@@ -91,7 +91,7 @@ def heights_across(
     Parameters
     ----------
     vertices, faces, some : ndarray
-        The mesh, and the triangles that count.
+        The mesh [m], and the indices of the triangles that are looked at.
     plane : ndarray, shape (3, 3)
         Origin of the coordinates [m] and both axes s and t.
     s : ndarray, shape (g,)
@@ -165,7 +165,7 @@ def rock_ends(
     least: Array,
     gap: float,
 ) -> Array:
-    """Return where the rock in a slab ends between places, beside the last of them with rock.
+    """Return where the rock in a slab ends, between a place with rock and a neighbour without.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def rock_ends(
     least : ndarray, shape (g,)
         Least t in the slab at these places, infinite without rock [m].
     gap : float
-        Difference of t from there up to which rock goes on [m].
+        Largest difference of an end's t from that of the place beside it [m].
 
     Returns
     -------
@@ -214,7 +214,7 @@ def rock_ends(
 
 @compiled("f2", "i1")
 def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]:
-    """Return what is seen of outlines along t, and how far an overhang reaches back at most.
+    """Return what is seen of outlines along t, and how far overhangs hide rock at most.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]
 
 @compiled("f2", "i1", "f1")
 def least_heights(points: Array, stops: Indices, s: Array) -> Array:
-    """Return the least t of outlines whose s ascends, at places s that ascend, too [m]."""
+    """Return the least t, (g,), of outlines (s ascending) at ascending places ``s`` [m]."""
     least = np.full(len(s), math.inf)
     start = 0
     for stop in stops:
@@ -306,7 +306,7 @@ def least_heights(points: Array, stops: Indices, s: Array) -> Array:
 
 @compiled("f2", "i1", "f0")
 def seen_corners(points: Array, stops: Indices, slack: float) -> Array:
-    """Return the points of outlines (`seen_outlines`) that no other outline hides, s ascending."""
+    """Return the points (s, t) of `seen_outlines` that no other hides by over ``slack`` [m]."""
     order = np.argsort(points[:, 0], kind="mergesort")
     if len(stops) < 2:
         return points[order]
@@ -324,7 +324,7 @@ def seen_corners(points: Array, stops: Indices, slack: float) -> Array:
 def raised_outlines(
     points: Array, s: Array, own: Array, least: Array, ends: Array, gap: float, slack: float
 ) -> tuple[Array, Indices]:
-    """Return outlines of an envelope: those in one plane, raised to what stands out beside it.
+    """Return outlines of an envelope: those of one plane, raised to rock that stands out beside it.
 
     Parameters
     ----------

@@ -83,11 +83,11 @@ def plot_holds(
     points : ndarray, shape (n, 3)
         Points with a hand, in the rock's frame [m].
     values : ndarray, shape (n,)
-        What the best hand at each point holds.
+        What the best hand at each point holds, in the unit that ``label`` names.
     refused : mapping of str to ndarray, shape (m, 3)
         Points without a hold [m], by the kind of reason; each kind has a marker of its own.
     best : sequence of Pose
-        H of the best hands in the rock's frame, the best first.
+        Hand frames H of the best hands in the rock's frame, the best first.
     path : Path
         File of the picture; its ending chooses the format.
     title : str
