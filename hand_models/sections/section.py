@@ -71,7 +71,7 @@ class Rest(NamedTuple):
 
 
 class Section(ABC):
-    """The rock in a plane with coordinates (s, t); t grows into the rock."""
+    """The rock in a finger's plane: s along the finger, t into the rock; base class of sections."""
 
     @abstractmethod
     def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
