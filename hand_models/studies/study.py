@@ -49,7 +49,10 @@ class Study(Protocol):
     """Interface of a study's module."""
 
     def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
-        """Compute the study's data and check its claims, for a hand's table."""
+        """Compute the study's data and check its claims, with the parameters of a hand.
+
+        ``progress``: called with (steps done, steps in all); ``hand``: all parameters of the hand.
+        """
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
         """Draw the study's pictures from its result.

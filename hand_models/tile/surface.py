@@ -260,7 +260,9 @@ class Surface:
         return np.asarray(self.lateral_limit / self.shear_limit * kept)
 
     def excess(self, shear: ArrayLike, normal: ArrayLike, lateral: ArrayLike = 0.0) -> Array:
-        """Return the excess of a whole tile's load over the limit surface [N]; negative inside.
+        """Return the excess of a tile's load over the limit surface [N]; negative inside.
+
+        The tile has all its spines on the rock.
 
         Parameters
         ----------
@@ -276,7 +278,7 @@ class Surface:
     def inner(self, count: int | None = None) -> tuple[HalfPlane, ...]:
         """Return half-planes inside the limit surface; see `inner_half_planes`.
 
-        ``count``: straight pieces from pure shear to φ_max; ``half_planes`` by default.
+        ``count``: number of straight pieces from pure shear to φ_max; ``half_planes`` by default.
         """
         return inner_half_planes(self if count is None else replace(self, half_planes=count))
 
