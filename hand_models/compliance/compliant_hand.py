@@ -75,7 +75,7 @@ class CompliantHand:
     Parameters
     ----------
     settled : SettledHand
-        Not in a fingernail grasp.
+        Closed hand, not in a fingernail grasp.
     preload : array_like, shape (4,), optional
         Tension of each tendon before the wrist moves [N]; the closing tension by default.
     scheme : {'held', 'tension'}, optional
@@ -149,33 +149,33 @@ class CompliantHand:
         return self._batch.loads([twists], [tensions])[0]
 
     def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
-        """Return the loads of one finger in its plane at twists of the wrist.
+        """Return the loads of one finger in its plane at m twists of the wrist.
 
         Parameters
         ----------
         i : int
             Index of the finger in `FINGERS`.
         twists : ndarray, shape (m, 6)
-            [m, rad]
+            Twists of the hand frame H, as in `loads` [m, rad].
         """
         x, z, turned, slip = (self._batch.bases[0, :, i] @ _terms(twists))[:, None]
         tension = np.full((1, len(twists)), self.preload[i])
         return self._alone[i].loads(x, z, turned, tension, slip).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
-        """Return the lateral loads of one finger's tiles at twists of the wrist.
+        """Return the lateral loads of one finger's tiles at m twists of the wrist.
 
         Parameters
         ----------
         i : int
             Index of the finger in `FINGERS`.
         twists : ndarray, shape (m, 6)
-            [m, rad]
+            Twists of the hand frame H, as in `loads` [m, rad].
 
         Returns
         -------
         ndarray, shape (m, n_i)
-            For the n_i tiles of the finger, from the base outward [N].
+            Load of each of the finger's n_i tiles, from the base outward [N].
         """
         own = self._own[i]
         moved = self._batch.aside[0, own] @ _terms(twists)
@@ -212,7 +212,7 @@ class CompliantHand:
         Parameters
         ----------
         twist : array_like, shape (6,), optional
-            [m, rad]; at rest by default.
+            Twist of the hand frame H, as in `loads` [m, rad]; at rest by default.
 
         Returns
         -------

@@ -208,7 +208,7 @@ class FloatingWrist(CompliantGrasp):
         )
 
     def sieve(self, twists: Array) -> Indices:
-        """Return the indices of the poses (m, d) that satisfy the limits of all finger tiles.
+        """Return the indices of those of m wrist poses (m, d) that keep the limits of finger tiles.
 
         Fingers are tested one after another, each only at the poses that passed before.
         """
@@ -309,7 +309,7 @@ class FloatingWrist(CompliantGrasp):
         Returns
         -------
         HandLoads
-            Of this pose alone (m = 1).
+            Loads at this pose alone (m = 1).
         """
         (steps,) = self._stepped(y[None])
         return HandLoads(*[part[:1].real for part in steps])

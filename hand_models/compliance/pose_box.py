@@ -64,10 +64,10 @@ class SearchBox:
 
 
 def linear_box(grasp: CompliantGrasp) -> SearchBox:
-    """Return the box of the set linearised at rest: its ellipsoid's axes, its range.
+    """Return the box about a grasp's set linearised at rest: axes of its ellipsoid, its ranges.
 
-    If neither the ellipsoid's centre nor rest is within every limit, the set is linearised about
-    the centre, up to six times.
+    The ellipsoid is that of Dikin about the set's analytic centre. If neither this centre nor rest
+    is within every limit, the set is linearised about the centre, up to six times.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
 
 
 def search_box(grasp: CompliantGrasp) -> SearchBox:
-    """Return the `linear_box` of a grasp, its range adapted to feasible poses by sparse grids.
+    """Return the `linear_box` of a grasp, its ranges adapted to feasible poses by sparse grids.
 
     Raises
     ------

@@ -144,6 +144,7 @@ def limit(points: Array, measure: Measure) -> Limit:
     points : ndarray, shape (n, 3)
         Wrenches (F_x, F_z, M_y) in the paper's signs [N, N, N·m].
     measure : {'shear', 'normal', 'moment'}
+        Largest F_x in the loading plane, −F_z, or M_y; of wrenches with F_z ≤ 0 (`MEASURE_UNITS`).
 
     Raises
     ------
@@ -198,7 +199,9 @@ def sharpened(
     ----------
     grasp : Gripper
     points : HullPoints
+        Points of the hull to begin with, from `HullPoints.explored`.
     measure : {'shear', 'normal', 'moment'}
+        Force limit to raise, as in `limit`.
     cuts : int
         Largest number of points to add.
     starts : int

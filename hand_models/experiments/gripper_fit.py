@@ -211,7 +211,7 @@ class GripperFit:
         Returns
         -------
         ndarray, shape (k, 3)
-            [N, N, N·m]
+            Wrenches, with their mirror images [N, N, N·m].
         """
         if fine:
             return held_wrenches(gripper)
@@ -237,7 +237,7 @@ class GripperFit:
         Returns
         -------
         ndarray, shape (k,)
-            In the units of the data.
+            Model's value of each datum, in its unit.
 
         Raises
         ------

@@ -213,7 +213,7 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     ----------
     gripper : Gripper
     directions : ndarray, shape (m, 3)
-        In (F_x, F_z, M_y), of any length.
+        Directions in (F_x, F_z, M_y), of any length.
     progress : callable, optional
         Called with (directions done, directions in all) after each increment.
 

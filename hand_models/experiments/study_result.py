@@ -55,7 +55,7 @@ class StudyResult:
         further remarks for a reader.
     claims : tuple of Claim
     hand : dict
-        By section and name, the hand's entries that differ from the bundled hand; filled in by
+        Entries of the hand that differ from the bundled hand, by section and name; filled in by
         `run_study`.
     """
 
@@ -108,7 +108,7 @@ class StudyText:
         claimed : float, optional
             The paper's value, in place of the file's.
         role : {'test', 'calibration'}, optional
-            In place of the file's, which is ``test`` by default.
+            Role of the claim in place of the file's, which is ``test`` by default.
         **values
             Values of the placeholders in the text.
         """

@@ -156,7 +156,7 @@ def clipped_vertices(points: Array) -> Array:
     Returns
     -------
     ndarray, shape (k, 3)
-        Empty, (0, 3), if no vertex of the hull has F_z < 0.
+        Vertices [N, N, N·m]; empty, (0, 3), if no vertex of the hull has F_z < 0.
     """
     height, slack = points[:, 1], _slack(points)
     if not (height < -slack).any():
@@ -205,14 +205,14 @@ def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> 
     points : ndarray, shape (n, 3)
         Wrenches [N, N, N·m].
     directions : ndarray, shape (m, 3)
-        In the wrenches' units, of any length.
+        Directions in the wrenches' units, of any length.
     start : array_like, shape (3,) or (m, 3), optional
         Wrench at which the line starts; zero by default [N, N, N·m].
 
     Returns
     -------
     ndarray, shape (m,)
-        NaN where the line misses the hull, or meets it only for s < 0.
+        Largest s of each direction; NaN where the line misses the hull, or meets it only for s < 0.
     """
     normals, offsets = hull_facets(points * PLANAR_SCALE)
     slack = _slack(points)

@@ -79,7 +79,7 @@ def stays(loads: Loads, surface: Surface, tension: float) -> bool:
     Parameters
     ----------
     loads : tuple of list of complex
-        From `tendon_loads`.
+        Result of `tendon_loads`.
     surface : Surface
     tension : float
         Tension of the tendon [N].

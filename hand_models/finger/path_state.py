@@ -149,6 +149,11 @@ def drives(model: FingerModel, closings: Sequence[OpenFinger]) -> Records:
     model : FingerModel
     closings : sequence of OpenFinger, length n
         The fingers' surfaces and closing tensions.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Records of `DRIVE_FIELDS`.
     """
     found = np.zeros(len(closings), DRIVE_FIELDS)
     losses = np.array([model.losses(closing.base_tile) for closing in closings])

@@ -125,7 +125,7 @@ def phalanx_beside(
     bare : ndarray of bool, shape (p,)
         True for rock that the bare frame meets, beside the tiles.
     settings, shape : record
-        As of `put_around`.
+        `FingerSettings` and `PhalanxShape`.
     joint, u : complex
         x + i z of the phalanx's joint [m], and the unit vector along the phalanx.
     depth : float
@@ -186,9 +186,9 @@ def near_points(
     points, lengths, bare, centres, radii, longest : ndarray
         Rock in the finger's plane, a row of `Outlines`.
     shape : record
-        As of `put_around`.
+        `PhalanxShape`.
     joint, u : complex
-        As of `phalanx_beside`.
+        Joint and direction of the phalanx, as of `phalanx_beside`.
     within : float
         Margin: the tile's depth and the largest further motion [m].
     """

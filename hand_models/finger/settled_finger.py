@@ -182,7 +182,7 @@ class SettledFinger:
         Parameters
         ----------
         shears : ndarray, shape (3, 2)
-            From `shears`.
+            Result of the method `shears`.
         base_tile : bool, optional
             Whether a base tile comes first on the tendon.
 
@@ -209,7 +209,7 @@ class SettledFinger:
         Parameters
         ----------
         shears, normals : ndarray, shape (3, 2)
-            From `shears` and `normals`.
+            Results of the methods `shears` and `normals`.
         base_tile : bool, optional
             Whether a base tile comes first on the tendon.
 

@@ -148,7 +148,7 @@ def grid_of_trials(
     Returns
     -------
     list of HoldTrial
-        For each point on rock, every angle with every rotation.
+        Places at each point on rock, one for every angle with every rotation.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def try_holds(
     Returns
     -------
     list of FoundHold or InvalidInputError
-        In the order of the trials; an error, with the reason, where the hand cannot be. A place
+        Hands in the order of the trials; an error, with the reason, where one cannot be. A place
         where the scan ends within a finger's reach is an error, too: the finger would take the
         scan's border for an edge.
     """

@@ -68,7 +68,7 @@ def write_hands(closed: Sequence[ClosedPlacement], path: Path) -> None:
     Parameters
     ----------
     closed : sequence of ClosedPlacement
-        At least one. All on the same `Mesh`, with the same surface and hand.
+        Hands, at least one, all on the same `Mesh`, with the same surface and hand model.
     path : Path
 
     Raises

@@ -78,8 +78,8 @@ def impossible_forces(
     Returns
     -------
     dict of str to str
-        By direction; without those along which the hand can pull or shear with at least
-        `FORCE_TOLERANCE`.
+        Sentences by direction, such as ``-fz``; none for a direction along which the hand can pull
+        or shear with at least `FORCE_TOLERANCE`.
     """
     found = {}
     for way in TRIAL_WAYS:

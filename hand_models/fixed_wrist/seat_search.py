@@ -75,15 +75,15 @@ def best_seats(
     hand : SpinyHand
         Model of all hands.
     placements : sequence of Placement
-        With ``hold_in_hand`` None.
+        Hands on their holds, with ``hold_in_hand`` None.
     direction : array_like, shape (6,), optional
         Direction of the wrench on the rock, in H; the pull-off by default.
 
     Returns
     -------
     list of SettledHand or InvalidInputError
-        In the order of ``placements``, with the seating rule ``best``; for a hand that can close at
-        none of the places tried, the error at the first of them.
+        Hands in the order of ``placements``, with the seating rule ``best``; for a hand that can
+        close at none of the places tried, the error at the first of them.
 
     Raises
     ------

@@ -198,7 +198,8 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     Returns
     -------
     H, h : ndarray, shapes (n, nh, m), (n, nh)
-        In the order of ``layout.hard``: tensions, tiles, joint stops, nails, tendon friction, palm.
+        Coefficients and right-hand sides, in the order of ``layout.hard``: tensions, tiles, joint
+        stops, nails, tendon friction, palm.
     """
     loads, shape = _of_tiles(hands, "loads"), (len(hands), len(layout.hard))
     friction = np.array([hand.surface.friction for hand in hands])[:, None, None]

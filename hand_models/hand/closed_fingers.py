@@ -60,8 +60,8 @@ class ClosedFingers:
     alone : dict of int to ClosedFinger
         Fingers that were closed along their paths, by their index in ``row_of``.
     lifts : dict of int to float
-        By the index of each hand with rock inside an open finger: distance along −z of the hand
-        frame H that would clear it [m].
+        For each hand with rock inside an open finger, by its index: distance along −z of the hand
+        frame H by which the hand would have to back off [m].
 
     Attributes
     ----------

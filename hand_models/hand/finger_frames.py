@@ -98,8 +98,9 @@ class FingerFrame:
         Parameters
         ----------
         hold : Hold
+            The rock.
         hand_in_hold : Pose
-            H in the hold's frame.
+            The hand frame H in the hold's frame.
         raw : bool, optional
             Whether to use `Hold.raw_section`, with steps and edges smaller than a tile.
         """

@@ -100,7 +100,7 @@ def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
     Returns
     -------
     tuple of ClosingSequence, length 4
-        In the order of `FINGERS`.
+        Sequence of each finger, in the order of `FINGERS`.
     """
     hand = settled.hand
     nail = hand.nail

@@ -70,7 +70,8 @@ def solid_triangles(vertices: Array, faces: Indices, least: float) -> NDArray[np
 def leaf_boxes(vertices: Array, faces: Indices, order: Indices) -> Array:
     """Return opposite corners of the box about each leaf of triangles, (n, 2, 3) [m].
 
-    ``order``: indices of the triangles, `LEAF_SIZE` for each leaf.
+    ``order``: indices of the triangles, `LEAF_SIZE` for each leaf, of the mesh of ``vertices`` and
+    ``faces``.
     """
     boxes = np.empty(((len(order) + LEAF_SIZE - 1) // LEAF_SIZE, 2, 3))
     boxes[:, 0], boxes[:, 1] = math.inf, -math.inf
@@ -138,7 +139,7 @@ def triangles_in_box(
     levels : ndarray of int, shape (k + 1,)
         Index of the first box of each level, and their number.
     axes, low, high : ndarray
-        As of `TriangleCells.within`.
+        The box that is searched, as of `TriangleCells.within`.
     """
     leaves = _leaves(boxes, levels, axes, low, high)
     found = np.empty(len(leaves) * LEAF_SIZE, dtype=np.intp)

@@ -324,7 +324,7 @@ def smoothed(
     Parameters
     ----------
     points, lengths : ndarray
-        As of `corners`.
+        Raw polyline, the result of `corners`.
     step : float
         Distance of neighbouring points along the polyline [m].
     count : int

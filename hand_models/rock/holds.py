@@ -88,6 +88,8 @@ class Hold(ABC):
     ) -> Section | None:
         """Cut the hold as `section` does, but keep steps and edges smaller than a finger's tile.
 
+        Arguments are those of `section`.
+
         Returns
         -------
         Section or None

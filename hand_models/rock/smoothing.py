@@ -260,12 +260,12 @@ class OutlinedHold(Hold):
 
         The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
         Where rock reaches back under an overhang in the finger's plane by more than a bridged gap,
-        only the cut in this plane is used. Arguments are those of `section`.
+        only the cut in this plane is used. Arguments are those of `Hold.section`.
 
         Returns
         -------
         FingerRock
-            Only rock within a finger's reach of the plane's origin.
+            Rock within a finger's reach of the plane's origin.
 
         Raises
         ------
@@ -336,6 +336,8 @@ class OutlinedHold(Hold):
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
         """Cut the hold with a finger's plane, and smooth the cut to the scale of a tile.
 
+        Arguments are those of `Hold.section`.
+
         Returns
         -------
         Section or None
@@ -352,6 +354,8 @@ class OutlinedHold(Hold):
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
         """Cut the hold with a finger's plane without smoothing, for a nail.
+
+        Arguments are those of `Hold.section`.
 
         Returns
         -------

@@ -34,7 +34,7 @@ __all__ = [
 
 
 def edges_of(faces: Indices) -> Indices:
-    """Return the three directed edges of each triangle (m, 3), as pairs of vertex indices.
+    """Return the three directed edges of each of ``faces`` (m, 3), as pairs of vertex indices.
 
     Returns
     -------

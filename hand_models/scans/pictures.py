@@ -79,7 +79,7 @@ def plot_holds(
     Parameters
     ----------
     rock : Triangles
-        In the rock's frame [m].
+        Surface of the rock, in the rock's frame [m].
     points : ndarray, shape (n, 3)
         Points with a hand, in the rock's frame [m].
     values : ndarray, shape (n,)
@@ -91,6 +91,7 @@ def plot_holds(
     path : Path
         File of the picture; its ending chooses the format.
     title : str
+        Title of the picture.
     label : str
         Meaning of the values, with their unit.
     """

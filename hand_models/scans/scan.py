@@ -86,7 +86,7 @@ class RawScan(NamedTuple):
     Attributes
     ----------
     points : ndarray, shape (n, 3)
-        In the file's axes and unit; not finite where nothing was measured.
+        Points in the file's axes and unit; not finite where nothing was measured.
     scanner : Pose or None
         Pose of the scanner, if the file has one; if the pose is turned, the points are in the
         scanner's frame.
@@ -109,7 +109,7 @@ class Scan:
     Attributes
     ----------
     points : ndarray, shape (n, 3)
-        Finite, z up [m].
+        The finite points, z up [m].
     read : int
         Number of points in the file, including those that were left out.
     view : ndarray, shape (3,), or None
@@ -241,7 +241,7 @@ def in_scan(cells: FilledCells, middle: Array, axes: Array) -> FilledCells:
     Parameters
     ----------
     cells : FilledCells
-        In coordinates from ``middle`` along ``axes``.
+        Filled cells, in coordinates from ``middle`` along ``axes``.
     middle : ndarray, shape (3,)
         Origin of these coordinates, in the scan's axes [m].
     axes : ndarray, shape (3, 3)

@@ -276,7 +276,7 @@ def rock_left(places: Complexes, axes: tuple[complex, complex]) -> Complexes:
     places : ndarray of complex
         Result of `arc`.
     axes : tuple of complex
-        Half-diameters e₁ and e₂ of the arc.
+        Half-diameters e₁ and e₂ that the arc was made with.
     """
     return places if (axes[0].conjugate() * axes[1]).imag > 0.0 else places[::-1]
 

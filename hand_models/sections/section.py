@@ -126,7 +126,7 @@ class Section(ABC):
         Returns
         -------
         ndarray
-            Of the places' shape; approximate, as `distance` [m].
+            Distances, in the shape of ``places``; approximate, as `distance` [m].
         """
         return np.array(list(map(self.distance, places.ravel().tolist()))).reshape(places.shape)
 

@@ -60,7 +60,7 @@ class Study(Protocol):
         Returns
         -------
         dict of str to Figure
-            By the names of the files, without ending.
+            Pictures by the names of their files, without ending.
         """
 
 
@@ -107,7 +107,7 @@ def run_study(
     Returns
     -------
     result : StudyResult
-        With the data as ``result.json`` has them.
+        Result of the study, its data as in ``result.json``.
     files : list of Path
         Files written, ``result.json`` first.
 

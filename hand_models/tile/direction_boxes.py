@@ -73,7 +73,7 @@ class DirectionBoxes(NamedTuple):
         return _steepness(self.last, self.near)
 
     def line(self, a: float, b: float) -> tuple[Array, Array]:
-        """Return bounds of ``a cos ω + b sin ω`` in each box, where it is positive.
+        """Return bounds of ``a cos ω + b sin ω`` in each box, valid where this is positive.
 
         Parameters
         ----------

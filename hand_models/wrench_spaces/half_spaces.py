@@ -85,7 +85,7 @@ def lifted(faces: Facets, directions: Array, reach: Array, base: Array) -> HalfS
     Parameters
     ----------
     faces : Facets
-        In r dimensions, in coordinates divided by the reach, about ``base``.
+        Facets in r dimensions, in coordinates divided by the reach, about ``base``.
     directions, reach : ndarray, shapes (r, d), (r,)
         Result of `affine_hull`.
     base : ndarray, shape (d,)
@@ -94,7 +94,7 @@ def lifted(faces: Facets, directions: Array, reach: Array, base: Array) -> HalfS
     Returns
     -------
     HalfSpaces
-        In d dimensions, with d − r equations.
+        The same set in d dimensions, with d − r equations.
     """
     normals = (faces.normals / reach) @ directions
     lengths = np.linalg.norm(normals, axis=1)

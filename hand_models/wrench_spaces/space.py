@@ -348,7 +348,7 @@ class WrenchSpace:
         Parameters
         ----------
         wrench : array_like, shape (6,)
-            [N, N·m]
+            Wrench on the rock, in H [N, N·m].
         tolerance : float, optional
             Distance, with moments divided by 0.1 m (*scaled* wrenches) [N].
         """
