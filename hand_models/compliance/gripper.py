@@ -32,7 +32,7 @@ GRIPPER_SIDES: Final = ("right", "left")
 
 
 def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
-    """Return the parameters of the gripper: the experiment's take the place of the hand's.
+    """Return the parameters of the gripper: the hand's, with those of the experiments put in.
 
     Parameters
     ----------

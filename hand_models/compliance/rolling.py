@@ -189,7 +189,7 @@ def _unit(angle: Numbers) -> Numbers:
 
 
 def dot(a: Numbers, b: Numbers) -> Numbers:
-    """Return inner products of vectors (x, z), shapes (..., 2, m) to (..., m), not conjugated."""
+    """Return inner products (..., m) of vectors (x, z), shape (..., 2, m), without conjugation."""
     return np.asarray(a[..., 0, :] * b[..., 0, :] + a[..., 1, :] * b[..., 1, :])
 
 

@@ -75,7 +75,7 @@ class Contact:
     across: float = 0.0
 
     def point(self, height: float) -> tuple[float, float]:
-        """Return the contact's place (x, z) in F [m]; ``height``: tile's face above axis [m]."""
+        """Return the contact's place (x, z) in F [m]; ``height``: as `FingerModel.tile_height`."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         height += self.rise
         return (

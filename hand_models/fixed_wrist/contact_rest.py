@@ -49,7 +49,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class ContactSettings:
-    """Settings of the search for a hand's rest. A way of 1 mm counts as a turn of 10 mrad."""
+    """Settings of the search for a hand's rest. A motion of 1 mm counts as a turn of 10 mrad."""
 
     force: float = 0.01
     """Largest net force at rest, and net moment over 0.1 m [N]: by some 40 N/mm along z it is a

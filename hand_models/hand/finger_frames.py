@@ -108,7 +108,7 @@ class FingerFrame:
         return hold.raw_section(*plane) if raw else hold.finger_rock(*plane).tile
 
     def rock(self, hold: Hold, hand_in_hold: Pose) -> FingerRock:
-        """Return the rock under the whole width of the finger, in its F; arguments as of `cut`."""
+        """Return the rock under the finger's whole width, in its frame F; arguments as of `cut`."""
         return hold.finger_rock(*self._plane(hand_in_hold))
 
     def _plane(self, hand_in_hold: Pose) -> tuple[Array, Array, Array]:

@@ -157,7 +157,7 @@ class PlacedHands:
         return hold.entries(places, into)
 
     def rock(self, index: int, finger: int) -> FingerRock:
-        """Return the rock that a finger of a hand meets with its whole width, by their indices."""
+        """Return the rock under the whole width of a finger; arguments as of `section`."""
         hand_in_hold = self.seatings[index].pose.inverse()
         return self.frames.hands[index][finger].rock(self.placements[index].hold, hand_in_hold)
 

@@ -57,7 +57,7 @@ class HandPostures(NamedTuple):
     across: Array
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
-        """Return the posture of each finger, of one model, in the order of `FINGERS`."""
+        """Return the four fingers in the order of `FINGERS`; ``model``: numbers of a finger."""
         return tuple(
             SettledFinger(
                 model,

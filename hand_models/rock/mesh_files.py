@@ -22,7 +22,7 @@ MESH_ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
 
 
 def read_mesh(path: Path) -> tuple[Array, Indices]:
-    """Read vertices and triangles of an STL, PLY, OBJ or OFF file, whose unit is to be metres.
+    """Read vertices and triangles of an STL, PLY, OBJ or OFF file, which must be in metres.
 
     Returns
     -------
