@@ -62,7 +62,7 @@ def seen_triangles(
     Parameters
     ----------
     vertices, faces, some : ndarray
-        The mesh, and the triangles that count.
+        The mesh [m], and the indices of the triangles that are looked at.
     plane : ndarray, shape (3, 3)
         Origin of the coordinates [m] and both axes s and t.
     half, reach : float
@@ -158,7 +158,7 @@ def heights_across(triangles: Array, s: Array, halves: Array, lines: Array, slac
 
 @compiled("f3", "f1", "f0", "f1", "f0")
 def rock_ends(triangles: Array, s: Array, half: float, least: Array, gap: float) -> Array:
-    """Return where the rock in a slab ends between places, beside the last of them with rock.
+    """Return where the rock in a slab ends, between a place with rock and a neighbour without.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def rock_ends(triangles: Array, s: Array, half: float, least: Array, gap: float)
     least : ndarray, shape (g,)
         Least t in the slab at these places, infinite without rock [m].
     gap : float
-        Difference of t from there up to which rock goes on [m].
+        Largest difference of an end's t from that of the place beside it [m].
 
     Returns
     -------

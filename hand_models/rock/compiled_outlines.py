@@ -17,7 +17,7 @@ __all__ = ["least_heights", "raised_outlines", "seen_corners", "seen_outlines"]
 
 @compiled("f2", "i1")
 def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]:
-    """Return what is seen of outlines along t, and how far an overhang reaches back at most.
+    """Return what is seen of outlines along t, and how far overhangs hide rock at most.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def seen_outlines(points: Array, stops: Indices) -> tuple[Array, Indices, float]
 
 @compiled("f2", "i1", "f1")
 def least_heights(points: Array, stops: Indices, s: Array) -> Array:
-    """Return the least t of outlines whose s ascends, at places s that ascend, too [m]."""
+    """Return the least t, (g,), of outlines (s ascending) at ascending places ``s`` [m]."""
     least = np.full(len(s), math.inf)
     start = 0
     for stop in stops:
@@ -110,7 +110,7 @@ def least_heights(points: Array, stops: Indices, s: Array) -> Array:
 
 @compiled("f2", "i1", "f0")
 def seen_corners(points: Array, stops: Indices, slack: float) -> Array:
-    """Return the points of outlines (`seen_outlines`) that no other outline hides, s ascending."""
+    """Return the points (s, t) of `seen_outlines` that no other hides by over ``slack`` [m]."""
     order = np.argsort(points[:, 0], kind="mergesort")
     if len(stops) < 2:
         return points[order]
@@ -128,7 +128,7 @@ def seen_corners(points: Array, stops: Indices, slack: float) -> Array:
 def raised_outlines(
     points: Array, s: Array, own: Array, least: Array, ends: Array, gap: float, slack: float
 ) -> tuple[Array, Indices]:
-    """Return outlines of an envelope: those in one plane, raised to what stands out beside it.
+    """Return outlines of an envelope: those of one plane, raised to rock that stands out beside it.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def raised_outlines(
         Places in equal steps, and t of the rock in the plane and of the envelope there; infinite
         without rock [m].
     ends : ndarray, shape (2, g, 2)
-        Ends of the envelope, as from `rock_ends` of the heights [m].
+        Ends of the envelope, as from `rock_ends` [m].
     gap : float
         Distance of places of the envelope, with none between, that is bridged [m].
     slack : float

@@ -114,13 +114,13 @@ class Scale:
 
     @property
     def lines(self) -> Array:
-        """Middles of equal strips across a tile, an odd number of them [m]."""
+        """Distance of the middle of each strip across a tile from the tile's middle, (k,) [m]."""
         half = math.ceil(0.5 * self.tile_width / self.strip - 0.5)
         return np.asarray(self.tile_width / (2 * half + 1) * np.arange(-half, half + 1))
 
     @property
     def places(self) -> Array:
-        """Places along a finger at which heights of rock are taken [m]."""
+        """Places s along a finger at which heights of rock are taken, (g,), ascending [m]."""
         count = math.ceil(self.reach / self.height_spacing)
         return np.asarray(self.reach / count * np.arange(-count, count + 1))
 
@@ -202,7 +202,7 @@ NO_OUTLINES: Final = np.zeros((0, 2)), np.zeros(0, dtype=np.intp), 0.0
 
 
 class Heights(NamedTuple):
-    """Heights t at which rock begins over places s in equal steps, across a finger.
+    """Heights t at which rock begins at g places s along a finger (`Scale.places`).
 
     Attributes
     ----------
@@ -211,7 +211,8 @@ class Heights(NamedTuple):
     lines : ndarray, shape (k, g)
         t in the middle of each strip across the tiles [m].
     tile_ends, frame_ends : ndarray, shape (2, g, 2)
-        Where the rock ends beside places, across the tiles and across the frames (`rock_ends`).
+        Ends (s, t) of the rock before and after each place, across the tiles and across the
+        frames, from `rock_ends`; NaN where the rock does not end there [m].
     """
 
     tile: Array
@@ -255,16 +256,16 @@ class OutlinedHold(Hold):
         self._scale = Scale.of(hand)
 
     def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
-        """Cut the hold with a plane, raise the cut to what stands out beside it, and smooth it.
+        """Return the envelope of the rock across a finger's width, in the finger's plane, smoothed.
 
-        Seen along t, what stands out first anywhere across the tiles, and across the frames, is the
-        envelope that they meet. Where rock reaches back under an overhang in the finger's plane by
-        more than a bridged gap, the finger is met in this plane alone.
+        The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
+        Where rock reaches back under an overhang in the finger's plane by more than a bridged gap,
+        only the cut in this plane is used. Arguments are those of `Hold.section`.
 
         Returns
         -------
         FingerRock
-            Only rock within a finger's reach of the plane's origin.
+            Rock within a finger's reach of the plane's origin.
 
         Raises
         ------
@@ -332,6 +333,8 @@ class OutlinedHold(Hold):
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
         """Cut the hold with a finger's plane, and smooth the cut to the scale of a tile.
 
+        Arguments are those of `Hold.section`.
+
         Returns
         -------
         Section or None
@@ -348,6 +351,8 @@ class OutlinedHold(Hold):
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
         """Cut the hold with a finger's plane without smoothing, for a nail.
+
+        Arguments are those of `Hold.section`.
 
         Returns
         -------

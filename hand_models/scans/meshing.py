@@ -113,13 +113,13 @@ class Triangulated(NamedTuple):
     points : ndarray, shape (n, 3)
         Coordinates from ``middle`` along ``axes`` [m].
     corners : ndarray of int, shape (m, 3)
-        Points of each triangle, counterclockwise over x and y.
+        Indices of each triangle's points, counterclockwise over x and y.
     gaps : Gaps
         The width that each triangle bridges.
     middle : ndarray, shape (3,)
-        In the scan's axes [m].
+        Origin of the points' coordinates, in the scan's axes [m].
     axes : ndarray, shape (3, 3)
-        Columns, in the scan's axes; z along the view.
+        Columns: axes of the points' coordinates, in the scan's axes; z along the view.
     """
 
     points: Array

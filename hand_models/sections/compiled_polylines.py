@@ -26,7 +26,11 @@ def _from_segment(vertices: Array, at: int, s: float, t: float) -> tuple[float, 
 
 @compiled("f2", "i1", "f2")
 def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Indices, Array, Array]:
-    """Return the nearest segment to each point; see `Boundary.nearest`."""
+    """Return the nearest segment to each of n points (n, 2) [m]; see `Boundary.nearest`.
+
+    ``vertices`` (p, 2) and ``ends``: points of the polylines [m], and the index at which each ends.
+    The vectors to the points are returned as (s, t), shape (n, 2).
+    """
     longest, begin = 1e-9, 0  # [m] or else the longest segment
     for end in ends:
         for i in range(begin, end - 1):
@@ -63,7 +67,11 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
 
 @compiled("f2", "i1", "f1", "f1")
 def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Array:
-    """Return the least t of polylines in each window low ≤ s ≤ high, or infinity."""
+    """Return the least t of polylines in each of n windows of s, (n,) [m]; infinite without rock.
+
+    ``vertices`` (p, 2) and ``ends``: points of the polylines [m], and the index at which each ends;
+    ``low`` and ``high``, (n,): the windows low ≤ s ≤ high [m].
+    """
     least = np.full(len(low), math.inf)
     for i in range(len(low)):
         begin = 0
