@@ -124,7 +124,7 @@ def closings(prepared: PreparedStance) -> Iterator[Change]:
 
 
 def fingers(turn: float) -> str:
-    """Return words for a rotation of the outer fingers.
+    """Return words for a rotation of the outer fingers: ``the outer fingers at 90°``.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _moved(
 
 
 def way_motions() -> list[_Motion]:
-    """Return small shifts of a hand along its palm, as motions for `placed`."""
+    """Return shifts of a hand by 2 cm along ±x and ±y of H, as motions for `placed`."""
     return [(x, y, 0.0) for x, y in SETTINGS.palm_ways]
 
 
@@ -237,7 +237,7 @@ def turn_motions(turns: Sequence[float] = SETTINGS.palm_turns) -> list[_Motion]:
 
 
 def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:
-    """Return the changes that remove a hand's automatic seat from a question.
+    """Return the changes of a question that leave out how a hand is seated, as it gets a pose.
 
     Parameters
     ----------

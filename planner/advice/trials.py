@@ -143,7 +143,7 @@ class Trials:
         self._odd = _odd(self.base.prepared)
 
     def holds(self, utilisation: float) -> bool:
-        """Return whether a utilisation is feasible: within the question's cap on it."""
+        """Return whether a utilisation is feasible: within the cap that the question sets."""
         return utilisation <= self.question.limits.utilisation + CAP_SLACK
 
     @property

@@ -204,7 +204,7 @@ class BodyPrograms:
         goal : ndarray, shape (n,)
             Not zero.
         ways : ndarray, shape (k, n)
-            Directions of the k acceleration components of `Motion`, in world frame W.
+            Directions of acceleration, as columns of the k components of `Motion`, in frame W.
 
         Returns
         -------

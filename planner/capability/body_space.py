@@ -303,7 +303,7 @@ class BodySpace(BodyPrograms):
         motion = self.motion
         if motion is None:
             raise InvalidInputError(
-                "does not determine the mass, which accelerations require; give load instead",
+                "gives no mass, and accelerations require one; give load instead of body_wrench",
                 field="body_wrench",
             )
         k = motion.wrench.shape[1]

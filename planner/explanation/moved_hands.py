@@ -22,7 +22,7 @@ __all__ = ["changed_contacts"]
 
 
 def changed_contacts(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[str]:
-    """Yield a sentence for each compliant hand that would close otherwise where its wrist goes.
+    """Yield a sentence for each compliant hand that would close differently at its planned pose.
 
     Parameters
     ----------

@@ -272,7 +272,7 @@ def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
 
 
 def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
-    """Yield warnings about a plan's floating wrists: moved or turned too far, or unstable.
+    """Yield warnings about a plan's floating wrists that move or turn too far, or are unstable.
 
     Beyond 5 mm or 50 mrad the linear step from rest is uncertain; unstable is a wrist whose least
     stiffness is not above zero.

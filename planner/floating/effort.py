@@ -122,7 +122,7 @@ class LeastEffort(Goal):
 
 
 def with_room(cap: float, used: float) -> float:
-    """Return a cap that leaves a plan at the cap some room for rounding.
+    """Return the cap on the utilisation, raised a little if the plan uses all of it, for rounding.
 
     Parameters
     ----------

@@ -127,7 +127,7 @@ class Goal(ABC):
         return self.value(measure) + penalty * self.wrong(measure)
 
     def constraints(self, data: StanceData) -> StanceData:
-        """Return the stance with the goal's constraints as hard rows; by default unchanged."""
+        """Return a stance's rows with the goal's constraints as hard rows; unchanged by default."""
         return data
 
     @abstractmethod
@@ -147,7 +147,7 @@ class Goal(ABC):
 
     @abstractmethod
     def dearest(self, outcome: Outcome) -> float:
-        """Return the largest dual value of an outcome; the penalty must exceed it to be exact."""
+        """Return the largest dual value of an outcome, which an exact penalty must exceed."""
 
     @abstractmethod
     def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
@@ -160,7 +160,7 @@ class Goal(ABC):
         outcome : Outcome
             Result of `solve` on the sets.
         near : sequence of ndarray, shape (m,)
-            Loads of each hand [N], or wrist pose [m, rad], at the current point.
+            Loads y of each hand at the current point, as in `LinearisationPoint`.
         """
 
     @abstractmethod
@@ -203,7 +203,7 @@ class Goal(ABC):
         root : ndarray, shape (M, M)
             R, in the scaled loads of all hands.
         near : sequence of ndarray, shape (m,)
-            Loads of each hand [N], or wrist pose [m, rad], at the current point.
+            Loads y of each hand at the current point, as in `LinearisationPoint`.
         """
 
     @abstractmethod

@@ -65,7 +65,7 @@ class WristSolution:
     sets : Sets
         Sets linearised at the point.
     outcome : Outcome
-        Of the goal's program on these sets; not solved if ``nothing`` was found.
+        Result of the goal's program on these sets; not solved if ``nothing`` was found.
     rounds : int
         Number of linearisations.
     error : float
@@ -100,7 +100,7 @@ def searching(
     before: Sets | None = None,
     error: float = 0.0,
 ) -> WristSolution:
-    """Return a point with the sets linearised there, and no program solved on them yet.
+    """Return the state of a search at a point: the sets linearised there, and nothing solved yet.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def solve_wrists(
     most: int = SETTINGS.rounds,
     goal: Goal = LEAST_USE,
 ) -> WristSolution:
-    """Search for the best wrist poses for a goal.
+    """Search for the loads and wrist poses that are best for a goal, within a trust region.
 
     If the search ends without proof, or its budget is spent, violations at the last point are
     corrected (`made_exact`). At a deadline the latest plan found on the way is returned.
@@ -136,6 +136,7 @@ def solve_wrists(
     ----------
     hands : HandSets
     start : LinearisationPoint
+        Point at which the search begins.
     budget : Budget
         Largest number of conic programs.
     most : int, optional

@@ -54,6 +54,7 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     path : Path
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
+        Title of the picture.
     """
     views = ACCELERATION_VIEWS if space.accelerates else ()
     outlines = [_accelerations(space, view) for view in views]

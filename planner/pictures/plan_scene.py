@@ -84,6 +84,7 @@ class Dots(NamedTuple):
     Attributes
     ----------
     kind : {'contact', 'joint', 'load', 'origin'}
+        Contacts of tiles, joints of a limb, the point where the load acts, or the origin of B.
     points : ndarray, shape (n, 3)
         [m]
     utilisations : ndarray, shape (n,), or None
@@ -124,6 +125,7 @@ class Label(NamedTuple):
     Attributes
     ----------
     kind : {'limb', 'origin'}
+        Name of a limb at its hand, or of the body frame at its origin.
     place : ndarray, shape (3,)
         [m]
     text : str

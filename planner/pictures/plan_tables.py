@@ -29,7 +29,7 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
     ----------
     axes : Axes
     plan : Plan
-        With loads.
+        A plan that has loads.
     question : Question
         Question that the plan answers.
     """
@@ -125,7 +125,7 @@ def draw_shortfall(axes: Any, plan: Plan) -> None:
     ----------
     axes : Axes
     plan : Plan
-        Without loads.
+        An infeasible plan, without loads.
     """
     axes.set_axis_off()
     proof = plan.certificate
@@ -203,7 +203,7 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     ----------
     axes : Axes
     spread : Spread
-        With load factors.
+        Spread that has load factors.
     nominal : float or None
         Load factor of the plan with nominal parameters.
     """

@@ -176,7 +176,7 @@ class View:
     def merged(
         self, spots: Iterable[Array], texts: Iterable[str], between: str, near: float
     ) -> list[tuple[Array, str]]:
-        """Return notes with their positions; in side views, near notes are joined at the first one.
+        """Return texts with their positions; in side views, texts close together become one note.
 
         Parameters
         ----------

@@ -34,8 +34,8 @@ class Posture:
     weights : Weights
         Body wrench from the robot's weight, centre of mass, and positions of payloads.
     off : mapping of str to tuple of float, float
-        Errors of inverse kinematics by limb, of hands whose pose is only nearly reached: distance
-        [m] and angle [rad].
+        Distance [m] and angle [rad] by which a hand misses its pose, by limb; only for hands whose
+        pose inverse kinematics reaches nearly.
     """
 
     angles: Mapping[str, Array]

@@ -1,4 +1,4 @@
-"""Close the hands of a stance on their holds, let them come to rest there, and find one's set."""
+"""Close hands on their holds, let them come to rest there, and find the set of one hand."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def settle_stance(stance: Stance, which: Sequence[int] | None = None) -> list[Se
     Raises
     ------
     InvalidInputError
-        If a hand cannot be closed on its hold; of the first such hand, its field relative to the
-        question.
+        If a hand cannot be closed on its hold; the field, relative to the question, is that of the
+        first such hand.
     """
     indices = range(len(stance.hands)) if which is None else which
     settled = []
@@ -118,8 +118,8 @@ def come_to_rest(
 ) -> list[HandOnHold | InvalidInputError]:
     """Place hands by contact: where each, closed and unloaded, rests on its rock.
 
-    Only its z, and its turns about x and y, are found (`hand_models.fixed_wrist.contact_rest`).
-    Its rock stays where it is under the given hand.
+    Only a hand's position along z, and its rotations about x and y of H, change
+    (`hand_models.fixed_wrist.contact_rest`). The rock stays at its pose in W.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def come_to_rest(
     hands : sequence of HandOnHold, length n
         Hands where they start.
     offsets : sequence of Pose, length n, optional
-        Final H in the frame where the hand rests; by default hands stay at rest.
+        Pose of each hand's final frame H in its frame H at rest; by default hands stay at rest.
 
     Returns
     -------

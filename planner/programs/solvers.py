@@ -1,7 +1,8 @@
 """One function for each conic program of a stance, and evaluations of given loads.
 
-The programs are defined in `planner.programs.program`. All loads y are in newtons, or of a
-floating wrist its twist [m, rad]; ``data`` holds the scaled rows of all hands.
+The programs are defined in `planner.programs.program`. Loads y are in newtons; those of a floating
+wrist are its twist [m, rad], those of a compliant wrist its tensions [N], then its twist. ``data``
+holds the scaled rows of all hands.
 """
 
 from __future__ import annotations
@@ -175,7 +176,7 @@ def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
     root : ndarray, shape (M, M)
         Root R of the curvature RᵀR in the scaled loads z of all hands.
     near : sequence of ndarray, shape (m,)
-        Loads y₀ of each hand [N], or wrist pose [m, rad]; z₀ is y₀ over its units.
+        Loads y₀ of each hand [N], or twist of a wrist that moves [m, rad]; z₀ = y₀ / units.
     """
     centre = root @ (np.concatenate(near) / data.rows.unit)
     return Best(data, residuals=Residuals(root, centre, 0.5)).solve()
@@ -209,7 +210,7 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
     Returns
     -------
     Outcome
-        Of the last try; status `OUT_OF_TIME` or unsolved if both fail.
+        Outcome of the last try; status `OUT_OF_TIME` or unsolved if both fail.
     """
     outcome = Outcome(False, OUT_OF_TIME, 0, math.nan)
     for slack in (1e-9, CAP_SLACK):  # where the least has all its digits, or else near it
@@ -251,7 +252,7 @@ def elastic(
     penalty : float
         Price ρ of violations of the balance and of hard rows.
     near : sequence of ndarray, shape (m,)
-        Loads of each hand [N], or wrist pose [m, rad], near which the solution is kept.
+        Loads y of each hand near which the solution is kept [N]; twists of wrists [m, rad].
     firm : ndarray of bool, shape (Σ nh,)
         True for each hard row that must not be exceeded.
     nearness : float, optional
@@ -316,7 +317,7 @@ def loads_are_feasible(data: StanceData, loads: Sequence[Array], cap: float) -> 
     ----------
     data : StanceData
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
     cap : float
         Largest utilisation.
     """
@@ -332,7 +333,7 @@ def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
     ----------
     data : StanceData
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
 
     Returns
     -------
@@ -344,20 +345,20 @@ def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
 
 
 def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
-    """Return the largest violation of limits at a cap, or of hard rows, by given loads.
+    """Return the largest excess of given loads over limits at a cap, or over hard rows.
 
     Parameters
     ----------
     data : StanceData
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
     cap : float
         Largest utilisation.
 
     Returns
     -------
     float
-        Violation of a limit as utilisation, of a hard row in `LOAD_UNIT`; at least 0.
+        Utilisation minus cap of a limit, or excess of a hard row [`LOAD_UNIT`]; at least 0.
     """
     worst = 0.0
     for hand, y in zip(data.hands, loads, strict=True):
@@ -374,7 +375,7 @@ def used(data: StanceData, loads: Sequence[Array]) -> Array:
     ----------
     data : StanceData
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
 
     Returns
     -------

@@ -211,9 +211,10 @@ class Question:
                 preload = float(hand.tendon_preload.min())
             if least > max(preload, 0.0):  # no preload is below zero
                 raise InvalidInputError(
-                    f"must be at most the tendon_preload of {hand.limb}, {preload:g} N, as motors "
-                    f"of floating hands stand still; got {least:g} N; lower it, give more "
-                    "tendon_preload, or let the wrist be 'compliant'",
+                    "must be at most the preload (tendon_preload, or else the closing tension) of "
+                    f"{hand.limb}, {preload:g} N, as motors of floating hands stand still; got "
+                    f"{least:g} N; lower it, give more tendon_preload, or let the wrist be "
+                    "'compliant'",
                     field="limits.least_tension",
                 )
 

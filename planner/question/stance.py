@@ -164,8 +164,8 @@ class HandOnHold:
         Where on the hold the hand is seated: a frame in the hold's frame, used in place of that
         frame.
     contact_offset : Pose, optional
-        Of a hand that was placed by contact (`planner.come_to_rest`): H in the frame where the
-        unloaded hand rests. None for a hand that is where it was put or seated.
+        Pose of H in its frame at rest, where the unloaded hand rests, for a hand placed by contact
+        (`planner.come_to_rest`). None for a hand that is where it was put or seated.
     """
 
     limb: str
@@ -188,13 +188,13 @@ class HandOnHold:
         known_choice(self.wrist, get_args(WristMode), "wrist")
         if self.wrist_travel is not None and self.wrist != "compliant":
             raise InvalidInputError(
-                f"requires wrist 'compliant', got {self.wrist!r}; remove it for any other",
+                f"requires wrist 'compliant', got {self.wrist!r}: change wrist, or leave it out",
                 field="wrist_travel",
             )
         if self.tendon_preload is not None:
             if self.wrist != "floating":
                 raise InvalidInputError(
-                    f"requires wrist 'floating', got {self.wrist!r}; remove it for any other",
+                    f"requires wrist 'floating', got {self.wrist!r}: change wrist, or leave it out",
                     field="tendon_preload",
                 )
             preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
@@ -240,7 +240,7 @@ class HandOnHold:
         if self.seat_direction is not None:
             if self.seat != "best":
                 raise InvalidInputError(
-                    f"requires the seat 'best', got {self.seat!r}; remove it for any other",
+                    f"requires the seat 'best', got {self.seat!r}: change seat, or leave it out",
                     field="seat_direction",
                 )
             direction = finite_vector(self.seat_direction, 6, "seat_direction")

@@ -183,15 +183,15 @@ class SetPoints:
     utilisation : float or None
         Largest utilisation of all limits.
     gap : float or None
-        Proven bound: no plan has a utilisation that is less by more than this. With compliant
-        wrists a bound of plans nearby, in the sets linearised at the wrists' poses.
+        Proven bound on how much lower the utilisation of another plan can be. With compliant
+        wrists it covers plans nearby only: those in the sets linearised at the wrists' poses.
     tensions : ndarray, shape (hands, 4), or None
         Tendon tensions [N].
     wrenches : ndarray, shape (hands, 6), or None
         Wrench of each hand on the rock, in H [N, N·m].
     loads : ndarray, shape (hands, m), or None
-        Loads y of each hand, in the order of `WrenchStream.columns`, then zeros [N]; of a compliant
-        wrist the twist, too [m, rad].
+        Loads y of each hand, in the order of `WrenchStream.columns`, then zeros [N]; those of a
+        compliant wrist include its twist [m, rad].
     source : {'interpolated', 'blended', 'solved'}
         ``interpolated``: from known plans; ``solved``: for this wrench alone; ``blended``: a
         mixture of both.

@@ -38,8 +38,8 @@ def evaluate(
     Returns
     -------
     RouteResult
-        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. Of
-        a finding of which a plan has at most one, the largest of all stages is left.
+        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. Kinds
+        of findings that a plan has at most once remain only in the stage with the largest value.
 
     Raises
     ------

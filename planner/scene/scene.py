@@ -67,7 +67,9 @@ class Scene:
     rocks: tuple[Pose, ...]
 
     def smooth_depths(self, hands: Sequence[int], points: Array) -> Array:
-        """Return the depth of points in the rock of hands on smooth holds, shape (k, n) [m].
+        """Return how deep points are in the smooth holds of some hands, shape (k, n) [m].
+
+        Depths are negative outside the rock, and lower bounds for an ellipsoid.
 
         Parameters
         ----------

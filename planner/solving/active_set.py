@@ -134,7 +134,7 @@ class Rows(NamedTuple):
 
 
 class ApartError(Exception):
-    """Error of active rows that have no common point, or of an iteration that does not converge."""
+    """Error: the active rows have no common point, or Newton's iteration does not converge."""
 
 
 class ActiveFace:

@@ -122,7 +122,7 @@ class FixedSolution(Solution):
     def load_factor(
         self, prepared: PreparedStance, budget: Budget
     ) -> tuple[LoadFactor, FixedSolution]:
-        """Return the load factor: the largest multiple of the body wrench at utilisation 1."""
+        """Return the largest multiple of the body wrench at utilisation 1, and this solution."""
         factor = most_of_fixed(prepared.hands, self.sets.data)
         return LoadFactor(factor, unfinished=factor is None and deadline.expired()), self
 

@@ -36,7 +36,8 @@ class Solution:
     sets : Sets
         Wrench spaces of the hands and rows of the programs, linearised about the loads.
     loads : tuple of ndarray, shape (m,)
-        Loads y of each hand [N], of a floating wrist [m, rad]; empty without a solution.
+        Loads y of each hand [N]; of a floating wrist its twist [m, rad], of a compliant one
+        tensions and twist. Empty without a solution.
     least : Outcome
         Outcome of the program of least utilisation.
     objective : Objective
@@ -95,7 +96,7 @@ class Solution:
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> tuple[LoadFactor, Solution]:
         """Return the load factor: the largest multiple of the body wrench at utilisation 1.
 
-        And the solution, or a better one that the search has come upon, not verified.
+        Returned with it: this solution, or a better one that the search found, not verified.
 
         Parameters
         ----------
@@ -190,8 +191,8 @@ def load_factor_of(
 ) -> tuple[LoadFactor, Solution]:
     """Return the load factor: the largest multiple of the body wrench at utilisation 1.
 
-    And the answer's solution, or a better one that the search has come upon, not verified. Without
-    a body wrench the factor is unbounded, if the stance is feasible at utilisation 1.
+    Returned with it: the answer's solution, or a better one that the search found, not verified. If
+    the body wrench is zero and the stance feasible at utilisation 1, the factor is unbounded.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def recover(prepared: PreparedStance, checks: Checks, solution: Solution) -> Ver
     prepared : PreparedStance
     checks : Checks
     solution : Solution
-        With loads.
+        A solution that has loads.
     """
     spaces, data = solution.sets
     if checks.recovery is not None:

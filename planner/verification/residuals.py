@@ -264,7 +264,7 @@ class PartNames(NamedTuple):
         return f"{self.limbs[h]}: "
 
     def tile(self, t: int) -> str:
-        """Return the name of tile t of all hands; indices after the tiles are palms."""
+        """Return the name of a tile from its index t over all hands; after the tiles come palms."""
         places = self.known.places
         if t >= len(places.hand):
             return f"{self.limbs[t - len(places.hand)]}: palm"

@@ -98,7 +98,7 @@ class RestingContact(NamedTuple):
     touches : float
         Position along the face at which it touches the rock [m].
     bears : float or None
-        Centre of pressure along the face, of one that rolls [m]; None of one that slides.
+        Centre of pressure along a face that rolls on the rock [m]; None if the face slides.
     """
 
     section: Section
