@@ -103,7 +103,7 @@ class SweepRow(msgspec.Struct, frozen=True):
 
     @property
     def margin(self) -> float | None:
-        """Ratio of the utilisation to its cap, 1 at the limit; None without a utilisation."""
+        """Ratio of utilisation to cap, 1 at the limit (no difference); None without a utilisation."""
         return None if self.utilisation is None else self.utilisation / self.cap
 
     @property

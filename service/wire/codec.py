@@ -269,6 +269,7 @@ def check_size(size: int, kind: type) -> None:
     Raises
     ------
     LimitError
+        If the payload has more bytes than `most_bytes` of the type.
     """
     most = most_bytes(kind)
     if size > most:
