@@ -103,7 +103,7 @@ class SweepRow(msgspec.Struct, frozen=True):
 
     @property
     def margin(self) -> float | None:
-        """Ratio of utilisation to cap, 1 at the limit (no difference); None without a utilisation."""
+        """Utilisation over cap, 1 at the limit (a ratio); None without a utilisation."""
         return None if self.utilisation is None else self.utilisation / self.cap
 
     @property
