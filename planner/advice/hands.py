@@ -54,6 +54,7 @@ def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     order : sequence of int
         Indices of the hands to change, in this order.
     """
@@ -87,6 +88,7 @@ def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     index : int
         Index of the hand.
     """
@@ -171,6 +173,7 @@ def placed(prepared: PreparedStance, index: int, motions: Sequence[_Motion]) -> 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     index : int
         Index of the hand.
     motions : sequence of (float, float, float)
@@ -242,6 +245,7 @@ def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:
     Parameters
     ----------
     hand : HandOnHold
+        The hand in the question.
     index : int
         Index of the hand in the question.
 
@@ -263,6 +267,7 @@ def rock_pose(prepared: PreparedStance, index: int) -> Pose:
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     index : int
         Index of the hand.
     """

@@ -52,6 +52,7 @@ class NewHold:
     trials : Trials
         Budget of plans.
     limb : str
+        Name of the limb that gets the hold.
 
     Attributes
     ----------
@@ -176,7 +177,9 @@ def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
     Parameters
     ----------
     trials : Trials
+        Budget of plans; its unchanged stance is the start.
     limb : str
+        Name of the limb.
     """
     search = NewHold(trials, limb)
     turns = [math.radians(turn) for turn in range(-135, 181, 45)]  # [rad] all around

@@ -87,9 +87,11 @@ class Tried(NamedTuple):
     Attributes
     ----------
     change : Change
+        Proposed change of the unchanged question.
     question : Question
         The changed question.
     trial : StanceTrial
+        Plan of the changed question's stance.
     """
 
     change: Change
@@ -161,6 +163,7 @@ class Trials:
         Parameters
         ----------
         candidates : iterable of Change
+            Changes to try, each alone.
 
         Returns
         -------
@@ -277,6 +280,7 @@ def direction(trial: StanceTrial) -> Array | None:
     Parameters
     ----------
     trial : StanceTrial
+        Plan of the stance, or the failed attempt at one.
 
     Returns
     -------

@@ -350,6 +350,7 @@ class HardRowSystem:
         Parameters
         ----------
         constraints : iterable of LimitName
+            Names of the selected constraints.
         balance : bool, optional
             Whether the body's balance takes part.
 

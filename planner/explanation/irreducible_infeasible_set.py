@@ -42,6 +42,7 @@ def irreducible_set(
     Parameters
     ----------
     system : HardRowSystem
+        Named constraints of the stance.
     suspects : collection of LimitName
         Constraints among which the subset is sought; all constraints if these are feasible.
 
@@ -88,6 +89,7 @@ def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
     Parameters
     ----------
     system : HardRowSystem
+        Named constraints of the stance.
     names : collection of LimitName
         Infeasible constraints.
 

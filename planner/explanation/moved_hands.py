@@ -27,6 +27,7 @@ def changed_contacts(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     hands : sequence of HandPlan
         A plan's hands, in the order of the stance.
     """

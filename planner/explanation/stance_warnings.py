@@ -30,6 +30,7 @@ def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
 
     Returns
     -------
@@ -63,6 +64,7 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     batch : HandBatch
         Settled hands of the stance, in its order.
     """
@@ -280,6 +282,7 @@ def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
     Parameters
     ----------
     hands : sequence of HandPlan
+        Hands of the plan, in the order of the stance.
     """
     for hand in hands:
         if hand.wrist is None:

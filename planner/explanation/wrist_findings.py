@@ -32,6 +32,7 @@ def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterat
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     hands : sequence of HandPlan
         A plan's hands, in the order of the stance.
     """
@@ -75,6 +76,7 @@ def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     hands : sequence of HandPlan
         A plan's hands, in the order of the stance.
     """

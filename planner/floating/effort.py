@@ -154,6 +154,7 @@ def best_within(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     plan : WristSolution
         Start plan, within the cap.
     cap : float

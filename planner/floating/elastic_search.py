@@ -48,6 +48,7 @@ def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     factor : float
         Multiple of the body wrench to be balanced.
     budget : Budget
@@ -122,6 +123,7 @@ def find_wrists(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     start : LinearisationPoint
         Point at which the search begins.
     budget : Budget
@@ -149,6 +151,7 @@ def without_hindrance(hands: HandSets, found: WristSolution, budget: Budget) -> 
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     found : WristSolution
         Result of a search, with or without a plan.
     budget : Budget

@@ -177,6 +177,7 @@ class Goal(ABC):
         Parameters
         ----------
         hands : HandSets
+            Hands of the stance, with their sets at any pose of their wrists.
         point : LinearisationPoint
             Current point.
         sets : Sets

@@ -105,8 +105,11 @@ def searching(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     goal : Goal
+        Objective of the search.
     point : LinearisationPoint
+        Wrist poses and loads at which the sets are linearised.
     within : float
         Half width of the trust region, in `TWIST_UNIT`.
     before : Sets, optional
@@ -135,6 +138,7 @@ def solve_wrists(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     start : LinearisationPoint
         Point at which the search begins.
     budget : Budget
@@ -216,7 +220,9 @@ def repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     goal : Goal
+        Objective of the search.
     state : WristSolution
         Point to be corrected.
     within : float
@@ -255,7 +261,9 @@ def made_exact(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     goal : Goal
+        Objective of the search.
     start : WristSolution
         Point at which the search ended.
     rounds : int
@@ -294,6 +302,7 @@ def gap(goal: Goal, state: WristSolution, outcome: Outcome) -> float:
     Parameters
     ----------
     goal : Goal
+        Objective of the search.
     state : WristSolution
         The point, with its exact measure.
     outcome : Outcome
@@ -319,6 +328,7 @@ def disagreements(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     spaces : sequence of WrenchSpace
         Sets whose error is wanted.
     there : sequence of WrenchSpace

@@ -49,6 +49,7 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     Parameters
     ----------
     space : BodySpace
+        Body space of the stance.
     section : BodySection
         Section of that body space, from `BodySpace.section`.
     path : Path

@@ -70,6 +70,7 @@ class Line(NamedTuple):
     Attributes
     ----------
     kind : {'finger', 'limb'}
+        What the line is: the joints of a finger, or those of a limb.
     points : ndarray, shape (n, 3)
         [m]
     """
@@ -108,6 +109,7 @@ class Arrow(NamedTuple):
     force : ndarray, shape (3,)
         In W [N].
     text : str
+        Text at the tip, such as the size of the force.
     utilisation : float or None
         Utilisation of the hand; None for the load.
     """
@@ -129,6 +131,7 @@ class Label(NamedTuple):
     place : ndarray, shape (3,)
         [m]
     text : str
+        Text at the point.
     """
 
     kind: str
@@ -145,11 +148,15 @@ class DrawnScene:
     origin : ndarray, shape (3,)
         Origin of body frame B in world frame W [m].
     surfaces : tuple of DrawnSurface
+        Rock, palms, body and links.
     lines : tuple of Line
+        Fingers and limbs.
     dots : tuple of Dots
+        Contacts, joints, and the points of load and origin.
     arrows : tuple of Arrow
         Those of the hands in their order, then that of the load.
     labels : tuple of Label
+        Names of the limbs and of the origin.
     """
 
     origin: Array
@@ -281,6 +288,7 @@ def joint_utilisations(plan: Plan, stance: Stance) -> dict[str, Array]:
     Parameters
     ----------
     plan : Plan
+        Plan with or without joint torques.
     stance : Stance
         Stance of the plan.
 

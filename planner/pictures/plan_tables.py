@@ -28,6 +28,7 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     plan : Plan
         A plan that has loads.
     question : Question
@@ -78,6 +79,7 @@ def draw_joints(axes: Any, used: Mapping[str, Array]) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     used : mapping of str to ndarray, shape (n,)
         Utilisation of the n joints of each limb, from the body outward.
     """
@@ -124,6 +126,7 @@ def draw_shortfall(axes: Any, plan: Plan) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     plan : Plan
         An infeasible plan, without loads.
     """
@@ -202,6 +205,7 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     spread : Spread
         Spread that has load factors.
     nominal : float or None

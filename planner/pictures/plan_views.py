@@ -67,6 +67,7 @@ class View:
     Attributes
     ----------
     axes : Axes or Axes3D
+        Matplotlib axes, two- or three-dimensional.
     place : callable
         Maps points in world frame W, shape (n, 3), to coordinates of the axes, shape (n, 2) or (n,
         3).
@@ -159,6 +160,7 @@ class View:
         step : ndarray, shape (3,)
             From start to tip, in W [m].
         colour : colour of matplotlib
+            Colour of the arrow.
 
         Returns
         -------
@@ -183,6 +185,7 @@ class View:
         spots : iterable of ndarray, shape (2,)
             Projected position of each text.
         texts : iterable of str
+            Texts of the notes.
         between : str
             Separator of joined texts.
         near : float
@@ -209,6 +212,7 @@ class View:
         Parameters
         ----------
         text : str
+            Text to write.
         tip : ndarray, shape (2,)
             Projection of the tip.
         step : ndarray, shape (2,)
@@ -228,6 +232,7 @@ class View:
         Parameters
         ----------
         text : str
+            Text to write.
         spot : ndarray, shape (2,)
             Projection of the point.
         shift : (float, float)

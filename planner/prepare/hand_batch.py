@@ -182,8 +182,11 @@ class HandBatch:
     Attributes
     ----------
     hands : tuple of SettledHand
+        The hands, closed on their holds.
     places : TileIndex
+        Indices of the tiles by hand, finger and phalanx.
     touch : ContactPattern
+        Contact states of the tiles.
     points : ndarray, shape (T + H, 3)
         Positions of all tiles, then of all palms [m].
     axes : ndarray, shape (T, 3, 3)

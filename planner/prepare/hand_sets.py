@@ -224,6 +224,7 @@ class HandSets:
         Parameters
         ----------
         point : LinearisationPoint
+            Wrist poses and loads at which the sets are linearised.
         within : float, optional
             Half width of the trust region of wrists, in `TWIST_UNIT`; by default unbounded.
         farthest : sequence of ndarray, shape (m,), optional

@@ -91,6 +91,7 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective.
     angles : mapping of str to ndarray, shape (n,)
         Joint angles by limb [rad], of prismatic joints [m]; limbs left out are at their rest
         angles.

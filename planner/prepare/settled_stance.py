@@ -46,6 +46,7 @@ def settle_stance(stance: Stance, which: Sequence[int] | None = None) -> list[Se
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     which : sequence of int, optional
         Indices of the hands; all by default.
 
@@ -75,6 +76,7 @@ def settle_each(
     kind : SpinyHand
         Model of all the hands.
     hands : sequence of HandOnHold
+        Hands with their holds and grasps.
 
     Returns
     -------
@@ -171,6 +173,7 @@ def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     limb : str
         Limb of the hand.
     """
@@ -184,6 +187,7 @@ class RestingHand(NamedTuple):
     Attributes
     ----------
     settled : SettledHand
+        The hand, closed on its hold.
     space : WrenchSpace
         All wrenches that the hand can exert on the rock. Of a floating hand, the set linearised at
         rest.
@@ -206,6 +210,7 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     limb : str
         Limb of the hand.
 
@@ -235,6 +240,7 @@ def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     limb : str
         Limb of the hand.
 

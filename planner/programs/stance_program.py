@@ -69,6 +69,7 @@ class Definition(NamedTuple):
     Attributes
     ----------
     problem : Problem
+        CVXPY problem: objective and constraints.
     variables : tuple of Variable
         Variables that the caller reads, in order; the hands' loads z come last.
     rows : tuple of Constraint
@@ -89,10 +90,12 @@ class StanceProgram(ABC):
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
 
     Attributes
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     G : ndarray, shape (nb, M)
         Balance: body wrench per load.
     L, l0 : ndarray, shapes (Σ nl, M), (Σ nl,)

@@ -45,6 +45,7 @@ class SilentHighs(highspy.Highs):
         Parameters
         ----------
         A : ndarray, shape (rows, columns)
+            Matrix A of the rows.
         columns : tuple of ndarray, shape (columns,)
             Lower and upper bounds of x.
         rows : tuple of ndarray, shape (rows,)

@@ -107,6 +107,7 @@ class Load(Strict, frozen=True):
         Parameters
         ----------
         stance : Stance
+            Poses of the body and of the hands on their holds.
         weights : Weights, optional
             Weight of the robot, if joints are known.
 

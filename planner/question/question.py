@@ -41,6 +41,7 @@ class Question:
     Attributes
     ----------
     stance : Stance
+        Poses of body and hands, and the holds.
     body_wrench : ndarray, shape (6,), optional
         Wrench that the rock must exert on the robot, in the body frame B [N, N·m]; by default
         computed from ``load``.
@@ -48,6 +49,7 @@ class Question:
         Mass, payloads and acceleration. Acceleration and payloads count in the joint torques even
         if the body wrench is given.
     limits : Limits
+        Caps on the plan.
     want : frozenset of str
         Extras: 'load_factor', 'prices', 'model', 'robust', 'open_loop', 'spread', 'clearance' and
         'advice'.

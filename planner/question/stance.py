@@ -40,6 +40,7 @@ def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
     named : mapping of str to object
         Mapping whose keys are checked.
     robot : Robot
+        Robot that has the limbs.
     field : str
         Field that the error names.
 
@@ -61,6 +62,7 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
     Parameters
     ----------
     value : str
+        Value of the field.
     known : sequence of str
         Valid values.
     field : str
@@ -83,6 +85,7 @@ def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     Parameters
     ----------
     wrench : ndarray, shape (6,)
+        Wrench to be checked [N, N·m].
     field : str or None
         Field that the error names.
 
@@ -273,6 +276,7 @@ class Stance:
     gravity : ndarray, shape (3,)
         In W [m/s²].
     robot : Robot
+        The robot; RoboSimian by default.
     joints : mapping of str to (ndarray or 'solve'), 'solve' or None
         Joint angles by limb [rad], of prismatic joints [m]; needed for every limb with a hand in
         the stance. 'solve', for one limb or for all: found by inverse kinematics. None: joints are

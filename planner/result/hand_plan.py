@@ -70,6 +70,7 @@ class HandPlan:
     Attributes
     ----------
     limb : str
+        Name of the limb that has the hand.
     wrench : ndarray, shape (6,)
         Wrench of the hand on the rock [N, N·m].
     tensions : ndarray, shape (4,)

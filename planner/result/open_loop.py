@@ -51,6 +51,7 @@ class OpenLoop(Struct, frozen=True):
     Attributes
     ----------
     samples : list of OpenLoopSample
+        Outcome of each sample.
     seed : int
         Seed of the displacements.
     position, height : float
@@ -104,7 +105,9 @@ class OpenLoop(Struct, frozen=True):
         Parameters
         ----------
         samples : sequence of OpenLoopSample
+            Outcome of each sample.
         seed : int
+            Seed of the displacements.
         ranges : tuple of float
             Position, height [m], tilt and yaw [rad].
         refused, reasons : mapping

@@ -52,6 +52,7 @@ class Plan:
     Attributes
     ----------
     status : {'optimal', 'overloaded', 'infeasible', 'failed'}
+        Whether there is a plan within the cap, one beyond it, none, or no answer.
     body_wrench : ndarray, shape (6,)
         Body wrench that is planned for, in the body frame B [N, N·m].
     utilisation : float or None
@@ -95,7 +96,9 @@ class Plan:
     warnings : tuple of str
         Messages of ``findings``, hands that touch nothing, and what a deadline left unfinished.
     solver : Solver
+        Solver of the plan's program, with its status.
     time : Time
+        Time that the answer took, by parts.
     findings : tuple of Finding
         What is odd about the stance as a scene, and may be a mistake.
     unfinished : tuple of str

@@ -75,6 +75,7 @@ def solve_limbs(
     Parameters
     ----------
     robot : Robot
+        Robot whose limbs carry the hands.
     poses : mapping of str to Pose
         Target pose of H in B, by limb.
     loads : mapping of str to ndarray, shape (6,)

@@ -29,6 +29,7 @@ def evaluate(
     Parameters
     ----------
     route : Route
+        Climb whose stages are planned.
     workers : int, optional
         Number of worker processes. By default the number of cores for routes of at least 100
         stages, else one. With one, this process plans all stages itself.

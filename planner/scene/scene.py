@@ -44,6 +44,7 @@ class Scene:
     Attributes
     ----------
     stance : Stance
+        The stance itself.
     hands : tuple of HandOnHold
         The hands of the stance.
     swept : tuple of Swept or None
@@ -110,6 +111,7 @@ def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     settled : sequence of SettledHand
         The stance's hands, closed on their holds.
     """

@@ -143,6 +143,7 @@ class ActiveFace:
     Parameters
     ----------
     rows : Rows
+        All rows of the stance.
     Q : ndarray, shape (M,)
         Diagonal of the curvature at a weight of 1.
     active : ndarray of bool, shape (k,)
@@ -260,6 +261,7 @@ def optimum(
     Parameters
     ----------
     rows : Rows
+        All rows of the stance.
     Q : ndarray, shape (M,)
         Diagonal of the curvature at a weight of 1.
     start : Point

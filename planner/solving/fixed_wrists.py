@@ -59,6 +59,7 @@ class FixedSolution(Solution):
         Parameters
         ----------
         prepared : PreparedStance
+            The question's stance, with hands on their holds and their sets.
         sets : Sets
             Wrench spaces of the hands and rows of the programs.
         least : Outcome
@@ -139,6 +140,7 @@ def fixed_solutions(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     near : Solution, optional
         Solution for the same hands at another body wrench, as a warm start.
     """
@@ -214,6 +216,7 @@ def nearest_solutions(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     found : Solution
         Solution for the body wrench of the question.
     nearest : Outcome
@@ -234,6 +237,7 @@ def most_of_fixed(hands: HandSets, data: StanceData) -> float | None:
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     data : StanceData
         Rows of the hands' wrench spaces, and the body wrench.
     """

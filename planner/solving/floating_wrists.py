@@ -130,6 +130,7 @@ def floating_solution(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     budget : Budget
         Number of programs that the search may solve.
     near : Solution, optional
@@ -153,6 +154,7 @@ def next_solution(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     budget : Budget
         Number of programs that may be solved.
     near : FloatingSolution

@@ -43,6 +43,7 @@ def load_factors_without_palm_loads(question: Question) -> PalmLoadFactors | Non
     Parameters
     ----------
     question : Question
+        Question whose stance is planned with each of the two loads left out.
 
     Returns
     -------

@@ -87,7 +87,9 @@ class Solution:
         Parameters
         ----------
         objective : CappedObjective
+            Objective to be minimised.
         prepared : PreparedStance
+            The question's stance, with hands on their holds and their sets.
         budget : Budget
             Number of programs that a search for wrist poses may still solve.
         """
@@ -101,6 +103,7 @@ class Solution:
         Parameters
         ----------
         prepared : PreparedStance
+            The question's stance, with hands on their holds and their sets.
         budget : Budget
             Number of programs that a search for wrist poses may still solve.
         """
@@ -117,6 +120,7 @@ class Failed:
     Attributes
     ----------
     solution : Solution
+        The solution that is no plan.
     reason : str
         Sentence that says why the solution is no plan.
     utilisation, whole : float
@@ -138,6 +142,7 @@ class Infeasible:
     solution : Solution
         The solution without a balance.
     proof : Certificate
+        Certificate that proves it.
     utilisation, whole : float
         Infinite, as for every answer without a plan.
     """
@@ -159,6 +164,7 @@ class Verified:
     Attributes
     ----------
     solution : Solution
+        Solution that was checked.
     arrays : PlanArrays
         The plan's numbers, in arrays over all hands.
     used : ndarray, shape (sum of nl,)
@@ -197,7 +203,9 @@ def load_factor_of(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     answer : Answer
+        Verified loads, a proof of infeasibility, or a failure.
     budget : Budget
         Number of programs that a search for wrist poses may still solve.
     overloaded : bool

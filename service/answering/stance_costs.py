@@ -16,6 +16,7 @@ def check_costs(stance: requests.Stance) -> None:
     Parameters
     ----------
     stance : requests.Stance
+        Stance of the request.
 
     Raises
     ------
