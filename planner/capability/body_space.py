@@ -177,6 +177,7 @@ class BodySpace(BodyPrograms):
         Returns
         -------
         BodySection
+            The plane, and the polygon of feasible body wrenches in it.
 
         Raises
         ------

@@ -56,6 +56,7 @@ def survey(
     Returns
     -------
     Survey
+        Feasible poses and wrenches, and the limit reached along each axis.
 
     Raises
     ------

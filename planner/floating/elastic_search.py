@@ -81,7 +81,10 @@ def _palms_carry(hands: HandSets, point: LinearisationPoint) -> bool:
 
 
 def pressing(hands: HandSets, factor: float) -> LinearisationPoint:
-    """Return the point at which all compliant and floating wrists have brought palms to rock."""
+    """Return the point at which all compliant and floating wrists have brought palms to rock.
+
+    ``factor`` is the multiple of the body wrench that is to be balanced from there on.
+    """
     point = hands.at_rest()
     loads = [
         y if wrist is None else wrist.pressing
@@ -136,6 +139,7 @@ def find_wrists(
     Returns
     -------
     WristSolution
+        The best plan found, or the failed search.
     """
     if hands.together is None or goal is not LEAST_USE:
         return solve_wrists(hands, start, budget, most, goal)

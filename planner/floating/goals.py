@@ -103,15 +103,15 @@ class Goal(ABC):
         """
 
     def excess(self, measure: ExactMeasure) -> float:
-        """Return by how much a point exceeds a bound of the goal, such as a cap; 0 by default."""
+        """Return by how much a measured point exceeds a cap of the goal; 0 by default."""
         return 0.0
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
-        """Return whether a point is a plan: balanced, within hard rows and the goal's bounds."""
+        """Return whether a measured point is a plan: balanced, within hard rows and caps."""
         return measure.exact(hands)
 
     def wrong(self, measure: ExactMeasure) -> float:
-        """Return the sum of all violations at a point: missing wrench, hard row, excess."""
+        """Return the sum of a measured point's violations: missing wrench, hard row, excess."""
         return measure.missing + measure.broken + self.excess(measure)
 
     def merit(self, measure: ExactMeasure, penalty: float) -> float:
@@ -219,7 +219,7 @@ class LeastUse(Goal):
     promised = None
 
     def value(self, measure: ExactMeasure) -> float:
-        """Return the utilisation of a point."""
+        """Return the utilisation of a measured point."""
         return measure.utilisation
 
     def solve(self, data: StanceData) -> Outcome:

@@ -151,6 +151,7 @@ def solve_wrists(
     Returns
     -------
     WristSolution
+        The best plan found, or the point at which the search failed.
     """
     now = searching(hands, goal, start, SETTINGS.first_range)
     passed: WristSolution | None = None

@@ -50,6 +50,11 @@ def settle_stance(stance: Stance, which: Sequence[int] | None = None) -> list[Se
     which : sequence of int, optional
         Indices of the hands; all by default.
 
+    Returns
+    -------
+    list of SettledHand
+        The closed hands, in the order of the indices.
+
     Raises
     ------
     InvalidInputError

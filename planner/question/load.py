@@ -95,7 +95,7 @@ class Load(Strict, frozen=True):
 
     @property
     def own(self) -> bool:
-        """True if no mass and no centre of mass is given, so that the robot's count."""
+        """True if neither mass nor centre of mass is given, so that those of the robot count."""
         return self.mass is None and self.com is None
 
     def body_wrench(self, stance: Stance, weights: Weights | None = None) -> Array:

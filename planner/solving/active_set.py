@@ -127,6 +127,7 @@ class Rows(NamedTuple):
         Returns
         -------
         ndarray of bool, shape (k,)
+            True for active rows.
         """
         active = self.room(z, u) <= TOLERANCES.row
         active[: self.equations] = True

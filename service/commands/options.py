@@ -169,7 +169,7 @@ class WorkersOption(NamedTuple):
     dask: str | None
 
     def place(self, plans: int) -> tuple[str, int | None]:
-        """Return where to do work that takes as long as a number of ``plans``.
+        """Return where to do work that takes as long as so many ``plans`` of stances.
 
         Returns
         -------

@@ -84,6 +84,7 @@ class Paths:
         Returns
         -------
         Target
+            Steps to all places of the path, with the unit of the values.
 
         Raises
         ------

@@ -198,6 +198,7 @@ def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[Sweep
     Yields
     ------
     SweepRow
+        Result of one point, or its error.
     """
     answers = ask(design.payload(point) for point in points)
     for point, answer in zip(points, answers, strict=True):

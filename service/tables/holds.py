@@ -41,7 +41,7 @@ Pair = tuple[HoldTrial, FoundHold]
 
 
 def hold_json(trial: HoldTrial, found: FoundHold, placing: Placing) -> dict[str, Any]:
-    """Return a hold as JSON values [m, rad, N].
+    """Return a hold as JSON values in SI units: place, grasp, and what the hand can hold.
 
     Parameters
     ----------
