@@ -114,6 +114,7 @@ def margin(data: StanceData) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
 
     Returns
     -------
@@ -137,6 +138,7 @@ def unique(data: StanceData, share: float = 1.0) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     share : float, optional
         Factor on the weight of the tensions.
 
@@ -154,6 +156,7 @@ def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     trade : TensionTrade
         Weight of the tensions, and largest utilisation of the plan.
 
@@ -173,6 +176,7 @@ def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     root : ndarray, shape (M, M)
         Root R of the curvature RᵀR in the scaled loads z of all hands.
     near : sequence of ndarray, shape (m,)
@@ -190,6 +194,7 @@ def tie_break(data: StanceData, cap: float) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     cap : float
         Largest utilisation.
     """
@@ -203,6 +208,7 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     utilisation : float
         Least utilisation. The cap is larger by 1e-9 (absolute below 1, relative above), in the
         second try by `CAP_SLACK`.
@@ -228,6 +234,7 @@ def effort(data: StanceData, cap: float) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     cap : float
         Largest utilisation.
     """
@@ -249,6 +256,7 @@ def elastic(
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     penalty : float
         Price ρ of violations of the balance and of hard rows.
     near : sequence of ndarray, shape (m,)
@@ -279,17 +287,7 @@ def reach(
 ) -> Reached:
     """Solve `Reach`: the farthest t along the columns of B, in direction ``goal``, within a cap.
 
-    Parameters
-    ----------
-    data : StanceData
-    goal : ndarray, shape (k,)
-        Direction in the space of t.
-    B : ndarray, shape (nb, k)
-        Directions of the balance's right-hand side, scaled as `StanceData.wrench`.
-    cap : float, optional
-        Largest utilisation.
-    K : sequence of ndarray, shape (nl, k), optional
-        Change of each hand's utilisations per unit of t; zero by default.
+    The parameters are those of `Reach`, with their shapes and units.
     """
     return Reach(data, goal, B, cap, K).farthest()
 
@@ -316,6 +314,7 @@ def loads_are_feasible(data: StanceData, loads: Sequence[Array], cap: float) -> 
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
         Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
     cap : float
@@ -332,6 +331,7 @@ def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
         Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
 
@@ -350,6 +350,7 @@ def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
         Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
     cap : float
@@ -374,6 +375,7 @@ def used(data: StanceData, loads: Sequence[Array]) -> Array:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
         Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
 

@@ -211,7 +211,7 @@ def nearest_solutions(
 ) -> Iterator[FixedSolution]:
     """Yield candidate plans for the feasible body wrench nearest to the one of the question.
 
-    For a body wrench that is infeasible only by rounding.
+    It serves body wrenches that are infeasible only by rounding.
 
     Parameters
     ----------
