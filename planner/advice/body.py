@@ -55,7 +55,7 @@ def slope(trial: StanceTrial) -> Array:
     Returns
     -------
     ndarray, shape (3,)
-        In the axes of body frame B [1/m].
+        Gradient in the axes of body frame B [1/m].
     """
     lacking = direction(trial)
     assert lacking is not None
@@ -146,8 +146,8 @@ class BodySearch:
         Returns
         -------
         list of Change
-            With known joints, one for each tilt. Otherwise the tilt whose reach gives the lowest
-            bound on the utilisation, if that bound is well below the best utilisation.
+            With known joints, a change for each tilt. Otherwise that for the tilt whose reach gives
+            the lowest bound on the utilisation, if the bound is well below the best utilisation.
         """
         if not self._known or self.range.tilt == 0.0:
             return []
@@ -180,7 +180,7 @@ class BodySearch:
         Returns
         -------
         ndarray, shape (s, 3)
-            In the axes of body frame B [m]; the first is zero.
+            Shifts in the axes of body frame B [m]; the first is zero.
         """
         steps = np.linspace(-self.range.shift, self.range.shift, 7)  # along each axis
         shifts = np.array([(x, y, z) for x in steps for y in steps for z in steps])
@@ -317,7 +317,7 @@ class BodySearch:
         Parameters
         ----------
         shift : ndarray, shape (3,)
-            In the axes of body frame B [m].
+            Shift in the axes of body frame B [m].
         tilt : _Tilt, optional
             Rotation of the body about its centre of mass; none by default.
         """

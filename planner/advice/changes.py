@@ -74,7 +74,7 @@ class Change(NamedTuple):
     Attributes
     ----------
     kind : str
-        Such as ``body`` or ``grasp``.
+        Kind of the change, such as ``body`` or ``grasp``.
     limbs : tuple of str
         Limbs whose hands change.
     words : str

@@ -77,7 +77,7 @@ class Attempt(Protocol):
         Returns
         -------
         StanceTrial
-            Its utilisation is infinite if the stance has no plan.
+            Plan; its utilisation is infinite if the stance has none.
         """
 
 
@@ -183,8 +183,8 @@ class Trials:
         Returns
         -------
         StanceTrial or None
-            Its utilisation is infinite if the stance has no plan. None if the change is not
-            `possible`.
+            Plan of the change; its utilisation is infinite if there is none. None if the change is
+            not `possible`.
         """
         for each, question in self._asked([change]):
             return self._tried(each, question)
@@ -245,7 +245,7 @@ class Trials:
         Returns
         -------
         StanceTrial
-            Its utilisation is infinite if the stance has no plan.
+            Plan; its utilisation is infinite if the stance has none.
         """
         return self._try(prepare_stance(replace(question, objective=objective)))
 
@@ -285,7 +285,7 @@ def direction(trial: StanceTrial) -> Array | None:
     Returns
     -------
     ndarray, shape (6,), or None
-        In body frame B [1/N, 1/(N·m)]; of any length. None if no program was solved.
+        Direction of any length, in body frame B [1/N, 1/(N·m)]. None if no program was solved.
     """
     outcome, data = trial.outcome, trial.data
     if outcome.solved and outcome.balance_dual is not None:

@@ -337,7 +337,7 @@ def checked_axes(axes: Sequence[str]) -> tuple[str, str]:
     Parameters
     ----------
     axes : sequence of str
-        To be two of `WRENCH_COMPONENTS`.
+        Names to check; valid are two of `WRENCH_COMPONENTS`.
 
     Raises
     ------

@@ -217,7 +217,7 @@ class MeasurementStudy:
         Returns
         -------
         dict of str to Figure
-            With the key ``measure``.
+            The figure, with the key ``measure``.
         """
         rows = result.data["measurements"][::-1]
         places = np.arange(len(rows))

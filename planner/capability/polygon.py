@@ -43,7 +43,7 @@ class SupportPoint(NamedTuple):
     normal : ndarray, shape (2,)
         Unit vector of the direction.
     point : ndarray, shape (2,)
-        In the unit of the set.
+        The point, in the unit of the set.
     limiting : LimitName or None
         Limit that bounds the set there.
     """

@@ -102,9 +102,9 @@ class LimitUse(NamedTuple):
     name : LimitName
         Name of the limit.
     load : float
-        [N], [N·m] or [A]
+        Load on the limit [N], [N·m] or [A].
     capacity : float
-        In the unit of the load.
+        Load at utilisation 1, in the same unit.
     """
 
     name: LimitName

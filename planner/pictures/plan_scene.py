@@ -48,7 +48,7 @@ class DrawnSurface(NamedTuple):
     name : str
         Limb whose rock or palm is drawn; empty for the body and links.
     vertices : ndarray, shape (n, 3)
-        [m]
+        Corners, in W [m].
     faces : ndarray of int, shape (m, 3)
         Vertex indices of each triangle.
     """
@@ -87,7 +87,7 @@ class Dots(NamedTuple):
     kind : {'contact', 'joint', 'load', 'origin'}
         Contacts of tiles, joints of a limb, the point where the load acts, or the origin of B.
     points : ndarray, shape (n, 3)
-        [m]
+        Marked points, in W [m].
     utilisations : ndarray, shape (n,), or None
         Utilisation of each joint; None for other kinds, and for joints without known torques.
     """
@@ -105,9 +105,9 @@ class Arrow(NamedTuple):
     kind : {'force', 'load'}
         ``force``: of the rock on a hand; ``load``: weight or other load that the hands hold.
     start : ndarray, shape (3,)
-        In world frame W [m].
+        Start of the arrow, in world frame W [m].
     force : ndarray, shape (3,)
-        In W [N].
+        The force, in W [N].
     text : str
         Text at the tip, such as the size of the force.
     utilisation : float or None
@@ -129,7 +129,7 @@ class Label(NamedTuple):
     kind : {'limb', 'origin'}
         Name of a limb at its hand, or of the body frame at its origin.
     place : ndarray, shape (3,)
-        [m]
+        The point, in W [m].
     text : str
         Text at the point.
     """

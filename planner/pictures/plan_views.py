@@ -95,7 +95,7 @@ class View:
         Parameters
         ----------
         points : ndarray, shape (n, 3)
-            In world frame W [m].
+            The points, in world frame W [m].
         **style
             Line properties of matplotlib.
         """
@@ -108,7 +108,7 @@ class View:
         Parameters
         ----------
         points : ndarray, shape (n, 3)
-            In world frame W [m].
+            The points, in world frame W [m].
         **style
             Line properties of matplotlib.
         """
@@ -156,9 +156,9 @@ class View:
         Parameters
         ----------
         start : ndarray, shape (3,)
-            In world frame W [m].
+            Start of the arrow, in world frame W [m].
         step : ndarray, shape (3,)
-            From start to tip, in W [m].
+            Vector from start to tip, in W [m].
         colour : colour of matplotlib
             Colour of the arrow.
 
@@ -322,7 +322,7 @@ def silhouette(vertices: Array, look: Array) -> Array:
     Parameters
     ----------
     vertices : ndarray, shape (n, 3)
-        [m]
+        Vertices of the surface [m].
     look : ndarray, shape (3,)
         Unit viewing direction.
 

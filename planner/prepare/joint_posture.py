@@ -55,7 +55,7 @@ def posture(question: Question) -> Posture | None:
     Returns
     -------
     Posture or None
-        With joint torques and weight; None if the question has no joints.
+        Joint angles with joint torques and weight; None if the question has no joints.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def settle_each(
     Returns
     -------
     list of SettledHand or InvalidInputError
-        In the order of ``hands``.
+        Closed hand, or error, for each of ``hands``, in their order.
     """
     placements = [
         Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold(), hand.at)

@@ -99,7 +99,7 @@ class Support:
         Parameters
         ----------
         direction : ndarray, shape (6,)
-            In the hand frame H [1/N, 1/(N·m)].
+            Direction in the hand frame H [1/N, 1/(N·m)].
 
         Returns
         -------

@@ -274,7 +274,7 @@ class Stance:
     body : Pose
         Pose of the body frame B in the world frame W.
     gravity : ndarray, shape (3,)
-        In W [m/s²].
+        Acceleration of gravity, in W [m/s²].
     robot : Robot
         The robot; RoboSimian by default.
     joints : mapping of str to (ndarray or 'solve'), 'solve' or None

@@ -231,13 +231,13 @@ class Clearance(Struct, frozen=True, kw_only=True):
     Attributes
     ----------
     link_rock : Distance or None
-        From a limb's link to rock.
+        Distance of a limb's link from rock.
     link_link : Distance or None
-        From a limb's link to another link, the body or another limb's hand.
+        Distance of a limb's link from another link, the body or another limb's hand.
     hand_hand, hand_body : Distance or None
-        From a hand to another hand, and to the body.
+        Distance of a hand from another hand, and from the body.
     body_rock : Distance or None
-        From the body to rock.
+        Distance of the body from rock.
     unchecked : list of str
         What was not measured, and why.
     """

@@ -139,7 +139,7 @@ def floating_solution(
     Returns
     -------
     FloatingSolution
-        Without loads if no equilibrium was found.
+        Solution; it has no loads if no equilibrium was found.
     """
     begin = near.usual if isinstance(near, FloatingSolution) and near.usual.exact else None
     search, factor = least_use(prepared.hands, budget, begin)

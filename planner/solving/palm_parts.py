@@ -25,9 +25,9 @@ class PalmLoadFactors(NamedTuple):
     Attributes
     ----------
     without_shear : float or None
-        Palms press, and carry no shear.
+        Load factor if palms press, and carry no shear.
     without_pressing : float or None
-        Palms carry shear, and do not press.
+        Load factor if palms carry shear, and do not press.
     """
 
     without_shear: float | None

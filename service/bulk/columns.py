@@ -189,7 +189,7 @@ def chosen_columns(
     Returns
     -------
     tuple of Column
-        In the usual order of the table.
+        Selected columns, in the usual order of the table.
 
     Raises
     ------
