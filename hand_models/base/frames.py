@@ -123,7 +123,11 @@ class Pose:
         norm = math.hypot(*q)
         tolerance = BASE_TOLERANCES.unit_norm
         if not abs(norm - 1.0) <= tolerance:
-            remedy = "divide all four numbers by it" if norm else "no rotation is [0, 0, 0, 1]"
+            remedy = (
+                "divide all four numbers by it"
+                if norm
+                else "for a pose that is not turned, give [0, 0, 0, 1]"
+            )
             raise InvalidInputError(
                 f"a quaternion [x, y, z, w] of norm 1 ± {tolerance:g} is needed, "
                 f"the norm is {norm:.6g}: {remedy}",

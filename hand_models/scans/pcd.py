@@ -81,7 +81,7 @@ def _check_header(path: Path, head: bytes, size: int) -> None:
     if len(found) < len(named) or len(named) > 10:
         raise InvalidInputError(
             f"the header must have at most 10 lines, each key once, got {len(named)} lines "
-            f"with {len(found)} keys: {path}; remove the others"
+            f"with {len(found)} keys: {path}; remove the lines that are extra or repeated"
         )
     try:
         sizes, counts = ([int(each) for each in found[name]] for name in (b"SIZE", b"COUNT"))

@@ -302,7 +302,7 @@ class Check:
         """
         error = self.carry @ wrenches.ravel() - body_wrench
         off, size = math.sqrt(error.dot(error)), math.sqrt(body_wrench.dot(body_wrench))
-        if not off <= 1e-6 * max(size, 1.0):  # moments count over a metre
+        if not off <= TOLERANCES.balance * max(size, 1.0):
             yield f"balance is off by {off:.3g} of {size:.3g}"
 
     def _wrists(self, arrays: PlanArrays) -> Iterator[str]:

@@ -40,6 +40,9 @@ FINGER_COUNT: Final = len(FINGERS)
 class VerificationTolerances:
     """Largest errors of a plan's numbers against the recomputed numbers."""
 
+    balance: float = 1e-6
+    """Of the hands' wrenches against the body wrench, over its size [1]; forces in N, moments over
+    1 m, and at least 1 N: solvers balance to 1e-8."""
     load: float = 1e-6  # of a tile, relative to the largest load of its hand
     utilisation: float = 1e-6
     near: float = 1e-9  # of any residual: the smallest error that is allowed of one

@@ -144,8 +144,8 @@ class Run(ABC):
                 self._header.check(stream.readline(), file)
             if count > asked.count:
                 raise InvalidInputError(
-                    f"{file} has {count} replies, and there are {asked.count} requests; is the "
-                    "file of another batch?",
+                    f"{file} has {count} replies, and there are {asked.count} requests; is it "
+                    "the file of another batch? give another output, or leave out --resume",
                     field="--resume",
                 )
             for number, question in enumerate(islice(asked, count), start=1 + heads):
@@ -375,7 +375,8 @@ class TableLines(Run):
             whole = False
         if not whole:
             raise InvalidInputError(
-                f"{where}: not a row of this table; is the file of another batch or sweep?",
+                f"{where}: not a row of this table; is it the file of another batch or sweep? "
+                "give another output, or leave out --resume",
                 field="--resume",
             )
         if row.asked != _digest(question):

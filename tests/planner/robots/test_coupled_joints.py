@@ -334,8 +334,8 @@ def test_a_limb_that_hangs_free_would_swing(wall_with_joints):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (0.0, r"0 for a joint without a motor \(not all of a limb\), got 0"),
-        ({"front_left": 0.0}, r"not all of a limb"),
+        (0.0, r"0 for a joint without a motor \(not for all joints of a limb\), got 0"),
+        ({"front_left": 0.0}, r"not for all joints of a limb"),
         ({"front_left": (1e-4,) + (0.0,) * 6}, r"at least 0.001 N·m, .* got 0.0001"),
         ({"front_left": (-1.0,) + (9.0,) * 6}, r"got -1"),
         (float("nan"), r"got nan"),
@@ -357,7 +357,10 @@ def wall_with_joints():
 @pytest.mark.parametrize(
     ("limb", "words"),
     [
-        ("front_left", r"^limits.joint_torque.front_left: .*not all of a limb\), got 0, 0"),
+        (
+            "front_left",
+            r"^limits.joint_torque.front_left: .*not for all joints of a limb\), got 0, 0",
+        ),
         ("nobody", r"^limits.joint_torque.nobody: .*front_left"),
     ],
 )
