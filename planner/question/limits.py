@@ -236,8 +236,8 @@ def no_torque(given: Sequence[float], field: str) -> InvalidFieldError:
     """
     return InvalidFieldError(
         f"must be finite and at least {LEAST_LIMIT:g} N·m, or in a list 0 for a joint without a "
-        f"motor (not for all joints of a limb), got {', '.join(f'{most:g}' for most in given)}; leave it out "
-        "to keep the robot's own limits",
+        f"motor (not for all joints of a limb), got {', '.join(f'{most:g}' for most in given)}; "
+        "leave it out to keep the robot's own limits",
         field=field,
     )
 

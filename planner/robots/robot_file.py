@@ -337,8 +337,8 @@ def _torque_limits(table: ParameterTable, section: str) -> tuple[float, ...] | N
     if not any(limits) or not all(sound):
         raise InvalidInputError(
             f"must be {weakest:g} to {TOLERANCES.joint_torque:g} N·m, or in a list 0 for a joint "
-            f"without a motor (not for all joints of a limb), got {_quoted(limits)}; leave it out to use the "
-            "efforts of the URDF",
+            f"without a motor (not for all joints of a limb), got {_quoted(limits)}; leave it out "
+            "to use the efforts of the URDF",
             field=f"{section}.torque_limit",
         )
     return limits

@@ -53,7 +53,7 @@ def test_a_quaternion_a_little_off_its_norm_is_normalised(norm):
 @pytest.mark.parametrize("norm", [0.0, 1.0 - 2e-3, 1.0 + 2e-3, 1e3])
 def test_a_quaternion_off_its_norm_is_refused(norm):
     with pytest.raises(
-        InvalidInputError, match="the norm is .*: divide" if norm else "no rotation"
+        InvalidInputError, match="the norm is .*: divide" if norm else "not turned"
     ) as caught:
         Pose.from_quaternion([0, 0, 0], norm * np.array([0.5, 0.5, 0.5, 0.5]))
     assert caught.value.field == "orientation"
