@@ -8,6 +8,7 @@ program, or two, of the solver that the stance has already, and the check of the
 from __future__ import annotations
 
 import time
+from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,14 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.base import Array, InvalidInputError, UnsupportedError
+from hand_models.base import Array, BoundedStore, InvalidInputError, UnsupportedError
 from hand_models.fixed_wrist import slipped_hand, wrench_spaces
 from hand_models.hand import FINGERS, SettledHand
+from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, PreparedStance
 from planner.programs import Columns, ScaledRows, StanceData
 from planner.question import LostTile
 from planner.result import Plan
-from planner.solving import Checks, StanceAnswer, Verified, answer_on, idle_joints
+from planner.solving import Checks, Solution, StanceAnswer, Verified, answer_on, idle_joints
 
 __all__ = ["Recovered", "Recovery"]
 
@@ -78,12 +80,25 @@ class Recovered(NamedTuple):
         return self.found.plan()
 
 
+class _Hand(NamedTuple):
+    """A hand without tiles, its set, and the scaled rows of the set."""
+
+    settled: SettledHand
+    space: WrenchSpace
+    scaled: ScaledRows
+
+
+_HandKey = tuple[int, tuple[int, ...], tuple[int, ...], bool]
+"""Index of a hand, its slipped tiles, its released fingers, and whether its palm holds."""
+
+
 class Recovery:
     """A prepared stance, for plans without tiles that have slipped. Safe to use from threads.
 
     A tile that has slipped drags on with friction, and only while it is pressed; a finger of which
     no tile holds, or whose slipped tiles cannot all be pressed, is released: off the rock. Where
-    dragging tiles leave no balance, their fingers are released for a second plan.
+    the plan is beyond the cap, fingers that have lost more than one tile are released for a second
+    plan, and the better one counts; where there is no plan, all that have lost a tile.
 
     Parameters
     ----------
@@ -109,6 +124,12 @@ class Recovery:
             if hand.touching[t]
         }
         self._pattern = _pattern(data)
+        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", 1024)
+        self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
+            "stances without tiles", 16
+        )
+        self._near: OrderedDict[tuple[_HandKey, ...], Solution] = OrderedDict()
+        self._keep([(h, (t,), (), True) for h, t in self._places.values()])
 
     @property
     def tiles(self) -> tuple[LostTile, ...]:
@@ -152,15 +173,17 @@ class Recovery:
         by_hand = self._by_hand(lost)
         gone = {*released, *((limb, finger) for limb in off for finger in FINGERS)}
         first = self._answer(start, lost, by_hand, gone, off, body_wrench)
-        pairs = {(tile.limb, tile.finger) for tile in lost} - {*first.released}
-        if first.verified is not None or not pairs:
+        counts = Counter((tile.limb, tile.finger) for tile in lost)
+        least = 1 if first.verified is None else 2
+        more = {finger for finger, count in counts.items() if count >= least} - {*first.released}
+        if first.holds or not more:
             return first
-        second = self._answer(start, lost, by_hand, gone | pairs, off, body_wrench)
-        return first if second.verified is None else second
+        second = self._answer(start, lost, by_hand, gone | more, off, body_wrench)
+        return second if second.utilisation < first.utilisation else first
 
     def without(self, lost: Sequence[LostTile]) -> PreparedStance:
         """Return the stance without tiles that have slipped, prepared for the solver."""
-        return self._prepared(self._by_hand(tuple(dict.fromkeys(lost))), set(), ())
+        return self._prepared(self._keys(self._by_hand(dict.fromkeys(lost)), (), ()))
 
     def _by_hand(self, lost: Iterable[LostTile]) -> dict[int, list[int]]:
         """Return the tiles that have slipped, by the index of their hand."""
@@ -193,33 +216,58 @@ class Recovery:
         off: Collection[str],
         body_wrench: Array | None,
     ) -> Recovered:
-        prepared = self._prepared(by_hand, released, off)
+        keys = self._keys(by_hand, released, off)
+        prepared = self._stances.get(keys, lambda: self._prepared(keys))
         if body_wrench is not None:
             prepared = prepared.turned(body_wrench)
-        found = answer_on(prepared, start, Checks.of(prepared, self._idle, lost), None)
+        checks = Checks.of(prepared, self._idle, lost)
+        found = answer_on(prepared, start, checks, self._near.get(keys))
+        if isinstance(found.answer, Verified):
+            self._near[keys] = found.answer.solution
+            while len(self._near) > self._stances.most:
+                self._near.popitem(last=False)
         hands = zip(prepared.limbs, prepared.batch.hands, strict=True)
         open_fingers = [(limb, finger) for limb, hand in hands for finger in _released(hand)]
         return Recovered(found, lost, tuple(open_fingers))
 
-    def _prepared(
+    def _keys(
         self,
         by_hand: Mapping[int, Sequence[int]],
         released: Collection[tuple[str, str]],
         off: Collection[str],
-    ) -> PreparedStance:
-        """Return the stance without tiles, by hand, and without fingers and whole hands."""
-        prepared, cap = self.prepared, self.prepared.question.limits.tendon_tension
+    ) -> tuple[_HandKey, ...]:
+        """Return what is gone of each hand that is not whole."""
+        keys = []
+        for h, limb in enumerate(self.prepared.limbs):
+            fingers = sorted(FINGERS.index(finger) for at, finger in released if at == limb)
+            tiles = sorted(by_hand.get(h, ()))
+            if tiles or fingers or limb in off:
+                keys.append((h, tuple(tiles), tuple(fingers), limb not in off))
+        return tuple(keys)
+
+    def _keep(self, keys: Sequence[_HandKey]) -> None:
+        """Find hands without tiles, all in one call."""
+        added, whole = self.prepared.hands.added, self.prepared.batch.hands
+        hands = [
+            slipped_hand(whole[h], tiles, fingers, palm=palm) for h, tiles, fingers, palm in keys
+        ]
+        plain = wrench_spaces(hands, self.prepared.question.limits.tendon_tension)
+        spaces = [added[key[0]].on(space) for key, space in zip(keys, plain, strict=True)]
+        found = [_Hand(*each, ScaledRows.of(each[1])) for each in zip(hands, spaces, strict=True)]
+        self._hands.keep(zip(keys, found, strict=True))
+
+    def _prepared(self, keys: Sequence[_HandKey]) -> PreparedStance:
+        """Return the stance with hands that are not whole, prepared for the solver."""
+        prepared, found = self.prepared, self._hands.find(keys)
+        new = [key for key, each in zip(keys, found, strict=True) if each is None]
+        if new:
+            self._keep(new)
+            found = self._hands.find(keys)
         hands, spaces = list(prepared.batch.hands), list(prepared.hands.spaces)
-        scaled, changed = list(prepared.hands.scaled), list[int]()
-        for h, limb in enumerate(prepared.limbs):
-            fingers = [FINGERS.index(finger) for at, finger in released if at == limb]
-            if h not in by_hand and not fingers and limb not in off:
-                continue
-            hands[h] = slipped_hand(hands[h], by_hand.get(h, ()), fingers, palm=limb not in off)
-            changed.append(h)
-        for h, space in zip(changed, wrench_spaces([hands[h] for h in changed], cap), strict=True):
-            spaces[h] = prepared.hands.added[h].on(space)
-            scaled[h] = ScaledRows.of(spaces[h])
+        scaled = list(prepared.hands.scaled)
+        for (h, *_), each in zip(keys, found, strict=True):
+            assert each is not None
+            hands[h], spaces[h], scaled[h] = each
         sets = prepared.hands.with_sets(spaces, scaled=tuple(scaled))
         data = replace(sets.data, rows=sets.data.rows._replace(columns=self._columns(sets.data)))
         return replace(prepared, batch=HandBatch.of(hands), hands=replace(sets, data=data))

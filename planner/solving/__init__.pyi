@@ -10,7 +10,7 @@ from .palm_parts import (
     PalmLoadFactors as PalmLoadFactors,
     load_factors_without_palm_loads as load_factors_without_palm_loads,
 )
-from .solution import Infeasible as Infeasible, Verified as Verified
+from .solution import Infeasible as Infeasible, Solution as Solution, Verified as Verified
 from .solve import (
     KnownStance as KnownStance,
     StanceAnswer as StanceAnswer,
