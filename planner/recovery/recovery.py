@@ -8,7 +8,7 @@ program, or two, of the solver that the stance has already, and the check of the
 from __future__ import annotations
 
 import time
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -128,7 +128,9 @@ class Recovery:
         self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
             "stances without tiles", 16
         )
-        self._near: OrderedDict[tuple[_HandKey, ...], Solution] = OrderedDict()
+        self._near: BoundedStore[tuple[_HandKey, ...], Solution] = BoundedStore(
+            "plans without tiles", 256
+        )
         self._keep([(h, (t,), (), True) for h, t in self._places.values()])
 
     @property
@@ -221,14 +223,19 @@ class Recovery:
         if body_wrench is not None:
             prepared = prepared.turned(body_wrench)
         checks = Checks.of(prepared, self._idle, lost)
-        found = answer_on(prepared, start, checks, self._near.get(keys))
+        found = answer_on(prepared, start, checks, self._nearest(keys))
         if isinstance(found.answer, Verified):
-            self._near[keys] = found.answer.solution
-            while len(self._near) > self._stances.most:
-                self._near.popitem(last=False)
+            self._near.keep([(keys, found.answer.solution)])
         hands = zip(prepared.limbs, prepared.batch.hands, strict=True)
         open_fingers = [(limb, finger) for limb, hand in hands for finger in _released(hand)]
         return Recovered(found, lost, tuple(open_fingers))
+
+    def _nearest(self, keys: tuple[_HandKey, ...]) -> Solution | None:
+        """Return a known solution to start from: of the same losses, or of one tile of them."""
+        single = [((h, (t,), (), True),) for h, tiles, _, _ in keys for t in tiles]
+        same, *others = self._near.find([keys, *single])
+        known = [each for each in others if each is not None]
+        return same or max(known, key=lambda each: each.least.value, default=None)
 
     def _keys(
         self,
