@@ -23,6 +23,7 @@ __all__ = [
     "Palm",
     "Price",
     "Solver",
+    "Status",
     "TensionPath",
     "Tile",
     "Time",
@@ -83,6 +84,9 @@ class Price(LimitName, frozen=True, kw_only=True):
         """The limit without its price."""
         return LimitName(self.limb, self.finger, self.phalanx, self.limit, self.joint)
 
+
+Status = Literal["optimal", "overloaded", "infeasible", "failed"]
+"""Status of a plan."""
 
 LoadFactorStatus = Literal["found", "at_least", "unbounded", "none", "not_asked", "not_finished"]
 """Status of a load factor.

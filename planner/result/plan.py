@@ -23,6 +23,7 @@ from planner.result.plain_parts import (
     LoadFactorStatus,
     Price,
     Solver,
+    Status,
     TensionPath,
     Time,
 )
@@ -31,7 +32,6 @@ from planner.result.spread import Spread
 
 __all__ = ["Certificate", "Plan", "SetPointSource", "SetPoints", "Status"]
 
-Status = Literal["optimal", "overloaded", "infeasible", "failed"]
 SetPointSource = Literal["interpolated", "blended", "solved"]
 
 

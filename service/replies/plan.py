@@ -15,6 +15,7 @@ from planner import (
     OpenLoop,
     Palm,
     Price,
+    Redundancy,
     RobustLoadFactor,
     Solver,
     Spread,
@@ -141,7 +142,8 @@ class PlanReply(StanceReply, kw_only=True):
       measured value.
     - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
       proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
-      ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``.
+      ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``,
+      ``redundancy``.
     - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
       ["robust"]``, and not for a body wrench of zero.
     - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;
@@ -150,6 +152,8 @@ class PlanReply(StanceReply, kw_only=True):
       ["spread"]``.
     - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
       ["clearance"]``.
+    - ``redundancy``: the plan without each tile, each finger and each hand; only with ``"want":
+      ["redundancy"]``.
     - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
       make the stance feasible come first, the smallest first; the rest follow by gain for their
       size.
@@ -184,6 +188,7 @@ class PlanReply(StanceReply, kw_only=True):
     open_loop: OpenLoop | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
+    redundancy: Redundancy | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 
