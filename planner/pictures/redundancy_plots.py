@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_redundancy"]
 
-COLUMNS: Final = ("base", *PHALANGES, "whole finger")
+GRID_COLUMNS: Final = ("base", *PHALANGES, "whole finger")
 """Columns of a hand's grid."""
 
 
@@ -60,15 +60,15 @@ def _hand(axes: Axes, losses: list[Loss], colours: ScalarMappable) -> None:
         if loss.finger is None:
             axes.set_title(f"{loss.limb}; without the hand {_number(loss)}", fontsize=10)
             continue
-        x = COLUMNS.index(loss.phalanx or COLUMNS[-1])
+        x = GRID_COLUMNS.index(loss.phalanx or GRID_COLUMNS[-1])
         y = FINGERS.index(loss.finger)
         used = np.inf if loss.utilisation is None else loss.utilisation
         colour = colours.to_rgba(np.array([used]))[0]
         axes.fill([x, x + 1, x + 1, x], [y, y, y + 1, y + 1], color=colour, ec="white", lw=2.0)
         weight = "normal" if loss.holds else "bold"
         axes.text(x + 0.5, y + 0.5, _number(loss), ha="center", va="center", weight=weight)
-    axes.set(xlim=(0, len(COLUMNS)), ylim=(len(FINGERS), 0))
-    axes.set_xticks([x + 0.5 for x in range(len(COLUMNS))], COLUMNS, fontsize=8)
+    axes.set(xlim=(0, len(GRID_COLUMNS)), ylim=(len(FINGERS), 0))
+    axes.set_xticks([x + 0.5 for x in range(len(GRID_COLUMNS))], GRID_COLUMNS, fontsize=8)
     axes.set_yticks([y + 0.5 for y in range(len(FINGERS))], FINGERS, fontsize=8)
     axes.tick_params(length=0)
     for side in axes.spines.values():

@@ -1,4 +1,4 @@
-"""How much a stance can lose without moving: each tile, each finger and each hand by itself."""
+"""Plan a stance without each of its tiles, fingers and hands, one at a time."""
 
 from __future__ import annotations
 

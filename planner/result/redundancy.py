@@ -1,4 +1,4 @@
-"""What a stance can lose without moving: each tile, each finger and each hand by itself."""
+"""Plans of a stance without each of its tiles, fingers and hands, in short."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Loss(Struct, frozen=True):
 
 
 class Redundancy(Struct, frozen=True):
-    """What a stance can lose without moving.
+    """Plans of a stance without each of its tiles, fingers and hands, one at a time.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Redundancy(Struct, frozen=True):
 
     @property
     def sentences(self) -> list[str]:
-        """How many losses of each kind have a plan, and which is worst."""
+        """Sentences that say how many losses of each kind have a plan, and which is worst."""
         found = []
         for kind, (held, count) in self.held.items():
             worst = self.worst[kind]
