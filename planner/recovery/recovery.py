@@ -124,9 +124,9 @@ class Recovery:
             if hand.touching[t]
         }
         self._pattern = _pattern(data)
-        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", 1024)
+        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", 128)
         self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
-            "stances without tiles", 16
+            "stances without tiles", 4
         )
         self._near: BoundedStore[tuple[_HandKey, ...], Solution] = BoundedStore(
             "plans without tiles", 256
@@ -225,9 +225,12 @@ class Recovery:
         checks = Checks.of(prepared, self._idle, lost)
         found = answer_on(prepared, start, checks, self._nearest(keys))
         if isinstance(found.answer, Verified):
-            self._near.keep([(keys, found.answer.solution)])
-        hands = zip(prepared.limbs, prepared.batch.hands, strict=True)
-        open_fingers = [(limb, finger) for limb, hand in hands for finger in _released(hand)]
+            # a start is all that is needed of it
+            kept = replace(found.answer.solution, sets=self.prepared.at_rest)
+            self._near.keep([(keys, kept)])
+        open_fingers = [
+            (prepared.limbs[h], finger) for h, *_ in keys for finger in _released(prepared, h)
+        ]
         return Recovered(found, lost, tuple(open_fingers))
 
     def _nearest(self, keys: tuple[_HandKey, ...]) -> Solution | None:
@@ -287,16 +290,12 @@ class Recovery:
         return Columns.of(whole, self._pattern)
 
 
-def _released(hand: SettledHand) -> Iterator[str]:
+def _released(prepared: PreparedStance, h: int) -> Iterator[str]:
     """Yield the fingers of a hand that are off the rock since tiles have slipped."""
-    for finger in FINGERS:
-        on = [
-            (now.contact, then.contact)
-            for now, then in zip(hand.tiles, hand.as_closed.tiles, strict=True)
-            if now.finger == finger
-        ]
-        if all(now == "none" for now, _ in on) and any(then != "none" for _, then in on):
-            yield finger
+    hand = prepared.batch.hands[h]
+    bearing = {tile.finger for tile in hand.tiles if tile.contact != "none"}
+    before = {tile.finger for tile in hand.as_closed.tiles if tile.contact != "none"}
+    yield from (finger for finger in FINGERS if finger in before - bearing)
 
 
 def _pattern(data: StanceData) -> NDArray[np.bool_]:
