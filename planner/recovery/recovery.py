@@ -183,10 +183,6 @@ class Recovery:
         second = self._answer(start, lost, by_hand, gone | more, off, body_wrench)
         return second if second.utilisation < first.utilisation else first
 
-    def without(self, lost: Sequence[LostTile]) -> PreparedStance:
-        """Return the stance without tiles that have slipped, prepared for the solver."""
-        return self._prepared(self._keys(self._by_hand(dict.fromkeys(lost)), (), ()))
-
     def _by_hand(self, lost: Iterable[LostTile]) -> dict[int, list[int]]:
         """Return the tiles that have slipped, by the index of their hand."""
         found: dict[int, list[int]] = {}

@@ -283,7 +283,8 @@ class Tile(Struct, frozen=True):
         ``base``, ``proximal``, ``middle`` or ``distal``, or ``nail``.
     contact : str
         ``face``; ``edge``; ``frame``: the phalanx only presses on rock beside the tile; ``nail``;
-        ``none``: the tile touches nothing and carries no load.
+        ``slipped``: the tile's spines have let go, and it drags on with friction; ``none``: the
+        tile touches nothing and carries no load.
     position : list of float, length 3
     force : list of float, length 3
         shear·shear_axis + normal·normal_axis + lateral·lateral_axis.
