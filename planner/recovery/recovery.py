@@ -124,7 +124,8 @@ class Recovery:
             if hand.touching[t]
         }
         self._pattern = _pattern(data)
-        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", 128)
+        most = 2 * len(self._places) + 16  # each tile alone, and as many losses of several
+        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", most)
         self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
             "stances without tiles", 4
         )
