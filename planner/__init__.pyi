@@ -19,6 +19,7 @@ from .explanation import (
 from .pictures import (
     plot_body_space as plot_body_space,
     plot_plan as plot_plan,
+    plot_redundancy as plot_redundancy,
     plot_wrench_space as plot_wrench_space,
     summary as summary,
     write_report as write_report,
@@ -48,11 +49,17 @@ from .question import (
     LimbStiffness as LimbStiffness,
     Limits as Limits,
     Load as Load,
+    LostTile as LostTile,
     Objective as Objective,
     OpenLoopSettings as OpenLoopSettings,
     Question as Question,
     Stance as Stance,
     Want as Want,
+)
+from .recovery import (
+    Recovered as Recovered,
+    Recovery as Recovery,
+    find_redundancy as find_redundancy,
 )
 from .result import (
     Advice as Advice,
@@ -65,12 +72,14 @@ from .result import (
     HandPlan as HandPlan,
     LimitName as LimitName,
     LoadFactorStatus as LoadFactorStatus,
+    Loss as Loss,
     OpenLoop as OpenLoop,
     OpenLoopSample as OpenLoopSample,
     Palm as Palm,
     Plan as Plan,
     Price as Price,
     Quantiles as Quantiles,
+    Redundancy as Redundancy,
     RobustLoadFactor as RobustLoadFactor,
     SetPoints as SetPoints,
     Solver as Solver,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
@@ -106,8 +107,22 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
         wanted = [want for want in request.want if want in included]
         request = replace(request, want=wanted, draws=[], open_loop=None)
     asked = question(request, robots)
+    start = time.perf_counter()
     answer = planner.plan(asked)
-    return Planned.of(asked, answer, request.id, detail, model="model" in request.want)
+    found = Planned.of(asked, answer, request.id, detail, model="model" in request.want)
+    if "redundancy" in request.want and isinstance(found.reply, PlanReply):
+        with deadline.within(asked.deadline, started=start):
+            _add_redundancy(found.reply, asked)
+    return found
+
+
+def _add_redundancy(reply: PlanReply, asked: planner.Question) -> None:
+    """Add the plans without each tile, finger and hand to a reply, if there is time."""
+    try:
+        reply.redundancy = planner.find_redundancy(asked)
+    except DeadlineError:
+        reply.unfinished.append("redundancy")
+        reply.warnings.append("the deadline left no time for the redundancy")
 
 
 def answer_with_advice(answer: Planned) -> Planned:

@@ -1,4 +1,4 @@
-"""Define replies with plans: whole and brief plans, climbs, and the set-points of a stream."""
+"""Define replies with plans: whole and brief plans, and climbs."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from planner import (
     OpenLoop,
     Palm,
     Price,
+    Redundancy,
     RobustLoadFactor,
     Solver,
     Spread,
@@ -26,14 +27,11 @@ from service.replies.reply import Reply, SeatingReply, StanceReply, Vector, Wren
 __all__ = [
     "BriefPlanReply",
     "CertificateReply",
-    "HandColumns",
     "HandReply",
     "HandSetPoints",
     "PlanReply",
     "RouteReply",
     "RouteStageReply",
-    "SetPointsReply",
-    "StreamReply",
 ]
 
 
@@ -144,7 +142,8 @@ class PlanReply(StanceReply, kw_only=True):
       measured value.
     - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
       proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
-      ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``.
+      ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``,
+      ``redundancy``.
     - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
       ["robust"]``, and not for a body wrench of zero.
     - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;
@@ -153,6 +152,8 @@ class PlanReply(StanceReply, kw_only=True):
       ["spread"]``.
     - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
       ["clearance"]``.
+    - ``redundancy``: the plan without each tile, each finger and each hand; only with ``"want":
+      ["redundancy"]``.
     - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
       make the stance feasible come first, the smallest first; the rest follow by gain for their
       size.
@@ -187,6 +188,7 @@ class PlanReply(StanceReply, kw_only=True):
     open_loop: OpenLoop | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
+    redundancy: Redundancy | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 
@@ -263,78 +265,6 @@ class BriefPlanReply(StanceReply, kw_only=True):
     warnings: list[str] | UnsetType = UNSET
     findings: list[Finding] | UnsetType = UNSET
     time: Time | UnsetType = UNSET
-
-
-class HandColumns(Struct, kw_only=True):
-    """One hand of a stream, with the names of its loads.
-
-    - ``limb``: name of the limb that carries the hand.
-    - ``columns``: names of the loads of the hand's wrench space, in order.
-    """
-
-    limb: str
-    columns: list[str]
-
-
-class StreamReply(StanceReply, kw_only=True):
-    """Confirmation that a stance is declared as a stream, with the identifier to ask it by.
-
-    The service keeps a stream until many others are declared, or until the service ends.
-
-    - ``stream``: identifier of the stream, for requests of set-points.
-    - ``radius``: distance from ``body_wrench`` within which set-points are interpolated between
-      plans [N], along a moment a tenth of it per metre [N·m]; null where each set-point is solved
-      for.
-    - ``status``: status of the plan at ``body_wrench``.
-    - ``reason``: why there is no plan at ``body_wrench``, or what overloads it; null where it is
-      within its limits.
-    - ``body_wrench``: centre of the first interpolation, in B [N, N·m].
-    - ``utilisation``: utilisation of the plan at ``body_wrench``; null without a plan.
-    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
-      compliant wrists, no plan nearby. Null without a plan.
-    - ``hands``: the hands in order, with the names of their loads.
-    - ``took``: time that the declaration took [s].
-    """
-
-    stream: str
-    radius: float | None
-    status: str
-    reason: str | None
-    body_wrench: Vector
-    utilisation: float | None
-    gap: float | None
-    hands: list[HandColumns]
-    took: float
-
-
-class SetPointsReply(Reply, kw_only=True):
-    """Set-points of all hands for one body wrench.
-
-    - ``stream``: identifier of the stream that was asked.
-    - ``status``: ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
-    - ``reason``: why there is no plan, or what overloads it; null where it is within its limits.
-    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
-    - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
-    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
-      compliant wrists, no plan nearby, by the sets linearised there. Null without a plan.
-    - ``hands``: set-points of each hand; null without a plan.
-    - ``verified``: true where the independent check of the set-points, or of the proof that there
-      is no plan, passed.
-    - ``source``: ``interpolated`` between plans known before, ``solved`` for this wrench, or
-      ``blended`` from both.
-    - ``took``: time that the answer took [s].
-    """
-
-    stream: str
-    status: str
-    reason: str | None
-    body_wrench: Vector
-    utilisation: float | None
-    gap: float | None
-    hands: list[HandSetPoints] | None
-    verified: bool
-    source: str
-    took: float
 
 
 class RouteStageReply(Struct, kw_only=True):
