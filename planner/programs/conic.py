@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple
 
 import clarabel
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, StoreInfo, enlist
 from planner import deadline
@@ -79,12 +80,15 @@ class Columns(NamedTuple):
     starts: Indices
 
     @classmethod
-    def of(cls, matrix: Array) -> Columns:
-        """Convert a dense matrix, shape (rows, columns), to compressed sparse columns."""
+    def of(cls, matrix: Array, kept: NDArray[np.bool_] | None = None) -> Columns:
+        """Convert a dense matrix, shape (rows, columns), to compressed sparse columns.
+
+        ``kept``, of the same shape, is true where entries are kept, also if they are zero.
+        """
         height, width = matrix.shape
         flat = matrix.T.ravel()
         # of truth values they are found six times as fast as of numbers
-        (places,) = (flat != 0.0).nonzero()
+        (places,) = (flat != 0.0 if kept is None else kept.T.ravel()).nonzero()
         starts = places.searchsorted(height * np.arange(width + 1))
         return cls(flat.take(places), places % max(height, 1), starts)
 
