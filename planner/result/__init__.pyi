@@ -39,3 +39,9 @@ from .spread import (
     Quantiles as Quantiles,
     Spread as Spread,
 )
+from .survival import (
+    Slip as Slip,
+    StrengthSource as StrengthSource,
+    Survival as Survival,
+    SurvivalShare as SurvivalShare,
+)
