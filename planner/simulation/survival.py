@@ -186,9 +186,7 @@ class _Replanned:
         self._tiles = len(prepared.batch.engagement)
         self._recoveries: dict[bytes, Recovery] = {}
         names = unit_names(prepared)[: self._tiles]
-        self._names = [
-            LostTile(limb, finger or "", phalanx) for limb, finger, phalanx in names
-        ]
+        self._names = [LostTile(limb, finger or "", phalanx) for limb, finger, phalanx in names]
         nothing = np.zeros(cascade.units, dtype=bool)
         self._plans: dict[bytes, Cascade | None] = {nothing.tobytes(): cascade}
         self._nothing = nothing
