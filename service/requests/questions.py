@@ -38,7 +38,10 @@ __all__ = [
 
 ObjectiveName = Annotated[
     Objective,
-    Meta(description="least utilisation, or least effort within limits.utilisation"),
+    Meta(
+        description="least utilisation; least effort within limits.utilisation; or largest "
+        "probability that no tile slips, at nearly the least utilisation"
+    ),
 ]
 Explain = Annotated[
     bool,
@@ -58,6 +61,7 @@ Radius = Annotated[
         description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
     ),
 ]
+Tolerance = Annotated[float, Meta(ge=0.001, le=1.0)]
 
 
 class Draw(Strict, frozen=True, kw_only=True):
@@ -96,7 +100,10 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
       robot's weight at rest.
     - ``objective``: ``max_margin`` for the least utilisation, ``min_effort`` for the least effort
-      within ``limits.utilisation``.
+      within ``limits.utilisation``, ``max_reliability`` for the largest probability that no tile
+      slips, at nearly the least utilisation; that needs fixed wrists on all hands.
+    - ``tolerance``: part of the least utilisation by which a plan for ``max_reliability`` may
+      exceed it; 0.02 by default.
     - ``limits``: the cap on the utilisation, and the caller's own limits.
     - ``present``: present tensions of the four tendons [N], by limb; the reply's ``path`` says
       whether the straight way from them is safe.
@@ -140,6 +147,10 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     open_loop: Annotated[
         OpenLoopSettings | None,
         Meta(description="samples of displaced hands; only with open_loop in want"),
+    ] = None
+    tolerance: Annotated[
+        Tolerance | None,
+        Meta(description="part of the least utilisation that max_reliability may give away"),
     ] = None
 
 
@@ -280,7 +291,7 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     - ``name``: name of the route.
     - ``stance``: the start stance.
     - ``load``: mass and payloads from which the body wrench of every stance follows.
-    - ``objective``: ``max_margin`` or ``min_effort``, for every stance.
+    - ``objective``: ``max_margin``, ``min_effort`` or ``max_reliability``, for every stance.
     - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
     - ``moves``: the moves in climbing order.
     - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.
