@@ -48,6 +48,7 @@ from .question import (
     LimbStiffness as LimbStiffness,
     Limits as Limits,
     Load as Load,
+    LostTile as LostTile,
     Objective as Objective,
     OpenLoopSettings as OpenLoopSettings,
     Question as Question,

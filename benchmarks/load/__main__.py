@@ -35,6 +35,7 @@ from benchmarks.load.asking import (
 )
 from benchmarks.load.bulk import bulk, memory_of
 from benchmarks.load.others import greedy, process, starve, starved, unread
+from benchmarks.load.slips import slips_table
 from hand_models.base import stores
 from planner import processes as proc
 from service.answering import dispatch
@@ -175,6 +176,28 @@ def latency(count: int) -> None:
     console.print(f"p99 beside dear questions / quiet: {beside / quiet:.2f}")
     echoes = middle["bare echo, beside them"][1] / middle["bare echo"][1]
     console.print(f"the same of the bare echo: {echoes:.2f}")
+
+
+@main.command()
+@click.option("--count", default=1000, show_default=True, help="Random slips.")
+def slips(count: int) -> None:
+    """Time set-points after slips of one to three tiles beside a bare echo, and both under load."""
+    where = free_endpoint()
+    with served() as server, other("refuse", where):
+        table = slips_table(
+            server.endpoint, Client(where), ECHO, count, lambda: other("ask", server.endpoint)
+        )
+    console.print(table)
+
+
+@main.command()
+@click.argument("endpoint")
+def ask(endpoint: str) -> None:
+    """Ask for plans of one new stance after another, one at a time, until killed."""
+    client = Client(endpoint, timeout=60.0)
+    print("on", flush=True)
+    for payload in new_stances():
+        client.ask(PLAN, payload)
 
 
 def rate(endpoint: str, seconds: float, clients: int, deep: int) -> float:

@@ -16,6 +16,7 @@ FILES = {
         "hand.toml",
         "surfaces.toml",
         "spines.toml",
+        "strength.toml",
         "scan.toml",
         "experiments.toml",
         "draws.toml",

@@ -53,5 +53,6 @@ from .seat_scatter import (
     scattered_places as scattered_places,
 )
 from .seat_search import PULL_OFF as PULL_OFF, best_seats as best_seats
+from .slipped_tiles import SLIPPED_TILE as SLIPPED_TILE, slipped_hand as slipped_hand
 from .space import wrench_space as wrench_space, wrench_spaces as wrench_spaces
 from .tension_box import TensionLimit as TensionLimit, tension_limits as tension_limits

@@ -120,7 +120,7 @@ class RowLayout:
 
 
 def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
-    """Return the row layout of a settled hand.
+    """Return the row layout of a settled hand; of one whose tiles have slipped, as it closed.
 
     Parameters
     ----------
@@ -129,15 +129,16 @@ def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
         True if the tendons have friction, so that they must not be slackened.
     """
     # nothing depends on what of a tile touches, and of a surface only the names
+    closed = settled.as_closed
     alike = [
-        tile if tile.contact != "edge" else tile._replace(contact="face") for tile in settled.tiles
+        tile if tile.contact != "edge" else tile._replace(contact="face") for tile in closed.tiles
     ]
     return row_layout(
         tuple(alike),
         settled.grasp.lateral,
         tuple([piece.limit for piece in inner_half_planes(settled.surface)]),
         tuple([(finger, joint) for finger, joint, _ in settled.stops]),
-        bool(settled.palm.engaged),
+        bool(closed.palm.engaged),
         sticking,
     )
 

@@ -46,6 +46,9 @@ HELD_ROWS: Final = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
 
 HELD_ROWS.setflags(write=False)
 
+NO_BOUND: Final = 1e4
+"""Right-hand side of a hard row of what is off the rock, whose coefficients are zero [N]."""
+
 
 def _moments() -> Array:
     """Return the matrix (p, 12) from (1, p) ⊗ F to a wrench and what is held of it."""
@@ -102,6 +105,7 @@ def wrench_columns(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Arr
         shear[:, 0], shear[:, 4], shear[:, 5] = -1.0, -z, y
         pressing[:, 2], pressing[:, 3], pressing[:, 4] = 1.0, y, -x
         shear[:, 6:], pressing[:, 6:] = -HELD_DIRECTIONS[:, 0], HELD_DIRECTIONS[:, 2]
+        V[[not hand.palm.engaged for hand in hands], :, -2:] = 0.0
     # residuals of forces that cancel [N/N, N·m/N]
     V[np.abs(V) < 0.01 * BASE_TOLERANCES.rounding] = 0.0
     return np.add.reduce(wrenches[:, 0], axis=2), V
@@ -140,8 +144,11 @@ def limit_rows(
     row, of = np.arange(k), finger_of[tile]
     planes = layout.planes([hand.surface for hand in hands])
     planar = planes[:, :, :1] * loads[:, tile, 0] + planes[:, :, 1:2] * loads[:, tile, 1]
+    held = _of_tiles(hands, "limit_shares")[:, tile]
+    # spines that have let go carry nothing
+    planar[held == 0.0] = 0.0
     l0[:, :k], L[:, row, of] = planar.transpose(2, 0, 1)
-    s[:, :k] = planes[:, :, 3] * _of_tiles(hands, "limit_shares")[:, tile]
+    s[:, :k] = planes[:, :, 3] * np.where(held > 0.0, held, 1.0)
     if layout.reacting:
         column = np.zeros(TENDON_COUNT, dtype=np.intp)
         column[list(layout.reacting)] = layout.lateral_columns
@@ -164,7 +171,7 @@ def limit_rows(
     either_way = np.array([np.zeros(len(sideways)), np.resize(signs, len(sideways))])
     for of, (start, slope), end in (
         (engaged, shears, structure.finger_shear),
-        (sideways, either_way, np.array([hand.lateral_limits[reacting] for hand in hands])),
+        (sideways, either_way, np.array([_aside(hand)[reacting] for hand in hands])),
         (finger_of[tips], loads[:, tips, 1].transpose(2, 0, 1), structure.fingertip_force),
     ):
         row = k + np.arange(len(of))
@@ -178,7 +185,7 @@ def limit_rows(
                 l0[h, i], s[h, i] = limit.a_normal * t0, limit.capacity
         k += 2
     if layout.palm:
-        L[:, k : k + 2, -2:] = np.eye(2)
+        L[:, k : k + 2, -2:] = [np.eye(2) * bool(hand.palm.engaged) for hand in hands]
         s[:, k : k + 2] = [(hand.palm.shear_limit, hand.palm.pressing_limit) for hand in hands]
         k += 2
     L[:, k:], l0[:, k:], s[:, k:] = V[:, 6:], at_zero[:, 6:], structure.hand_load
@@ -211,13 +218,17 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     for tiles, kept in ((layout.touching, drags), (layout.frames, loads[:, :, 1])):
         row, along = k + np.arange(len(tiles)), kept[:, tiles]
         H[:, row, layout.finger_of[tiles]], h[:, row] = -along[:, :, 1], along[:, :, 0]
+        # what is off the rock has no such condition
+        h[:, row] = np.where(loads[:, tiles].any(axis=(2, 3)), h[:, row], NO_BOUND)
         k += len(tiles)
     if layout.stops:
         row, stopped = k + np.arange(len(layout.stops)), [finger for finger, _ in layout.stops]
         torques = np.array([[torque for _, _, torque in hand.stops] for hand in hands])
+        idle = ~torques.any(axis=2)
         # in newtons of tension, so that rows stay commensurate
         torques /= np.maximum(np.abs(torques[..., 1:]), 1e-6)
-        H[:, row, stopped], h[:, row] = -torques[..., 1], torques[..., 0]
+        H[:, row, stopped] = -torques[..., 1]
+        h[:, row] = np.where(idle, NO_BOUND, torques[..., 0])
         k += len(row)
     for i, (_, columns) in enumerate(_nails(layout)):
         rows, ends = (np.array([hand.nail_rows[i][part] for hand in hands]) for part in (0, 1))
@@ -227,10 +238,18 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     if layout.sticking:
         row, drawing = k + np.arange(len(layout.drawing)), list(layout.drawing)
         H[:, row, drawing] = -1.0
-        h[:, row] = [[-hand.closing_tension] for hand in hands]
+        closing = np.array([[-hand.closing_tension] for hand in hands])
+        drawn = _of_fingers(layout, _of_tiles(hands, "holding"))[:, drawing]
+        h[:, row] = np.where(drawn > 0, closing, 0.0)
     if layout.palm:
         H[:, -2:, -2:] = -np.eye(2)
     return H, h
+
+
+def _aside(hand: SettledHand) -> Array:
+    """Return the lateral strength of each finger (4,) [N]; of one that has let go, as it closed."""
+    limits = hand.lateral_limits
+    return np.where(limits > 0.0, limits, hand.as_closed.lateral_limits)
 
 
 def _nails(layout: RowLayout) -> list[tuple[int, list[int]]]:

@@ -91,8 +91,9 @@ class SettledTile(NamedTuple):
         One of `FINGERS`.
     phalanx : str
         ``base``, ``proximal``, ``middle``, ``distal``, or ``nail`` in a fingernail grasp.
-    contact : {'face', 'edge', 'frame', 'nail', 'none'}
-        Part that touches the rock; ``frame`` if the bare phalanx beside the tile does.
+    contact : {'face', 'edge', 'frame', 'nail', 'slipped', 'none'}
+        Part that touches the rock; ``frame`` if the bare phalanx beside the tile does; ``slipped``
+        if the tile's spines have let go, and it drags on along the rock.
     """
 
     finger: str
@@ -193,6 +194,8 @@ class SettledHand:
         For each joint at a limit, of fingers with a contact: index of the finger, index of the
         joint, and the torque against its stop at zero tension [N·m] and per newton [m].
     palm : SettledPalm
+    closed : SettledHand or None
+        The hand as it closed, if tiles have slipped since (`fixed_wrist.slipped_hand`).
     sets : BoundedStore of float to WrenchSpace
         Cache of `fixed_wrist.wrench_spaces` by the largest tension [N], the last few.
     """
@@ -215,9 +218,15 @@ class SettledHand:
     nail_rows: tuple[tuple[Array, Array], ...]
     stops: tuple[tuple[int, int, Array], ...]
     palm: SettledPalm
+    closed: SettledHand | None = None
     sets: BoundedStore[float, WrenchSpace] = field(
         default_factory=lambda: BoundedStore("sets of hands", most=4), init=False, repr=False
     )
+
+    @property
+    def as_closed(self) -> SettledHand:
+        """The hand before any of its tiles slipped."""
+        return self if self.closed is None else self.closed
 
     @cached_property
     def fingers(self) -> tuple[SettledFinger, ...]:
@@ -236,14 +245,9 @@ class SettledHand:
         if self.grasp.fingernail:
             return ("straight",) * len(FINGERS)
         none, balance = CONTACT_KINDS.index("none"), JOINT_STOPS.index("balance")
-        postures = self.postures
-        words = []
-        for shares, kinds, stops in zip(
-            postures.engagement.tolist(),
-            postures.kinds.tolist(),
-            postures.stops.tolist(),
-            strict=True,
-        ):
+        postures, words = self.postures, []
+        numbers = postures.engagement, postures.kinds, postures.stops
+        for shares, kinds, stops in zip(*(each.tolist() for each in numbers), strict=True):
             if any(shares):
                 words.append("laid" if all(shares) else "hooked")
             elif any(kind != none for kind in kinds):
@@ -294,8 +298,7 @@ class SettledHand:
     @cached_property
     def _whole_tiles(self) -> Array:
         """Number of whole tiles that each finger's spines on rock make, Σ φ, shape (4,)."""
-        sums = np.bincount(self.finger_of, weights=self.engagement, minlength=len(FINGERS))
-        return np.asarray(sums, dtype=float)
+        return np.bincount(self.finger_of, self.engagement, len(FINGERS)).astype(float)
 
     @property
     def stiffness_ratio(self) -> float:
@@ -360,9 +363,8 @@ class SettledHand:
         tuple of HalfPlane
             ``nail_shear`` with the capacity ``finger_shear``, and ``fingertip_force`` [N].
         """
-        structure = self.hand.structure
+        structure, into = self.hand.structure, np.array([0.0, 0.0, 1.0])
         base = -self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]].along
-        into = np.array([0.0, 0.0, 1.0])
         (shear, normal), (pulled, pressed) = (
             (self.axes[tile, :2] @ direction).tolist() for direction in (base, into)
         )

@@ -15,8 +15,8 @@ from .spine_calibration import (
     within_law as within_law,
 )
 from .strength import (
-    hazards as hazards,
-    mean_factor as mean_factor,
+    StrengthScatter as StrengthScatter,
+    TileStrengths as TileStrengths,
     weibull_modulus as weibull_modulus,
 )
 from .surface import (

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
+from hand_models.fixed_wrist import SLIPPED_TILE
 from hand_models.hand import FINGERS, NAIL, SettledHand, SettledTile
 
 __all__ = [
@@ -34,7 +35,7 @@ KEPT_NAMES: Final = 256
 
 Number = TypeVar("Number", bound=np.generic)
 
-CONTACT_CODES: Final = {"none": 0, "face": 1, "edge": 1, "frame": 2, NAIL: 3}
+CONTACT_CODES: Final = {"none": 0, "face": 1, "edge": 1, "frame": 2, NAIL: 3, SLIPPED_TILE: 4}
 """Code of each contact state; ``face`` and ``edge`` share a code, as they carry load alike."""
 
 
@@ -138,6 +139,8 @@ class ContactPattern(NamedTuple):
         True for a tile that is not on rock.
     touching, idle : ndarray of int
         Indices of the tiles on rock, and of the tiles that touch nothing.
+    slipped : ndarray of int
+        Indices of the tiles that have slipped, and drag on.
     holding : tuple of int, length F
         Number of each finger's tiles and nails that are on rock.
     """
@@ -148,6 +151,7 @@ class ContactPattern(NamedTuple):
     away: NDArray[np.bool_]
     touching: Indices
     idle: Indices
+    slipped: Indices
     holding: tuple[int, ...]
 
 
@@ -171,6 +175,7 @@ def contact_pattern_of(hands: tuple[tuple[SettledTile, ...], ...]) -> ContactPat
         away=away,
         touching=np.flatnonzero(touches),
         idle=np.flatnonzero(contacts == CONTACT_CODES["none"]),
+        slipped=np.flatnonzero(contacts == CONTACT_CODES[SLIPPED_TILE]),
         holding=tuple(np.add.reduceat(holds, places.first_of_finger).astype(int).tolist()),
     )
 

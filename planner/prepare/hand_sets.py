@@ -187,10 +187,15 @@ class HandSets:
         self,
         spaces: Sequence[WrenchSpace],
         wrists: tuple[FloatingWrist | None, ...] | None = None,
+        scaled: tuple[ScaledRows, ...] | None = None,
     ) -> HandSets:
-        """Return the same stance with other sets of its hands and, if given, other wrists."""
+        """Return the same stance with other sets of its hands and, if given, other wrists.
+
+        ``scaled`` are the scaled rows of the sets, if already computed.
+        """
         own = self.wrists if wrists is None else wrists
-        return HandSets.of(spaces, own, self.transports, self.wrench, self.held, self.added)
+        of_all = self.transports, self.wrench, self.held, self.added
+        return HandSets.of(spaces, own, *of_all, scaled)
 
     def turned(self, wrench: Array) -> HandSets:
         """Return the same hands for another body wrench, shape (6,) [N, N·m]."""

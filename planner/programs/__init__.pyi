@@ -1,5 +1,6 @@
 from .conic import (
     INFEASIBLE_STATUSES as INFEASIBLE_STATUSES,
+    Columns as Columns,
     Outcome as Outcome,
     Reached as Reached,
 )

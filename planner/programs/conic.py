@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple
 
 import clarabel
 import numpy as np
+from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices, StoreInfo, enlist
 from planner import deadline
@@ -78,12 +79,15 @@ class Columns(NamedTuple):
     starts: Indices
 
     @classmethod
-    def of(cls, matrix: Array) -> Columns:
-        """Convert a dense matrix, shape (rows, columns), to compressed sparse columns."""
+    def of(cls, matrix: Array, kept: NDArray[np.bool_] | None = None) -> Columns:
+        """Convert a dense matrix, shape (rows, columns), to compressed sparse columns.
+
+        ``kept``, of the same shape, is true where entries are kept, also if they are zero.
+        """
         height, width = matrix.shape
         flat = matrix.T.ravel()
         # of truth values they are found six times as fast as of numbers
-        (places,) = (flat != 0.0).nonzero()
+        (places,) = (flat != 0.0 if kept is None else kept.T.ravel()).nonzero()
         starts = places.searchsorted(height * np.arange(width + 1))
         return cls(flat.take(places), places % max(height, 1), starts)
 
@@ -115,7 +119,7 @@ class ConicProgram(NamedTuple):
     above : int
         Number of those equations that come before the balance of wrenches.
     second_order : int
-        Number of rows of the second-order cone, which follow the inequalities.
+        Number of rows of the second-order cone, below the inequalities.
     powers : tuple of float
         Exponent α of each cone x^α y^(1 − α) ≥ |z| of the last rows, three each.
     """
@@ -203,10 +207,7 @@ class ConicSolver:
             self._numbers = numbers
 
     def solve(self) -> ConicSolution:
-        """Solve the program passed last; stop at the deadline of `planner.deadline`, if one is set.
-
-        If the deadline expires, the solution's status is `OUT_OF_TIME`.
-        """
+        """Solve the program passed last; `OUT_OF_TIME` if `planner.deadline` ends it."""
         if deadline.left() is None:
             return _read(self._solver.solve())
         caught: list[BaseException] = []

@@ -13,6 +13,7 @@ from .limits import (
     Want as Want,
 )
 from .load import Load as Load, Weights as Weights
+from .lost_tile import LostTile as LostTile
 from .question import (
     MOST_DRAWS as MOST_DRAWS,
     OwnObjective as OwnObjective,

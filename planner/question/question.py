@@ -18,7 +18,6 @@ from hand_models.base import (
 )
 from hand_models.hand import FINGERS
 from hand_models.parameters import ParameterSample, ParameterTable
-from hand_models.tile import weibull_modulus
 from planner.question.draws import drawn_hands
 from planner.question.limits import (
     BodyRange,
@@ -45,6 +44,10 @@ MOST_DRAWS: Final = 100
 
 LEAST_TOLERANCE: Final = 1e-3
 """Least tolerance that is valid: with less, plans hardly differ, and a solver's digits count."""
+
+SCATTER_RANGE: Final = (0.05, 0.9)
+"""Least and largest scatter of a surface for ``max_reliability``, over its strength: Weibull moduli
+of 25 and 1.1. Larger powers are beyond a solver's digits, and those below 1 are not convex."""
 
 
 @cache
@@ -182,23 +185,15 @@ class Question:
                 "max_margin or min_effort",
                 field="objective",
             )
-        _ = self.weibull_moduli
-
-    @property
-    def weibull_moduli(self) -> tuple[float, ...]:
-        """Weibull modulus of the tiles of each hand, from the scatter of its surface.
-
-        Raises
-        ------
-        InvalidInputError
-            If a surface's scatter has no modulus from 1.1 to 25.
-        """
-        found = []
+        least, most = SCATTER_RANGE
         for i, hand in enumerate(self.stance.hands):
-            with errors_under(f"stance.hands[{i}].surface.shear_scatter"):
-                scatter = hand.surface.shear_scatter / hand.surface.shear_limit
-                found.append(weibull_modulus(scatter))
-        return tuple(found)
+            whole, scatter = hand.surface.shear_limit, hand.surface.shear_scatter
+            if not least * whole <= scatter <= most * whole:
+                raise InvalidInputError(
+                    f"must be {least:g} to {most:g} times shear_limit ({whole:g} N) for "
+                    f"max_reliability, got {scatter:g} N",
+                    field=f"stance.hands[{i}].surface.shear_scatter",
+                )
 
     @property
     def utilisation_tolerance(self) -> float:

@@ -194,12 +194,9 @@ class LoadRecovery:
         signs = [2 if hand.grasp.lateral else 1 for hand in settled]
         limits = [len(own) * sign for own, sign in zip(pieces, signs, strict=True)]
         tiles = tuple([hand.tiles for hand in settled])
-        self._layout = layout = _layout_of(
-            tiles,
-            tuple([space.columns for space in spaces]),
-            tuple([space.rows for space in spaces]),
-            tuple(limits),
-        )
+        columns, rows = zip(*((space.columns, space.rows) for space in spaces), strict=True)
+        closed = tuple([hand.as_closed.tiles for hand in settled])
+        self._layout = layout = _layout_of(closed, columns, rows, tuple(limits))
 
         laws = concatenated([hand.loads for hand in settled])
         self._at_zero, self._slope = np.zeros((len(laws), 3)), np.empty((len(laws), 3))
@@ -215,6 +212,9 @@ class LoadRecovery:
             end, columns = WRENCH_ROWS + len(own.L), own.L.shape[1]
             mine[:WRENCH_ROWS, :columns], mine[WRENCH_ROWS:end, :columns] = own.generators, own.L
             rest[:WRENCH_ROWS], rest[WRENCH_ROWS:end] = own.origin, own.l0
+        # loads of what is off the rock since tiles slipped exert no wrench
+        slipped = np.array([[hand.closed is not None] for hand in settled])
+        self._released = layout.columns[slipped & ~self.rows[:, :WRENCH_ROWS].any(axis=1)]
         self._drawn = _drawn_tendons(known)
         self._fixed = (
             tiles,
@@ -245,6 +245,7 @@ class LoadRecovery:
         known, layout = self._known, self._layout
         y = np.concatenate([NO_LOAD, *loads])
         np.maximum(y, layout.least, out=y)
+        y[self._released] = 0.0
         scaled = y.take(layout.columns)
         scaled /= LOAD_UNIT
         rows = (self.rows @ scaled[:, :, None])[:, :, 0]

@@ -150,8 +150,9 @@ class Time(Struct, frozen=True):
 class Reliability(Struct, frozen=True):
     """Probability that no tile slips, of a plan of least hazard.
 
-    The hazard is Σ (u Γ(1 + 1/m))^m over all tiles on rock, with each tile's utilisation u and the
-    Weibull modulus m of its surface. Tiles are independent, and their mean strength is right.
+    The hazard is Σ (u Γ(1 + 1/m) / w̄)^m over all tiles on rock (`hand_models.tile.TileStrengths`),
+    with each tile's utilisation u and the Weibull modulus m of its surface. Tiles are independent,
+    and their mean strength is right; w̄ > 1 where that was fitted to the weakest of several.
 
     Attributes
     ----------

@@ -11,6 +11,7 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.wrench_spaces import WrenchSpace
 from planner.deadline import Unfinished
+from planner.question import LostTile
 from planner.result.advice import Advice
 from planner.result.certificate import CertificateOf
 from planner.result.hand_plan import HandPlan, WristPlan
@@ -207,6 +208,14 @@ class SetPoints:
         Why there is no plan, or which limit an overloaded one exceeds most.
     wrists : tuple of WristPlan or None, or None
         Planned pose of each compliant wrist, None of a fixed one; None where all are fixed.
+    lost : tuple of LostTile
+        Tiles that have slipped, without which the set-points do.
+    released : tuple of (str, str)
+        Limb and finger of each finger that the set-points take off the rock, as tiles of it have
+        slipped: its tendon is slack.
+    save_first : str or None
+        Limb of the hand on whose limits the overload after slips depends most; None where there is
+        a plan within the cap, or nothing has slipped.
     """
 
     status: Status
@@ -223,3 +232,6 @@ class SetPoints:
     motor_current: Array | None = None
     reason: str | None = None
     wrists: tuple[WristPlan | None, ...] | None = None
+    lost: tuple[LostTile, ...] = ()
+    released: tuple[tuple[str, str], ...] = ()
+    save_first: str | None = None

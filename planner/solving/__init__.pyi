@@ -10,12 +10,14 @@ from .palm_parts import (
     PalmLoadFactors as PalmLoadFactors,
     load_factors_without_palm_loads as load_factors_without_palm_loads,
 )
-from .solution import Infeasible as Infeasible, Verified as Verified
+from .solution import Infeasible as Infeasible, Solution as Solution, Verified as Verified
 from .solve import (
     KnownStance as KnownStance,
     StanceAnswer as StanceAnswer,
+    answer_on as answer_on,
     plan as plan,
     try_stance as try_stance,
     with_advice as with_advice,
 )
 from .unique_plan import least_utilisation as least_utilisation
+from .verified import Checks as Checks, idle_joints as idle_joints

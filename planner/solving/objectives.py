@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from hand_models.base import Array, Indices, InvalidInputError, UnsupportedError
-from hand_models.tile import hazards, mean_factor
+from hand_models.tile import TileStrengths
 from planner import programs
 from planner.deadline import Unfinished
 from planner.explanation import ActiveLimits
@@ -267,10 +267,11 @@ class MaxReliability(Objective):
         self, prepared: PreparedStance, sets: Sets, loads: Sequence[Array]
     ) -> CappedObjective | None:
         """Return the objective for the tiles of one stance; None if no tile is loaded."""
-        moduli, first = prepared.question.weibull_moduli, prepared.batch.places.first
+        batch = prepared.batch
+        surfaces = [hand.surface for hand in prepared.question.stance.hands]
         rows, tile_of, places = list[int](), list[int](), dict[int, int]()
         at = 0
-        for hand, space, start in zip(prepared.batch.hands, sets.spaces, first, strict=True):
+        for hand, space, start in zip(batch.hands, sets.spaces, batch.places.first, strict=True):
             names: dict[tuple[str | None, str | None], int] = {
                 tile[:2]: start + i for i, tile in enumerate(hand.tiles) if hand.touching[i]
             }
@@ -281,23 +282,27 @@ class MaxReliability(Objective):
                     tile_of.append(places.setdefault(place, len(places)))
             at += len(space.s)
         each, of_rows, of_tiles = (np.array([*x], dtype=np.intp) for x in (places, rows, tile_of))
-        own = np.array(moduli)[prepared.batch.places.hand[each]]
-        tiles = TilePowers(of_rows, of_tiles, mean_factor(own) ** own, own)
+        strengths = TileStrengths.of(surfaces, batch.places.hand[each])
+        own = strengths.modulus[strengths.hand]
+        # of a tile alone, at its whole strength
+        weights = [math.exp(strengths.log_hazards(x).max()) for x in np.eye(len(each))]
+        tiles = TilePowers(of_rows, of_tiles, np.array(weights), own)
         used = programs.used(sets.data, loads)
         hazard = float(tiles.terms(tiles.uses(used)).sum())
         if hazard <= 0.0:
             return None
-        weighed, tolerance = tiles.weights / hazard, prepared.question.utilisation_tolerance
-        tiles = tiles._replace(weights=weighed)
-        return LeastHazard(tiles, each, tolerance, hazard, max(float(used.max()), 0.0), moduli)
+        tiles = tiles._replace(weights=tiles.weights / hazard)
+        before, tolerance = max(float(used.max()), 0.0), prepared.question.utilisation_tolerance
+        return LeastHazard(tiles, each, strengths, tolerance, hazard, before)
 
 
 @dataclass(frozen=True, eq=False)
 class LeastHazard(CappedObjective):
     """Least hazard of the tiles of one stance, at nearly the least utilisation.
 
-    Its value is the hazard (`hand_models.tile.hazards`) over that of the plan of least utilisation,
-    plus a term in the squares of loads that makes the plan unique (`planner.programs.Hazard`).
+    Its value is the hazard (`hand_models.tile.TileStrengths`) over that of the plan of least
+    utilisation, plus a term in the squares of loads that makes the plan unique
+    (`planner.programs.Hazard`).
 
     Attributes
     ----------
@@ -305,20 +310,20 @@ class LeastHazard(CappedObjective):
         Tiles on rock, with weights relative to ``before``.
     places : ndarray of int
         Index of each of them among the tiles of all hands.
+    strengths : TileStrengths
+        Distribution of their strengths.
     tolerance : float
         Part of the least utilisation by which the plan may exceed it.
     before, utilisation_before : float
         Hazard and utilisation of the plan of least utilisation.
-    moduli : tuple of float
-        Weibull modulus of each hand's tiles.
     """
 
     tiles: TilePowers
     places: Indices
+    strengths: TileStrengths
     tolerance: float
     before: float
     utilisation_before: float
-    moduli: tuple[float, ...]
 
     name = MaxReliability.name
     words = MaxReliability.words
@@ -359,12 +364,12 @@ class LeastHazard(CappedObjective):
     def measured(self, arrays: PlanArrays) -> Mapping[str, Any]:
         """Return the plan's hazard and its probability that no tile slips."""
         found = self._hazard(arrays)
-        before, moduli = (self.utilisation_before, self.before), list(self.moduli)
+        before, moduli = (self.utilisation_before, self.before), self.strengths.modulus.tolist()
         return {"reliability": Reliability(found, math.exp(-found), *before, moduli)}
 
     def _hazard(self, arrays: PlanArrays) -> float:
         used = arrays.tile_utilisations[self.places]
-        return float(hazards(used, self.tiles.moduli).sum())
+        return float(np.exp(self.strengths.log_hazards(used)).sum())
 
 
 MAX_MARGIN: Final = MaxMargin()

@@ -38,7 +38,14 @@ from planner.solving.solution import (
 )
 from planner.solving.verified import Checks, prepare_checks, recover, verify
 
-__all__ = ["KnownStance", "StanceAnswer", "plan", "plan_on", "try_stance", "with_advice"]
+__all__ = [
+    "KnownStance",
+    "StanceAnswer",
+    "answer_on",
+    "plan",
+    "try_stance",
+    "with_advice",
+]
 
 
 def plan(question: Question) -> Plan:
@@ -63,35 +70,8 @@ def plan(question: Question) -> Plan:
     """
     start = time.perf_counter()
     with deadline.within(checked_question(question).deadline, started=start):
-        answer = plan_on(prepare_stance(question), start)[0]
+        answer = answer_on(prepare_stance(question), start).plan()
         return with_advice(question, answer) if "advice" in question.want else answer
-
-
-def plan_on(
-    prepared: PreparedStance,
-    start: float,
-    known: Checks | None = None,
-    near: Solution | None = None,
-) -> tuple[Plan, Solution]:
-    """Answer the question of a prepared stance; return the plan and its solution.
-
-    Parameters
-    ----------
-    prepared : PreparedStance
-    start : float
-        Time at which the answer was begun, on the clock of `time.perf_counter` [s].
-    known : Checks, optional
-        Recovery and checks of the stance's plans; prepared here by default.
-    near : Solution, optional
-        Solution for the same hands at another body wrench, as a warm start.
-
-    Raises
-    ------
-    DeadlineError
-        If the deadline passes before a plan passes the checks or is proven infeasible.
-    """
-    found = _answer_on(prepared, start, known, near)
-    return found.plan(), found.answer.solution
 
 
 class StanceAnswer(NamedTuple):
@@ -140,10 +120,29 @@ class StanceAnswer(NamedTuple):
         return explained_plan(prepared, checks, answer, factor, try_stance, solved)
 
 
-def _answer_on(
-    prepared: PreparedStance, start: float, known: Checks | None, near: Solution | None
+def answer_on(
+    prepared: PreparedStance,
+    start: float,
+    known: Checks | None = None,
+    near: Solution | None = None,
 ) -> StanceAnswer:
-    """Answer the question of a prepared stance; parameters as of `plan_on`."""
+    """Answer the question of a prepared stance.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    start : float
+        Time at which the answer was begun, on the clock of `time.perf_counter` [s].
+    known : Checks, optional
+        Recovery and checks of the stance's plans; prepared here by default.
+    near : Solution, optional
+        Solution for the same hands at another body wrench, as a warm start.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes before a plan passes the checks or is proven infeasible.
+    """
     modelled, budget = time.perf_counter(), Budget(SETTINGS.programs)
     deadline.check(f"the hands were closed on their holds, which took {modelled - start:.2g} s")
     checks = prepare_checks(prepared) if known is None else known
@@ -353,10 +352,10 @@ class KnownStance:
         """
         wrench = checked_body_wrench(finite_vector(body_wrench, 6, "body_wrench"), "body_wrench")
         near, prepared = self._near, self.prepared.turned(wrench)
-        found = _answer_on(prepared, start, self._checks, near)
+        found = answer_on(prepared, start, self._checks, near)
         if isinstance(near, FloatingSolution) and not found.optimal:
             # the search from the wrists of another wrench is local
-            found = _answer_on(prepared, start, self._checks, None)
+            found = answer_on(prepared, start, self._checks, None)
         solution = found.answer.solution
         if isinstance(solution, FixedSolution):
             self._near = near if solution.start is None else solution

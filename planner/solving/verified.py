@@ -14,6 +14,7 @@ from planner import programs
 from planner.explanation import LimitUse, joint_name, oddities
 from planner.prepare import HandBatch, PreparedStance
 from planner.programs import CAP_SLACK
+from planner.question import LostTile
 from planner.result import (
     Finding,
     HandPlan,
@@ -72,7 +73,12 @@ class Checks(NamedTuple):
         return self.idle_use > 1.0 + CAP_SLACK
 
     @classmethod
-    def of(cls, prepared: PreparedStance, idle: Sequence[LimitUse] | None = None) -> Checks:
+    def of(
+        cls,
+        prepared: PreparedStance,
+        idle: Sequence[LimitUse] | None = None,
+        lost: Sequence[LostTile] = (),
+    ) -> Checks:
         """Return recovery and checks of the loads of a stance, without findings.
 
         Parameters
@@ -80,11 +86,13 @@ class Checks(NamedTuple):
         prepared : PreparedStance
         idle : sequence of LimitUse, optional
             Utilisation of the joints of limbs without a hand; computed by default.
+        lost : sequence of LostTile, optional
+            The tiles that have slipped; none by default.
         """
         batch, hands = prepared.batch, prepared.hands
         fixed = None if hands.floating else LoadRecovery(batch, hands.spaces, hands.scaled)
         used = idle_joints(prepared) if idle is None else tuple(idle)
-        return cls(Check(prepared.question, batch, prepared.where), fixed, used)
+        return cls(Check(prepared.question, batch, prepared.where, lost), fixed, used)
 
 
 def prepare_checks(prepared: PreparedStance) -> Checks:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
-
-from hand_models.base import Array
-from hand_models.hand import FINGERS
+from hand_models.base import Array, UnsupportedError
 from planner.question import Question
 from planner.result import SetPoints
-from planner.solving import Infeasible, KnownStance, Verified
+from planner.solving import KnownStance
+from planner.streaming.answered_points import PointsAfterSlips, answered_points
 
 __all__ = ["CompliantPoints"]
 
@@ -50,6 +48,13 @@ class CompliantPoints:
     def close(self) -> None:
         """Do nothing: there is no thread to end."""
 
+    def after_slips(self) -> PointsAfterSlips:
+        """Refuse tiles that have slipped."""
+        raise UnsupportedError(
+            "not available with compliant wrists, which then go elsewhere: valid is fixed",
+            field="lost",
+        )
+
     def find(self, wrench: Array) -> SetPoints:
         """Return the set-points for a body wrench.
 
@@ -59,28 +64,4 @@ class CompliantPoints:
             Wrench that the rock must exert on the robot, in B [N, N·m].
         """
         found = self._known.answer(wrench, time.perf_counter())
-        answer = found.answer
-        if isinstance(answer, Infeasible):
-            return SetPoints("infeasible", wrench, verified=True, reason=found.reason)
-        if not isinstance(answer, Verified):
-            return SetPoints("failed", wrench, verified=False, reason=found.reason)
-        arrays = answer.arrays
-        torque, current, angle = arrays.drives.reshape(3, -1, len(FINGERS))
-        loads = np.zeros((len(self.columns), max(map(len, self.columns))))
-        for row, y in zip(loads, answer.solution.loads, strict=True):
-            row[: len(y)] = y
-        return SetPoints(
-            status="optimal" if found.optimal else "overloaded",
-            body_wrench=wrench,
-            verified=True,
-            utilisation=answer.whole,
-            gap=max(answer.whole - max(answer.solution.least.value, found.checks.idle_use), 0.0),
-            tensions=arrays.tensions.reshape(-1, len(FINGERS)),
-            wrenches=arrays.wrenches,
-            loads=loads,
-            winch_angle=angle,
-            motor_torque=torque,
-            motor_current=current,
-            reason=found.reason,
-            wrists=arrays.wrists,
-        )
+        return answered_points(found, wrench, self.columns)

@@ -23,6 +23,7 @@ from hand_models.hand import FINGERS
 from planner.programs import CAP_SLACK
 from planner.question import Question
 from planner.result import SetPoints, SetPointSource
+from planner.streaming.answered_points import PointsAfterSlips
 from planner.streaming.interpolation import Interpolation
 from planner.streaming.prefetch import Mixture, Prefetch
 from planner.streaming.stream_stance import LoadEffects, StreamStance, SupportBound
@@ -76,6 +77,20 @@ class InterpolatedPoints:
     def close(self) -> ThreadPoolExecutor | None:
         """Stop solving interpolations; return the thread pool, for the caller to shut down."""
         return self._following.close()
+
+    def after_slips(self) -> PointsAfterSlips:
+        """Return the source of set-points after tiles have slipped.
+
+        Raises
+        ------
+        UnsupportedError
+            If a part of the stance is not supported after slips.
+        """
+        points = PointsAfterSlips(self._stance.known.prepared)
+        # a plan without more tiles starts from that without one
+        for tile in points.tiles:
+            self._following.submit(points.find, self._stance.first, [tile])
+        return points
 
     def find(self, wrench: Array) -> SetPoints:
         """Return the set-points for a body wrench.

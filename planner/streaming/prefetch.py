@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -85,6 +85,11 @@ class Prefetch:
         """Stop solving interpolations; return the thread pool, for the caller to shut down."""
         thread, self._thread = self._thread, None
         return thread
+
+    def submit(self, work: Callable[..., object], *given: object) -> None:
+        """Let the thread do some other work, unless it was stopped."""
+        if self._thread is not None:
+            self._thread.submit(work, *given)
 
     def go(self, last: Array, wrench: Array) -> None:
         """Update the weights for a new body wrench, and take over an interpolation that is ready.

@@ -2,12 +2,14 @@
 
 With fixed wrists plans are interpolated (`planner.streaming.interpolated_points`), a thousand times
 a second. The sets of compliant wrists are curved, so that a mixture of plans is none: each
-set-point is solved, beginning at the last (`planner.streaming.compliant_points`).
+set-point is solved, beginning at the last (`planner.streaming.compliant_points`). After tiles have
+slipped, set-points are solved without them (`planner.recovery`).
 """
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from concurrent.futures import wait
 from dataclasses import fields, replace
 from typing import Self
@@ -22,9 +24,10 @@ from hand_models.base import (
     check_positive,
     finite_vector,
 )
-from planner.question import Question, checked_body_wrench
+from planner.question import LostTile, Question, checked_body_wrench
 from planner.result import SetPoints
 from planner.solving import MaxMargin, objective_of
+from planner.streaming.answered_points import PointsAfterSlips
 from planner.streaming.compliant_points import CompliantPoints
 from planner.streaming.interpolated_points import InterpolatedPoints
 from planner.streaming.interpolation import Interpolation
@@ -46,6 +49,8 @@ class WrenchStream:
     radius : float, optional
         Radius of an interpolation along a force [N]; along a moment a tenth of that [N·m]. Smaller
         near the boundary of the feasible wrenches. Without meaning for compliant wrists.
+    lost : sequence of LostTile, optional
+        Tiles that have slipped before, beside those of each call; fixed wrists only.
 
     Attributes
     ----------
@@ -59,7 +64,9 @@ class WrenchStream:
         objective other than ``max_margin``, or a limit on the change of tensions.
     """
 
-    def __init__(self, question: Question, *, radius: float = 30.0) -> None:
+    def __init__(
+        self, question: Question, *, radius: float = 30.0, lost: Sequence[LostTile] = ()
+    ) -> None:
         check_positive(radius, "N", "radius", 1e4)
         self.radius = float(radius)
         self.question = question
@@ -70,11 +77,17 @@ class WrenchStream:
             self._source = CompliantPoints(question)
         else:
             self._source = InterpolatedPoints(question, self.radius)
+        self._lost = tuple(lost)
+        self._slips: PointsAfterSlips | UnsupportedError
+        try:
+            self._slips = self._source.after_slips()
+        except UnsupportedError as refused:
+            self._slips = refused
         self._lock = threading.Lock()
         self._last: SetPoints | None = None
         self._closed = False
-        self._key = b""
-        """The wrench of the last set-points."""
+        self._key: tuple[bytes, tuple[LostTile, ...]] = b"", ()
+        """The wrench of the last set-points, and the tiles that had slipped."""
 
     @property
     def limbs(self) -> tuple[str, ...]:
@@ -134,33 +147,45 @@ class WrenchStream:
             coming = self._source.coming
         return coming is None or not wait([coming], timeout).not_done
 
-    def set_points(self, body_wrench: ArrayLike) -> SetPoints:
+    def set_points(self, body_wrench: ArrayLike, lost: Sequence[LostTile] = ()) -> SetPoints:
         """Return the set-points for a body wrench: tensions, winch angles, poses of wrists.
 
         Parameters
         ----------
         body_wrench : array_like, shape (6,)
             Wrench that the rock must exert on the robot, in B [N, N·m].
+        lost : sequence of LostTile, optional
+            Tiles that have slipped, and all that had slipped before: the set-points do without
+            them. They are solved for this wrench.
 
         Raises
         ------
         InvalidInputError
-            If the wrench is not six finite numbers, or too large to be plausible, or if the stream
-            is closed.
+            If the wrench is not six finite numbers, or too large to be plausible, if a lost tile
+            is not on the rock in this stance, or if the stream is closed.
+        UnsupportedError
+            If tiles are lost of a stance that does not support it.
         """
         # a copy: callers may well fill their own array again
         wrench = checked_body_wrench(
             finite_vector(body_wrench, 6, "body_wrench"), "body_wrench"
         ).copy()
-        key = wrench.tobytes()
+        lost = tuple(dict.fromkeys((*self._lost, *lost)))
+        key = wrench.tobytes(), lost
         with self._lock:
             if self._closed:
                 raise InvalidInputError("is closed; open another stream", field="stream")
             last = self._last
             if last is not None and last.verified and self._key == key:
                 return last
-            self._last, self._key = _frozen(self._source.find(wrench)), key
-            return self._last
+            if not lost:
+                found = self._source.find(wrench)
+            elif isinstance(self._slips, UnsupportedError):
+                raise self._slips
+            else:
+                found = self._slips.find(wrench, lost)
+            self._last, self._key = _frozen(found), key
+            return found
 
 
 def _refuse(question: Question) -> None:

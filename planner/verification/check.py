@@ -22,7 +22,7 @@ import numpy as np
 
 from hand_models.base import SKEW_MATRICES, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
-from planner.question import HandOnHold, Question
+from planner.question import HandOnHold, LostTile, Question
 from planner.result import PlanArrays
 from planner.verification.fingers import DriveLimits, NailLimits
 from planner.verification.floating import recompute_floating
@@ -39,6 +39,7 @@ from planner.verification.residuals import (
     claim,
     is_near,
 )
+from planner.verification.slips import SlippedTiles
 from planner.verification.tiles import TileLimits
 
 __all__ = ["Check"]
@@ -139,6 +140,8 @@ class Check:
         The hands on their holds.
     where : Posture, optional
         Joint angles and joint loads; None if the question has no joints.
+    lost : sequence of LostTile, optional
+        The tiles that have slipped; none by default.
 
     Attributes
     ----------
@@ -155,7 +158,13 @@ class Check:
         the robot in B.
     """
 
-    def __init__(self, question: Question, known: HandBatch, where: Posture | None = None) -> None:
+    def __init__(
+        self,
+        question: Question,
+        known: HandBatch,
+        where: Posture | None = None,
+        lost: Sequence[LostTile] = (),
+    ) -> None:
         hands, stance, limits = known.hands, question.stance, question.limits
         self.question, self.where, self.known = question, where, known
         cap, most = limits.tendon_tension, hands[0].hand.maximum_tension
@@ -163,7 +172,8 @@ class Check:
         self.settled = _settled_limits(known, stance.hands, self.strength)
         self.limbs = self.settled.names.limbs
         asked = AskedLimits(question, self.settled.names, self.settled.tiles)
-        self._limits = (*self.settled.limits, asked)
+        self._slipped = SlippedTiles(self.settled.names, lost)
+        self._limits = (*self.settled.limits, asked, self._slipped)
         poses = [place.pose for place in stance.hands]
         into_body = stance.body.rotation.T
         turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
@@ -203,6 +213,7 @@ class Check:
             joints = self.joints(found, arrays.wrenches, body_wrench)
             residuals, _, used = self.recompute(found, arrays, joints)
             misplaced = [*self._wrists(arrays), *check_contacts(self.settled.names, arrays)]
+            misplaced += self._slipped.contacts(arrays)
             if misplaced or not is_near(residuals):
                 allowed = allowed_errors(self.known, arrays)
                 for residual in residuals:

@@ -15,7 +15,7 @@ Moments are taken about the joints' axes in H. Each axis is a row (a × p, −a)
 a wrench (F, M) about the origin of H: with a across the finger, a × p = a × p_0 − x e_z + z e_x for
 a joint at (x, z) of the finger's plane. Nothing is shared with the computation of the affine maps
 of settled hands (Eq. 14): the balance itself is solved, once for hands at rest, whose loads are
-affine in the tensions.
+affine in the tensions. A tile that has slipped has the shear μ N of friction, N its normal load.
 """
 
 from __future__ import annotations
@@ -147,6 +147,10 @@ class JointBalance(ResidualLimits):
         known = names.known
         hands, places, touch = known.hands, known.places, known.touch
         self._names, self._known, body = names, known, hands[0].hand
+        # slipped tiles drag on with friction alone
+        self._rubs = np.zeros(len(places.hand))
+        self._rubs[touch.slipped] = known.friction[touch.slipped]
+        self._rubs[places.bases] = 0.0  # which no joint presses
         self._pull, self.left, gain, engaged = tendons_of(places, body)
         self._closing = np.array(known.closing_tensions)
         self._shear = engaged * self._closing.take(places.hand) * known.engagement
@@ -193,7 +197,7 @@ class JointBalance(ResidualLimits):
         except np.linalg.LinAlgError:
             # nothing is what it should be, so that every plan is refused
             normals, left = np.full(ends.shear.shape, np.nan), np.full(ends.torques.shape, np.nan)
-        both = np.stack((ends.shear, normals), axis=2)
+        both = np.stack((ends.shear + self._rubs * normals, normals), axis=2)
         self._at_zero, self._per_newton = np.zeros((2, normals.shape[1], 3))
         self._at_zero[:, :2], self._per_newton[:, :2] = both[0], both[1] - both[0]
         self._left_at_zero, self._left_per_newton = left[0], left[1] - left[0]
@@ -282,7 +286,7 @@ class JointBalance(ResidualLimits):
         """
         phalanges, points = self._known.places.phalanges, fingers.points[: len(fingers.axes)]
         along = wrenches_of(points, fingers.axes[:, 0])[phalanges]
-        into = wrenches_of(points, fingers.axes[:, 1])
+        into = wrenches_of(points, fingers.axes[:, 1] + self._rubs[:, None] * fingers.axes[:, 0])
         rows = self._axes_of(fingers.joints)
         left = fingers.torques - _turned(rows, along * fingers.shear[..., phalanges, None])
         turns = rows @ into[phalanges].transpose(0, 2, 1) * TURNED_PHALANGES

@@ -16,7 +16,7 @@ from planner import SetPoints, WrenchStream, deadline
 from service.answering.answers import cut_reason, finite, placed_poses
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.questions import question
-from service.replies import HandColumns, HandSetPoints, SetPointsReply, StreamReply
+from service.replies import HandColumns, HandSetPoints, ReleasedFinger, SetPointsReply, StreamReply
 from service.requests import Detail, PlanRequest, SetPointsRequest, StreamRequest
 from service.wire import Format
 
@@ -67,7 +67,7 @@ def opened(request: StreamRequest, robots: Robots = BUNDLED_ROBOTS) -> WrenchStr
         limits=request.limits,
     )
     asked = question(first, robots)
-    return WrenchStream(asked, radius=request.radius)
+    return WrenchStream(asked, radius=request.radius, lost=request.lost)
 
 
 class Streams:
@@ -199,7 +199,7 @@ class Streams:
                 field="stream",
             )
         stream = kept.stream
-        points = stream.set_points(request.body_wrench)
+        points = stream.set_points(request.body_wrench, request.lost)
         reply = set_points_reply(request.stream, stream, points, start, request.detail or "full")
         reply.id = request.id
         return reply
@@ -261,6 +261,9 @@ def set_points_reply(
         source=points.source,
         took=time.perf_counter() - start,
     )
+    if points.lost:
+        reply.lost, reply.save_first = list(points.lost), points.save_first
+        reply.released = [ReleasedFinger(limb=limb, finger=each) for limb, each in points.released]
     return brief_set_points(reply) if detail == "set_points" else reply
 
 

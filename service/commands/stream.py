@@ -11,7 +11,7 @@ import click
 import msgspec
 
 import planner
-from hand_models.base import InvalidInputError, UnsupportedError
+from hand_models.base import InvalidInputError, Strict, UnsupportedError
 from service import answering, replies, requests, tables, wire
 from service.commands import options, stances
 
@@ -33,10 +33,11 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
     """Give set-points for one body wrench after another: one a line in, one a line out.
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first
-    [N, N·m]; blank lines are skipped. Plans are prepared first about the body wrench or the load of
-    STANCE; of compliant wrists each is solved, and only --json has their poses. Floating wrists are
-    refused. A line that is no body wrench is reported on standard error, with --json by an error in
-    its place, and the next line is read.
+    [N, N·m]; or an object {"body_wrench": [...], "lost": [...]} with all tiles that have slipped,
+    each {"limb", "finger", "phalanx"}. Blank lines are skipped. Plans are prepared first about the
+    body wrench or the load of STANCE; of compliant wrists each is solved, and only --json has their
+    poses. Floating wrists are refused. A line that is no body wrench is reported on standard error,
+    with --json by an error in its place, and the next line is read.
 
     Exit status: 2 where a line was bad, or else 1 where one failed, or else 3 where one is
     overloaded or infeasible.
@@ -57,7 +58,8 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
                 continue
             start = time.perf_counter()
             try:
-                points = source.set_points(_body_wrench(line))
+                asked = _line(line)
+                points = source.set_points(asked.body_wrench, asked.lost)
             except InvalidInputError as error:
                 worst = status.BAD_INPUT
                 if as_json:
@@ -90,14 +92,23 @@ def _declared(plan: requests.PlanRequest, radius: float) -> requests.StreamReque
     )
 
 
-def _body_wrench(line: bytes) -> requests.Wrench:
-    """Return the body wrench of a line of JSON."""
+class _Line(Strict, frozen=True):
+    """A line of standard input: body wrench, and tiles that have slipped."""
+
+    body_wrench: requests.Wrench
+    lost: requests.LostTiles = msgspec.field(default_factory=list)
+
+
+def _line(line: bytes) -> _Line:
+    """Return what a line of JSON asks for."""
     try:
+        if line.lstrip().startswith(b"{"):
+            return msgspec.json.decode(line, type=_Line)
         wrench: requests.Wrench = msgspec.json.decode(line, type=requests.Wrench)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         wanted = "six finite numbers up to 1e6 as [fx, fy, fz, mx, my, mz] are wanted"
         raise wire.MalformedError(f"{wanted}: {error}") from None
-    return wrench
+    return _Line(body_wrench=wrench)
 
 
 def _refused(error: InvalidInputError, number: int) -> replies.ErrorReply:

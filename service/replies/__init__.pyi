@@ -1,14 +1,11 @@
 from .plan import (
     BriefPlanReply as BriefPlanReply,
     CertificateReply as CertificateReply,
-    HandColumns as HandColumns,
     HandReply as HandReply,
     HandSetPoints as HandSetPoints,
     PlanReply as PlanReply,
     RouteReply as RouteReply,
     RouteStageReply as RouteStageReply,
-    SetPointsReply as SetPointsReply,
-    StreamReply as StreamReply,
 )
 from .reply import (
     WRENCH_AXES as WRENCH_AXES,
@@ -26,6 +23,12 @@ from .reply import (
     Vector as Vector,
     WrenchSet as WrenchSet,
     Wrist as Wrist,
+)
+from .set_points import (
+    HandColumns as HandColumns,
+    ReleasedFinger as ReleasedFinger,
+    SetPointsReply as SetPointsReply,
+    StreamReply as StreamReply,
 )
 from .spaces import (
     Acceleration as Acceleration,

@@ -15,6 +15,7 @@ from .questions import (
     Axis as Axis,
     BodySpaceRequest as BodySpaceRequest,
     Draw as Draw,
+    LostTiles as LostTiles,
     PlanRequest as PlanRequest,
     RouteRequest as RouteRequest,
     SetPointsRequest as SetPointsRequest,

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from hand_models.base import Coordinate, Name, Strict
-from planner import BodyRange, Limits, Load, Objective, OpenLoopSettings, Want
+from planner import BodyRange, Limits, Load, LostTile, Objective, OpenLoopSettings, Want
 from service.requests.request import (
     Detail,
     Identifier,
@@ -28,6 +28,7 @@ __all__ = [
     "Axis",
     "BodySpaceRequest",
     "Draw",
+    "LostTiles",
     "PlanRequest",
     "RouteRequest",
     "SetPointsRequest",
@@ -62,6 +63,9 @@ Radius = Annotated[
     ),
 ]
 Tolerance = Annotated[float, Meta(ge=0.001, le=1.0)]
+
+
+LostTiles = Annotated[list[LostTile], Meta(max_length=1000, description="tiles that have slipped")]
 
 
 class Draw(Strict, frozen=True, kw_only=True):
@@ -235,6 +239,7 @@ class StreamRequest(Query, frozen=True, kw_only=True):
     - ``radius``: distance from the centre within which set-points are interpolated between plans
       [N]; along a moment a tenth of it per metre [N·m]. Without meaning for compliant wrists, whose
       set-points are solved one by one.
+    - ``lost``: tiles that have slipped before; fixed wrists only.
     """
 
     stance: Stance
@@ -244,6 +249,7 @@ class StreamRequest(Query, frozen=True, kw_only=True):
     load: Load | None = None
     limits: Limits = Limits()
     radius: Radius = 30.0
+    lost: LostTiles = []
 
 
 class SetPointsRequest(Query, frozen=True, kw_only=True):
@@ -253,11 +259,14 @@ class SetPointsRequest(Query, frozen=True, kw_only=True):
     - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
     - ``detail``: ``set_points`` leaves out torques, currents and wrenches; ``hands`` and ``full``
       are the same.
+    - ``lost``: all tiles that have slipped, besides those of the declaration: the set-points do
+      without them. Fixed wrists only.
     """
 
     stream: Annotated[Name, Meta(description="as the reply to its declaration names it")]
     body_wrench: Annotated[Wrench, Meta(description="that the rock must exert on the robot, in B")]
     detail: Detail | None = None
+    lost: LostTiles = []
 
 
 class Move(Hand, frozen=True, kw_only=True):

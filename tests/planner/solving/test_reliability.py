@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hand_models.base import InvalidInputError, Pose, UnsupportedError
-from hand_models.tile import Surface, hazards, weibull_modulus
+from hand_models.tile import Surface, weibull_modulus
 from planner import programs
 from planner.programs import CAP_SLACK
 from planner.question import Load, Question
@@ -52,23 +52,25 @@ def reliable(question: Question, **kwargs) -> Question:
     return replace(question, objective="max_reliability", **kwargs)
 
 
-def modulus_of(surface: Surface) -> float:
-    return weibull_modulus(surface.shear_scatter / surface.shear_limit)
+def law_of(surface: Surface) -> tuple[float, float]:
+    """Weibull modulus; hazard of a tile at its strength: a sixth if that is a weakest of six."""
+    m = weibull_modulus(surface.shear_scatter / surface.shear_limit)
+    return m, math.gamma(1 + 1 / m) ** m / (6.0 if surface.name in ("rock", "sandpaper-36") else 1)
 
 
 def least_hazard(question: Question, cap: float) -> tuple[float, float]:
-    """Bounds of the least Σ (u Γ(1 + 1/m))^m, from tangents to each tile's power (HiGHS)."""
+    """Bounds of the least hazard, from tangents to each tile's power (HiGHS)."""
     sets = peer.spaces(question)
     r = peer.rows(question, sets)
-    names, moduli = [], []
+    names, laws = [], []
     for hand, space in zip(question.stance.hands, sets, strict=True):
         for row in space.rows[: len(space.s)]:
             tile = row.limit in ("shear", "pull_off")
             names.append((hand.limb, row.finger, row.phalanx) if tile else None)
-            moduli.append(modulus_of(hand.surface))
+            laws.append(law_of(hand.surface))
     tiles = sorted({name for name in names if name is not None})
     n, count = r.L.shape[1], len(tiles)
-    m = np.array([moduli[names.index(tile)] for tile in tiles])
+    m, weights = np.array([laws[names.index(tile)] for tile in tiles]).T
     # unknowns: y, the tiles' uses and their hazards
     A, b = [], []
     L, l0 = r.L / r.s[:, None], r.l0 / r.s
@@ -89,8 +91,9 @@ def least_hazard(question: Question, cap: float) -> tuple[float, float]:
     low = [(None, None)] * n + [(0.0, None)] * (2 * count)
 
     def tangents(uses: np.ndarray) -> None:
-        steep = m * np.array([math.gamma(1 + 1 / k) for k in m]) ** m * uses ** (m - 1.0)
-        for i, (use, slope, part) in enumerate(zip(uses, steep, hazards(uses, m), strict=True)):
+        parts = weights * uses**m
+        steep = m * weights * uses ** (m - 1.0)
+        for i, (use, slope, part) in enumerate(zip(uses, steep, parts, strict=True)):
             line = np.zeros(n + 2 * count)
             line[n + i], line[n + count + i] = slope, -1.0
             A.append(line)
@@ -107,7 +110,7 @@ def least_hazard(question: Question, cap: float) -> tuple[float, float]:
         for name, use in zip(names, used, strict=True):
             if name is not None:
                 uses[tiles.index(name)] = max(uses[tiles.index(name)], use)
-        most = min(most, float(hazards(uses, m).sum()))
+        most = min(most, float((weights * uses**m).sum()))
         if most - found.fun <= 2e-6 * max(most, 1e-3):
             break
         tangents(uses)
@@ -148,7 +151,7 @@ def test_the_hazard_is_the_tiles_own():
     ]
     found, (m, *others) = answer.reliability, answer.reliability.moduli
     assert others == [m] * 3
-    assert found.hazard == pytest.approx(sum((u * math.gamma(1 + 1 / m)) ** m for u in used))
+    assert found.hazard == pytest.approx(sum((u * math.gamma(1 + 1 / m)) ** m for u in used) / 6)
     assert found.no_slip == pytest.approx(math.exp(-found.hazard))
     assert found.hazard < 0.99 * found.hazard_before
 
@@ -223,6 +226,6 @@ def test_what_cannot_be_had_is_refused():
         with pytest.raises(InvalidInputError, match=r"must be 0\.001 to 1"):
             reliable(question, tolerance=tolerance)
     sure = replace(ROCK, shear_scatter=0.0)
-    with pytest.raises(InvalidInputError, match=r"0\.05 to 0\.9 times the mean") as caught:
+    with pytest.raises(InvalidInputError, match=r"0\.05 to 0\.9 times shear_limit") as caught:
         reliable(ask(on_wall(surface=sure)))
     assert caught.value.field == "stance.hands[0].surface.shear_scatter"

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, prepare_stance, settle_hand
 from planner.result import PlanArrays
-from planner.solving.solve import plan_on
+from planner.solving import answer_on
 from planner.verification import Check
 from planner.verification.joint_balance import JointBalance
 from planner.verification.residuals import PartNames
@@ -95,7 +95,7 @@ def test_a_plan_is_refused_for_hands_whose_balance_cannot_be_solved():
     """Joints that no contact holds, which no settled hand has."""
     question = ask(on_wall())
     prepared = prepare_stance(question)
-    answer, _ = plan_on(prepared, time.perf_counter())
+    answer = answer_on(prepared, time.perf_counter()).plan()
     hand = prepared.batch.hands[0]
     tiles = (hand.tiles[0], hand.tiles[1]._replace(contact="none"), *hand.tiles[2:])
     loose = replace(hand, tiles=tiles)
@@ -110,7 +110,7 @@ def test_contacts_that_a_plan_has_elsewhere_are_told_though_all_its_numbers_agre
     """A distal tile 10 mm off, or turned, or another contact off, and the wrenches that fit it."""
     question = ask(on_wall())
     prepared = prepare_stance(question)
-    answer, _ = plan_on(prepared, time.perf_counter())
+    answer = answer_on(prepared, time.perf_counter()).plan()
     check, honest = Check(question, prepared.batch, None), PlanArrays.of(answer.hands)
     assert check.problems(honest, answer.utilisation, prepared.wrench) == []
     places, count = prepared.batch.places, len(honest.loads)

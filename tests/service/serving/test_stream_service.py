@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import zenoh
 
+from planner import LostTile
 from planner.result import SetPoints
 from planner.streaming import WrenchStream
 from service import CruxClient, PlanRequest, SetPointsRequest, StreamRequest
@@ -209,7 +210,7 @@ def stand_in(close: Callable[[], None] = lambda: None) -> SimpleNamespace:
         columns=(),
         interpolates=None,
         question=SimpleNamespace(stance=SimpleNamespace(hands=())),
-        set_points=lambda _: SetPoints("failed", wrench, verified=False, reason="none"),
+        set_points=lambda *_: SetPoints("failed", wrench, verified=False, reason="none"),
         close=close,
     )
 
@@ -426,3 +427,45 @@ def test_a_line_is_answered_before_the_next_is_there() -> None:
     asked = process("stream", "wall", "--json", given=(light + "\n").encode() * 3)
     assert (asked.returncode, asked.stderr) == (0, b"")
     assert len(asked.stdout.splitlines()) == 3
+
+
+# After slips --------------------------------------------------------------------------------------
+
+
+def test_a_client_says_what_has_slipped(client: CruxClient) -> None:
+    declared = client.stream(declaration())
+    wrench = tuple((0.5 * np.array(declared.body_wrench)).tolist())
+    limb = declared.hands[0].limb
+    finger = "inner_left"
+    lost = [LostTile(limb, finger, phalanx) for phalanx in ("proximal", "middle", "distal")]
+    asked = SetPointsRequest(v=1, stream=declared.stream, body_wrench=wrench, lost=lost)
+    reply = client.set_points(asked)
+    assert (reply.status, reply.source, reply.verified) == ("optimal", "solved", True)
+    assert reply.lost == lost
+    assert [(each.limb, each.finger) for each in reply.released] == [(limb, finger)]
+    assert reply.hands[0].tensions[1] == 0.0
+    assert reply.save_first is None
+    whole = client.set_points(msgspec.structs.replace(asked, lost=[]))
+    assert whole.lost is msgspec.UNSET
+    assert whole.utilisation < reply.utilisation
+    heavy = tuple((3.0 * np.array(declared.body_wrench)).tolist())
+    reply = client.set_points(msgspec.structs.replace(asked, body_wrench=heavy))
+    assert (reply.status, reply.verified) == ("overloaded", True)
+    assert reply.save_first in [hand.limb for hand in declared.hands]
+    assert reply.reason
+    with pytest.raises(ServiceError) as refused:
+        client.set_points(msgspec.structs.replace(asked, lost=[LostTile(limb, finger, "nail")]))
+    assert (refused.value.kind, refused.value.field) == ("invalid", "lost[0]")
+
+
+def test_a_line_says_what_has_slipped(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    lost = [{"limb": "rear_left", "finger": "inner_left", "phalanx": "middle"}]
+    lines = [{"body_wrench": WRENCH, "lost": lost}, WRENCH, {"body_wrench": WRENCH, "tile": 1}]
+    given = b"\n".join(map(msgspec.json.encode, lines))
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(given)))
+    assert run_command_line(["stream", "wall-300", "--json"]) == BAD_INPUT
+    one, two, three = map(json.loads, capfd.readouterr().out.splitlines())
+    assert (one["verified"], one["lost"], "lost" in two) == (True, lost, False)
+    assert "tile" in three["error"]["message"]

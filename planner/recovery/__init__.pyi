@@ -1,0 +1,1 @@
+from .recovery import Recovered as Recovered, Recovery as Recovery

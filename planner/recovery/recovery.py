@@ -1,0 +1,337 @@
+"""Plan a prepared stance anew after tiles have slipped: no closing, and no new solver.
+
+The hands stay where they closed. Only the numbers of the hands that have lost tiles change
+(`hand_models.fixed_wrist.slipped_hand`), in rows of the same names and places, so that one
+program, or two, of the solver that the stance has already, and the check of their plan, are all.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hand_models.base import Array, BoundedStore, InvalidInputError, UnsupportedError
+from hand_models.fixed_wrist import slipped_hand, wrench_spaces
+from hand_models.hand import FINGERS, SettledHand
+from hand_models.wrench_spaces import WrenchSpace
+from planner.prepare import HandBatch, PreparedStance
+from planner.programs import Columns, ScaledRows, StanceData
+from planner.question import LostTile
+from planner.result import Plan
+from planner.solving import Checks, Solution, StanceAnswer, Verified, answer_on, idle_joints
+
+__all__ = ["Recovered", "Recovery"]
+
+
+class Recovered(NamedTuple):
+    """Verified plan of a stance without tiles that have slipped, or why there is none.
+
+    Attributes
+    ----------
+    found : StanceAnswer
+        The answer; its ``prepared`` stance has the hands without the tiles.
+    lost : tuple of LostTile
+        The tiles that have slipped.
+    released : tuple of (str, str)
+        Limb and finger of each finger that the plan takes off the rock.
+    """
+
+    found: StanceAnswer
+    lost: tuple[LostTile, ...]
+    released: tuple[tuple[str, str], ...]
+
+    @property
+    def utilisation(self) -> float:
+        """Least utilisation without the tiles; infinite without a verified plan."""
+        return self.found.answer.whole
+
+    @property
+    def holds(self) -> bool:
+        """True if there is a verified plan within the cap on the utilisation."""
+        return self.found.optimal
+
+    @property
+    def verified(self) -> Verified | None:
+        """The plan's loads, which have passed the checks; None without a plan."""
+        return self.found.answer if isinstance(self.found.answer, Verified) else None
+
+    @property
+    def save_first(self) -> str | None:
+        """Limb of the hand on whose limits the overload depends most; None if there is a plan.
+
+        That is the hand with the largest sum of multipliers: an equal part more of strength there
+        lowers the utilisation most.
+        """
+        least = self.found.answer.solution.least
+        if self.holds or not least.limit_duals:
+            return None
+        pairs = zip(least.limit_duals, least.hard_duals, strict=True)
+        prices = [float(limits.sum()) or float(hard.sum()) for limits, hard in pairs]
+        return self.found.prepared.limbs[int(np.argmax(prices))]
+
+    def plan(self) -> Plan:
+        """Return the whole plan, with its explanation."""
+        return self.found.plan()
+
+
+class _Hand(NamedTuple):
+    """A hand without tiles, its set, and the scaled rows of the set."""
+
+    settled: SettledHand
+    space: WrenchSpace
+    scaled: ScaledRows
+
+
+_HandKey = tuple[int, tuple[int, ...], tuple[int, ...], bool]
+"""Index of a hand, its slipped tiles, its released fingers, and whether its palm holds."""
+
+
+class Recovery:
+    """A prepared stance, for plans without tiles that have slipped. Safe to use from threads.
+
+    A tile that has slipped drags on with friction, and only while it is pressed; a finger of which
+    no tile holds, or whose slipped tiles cannot all be pressed, is released: off the rock. Where
+    the plan is beyond the cap, fingers that have lost more than one tile are released for a second
+    plan, and the better one counts; where there is no plan, all that have lost a tile.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+        The stance before tiles slipped; all wrists are fixed.
+
+    Raises
+    ------
+    UnsupportedError
+        If wrists are compliant or floating, grasps hold with fingernails, or limits keep the
+        tensions of fingers that would have to be released.
+    """
+
+    def __init__(self, prepared: PreparedStance) -> None:
+        _refuse(prepared)
+        self.prepared = prepared
+        self._idle = idle_joints(prepared)
+        data = prepared.hands.data
+        self._places = {
+            (limb, tile.finger, tile.phalanx): (h, t)
+            for h, (limb, hand) in enumerate(zip(prepared.limbs, prepared.batch.hands, strict=True))
+            for t, tile in enumerate(hand.tiles)
+            if hand.touching[t]
+        }
+        self._pattern = _pattern(data)
+        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", 1024)
+        self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
+            "stances without tiles", 16
+        )
+        self._near: BoundedStore[tuple[_HandKey, ...], Solution] = BoundedStore(
+            "plans without tiles", 256
+        )
+        self._keep([(h, (t,), (), True) for h, t in self._places.values()])
+
+    @property
+    def tiles(self) -> tuple[LostTile, ...]:
+        """All tiles on the rock, hand by hand: those that can slip."""
+        return tuple([LostTile(*name) for name in self._places])
+
+    def plan(
+        self,
+        lost: Sequence[LostTile],
+        body_wrench: Array | None = None,
+        *,
+        released: Collection[tuple[str, str]] = (),
+        off: Collection[str] = (),
+    ) -> Recovered:
+        """Plan without tiles that have slipped.
+
+        Parameters
+        ----------
+        lost : sequence of LostTile
+            The tiles that have slipped; a tile that is named twice counts once.
+        body_wrench : ndarray, shape (6,), optional
+            Wrench that the rock must exert on the robot, in B [N, N·m]; by default that of the
+            stance.
+        released : collection of (str, str), optional
+            Limb and finger of fingers that are off the rock, whatever their tiles do.
+        off : collection of str, optional
+            Limbs of hands that are off the rock: their fingers are released, and palms carry
+            nothing.
+
+        Returns
+        -------
+        Recovered
+
+        Raises
+        ------
+        InvalidInputError
+            If a tile is not on the rock in this stance; the field is ``lost[i]``.
+        """
+        start = time.perf_counter()
+        lost = tuple(dict.fromkeys(lost))
+        by_hand = self._by_hand(lost)
+        gone = {*released, *((limb, finger) for limb in off for finger in FINGERS)}
+        first = self._answer(start, lost, by_hand, gone, off, body_wrench)
+        counts = Counter((tile.limb, tile.finger) for tile in lost)
+        least = 1 if first.verified is None else 2
+        more = {finger for finger, count in counts.items() if count >= least} - {*first.released}
+        if first.holds or not more:
+            return first
+        second = self._answer(start, lost, by_hand, gone | more, off, body_wrench)
+        return second if second.utilisation < first.utilisation else first
+
+    def without(self, lost: Sequence[LostTile]) -> PreparedStance:
+        """Return the stance without tiles that have slipped, prepared for the solver."""
+        return self._prepared(self._keys(self._by_hand(dict.fromkeys(lost)), (), ()))
+
+    def _by_hand(self, lost: Iterable[LostTile]) -> dict[int, list[int]]:
+        """Return the tiles that have slipped, by the index of their hand."""
+        found: dict[int, list[int]] = {}
+        for i, tile in enumerate(lost):
+            place = self._places.get((tile.limb, tile.finger, tile.phalanx))
+            if place is None:
+                raise InvalidInputError(
+                    f"no {tile.phalanx} tile of {tile.finger} of {tile.limb} is on the rock in "
+                    f"this stance; {self._valid(tile)}",
+                    field=f"lost[{i}]",
+                )
+            found.setdefault(place[0], []).append(place[1])
+        return found
+
+    def _valid(self, tile: LostTile) -> str:
+        """Return a sentence that says what could be in place of a tile that is not on the rock."""
+        limbs = list(self.prepared.limbs)
+        if tile.limb not in limbs:
+            return f"its limbs are {', '.join(limbs)}"
+        own = [name[1:] for name in self._places if name[0] == tile.limb]
+        return "on it are " + (", ".join(" ".join(each[::-1]) for each in own) or "none")
+
+    def _answer(
+        self,
+        start: float,
+        lost: tuple[LostTile, ...],
+        by_hand: Mapping[int, Sequence[int]],
+        released: Collection[tuple[str, str]],
+        off: Collection[str],
+        body_wrench: Array | None,
+    ) -> Recovered:
+        keys = self._keys(by_hand, released, off)
+        prepared = self._stances.get(keys, lambda: self._prepared(keys))
+        if body_wrench is not None:
+            prepared = prepared.turned(body_wrench)
+        checks = Checks.of(prepared, self._idle, lost)
+        found = answer_on(prepared, start, checks, self._nearest(keys))
+        if isinstance(found.answer, Verified):
+            self._near.keep([(keys, found.answer.solution)])
+        hands = zip(prepared.limbs, prepared.batch.hands, strict=True)
+        open_fingers = [(limb, finger) for limb, hand in hands for finger in _released(hand)]
+        return Recovered(found, lost, tuple(open_fingers))
+
+    def _nearest(self, keys: tuple[_HandKey, ...]) -> Solution | None:
+        """Return a known solution to start from: of the same losses, or of one tile of them."""
+        single = [((h, (t,), (), True),) for h, tiles, _, _ in keys for t in tiles]
+        same, *others = self._near.find([keys, *single])
+        known = [each for each in others if each is not None]
+        return same or max(known, key=lambda each: each.least.value, default=None)
+
+    def _keys(
+        self,
+        by_hand: Mapping[int, Sequence[int]],
+        released: Collection[tuple[str, str]],
+        off: Collection[str],
+    ) -> tuple[_HandKey, ...]:
+        """Return what is gone of each hand that is not whole."""
+        keys = []
+        for h, limb in enumerate(self.prepared.limbs):
+            fingers = sorted(FINGERS.index(finger) for at, finger in released if at == limb)
+            tiles = sorted(by_hand.get(h, ()))
+            if tiles or fingers or limb in off:
+                keys.append((h, tuple(tiles), tuple(fingers), limb not in off))
+        return tuple(keys)
+
+    def _keep(self, keys: Sequence[_HandKey]) -> None:
+        """Find hands without tiles, all in one call."""
+        added, whole = self.prepared.hands.added, self.prepared.batch.hands
+        hands = [
+            slipped_hand(whole[h], tiles, fingers, palm=palm) for h, tiles, fingers, palm in keys
+        ]
+        plain = wrench_spaces(hands, self.prepared.question.limits.tendon_tension)
+        spaces = [added[key[0]].on(space) for key, space in zip(keys, plain, strict=True)]
+        found = [_Hand(*each, ScaledRows.of(each[1])) for each in zip(hands, spaces, strict=True)]
+        self._hands.keep(zip(keys, found, strict=True))
+
+    def _prepared(self, keys: Sequence[_HandKey]) -> PreparedStance:
+        """Return the stance with hands that are not whole, prepared for the solver."""
+        prepared, found = self.prepared, self._hands.find(keys)
+        new = [key for key, each in zip(keys, found, strict=True) if each is None]
+        if new:
+            self._keep(new)
+            found = self._hands.find(keys)
+        hands, spaces = list(prepared.batch.hands), list(prepared.hands.spaces)
+        scaled = list(prepared.hands.scaled)
+        for (h, *_), each in zip(keys, found, strict=True):
+            assert each is not None
+            hands[h], spaces[h], scaled[h] = each
+        sets = prepared.hands.with_sets(spaces, scaled=tuple(scaled))
+        data = replace(sets.data, rows=sets.data.rows._replace(columns=self._columns(sets.data)))
+        return replace(prepared, batch=HandBatch.of(hands), hands=replace(sets, data=data))
+
+    def _columns(self, data: StanceData) -> Columns:
+        """Return the rows as the solver takes them, in the pattern that it has already."""
+        whole = data.rows.whole
+        if ((whole != 0.0) & ~self._pattern).any():
+            self._pattern |= whole != 0.0
+        return Columns.of(whole, self._pattern)
+
+
+def _released(hand: SettledHand) -> Iterator[str]:
+    """Yield the fingers of a hand that are off the rock since tiles have slipped."""
+    for finger in FINGERS:
+        on = [
+            (now.contact, then.contact)
+            for now, then in zip(hand.tiles, hand.as_closed.tiles, strict=True)
+            if now.finger == finger
+        ]
+        if all(now == "none" for now, _ in on) and any(then != "none" for _, then in on):
+            yield finger
+
+
+def _pattern(data: StanceData) -> NDArray[np.bool_]:
+    """Return where rows may have entries that are not zero, whichever tiles slip.
+
+    The balance, and rows that couple more than two loads of a hand, may have all.
+    """
+    places, balance = np.asarray(data.rows.whole != 0.0), len(data.wrench)
+    places[:balance] = True
+    left = 0
+    for hand in data.hands:
+        own = places[:, left : left + len(hand.unit)]
+        own[own.sum(axis=1) > 2] = True
+        left += len(hand.unit)
+    return places
+
+
+def _refuse(prepared: PreparedStance) -> None:
+    """Refuse stances whose hands cannot be planned without tiles."""
+    question = prepared.question
+    for i, hand in enumerate(question.stance.hands):
+        if hand.wrist != "fixed":
+            raise UnsupportedError(
+                f"{hand.wrist} is not available after slips: where the wrist then goes takes a "
+                "search; valid is fixed",
+                field=f"stance.hands[{i}].wrist",
+            )
+        if hand.grasp.fingernail:
+            raise UnsupportedError(
+                "a hand that holds with its fingernails has no tiles that can slip",
+                field=f"stance.hands[{i}].grasp.fingernail",
+            )
+    for name in ("tension_change", "least_tension"):
+        if getattr(question.limits, name):
+            raise UnsupportedError(
+                "not available after slips, as fingers may have to be released: leave it out",
+                field=f"limits.{name}",
+            )

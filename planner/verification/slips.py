@@ -1,0 +1,75 @@
+"""Check what a plan says of tiles that have slipped, from the list of their names alone.
+
+A tile on that list drags on with friction, or is off the rock: its shear is μ times a normal load
+that is not negative, and it has no lateral load. All other tiles touch as they closed, unless their
+whole finger is off the rock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from planner.prepare import CONTACT_CODES
+from planner.question import LostTile
+from planner.result import PlanArrays
+from planner.verification.residuals import PartNames, Recomputed, Residual, ResidualLimits
+
+__all__ = ["SlippedTiles"]
+
+
+class SlippedTiles(ResidualLimits):
+    """The loads and contacts of tiles that have slipped.
+
+    Parameters
+    ----------
+    names : PartNames
+        Names of the hands' parts.
+    lost : sequence of LostTile
+        The tiles that have slipped.
+    """
+
+    def __init__(self, names: PartNames, lost: Sequence[LostTile]) -> None:
+        self._names, known = names, names.known
+        gone = {(tile.limb, tile.finger, tile.phalanx) for tile in lost}
+        each = [
+            (limb, tile.finger, tile.phalanx)
+            for limb, hand in zip(names.limbs, known.hands, strict=True)
+            for tile in hand.tiles
+        ]
+        self._lost = np.array([name in gone for name in each])
+        self._tiles = np.flatnonzero(self._lost)
+        self._found = len(self._tiles) == len(gone)
+        self._friction = known.friction[self._tiles]
+
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return the residuals of friction of the tiles that have slipped, which only presses."""
+        loads, hand = again.arrays.loads[self._tiles], self._names.known.places.hand[self._tiles]
+        shear, normal, lateral = loads.T
+        off = np.column_stack((shear - self._friction * normal, lateral))
+        text = " has slipped: {:.6g} N along and {:.6g} N across the rock are not friction"
+        pulled = " has slipped: it cannot pull with {:.6g} N"
+        return [
+            Residual("zero", off, hand, self._name, text, (shear, normal)),
+            Residual("least", normal, hand, self._name, pulled, (-normal,)),
+        ]
+
+    def contacts(self, arrays: PlanArrays) -> Iterator[str]:
+        """Yield an error message for each tile with a contact state that it cannot have."""
+        if not self._found:
+            yield "a tile that is said to have slipped is not in this stance"
+        known = self._names.known
+        codes = np.array([CONTACT_CODES[tile.contact] for own in arrays.tiles for tile in own])
+        closed = np.array(
+            [CONTACT_CODES[tile.contact] for hand in known.hands for tile in hand.as_closed.tiles]
+        )
+        off = codes == CONTACT_CODES["none"]
+        whole = np.logical_and.reduceat(off, known.places.first_of_finger)[known.places.finger]
+        slipped = codes == CONTACT_CODES["slipped"]
+        wrong = np.where(self._lost, ~(slipped | (off & whole)), (codes != closed) & ~(off & whole))
+        for t in np.flatnonzero(wrong).tolist():
+            yield f"{self._names.tile(t)} has another contact than its slip leaves it"
+
+    def _name(self, i: int) -> str:
+        return self._names.tile(int(self._tiles[i]))

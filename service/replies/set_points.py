@@ -1,0 +1,102 @@
+"""Define the replies of streams: their declaration, and set-points."""
+
+from __future__ import annotations
+
+from msgspec import UNSET, Struct, UnsetType
+
+from planner import LostTile
+from service.replies.plan import HandSetPoints
+from service.replies.reply import Reply, StanceReply, Vector
+
+__all__ = ["HandColumns", "ReleasedFinger", "SetPointsReply", "StreamReply"]
+
+
+class HandColumns(Struct, kw_only=True):
+    """One hand of a stream, with the names of its loads.
+
+    - ``limb``: name of the limb that carries the hand.
+    - ``columns``: names of the loads of the hand's wrench space, in order.
+    """
+
+    limb: str
+    columns: list[str]
+
+
+class StreamReply(StanceReply, kw_only=True):
+    """Confirmation that a stance is declared as a stream, with the identifier to ask it by.
+
+    The service keeps a stream until many others are declared, or until the service ends.
+
+    - ``stream``: identifier of the stream, for requests of set-points.
+    - ``radius``: distance from ``body_wrench`` within which set-points are interpolated between
+      plans [N], along a moment a tenth of it per metre [N·m]; null where each set-point is solved
+      for.
+    - ``status``: status of the plan at ``body_wrench``.
+    - ``reason``: why there is no plan at ``body_wrench``, or what overloads it; null where it is
+      within its limits.
+    - ``body_wrench``: centre of the first interpolation, in B [N, N·m].
+    - ``utilisation``: utilisation of the plan at ``body_wrench``; null without a plan.
+    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
+      compliant wrists, no plan nearby. Null without a plan.
+    - ``hands``: the hands in order, with the names of their loads.
+    - ``took``: time that the declaration took [s].
+    """
+
+    stream: str
+    radius: float | None
+    status: str
+    reason: str | None
+    body_wrench: Vector
+    utilisation: float | None
+    gap: float | None
+    hands: list[HandColumns]
+    took: float
+
+
+class ReleasedFinger(Struct, kw_only=True):
+    """A finger that is taken off the rock.
+
+    - ``limb``: limb of its hand.
+    - ``finger``: name of the finger.
+    """
+
+    limb: str
+    finger: str
+
+
+class SetPointsReply(Reply, kw_only=True):
+    """Set-points of all hands for one body wrench.
+
+    - ``stream``: identifier of the stream that was asked.
+    - ``status``: ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
+    - ``reason``: why there is no plan, or what overloads it; null where it is within its limits.
+    - ``body_wrench``: wrench that the rock must exert on the robot, in B [N, N·m].
+    - ``utilisation``: load over capacity of the limit that is used most; null without a plan.
+    - ``gap``: proven bound: no plan has a utilisation lower than this one by more than ``gap``; of
+      compliant wrists, no plan nearby, by the sets linearised there. Null without a plan.
+    - ``hands``: set-points of each hand; null without a plan.
+    - ``verified``: true where the independent check of the set-points, or of the proof that there
+      is no plan, passed.
+    - ``source``: ``interpolated`` between plans known before, ``solved`` for this wrench, or
+      ``blended`` from both.
+    - ``took``: time that the answer took [s].
+    - ``lost``: tiles that have slipped, without which the set-points do; left out where none has.
+    - ``released``: fingers that the set-points take off the rock, as tiles of them have slipped:
+      slacken their tendons. Left out where no tile has slipped.
+    - ``save_first``: where the set-points after slips are beyond the cap, limb of the hand on whose
+      limits that depends most; left out or null otherwise.
+    """
+
+    stream: str
+    status: str
+    reason: str | None
+    body_wrench: Vector
+    utilisation: float | None
+    gap: float | None
+    hands: list[HandSetPoints] | None
+    verified: bool
+    source: str
+    took: float
+    lost: list[LostTile] | UnsetType = UNSET
+    released: list[ReleasedFinger] | UnsetType = UNSET
+    save_first: str | UnsetType | None = UNSET

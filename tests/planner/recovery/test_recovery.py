@@ -1,0 +1,257 @@
+"""Plans without tiles that have slipped: hand-worked loads, another solver, symmetry, the check."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from hand_models.base import InvalidInputError, UnsupportedError
+from hand_models.fixed_wrist import slipped_hand
+from hand_models.hand import FINGERS
+from planner.prepare import prepare_stance
+from planner.programs.conic import WAITING_SOLVERS
+from planner.programs.program import Best
+from planner.question import LostTile
+from planner.recovery import Recovery
+from planner.verification import Check
+from service.answering.questions import question
+from service.commands.stances import read_request
+from tests.suite.helpers.hands import pinch
+
+NAMES = ["wall-300", "wall", "slab", "boulders"]
+
+
+@pytest.fixture(scope="module")
+def recoveries():
+    """A prepared stance of each name."""
+    return {name: Recovery(prepare_stance(question(read_request(name)))) for name in NAMES}
+
+
+def some(recovery: Recovery, seed: int, count: int) -> list[list[LostTile]]:
+    """Random losses of one to three tiles."""
+    chance, tiles = np.random.default_rng(seed), recovery.tiles
+    return [
+        [tiles[i] for i in chance.choice(len(tiles), chance.integers(1, 4), replace=False)]
+        for _ in range(count)
+    ]
+
+
+def test_a_distal_tile_that_slips_is_balanced_by_hand():
+    """About the last joint: M r f - k q - tau = along N + height mu N."""
+    hand = pinch()
+    finger, tile = (
+        1,
+        next(t for t, each in enumerate(hand.tiles) if each[:2] == ("inner_left", "distal")),
+    )
+    slipped, model, mu = slipped_hand(hand, [tile]), hand.hand.finger, hand.surface.friction
+    bend = float(np.diff(hand.postures.angles[finger])[-1])
+    spring = model.joint_stiffness[2] * bend + model.joint_preload[2]
+    pull = (1.0 - model.friction) ** 2 * model.pulley_radii[2]
+    arm = hand.postures.alongs[finger, 2] + mu * model.tile_height
+    for tension in (40.0, 90.0):
+        normal = (pull * tension - spring) / arm
+        shear, across = slipped.loads[tile] @ [1.0, tension]
+        assert across == pytest.approx(normal, rel=1e-9)
+        assert shear == pytest.approx(mu * normal, rel=1e-9)
+    assert slipped.tiles[tile].contact == "slipped"
+    others = [t for t in range(len(hand.tiles)) if hand.finger_of[t] != finger]
+    assert np.array_equal(slipped.loads[others], hand.loads[others])
+
+
+def test_the_lateral_reaction_goes_over_to_the_tiles_that_hold():
+    hand = pinch()
+    tile = next(t for t, each in enumerate(hand.tiles) if each[:2] == ("inner_left", "middle"))
+    slipped = slipped_hand(hand, [tile])
+    own = hand.finger_of == 1
+    assert slipped.lateral_shares[tile] == 0.0
+    assert slipped.lateral_shares[own].sum() == pytest.approx(1.0)
+    assert slipped.lateral_limits[1] == pytest.approx(hand.lateral_limits[1] * 2 / 3)
+
+
+def test_a_finger_of_which_nothing_holds_is_released():
+    hand = pinch()
+    gone = [t for t in range(len(hand.tiles)) if hand.finger_of[t] == 0]
+    slipped = slipped_hand(hand, gone)
+    assert {slipped.tiles[t].contact for t in gone} == {"none"}
+    assert not slipped.loads[gone].any()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_plan_is_verified_and_uses_the_solver_that_is_there(recoveries, name):
+    recovery = recoveries[name]
+    recovery.plan(recovery.tiles[:1])
+    before = WAITING_SOLVERS.info().misses
+    plans = [recovery.plan(lost) for lost in some(recovery, 1, 12)]
+    assert WAITING_SOLVERS.info().misses == before
+    for found in plans:
+        assert found.verified is not None
+        told = found.plan()
+        assert told.verified
+        state = {
+            (hand.limb, tile.finger, tile.phalanx): tile.contact
+            for hand in told.hands
+            for tile in hand.tiles
+        }
+        released = {*found.released}
+        for each in found.lost:
+            off = (each.limb, each.finger) in released
+            expected = "none" if off else "slipped"
+            assert state[each.limb, each.finger, each.phalanx] == expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_another_solver_finds_the_same_utilisation(recoveries, name):
+    """HiGHS, over the rows of the hands' sets in newtons."""
+    recovery = recoveries[name]
+    for lost in some(recovery, 2, 4):
+        found = recovery.plan(lost)
+        prepared = found.found.prepared
+        sizes = [len(space.columns) for space in prepared.hands.spaces]
+        ends = np.cumsum([0, *sizes])
+        A, b, G, g = [], [], np.zeros((6, ends[-1] + 1)), prepared.wrench.copy()
+        for h, space in enumerate(prepared.hands.spaces):
+            own = slice(ends[h], ends[h + 1])
+            rows = np.zeros((len(space.s) + len(space.h), ends[-1] + 1))
+            rows[: len(space.s), own] = space.L / space.s[:, None]
+            rows[: len(space.s), -1] = -1.0
+            rows[len(space.s) :, own] = space.H
+            A.append(rows)
+            b.append(np.concatenate([-space.l0 / space.s, space.h]))
+            carried = -prepared.hands.transports[h]
+            G[:, own] = carried @ space.generators
+            g -= carried @ space.origin
+        goal = np.zeros(ends[-1] + 1)
+        goal[-1] = 1.0
+        least = linprog(goal, np.vstack(A), np.concatenate(b), G, g, bounds=(None, None)).fun
+        assert found.found.answer.solution.least.value == pytest.approx(least, abs=1e-6)
+        assert found.utilisation >= least - 1e-6
+
+
+def test_the_definition_in_cvxpy_agrees(recoveries):
+    recovery = recoveries["wall-300"]
+    for lost in some(recovery, 3, 2):
+        found = recovery.plan(lost)
+        data = found.found.prepared.hands.data
+        outcome, _ = Best(data).by_definition()
+        least = found.found.answer.solution.least.value
+        assert outcome.value == pytest.approx(least, abs=1e-5)
+
+
+def test_mirrored_losses_use_as_much(recoveries):
+    recovery = recoveries["wall-300"]
+    mirror = {"right": "left", "left": "right"}
+
+    def mirrored(name: str) -> str:
+        first, side = name.split("_")
+        return f"{first}_{mirror[side]}"
+
+    for tile in recovery.tiles[:14:3]:
+        other = LostTile(mirrored(tile.limb), mirrored(tile.finger), tile.phalanx)
+        one, two = recovery.plan([tile]), recovery.plan([other])
+        assert one.utilisation == pytest.approx(two.utilisation, abs=1e-5)
+
+
+def test_nothing_lost_is_the_plan_of_the_stance(recoveries):
+    recovery = recoveries["wall-300"]
+    whole = recovery.plan(())
+    assert whole.utilisation == pytest.approx(0.9564, abs=1e-3)
+    assert whole.holds
+    assert whole.save_first is None
+
+
+def test_a_hand_that_is_off_carries_nothing(recoveries):
+    recovery = recoveries["slab"]
+    found = recovery.plan((), off=["front_left"])
+    told = found.plan()
+    hand = next(each for each in told.hands if each.limb == "front_left")
+    assert told.verified
+    assert not hand.wrench.any()
+    assert not hand.tensions.any()
+    assert {(limb, finger) for limb, finger in found.released} == {
+        ("front_left", finger) for finger in FINGERS
+    }
+
+
+def test_a_hand_that_is_off_is_a_stance_without_it(recoveries):
+    """The plan of the other three alone has the same utilisation."""
+    recovery = recoveries["slab"]
+    asked = recovery.prepared.question
+    others = tuple(h for h in asked.stance.hands if h.limb != "front_left")
+    stance = replace(asked.stance, hands=others)
+    three = replace(asked, stance=stance, load=None, body_wrench=recovery.prepared.wrench)
+    alone = Recovery(prepare_stance(three)).plan(())
+    off = recovery.plan((), off=["front_left"])
+    assert off.utilisation == pytest.approx(alone.utilisation, abs=2e-3)
+    assert off.found.answer.solution.least.value == pytest.approx(
+        alone.found.answer.solution.least.value, abs=1e-5
+    )
+
+
+def test_the_check_refuses_what_a_slip_leaves_nobody(recoveries):
+    recovery = recoveries["wall-300"]
+    tile = LostTile("front_left", "inner_left", "middle")
+    whole, without = recovery.plan(()), recovery.plan([tile])
+    for found, lost, words in (
+        # the spines still carry, as the intact plan says
+        (whole, [tile], "another contact than its slip"),
+        (without, [], "another contact than its slip"),
+        (without, [tile, LostTile("front_left", "inner_left", "distal")], "another contact"),
+        (without, [tile, LostTile("front_left", "thumb", "distal")], "not in this stance"),
+    ):
+        prepared = found.found.prepared
+        check = Check(prepared.question, prepared.batch, None, lost)
+        wrong = check.problems(found.verified.arrays, found.utilisation, prepared.wrench)
+        assert any(words in each for each in wrong), wrong
+    prepared = without.found.prepared
+    check = Check(prepared.question, prepared.batch, None, [tile])
+    arrays = without.verified.arrays
+    assert not check.problems(arrays, without.utilisation, prepared.wrench)
+    dragging = prepared.batch.touch.slipped[0]
+    loads = arrays.loads.copy()
+    loads[dragging, 0] += 1.0
+    wrong = check.problems(arrays._replace(loads=loads), without.utilisation, prepared.wrench)
+    assert any("are not friction" in each for each in wrong)
+    loads = arrays.loads.copy()
+    loads[dragging, :2] *= -1.0
+    wrong = check.problems(arrays._replace(loads=loads), without.utilisation, prepared.wrench)
+    assert any("cannot pull" in each for each in wrong)
+
+
+def test_the_hand_to_save_first_is_where_strength_helps_most(recoveries):
+    """One percent more strength of all tiles of that hand lowers the overload most."""
+    recovery = recoveries["wall-300"]
+    limb = "front_left"
+    lost = [LostTile(limb, f, p) for f in ("inner_left", "inner_right") for p in ("middle",)]
+    lost += [LostTile(limb, "outer_left", "middle")]
+    found = recovery.plan(lost)
+    assert not found.holds
+    data = found.found.prepared.hands.data
+    gains = []
+    for h in range(len(data.hands)):
+        hands = list(data.hands)
+        stronger = hands[h]
+        hands[h] = stronger._replace(L=stronger.L / 1.01, l0=stronger.l0 / 1.01)
+        value = Best(type(data).of(tuple(hands), data.wrench)).solve().value
+        gains.append(found.found.answer.solution.least.value - value)
+    assert found.save_first == recovery.prepared.limbs[int(np.argmax(gains))]
+
+
+def test_what_cannot_slip_is_refused_by_name(recoveries):
+    recovery = recoveries["wall-300"]
+    for tile in (
+        LostTile("front", "inner_left", "middle"),
+        LostTile("front_left", "inner_left", "base"),
+    ):
+        with pytest.raises(InvalidInputError) as refused:
+            recovery.plan([recovery.tiles[0], tile])
+        assert refused.value.field == "lost[1]"
+    with pytest.raises(UnsupportedError) as refused:
+        Recovery(prepare_stance(question(read_request("wall-300-floating"))))
+    assert refused.value.field.endswith("wrist")
+
+
+def test_a_tile_lost_twice_counts_once(recoveries):
+    recovery = recoveries["wall-300"]
+    tile = recovery.tiles[5]
+    assert recovery.plan([tile, tile]).utilisation == recovery.plan([tile]).utilisation
