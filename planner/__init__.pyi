@@ -74,6 +74,7 @@ from .result import (
     Plan as Plan,
     Price as Price,
     Quantiles as Quantiles,
+    Reliability as Reliability,
     RobustLoadFactor as RobustLoadFactor,
     SetPoints as SetPoints,
     Solver as Solver,

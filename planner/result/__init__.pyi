@@ -16,6 +16,7 @@ from .plain_parts import (
     LoadFactorStatus as LoadFactorStatus,
     Palm as Palm,
     Price as Price,
+    Reliability as Reliability,
     Solver as Solver,
     TensionPath as TensionPath,
     Tile as Tile,

@@ -64,6 +64,7 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
         explain=request.explain,
         body_range=request.body_range,
         open_loop=request.open_loop,
+        tolerance=request.tolerance,
     )
 
 

@@ -15,6 +15,7 @@ from planner import (
     OpenLoop,
     Palm,
     Price,
+    Reliability,
     RobustLoadFactor,
     Solver,
     Spread,
@@ -129,11 +130,9 @@ class PlanReply(StanceReply, kw_only=True):
     - ``effort_prices``: how far the effort falls for one more unit of a limit, where the objective
       is ``min_effort``; else null.
     - ``certificate``: proof that there is no plan within the limits; null where there is one, and
-      where the request says ``"explain": false``.
-    - ``residual``: body wrench of the returned loads minus ``body_wrench`` [N, N·m]; null without a
-      plan.
-    - ``path``: whether the straight way from the ``present`` tensions to the plan is safe; null
-      where the request gives no present tensions, or without a plan.
+      with ``"explain": false``.
+    - ``residual``: body wrench of the loads minus ``body_wrench`` [N, N·m]; null without a plan.
+    - ``path``: whether the straight way from the ``present`` tensions, if given, is safe; or null.
     - ``verified``: true where the independent check of the answer passed.
     - ``solver``: name of the solver, how it ended, and its iterations.
     - ``time``: time that each part of the answer took [s].
@@ -153,8 +152,9 @@ class PlanReply(StanceReply, kw_only=True):
       with ``"want": ["survival"]``, and with a plan.
     - ``spread``: Monte Carlo statistics over samples of uncertain parameters; only with ``"want":
       ["spread"]``.
-    - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
-      ["clearance"]``.
+    - ``clearance``: least distances of body, hands, links and rock; if ``want`` names it.
+    - ``reliability``: probability that no tile slips; only with the objective ``max_reliability``,
+      where tiles are loaded and the limits can be kept.
     - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
       make the stance feasible come first, the smallest first; the rest follow by gain for their
       size.
@@ -190,6 +190,7 @@ class PlanReply(StanceReply, kw_only=True):
     survival: Survival | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
+    reliability: Reliability | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 

@@ -48,7 +48,10 @@ __all__ = [
 
 ObjectiveName = Annotated[
     Objective,
-    Meta(description="least utilisation, or least effort within limits.utilisation"),
+    Meta(
+        description="least utilisation; least effort within limits.utilisation; or largest "
+        "probability that no tile slips, at nearly the least utilisation"
+    ),
 ]
 Explain = Annotated[
     bool,
@@ -68,6 +71,7 @@ Radius = Annotated[
         description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
     ),
 ]
+Tolerance = Annotated[float, Meta(ge=0.001, le=1.0)]
 
 
 LostTiles = Annotated[list[LostTile], Meta(max_length=1000, description="tiles that have slipped")]
@@ -109,7 +113,10 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
       robot's weight at rest.
     - ``objective``: ``max_margin`` for the least utilisation, ``min_effort`` for the least effort
-      within ``limits.utilisation``.
+      within ``limits.utilisation``, ``max_reliability`` for the largest probability that no tile
+      slips, at nearly the least utilisation; that needs fixed wrists on all hands.
+    - ``tolerance``: part of the least utilisation by which a plan for ``max_reliability`` may
+      exceed it; 0.02 by default.
     - ``limits``: the cap on the utilisation, and the caller's own limits.
     - ``present``: present tensions of the four tendons [N], by limb; the reply's ``path`` says
       whether the straight way from them is safe.
@@ -159,6 +166,10 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     survival: Annotated[
         SurvivalSettings | None,
         Meta(description="draws of strengths; only with survival in want"),
+    ] = None
+    tolerance: Annotated[
+        Tolerance | None,
+        Meta(description="part of the least utilisation that max_reliability may give away"),
     ] = None
 
 
@@ -304,7 +315,7 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     - ``name``: name of the route.
     - ``stance``: the start stance.
     - ``load``: mass and payloads from which the body wrench of every stance follows.
-    - ``objective``: ``max_margin`` or ``min_effort``, for every stance.
+    - ``objective``: ``max_margin``, ``min_effort`` or ``max_reliability``, for every stance.
     - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
     - ``moves``: the moves in climbing order.
     - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.

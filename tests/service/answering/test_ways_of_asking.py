@@ -85,6 +85,10 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     "PlanRequest.objective": [{"objective": "min_effort"}],
     "PlanRequest.limits": [{}],
     "PlanRequest.present": [{"present": {RIGHT: [50.0, 60.0, 60.0, 50.0]}}],
+    "PlanRequest.tolerance": [
+        {"objective": "max_reliability"},
+        {"objective": "max_reliability", "tolerance": 0.1},
+    ],
     "PlanRequest.confidence": [],  # refused
     "PlanRequest.detail": [{}],
     "PlanRequest.want": [{"want": ["load_factor", "prices", "clearance", "model"]}],
