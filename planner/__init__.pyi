@@ -20,6 +20,7 @@ from .pictures import (
     plot_body_space as plot_body_space,
     plot_plan as plot_plan,
     plot_redundancy as plot_redundancy,
+    plot_survival as plot_survival,
     plot_wrench_space as plot_wrench_space,
     summary as summary,
     write_report as write_report,
@@ -54,6 +55,7 @@ from .question import (
     OpenLoopSettings as OpenLoopSettings,
     Question as Question,
     Stance as Stance,
+    SurvivalSettings as SurvivalSettings,
     Want as Want,
 )
 from .recovery import (
@@ -80,10 +82,13 @@ from .result import (
     Price as Price,
     Quantiles as Quantiles,
     Redundancy as Redundancy,
+    Reliability as Reliability,
     RobustLoadFactor as RobustLoadFactor,
     SetPoints as SetPoints,
     Solver as Solver,
     Spread as Spread,
+    Survival as Survival,
+    SurvivalShare as SurvivalShare,
     TensionPath as TensionPath,
     Time as Time,
     WristPlan as WristPlan,
@@ -101,6 +106,7 @@ from .route import (
     RouteResult as RouteResult,
     evaluate as evaluate,
 )
+from .simulation import find_survival as find_survival
 from .solving import (
     KnownStance as KnownStance,
     PalmLoadFactors as PalmLoadFactors,

@@ -16,11 +16,12 @@ FILES = {
         "hand.toml",
         "surfaces.toml",
         "spines.toml",
+        "strength.toml",
         "scan.toml",
         "experiments.toml",
         "draws.toml",
     ),
-    "planner.parameters": ("robosimian.toml", "scene.toml", "plans.toml"),
+    "planner.parameters": ("robosimian.toml", "scene.toml", "plans.toml", "slips.toml"),
 }
 
 SHOWN = 6

@@ -21,5 +21,6 @@ from .tables import (
     hand_table as hand_table,
     scan_table as scan_table,
     spine_table as spine_table,
+    strength_table as strength_table,
     surface_table as surface_table,
 )

@@ -1,10 +1,10 @@
 """Parameter files: every physical number with its unit and its source.
 
 Beside this file, the hand's numbers are in ``hand.toml``, the surfaces' in ``surfaces.toml``, those
-of a tile's spines in ``spines.toml``, those for reading scanned rock in ``scan.toml``, those of the
-paper's experiments in ``experiments.toml``, and sets of parameter values that meet the published
-data in ``draws.toml``. A caller's file in the form of ``hand.toml`` may replace some or all of the
-hand's numbers (`hand_models.parameters.own`).
+of a tile's spines in ``spines.toml``, the scatter of strengths in ``strength.toml``, those for
+reading scanned rock in ``scan.toml``, those of the paper's experiments in ``experiments.toml``, and
+sets of parameter values that meet the published data in ``draws.toml``. A caller's file in the form
+of ``hand.toml`` may replace some or all of the hand's numbers (`hand_models.parameters.own`).
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ __all__ = [
     "hand_table",
     "scan_table",
     "spine_table",
+    "strength_table",
     "surface_table",
 ]
 
@@ -344,6 +345,11 @@ def scan_table() -> ParameterTable:
 def spine_table() -> ParameterTable:
     """Return the parameters of a tile's spines and the rock's asperities, from ``spines.toml``."""
     return _bundled("spines.toml")
+
+
+def strength_table() -> ParameterTable:
+    """Return how the strengths of tiles scatter, from ``strength.toml``."""
+    return _bundled("strength.toml")
 
 
 def draw_table() -> ParameterTable:

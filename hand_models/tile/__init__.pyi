@@ -14,6 +14,11 @@ from .spine_calibration import (
     measured_tile_shear as measured_tile_shear,
     within_law as within_law,
 )
+from .strength_scatter import (
+    StrengthScatter as StrengthScatter,
+    TileStrengths as TileStrengths,
+    weibull_modulus as weibull_modulus,
+)
 from .surface import (
     LEAST_SHARE as LEAST_SHARE,
     Surface as Surface,

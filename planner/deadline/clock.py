@@ -44,6 +44,7 @@ Unfinished = Literal[
     "tie_break",
     "wrists",
     "least_effort",
+    "least_hazard",
     "load_factor",
     "path",
     "certificate",
@@ -51,6 +52,7 @@ Unfinished = Literal[
     "robust",
     "open_loop",
     "spread",
+    "survival",
     "advice",
 ]
 
@@ -59,6 +61,7 @@ UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
     "tie_break": "the one of least effort was found of the plans that use as little",
     "wrists": "the search for the poses of the floating wrists ended",
     "least_effort": "the plan of least effort was found",
+    "least_hazard": "the plan of least hazard was found",
     "load_factor": "the load factor was found",
     "path": "it was found whether the way from the present tensions is safe",
     "certificate": "it was found what keeps the hands from a plan within the limits",
@@ -66,6 +69,7 @@ UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
     "robust": "the load factor was found at all places of the hands",
     "open_loop": "the plan was executed on all displaced hands",
     "spread": "a plan was found in all draws of the numbers",
+    "survival": "all draws of strengths were simulated",
     "advice": "all changes were tried that might make it hold",
 }
 """Results that a deadline can prevent, in words that follow "expired before"."""
@@ -195,8 +199,9 @@ def late_sentence(seconds: float, names: Sequence[Unfinished]) -> str:
     """
     missing = ", before ".join(UNFINISHED_RESULTS[name] for name in names)
     sentence = f"the deadline of {seconds:g} s expired before {missing}"
-    if "least_effort" in names:
-        sentence += "; the plan is one of less utilisation and more effort"
+    for name, more in (("least_effort", "effort"), ("least_hazard", "hazard")):
+        if name in names:
+            sentence += f"; the plan is one of less utilisation and more {more}"
     return sentence
 
 

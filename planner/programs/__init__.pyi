@@ -4,6 +4,7 @@ from .conic import (
     Outcome as Outcome,
     Reached as Reached,
 )
+from .hazard import Hazard as Hazard, TilePowers as TilePowers
 from .program import (
     LOAD_BOX as LOAD_BOX,
     TIE_WEIGHT as TIE_WEIGHT,

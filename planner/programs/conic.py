@@ -2,10 +2,10 @@
 
     min ½ xᵀ diag(P) x + qᵀ x   with   A x + s = b,  s ∈ K.
 
-The cone K is a product of zeros, then nonnegative numbers, then one second-order cone. A is passed
-sparse, because most entries of a stance's rows are zero: a dense A costs three times as much. A
-solver is set up for one sparsity pattern, kept in the cache `Solvers`, and given the numbers of
-later programs of that pattern. No solution depends on the programs that were solved before it.
+The cone K is a product of zeros, nonnegative numbers, a second-order cone and power cones, in this
+order. A is passed sparse: a dense A costs three times as much. A solver is set up for one sparsity
+pattern, kept in the cache `Solvers`, and given the numbers of later programs of that pattern. No
+solution depends on the programs that were solved before it.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class ConicProgram(NamedTuple):
     Attributes
     ----------
     P, q : ndarray, shape (n,)
-        Diagonal of the quadratic cost, and linear cost.
+        Diagonal of the quadratic cost; linear cost.
     A : tuple of Columns
         Blocks of the constraint matrix from left to right, each with m rows.
     b : ndarray, shape (m,)
@@ -120,8 +120,9 @@ class ConicProgram(NamedTuple):
     above : int
         Number of those equations that come before the balance of wrenches.
     second_order : int
-        Number of rows of the second-order cone, which are the last rows. All rows between the
-        equations and the second-order cone are inequalities.
+        Number of rows of the second-order cone, below the inequalities.
+    powers : tuple of float
+        Exponent α of each cone x^α y^(1 − α) ≥ |z| of the last rows, three each.
     """
 
     P: Array
@@ -131,6 +132,7 @@ class ConicProgram(NamedTuple):
     zero: int
     above: int = 0
     second_order: int = 0
+    powers: tuple[float, ...] = ()
 
 
 class ConicSolution(NamedTuple):
@@ -147,8 +149,7 @@ class ConicSolution(NamedTuple):
     x : ndarray, shape (n,), or None
         Variables; None without a solution.
     multipliers : ndarray, shape (m,), or None
-        Dual values (Lagrange multipliers) of the rows. Of an infeasible program, its infeasibility
-        certificate. None for every other status without a solution.
+        Dual values of the rows, or the certificate of an infeasible program; else None.
     """
 
     status: str
@@ -180,10 +181,11 @@ class ConicSolver:
         P = Columns(program.P, diagonal[:-1], diagonal)
         if not self.pattern.quadratic:
             P = Columns(P.values[:0], P.rows[:0], np.zeros_like(P.starts))
-        between = rows - program.zero - program.second_order
+        between = rows - program.zero - program.second_order - 3 * len(program.powers)
         cones = [clarabel.ZeroConeT(program.zero), clarabel.NonnegativeConeT(between)]
         if program.second_order:
             cones.append(clarabel.SecondOrderConeT(program.second_order))
+        cones += [clarabel.PowerConeT(exponent) for exponent in program.powers]
         chosen = clarabel.DefaultSettings()
         chosen.verbose = False
         for name, value in settings.items():
@@ -206,10 +208,7 @@ class ConicSolver:
             self._numbers = numbers
 
     def solve(self) -> ConicSolution:
-        """Solve the program passed last; stop at the deadline of `planner.deadline`, if one is set.
-
-        If the deadline expires, the solution's status is `OUT_OF_TIME`.
-        """
+        """Solve the program passed last; `OUT_OF_TIME` if `planner.deadline` ends it."""
         if deadline.left() is None:
             return _read(self._solver.solve())
         caught: list[BaseException] = []
@@ -317,8 +316,8 @@ class Pattern(NamedTuple):
 
     Attributes
     ----------
-    rows, columns, zero, second_order : int
-        Shape of A, and numbers of equations and of rows of the second-order cone.
+    rows, columns, zero, second_order, powers : int, and tuple of float
+        Shape of A, numbers of equations and of rows of the second-order cone, power cones.
     quadratic : bool
         True if P has an entry that is not zero.
     places : tuple of bytes
@@ -329,6 +328,7 @@ class Pattern(NamedTuple):
     columns: int
     zero: int
     second_order: int
+    powers: tuple[float, ...]
     quadratic: bool
     places: tuple[bytes, ...]
 
@@ -340,6 +340,7 @@ class Pattern(NamedTuple):
             len(program.q),
             program.zero,
             program.second_order,
+            program.powers,
             bool(program.P.any()),
             tuple(part.tobytes() for each in program.A for part in (each.rows, each.starts)),
         )
@@ -365,7 +366,7 @@ class Outcome:
     Attributes
     ----------
     solved : bool
-        True if the solver returned loads. The planner checks the loads separately.
+        True if the solver returned loads, which the planner checks.
     status : str
         CVXPY's name of the solver's status, or `OUT_OF_TIME`.
     iterations : int
@@ -376,8 +377,7 @@ class Outcome:
         Loads y of each hand [N]; of a floating wrist its twist [m, rad], of a compliant one
         tensions [N] and twist. Empty if not solved.
     limit_duals, hard_duals : tuple of ndarray, shapes (nl,), (nh,)
-        Dual values of each hand's limit rows and hard rows. Of an infeasible program, its Farkas
-        certificate. Empty if the solver returned no dual values.
+        Dual values of each hand's limits and hard rows, or the Farkas certificate; empty without.
     balance_dual : ndarray, shape (nb,), or None
         Dual values of the balance of wrenches.
     """

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import resources
 from typing import ClassVar, Final, Protocol, get_args
 
-from hand_models.base import Array, InvalidInputError, check_positive, errors_under, finite_vector
+from hand_models.base import (
+    Array,
+    InvalidInputError,
+    UnsupportedError,
+    check_positive,
+    errors_under,
+    finite_vector,
+)
 from hand_models.hand import FINGERS
-from hand_models.parameters import ParameterSample
+from hand_models.parameters import ParameterSample, ParameterTable
 from planner.question.draws import drawn_hands
 from planner.question.limits import (
     BodyRange,
@@ -33,6 +42,21 @@ class OwnObjective(Protocol):
 MOST_DRAWS: Final = 100
 """Largest number of samples that a caller may give: each costs a plan and a load factor."""
 
+LEAST_TOLERANCE: Final = 1e-3
+"""Least tolerance that is valid: with less, plans hardly differ, and a solver's digits count."""
+
+SCATTER_RANGE: Final = (0.05, 0.9)
+"""Least and largest scatter of a surface for ``max_reliability``, over its strength: Weibull moduli
+of 25 and 1.1. Larger powers are beyond a solver's digits, and those below 1 are not convex."""
+
+
+@cache
+def _usual_tolerance() -> float:
+    """Return the tolerance of ``plans.toml``."""
+    path = resources.files("planner.parameters").joinpath("plans.toml")
+    table = ParameterTable.read(path.read_text("utf-8"), path.name)
+    return table.positive("reliability", "tolerance")
+
 
 @dataclass(frozen=True, eq=False)
 class Question:
@@ -53,9 +77,14 @@ class Question:
     want : frozenset of str
         Extras: 'load_factor', 'prices', 'model', 'robust', 'open_loop', 'spread', 'clearance' and
         'advice'.
-    objective : {'max_margin', 'min_effort'} or planner.solving.Objective
+    objective : {'max_margin', 'min_effort', 'max_reliability'} or planner.solving.Objective
         'max_margin': least utilisation. 'min_effort': least sum of squared relative tensions and
-        joint torques, at a utilisation within the limits. Or an object with the caller's objective.
+        joint torques, at a utilisation within the limits. 'max_reliability': largest probability
+        that no tile slips, at nearly the least utilisation; only with fixed wrists on all hands.
+        Or an object with the caller's objective.
+    tolerance : float, optional
+        Part of the least utilisation by which a plan of 'max_reliability' may exceed it, from
+        0.001 to 1; that of ``plans.toml`` by default.
     present : mapping of str to ndarray, shape (4,)
         Present tendon tensions by limb [N]; only of hands with fixed wrists.
     deadline : float, optional
@@ -84,6 +113,7 @@ class Question:
     explain: bool = True
     body_range: BodyRange = field(default_factory=BodyRange)
     open_loop: OpenLoopSettings | None = None
+    tolerance: float | None = None
 
     def __post_init__(self) -> None:
         if self.body_wrench is not None:
@@ -103,6 +133,7 @@ class Question:
         if self.deadline is not None:
             check_positive(self.deadline, "s", "deadline")
         self._check_limits()
+        self._check_reliability()
         self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
         floating = [name for name, wrist in wrists.items() if wrist == "floating"]
@@ -134,6 +165,42 @@ class Question:
                 "requires 'present' tensions; give them, or remove tension_change",
                 field="limits.tension_change",
             )
+
+    def _check_reliability(self) -> None:
+        tolerance = self.tolerance
+        if self.objective != "max_reliability":
+            if tolerance is not None:
+                raise InvalidInputError(
+                    "requires the objective 'max_reliability'; ask for it, or remove tolerance",
+                    field="tolerance",
+                )
+            return
+        if tolerance is not None and not LEAST_TOLERANCE <= tolerance <= 1.0:
+            raise InvalidInputError(
+                f"must be {LEAST_TOLERANCE:g} to 1, got {tolerance:g}", field="tolerance"
+            )
+        moving = [hand.limb for hand in self.stance.hands if hand.wrist != "fixed"]
+        if moving:
+            raise UnsupportedError(
+                "max_reliability requires fixed wrists on all hands, as tiles' loads are not "
+                f"convex in a wrist's pose; others have {', '.join(moving)}: fix these, or ask for "
+                "max_margin or min_effort",
+                field="objective",
+            )
+        least, most = SCATTER_RANGE
+        for i, hand in enumerate(self.stance.hands):
+            whole, scatter = hand.surface.shear_limit, hand.surface.shear_scatter
+            if not least * whole <= scatter <= most * whole:
+                raise InvalidInputError(
+                    f"must be {least:g} to {most:g} times shear_limit ({whole:g} N) for "
+                    f"max_reliability, got {scatter:g} N",
+                    field=f"stance.hands[{i}].surface.shear_scatter",
+                )
+
+    @property
+    def utilisation_tolerance(self) -> float:
+        """Part of the least utilisation by which a plan of 'max_reliability' may exceed it."""
+        return _usual_tolerance() if self.tolerance is None else self.tolerance
 
     def _check_draws(self) -> None:
         if "spread" not in self.want:
@@ -224,7 +291,7 @@ class Question:
         """Return the question for the least utilisation, without extras, samples and deadline."""
         least: Objective = "max_margin"
         plain = replace(self, want=frozenset(), draws=None, open_loop=None)
-        return replace(plain, deadline=None, objective=least)
+        return replace(plain, deadline=None, objective=least, tolerance=None)
 
     def needed_wrench(self, weights: Weights | None = None) -> Array:
         """Return the body wrench: what the rock must exert on the robot, in B, shape (6,) [N, N·m].

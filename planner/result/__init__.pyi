@@ -16,6 +16,7 @@ from .plain_parts import (
     LoadFactorStatus as LoadFactorStatus,
     Palm as Palm,
     Price as Price,
+    Reliability as Reliability,
     Solver as Solver,
     Status as Status,
     TensionPath as TensionPath,
@@ -42,4 +43,10 @@ from .spread import (
     SentSpread as SentSpread,
     Spread as Spread,
     StrengthThreshold as StrengthThreshold,
+)
+from .survival import (
+    Slip as Slip,
+    StrengthSource as StrengthSource,
+    Survival as Survival,
+    SurvivalShare as SurvivalShare,
 )

@@ -22,6 +22,7 @@ __all__ = [
     "LoadFactorStatus",
     "Palm",
     "Price",
+    "Reliability",
     "Solver",
     "Status",
     "TensionPath",
@@ -150,6 +151,32 @@ class Time(Struct, frozen=True):
     model: float
     solve: float
     total: float
+
+
+class Reliability(Struct, frozen=True):
+    """Probability that no tile slips, of a plan of least hazard.
+
+    The hazard is Σ (u Γ(1 + 1/m) / w̄)^m over all tiles on rock (`hand_models.tile.TileStrengths`),
+    with each tile's utilisation u and the Weibull modulus m of its surface. Tiles are independent,
+    and their mean strength is right; w̄ > 1 where that was fitted to the weakest of several.
+
+    Attributes
+    ----------
+    hazard : float
+        Of the plan; comparable only between plans on the same surfaces.
+    no_slip : float
+        exp(−hazard): probability that no tile slips.
+    utilisation_before, hazard_before : float
+        Of the plan for ``max_margin``.
+    moduli : list of float
+        m of each hand's tiles, from the scatter of its surface.
+    """
+
+    hazard: float
+    no_slip: float
+    utilisation_before: float
+    hazard_before: float
+    moduli: list[float]
 
 
 class TensionPath(Struct, frozen=True):

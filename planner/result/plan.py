@@ -22,6 +22,7 @@ from planner.result.plain_parts import (
     LimitName,
     LoadFactorStatus,
     Price,
+    Reliability,
     Solver,
     Status,
     TensionPath,
@@ -76,6 +77,8 @@ class Plan:
     effort_prices : tuple of Price or None
         Decrease of the effort per unit more of a limit, if the objective is the effort. Relative
         tensions and torques still refer to the unchanged limits.
+    reliability : Reliability or None
+        Hazard and probability of no slip, if the objective is the hazard.
     certificate : Certificate or None
         Infeasibility certificate; None if there is a plan within the cap, or no explanation was
         asked for.
@@ -134,6 +137,7 @@ class Plan:
     hands: tuple[HandPlan, ...] | None = None
     prices: tuple[Price, ...] | None = None
     effort_prices: tuple[Price, ...] | None = None
+    reliability: Reliability | None = None
     certificate: Certificate | None = None
     residual: Array | None = None
     joints: Mapping[str, Array] | None = None

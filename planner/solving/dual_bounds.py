@@ -7,11 +7,12 @@ import math
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs import TIE_WEIGHT, Outcome, StanceData, tie_weight
+from planner.programs import TIE_WEIGHT, Outcome, StanceData, TilePowers, tie_weight
 from planner.solving.active_set import TOLERANCES
 
 __all__ = [
     "convex_bound",
+    "hazard_bound",
     "is_least",
     "least_bound",
     "unique_bound",
@@ -111,6 +112,39 @@ def convex_bound(
     """
     z = np.concatenate(outcome.loads) / data.rows.unit
     return _dual_bound(data, outcome, slopes, cap, 0.0) + value - float(slopes @ z)
+
+
+def hazard_bound(data: StanceData, outcome: Outcome, tiles: TilePowers, cap: float) -> float:
+    """Return a lower bound of the objective of `planner.programs.Hazard` from its multipliers.
+
+    With Λ_i the sum of the multipliers λ_k of a tile's rows, each of which is at most its use u_i,
+    every plan has
+
+        Σ_i w_i u_i^m_i ≥ Σ_i Λ_i u_i − Σ_i f*_i(Λ_i) ≥ Σ_k λ_k (L_k z + l0_k) − Σ_i f*_i(Λ_i),
+
+    where f*_i(Λ) is the largest Λ u − w_i u^m_i of any use from 0 to the cap. The right-hand side
+    is bounded as in `convex_bound`, with the rows that are not tiles' at the cap, and the term in
+    the squares of z.
+
+    Parameters
+    ----------
+    data : StanceData
+    outcome : Outcome
+        Outcome of the program, whose limits' multipliers are those of its rows L z + l0 ≤ cap τ.
+    tiles : TilePowers
+    cap : float
+        Cap on the utilisation.
+    """
+    if not outcome.limit_duals:
+        return -math.inf
+    multipliers = np.maximum(np.concatenate(outcome.limit_duals), 0.0)
+    of_tiles = np.zeros(len(tiles.weights))
+    np.add.at(of_tiles, tiles.tile_of, multipliers[tiles.rows])
+    others = float(multipliers.sum() - of_tiles.sum())
+    z = np.concatenate(outcome.loads) / data.rows.unit
+    small = tie_weight(len(data.hands)) * data.rows.tie * z
+    value = float(small @ z) - tiles.conjugate(of_tiles, cap) - cap * others
+    return convex_bound(data, outcome, value, 2.0 * small, 0.0)
 
 
 def _missing(outcome: Outcome) -> float:

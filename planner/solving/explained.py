@@ -50,6 +50,7 @@ from planner.result import (
 )
 from planner.scene import clearance, scene_of, wrench_findings
 from planner.solving.fixed_wrists import FixedSolution
+from planner.solving.objectives import CappedObjective
 from planner.solving.robust import find_robust_load_factor
 from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread
@@ -206,6 +207,8 @@ def _of_plan(
     if solution.best is not solution.least:
         own = ActiveLimits(prepared.limbs, spaces, solution.best.limit_duals)
         parts |= solution.objective.reported(own, solution.cap)
+    if isinstance(solution.objective, CappedObjective):
+        parts |= solution.objective.measured(found.arrays)
     if question.present:
         parts["path"] = path = tension_path(prepared, solution.sets, solution.loads, idle)
         unfinished += late("path") if path is None else ()

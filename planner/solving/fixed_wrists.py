@@ -102,7 +102,8 @@ class FixedSolution(Solution):
         if not self.loads or used > self.cap + CAP_SLACK:
             return self
         # where the least utilisation is the cap itself, rounding must not empty the set
-        cap, data = max(self.cap, used + 0.5 * CAP_SLACK), self.sets.data
+        cap = max(objective.cap(used, self.cap), used + 0.5 * CAP_SLACK)
+        data = self.sets.data
         best = objective.solve(data, cap)
         if not best.solved:
             if deadline.expired():

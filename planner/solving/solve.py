@@ -27,7 +27,7 @@ from planner.solving.floating_wrists import (
     next_solution,
     wrench_is_given,
 )
-from planner.solving.objectives import CappedObjective, objective_of
+from planner.solving.objectives import objective_of
 from planner.solving.solution import (
     Answer,
     Failed,
@@ -171,9 +171,8 @@ def _best_in(
     """Yield plans of least utilisation, or what a question's objective makes of each."""
     objective = objective_of(prepared.question)
     for least in found:
-        if isinstance(objective, CappedObjective):
-            least = least.best_in(objective, prepared, budget)
-        yield least
+        capped = objective.within(prepared, least.sets, least.loads) if least.loads else None
+        yield least if capped is None else least.best_in(capped, prepared, budget)
 
 
 def _first_verified(prepared: PreparedStance, checks: Checks, found: Iterable[Solution]) -> Answer:

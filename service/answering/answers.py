@@ -156,6 +156,7 @@ def plan_reply(answer: Plan, identifier: str | None, *, model: bool) -> replies.
         open_loop=answer.open_loop or UNSET,
         spread=answer.spread or UNSET,
         clearance=answer.clearance or UNSET,
+        reliability=answer.reliability or UNSET,
         advice=UNSET if answer.advice is None else list(answer.advice),
     )
 

@@ -19,6 +19,7 @@ from service.answering.own_models import BUNDLED_ROBOTS, Robots, over_default
 from service.answering.questions import climb, question
 from service.answering.reply_sizes import fitted
 from service.answering.streams import LOCAL_STREAMS, Streams
+from service.answering.survival import add_survival, check_survival
 from service.replies import BriefPlanReply, PlanReply, Reply, StreamReply
 from service.requests import (
     BodySpaceRequest,
@@ -105,14 +106,18 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
         # compute only what the reply contains
         included = ["load_factor"] if detail == "hands" else []
         wanted = [want for want in request.want if want in included]
-        request = replace(request, want=wanted, draws=[], open_loop=None)
+        request = replace(request, want=wanted, draws=[], open_loop=None, survival=None)
+    check_survival(request)
     asked = question(request, robots)
     start = time.perf_counter()
     answer = planner.plan(asked)
     found = Planned.of(asked, answer, request.id, detail, model="model" in request.want)
-    if "redundancy" in request.want and isinstance(found.reply, PlanReply):
-        with deadline.within(asked.deadline, started=start):
+    with deadline.within(asked.deadline, started=start):
+        if "redundancy" in request.want and isinstance(found.reply, PlanReply):
             _add_redundancy(found.reply, asked)
+        if "survival" in request.want and isinstance(found.reply, PlanReply):
+            settings = request.survival or planner.SurvivalSettings()
+            add_survival(found.reply, asked, answer, settings)
     return found
 
 

@@ -56,7 +56,9 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
         body_wrench=array_of(request.body_wrench),
         load=request.load or Load(),
         limits=request.limits,
-        want=frozenset([want for want in request.want if want != "redundancy"]),
+        want=frozenset(
+            [want for want in request.want if want != "redundancy" and want != "survival"]
+        ),
         objective=request.objective,
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,
@@ -64,6 +66,7 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
         explain=request.explain,
         body_range=request.body_range,
         open_loop=request.open_loop,
+        tolerance=request.tolerance,
     )
 
 

@@ -16,9 +16,11 @@ from planner import (
     Palm,
     Price,
     Redundancy,
+    Reliability,
     RobustLoadFactor,
     Solver,
     Spread,
+    Survival,
     TensionPath,
     Time,
 )
@@ -113,7 +115,8 @@ class PlanReply(StanceReply, kw_only=True):
     - ``load_factor_status``: ``found``; ``at_least``, where floating hands may hold more; or why
       ``load_factor`` is null: ``unbounded``, ``none`` where no multiple can be held, ``not_asked``,
       ``not_finished`` by the deadline.
-    - ``survival_probability``: always null in this version.
+    - ``survival_probability``: probability that no tile and no palm slips, ``survival.no_slip``;
+      null where it was not asked for, or without a plan.
     - ``limiting``: the limit that is used most; null without a plan.
     - ``hands``: one entry for each hand; null where nothing balances the body.
     - ``joints``: joint angles planned for, by limb, from the body outward [rad]; [m] for joints
@@ -128,11 +131,9 @@ class PlanReply(StanceReply, kw_only=True):
     - ``effort_prices``: how far the effort falls for one more unit of a limit, where the objective
       is ``min_effort``; else null.
     - ``certificate``: proof that there is no plan within the limits; null where there is one, and
-      where the request says ``"explain": false``.
-    - ``residual``: body wrench of the returned loads minus ``body_wrench`` [N, N·m]; null without a
-      plan.
-    - ``path``: whether the straight way from the ``present`` tensions to the plan is safe; null
-      where the request gives no present tensions, or without a plan.
+      with ``"explain": false``.
+    - ``residual``: body wrench of the loads minus ``body_wrench`` [N, N·m]; null without a plan.
+    - ``path``: whether the straight way from the ``present`` tensions, if given, is safe; or null.
     - ``verified``: true where the independent check of the answer passed.
     - ``solver``: name of the solver, how it ended, and its iterations.
     - ``time``: time that each part of the answer took [s].
@@ -143,17 +144,21 @@ class PlanReply(StanceReply, kw_only=True):
     - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
       proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
       ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``,
-      ``redundancy``.
+      ``redundancy``, ``survival``.
     - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
       ["robust"]``, and not for a body wrench of zero.
     - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;
       only with ``"want": ["open_loop"]``, and with a plan.
+    - ``survival``: how likely it is that no tile slips, and that all hands hold if some do; only
+      with ``"want": ["survival"]``, and with a plan.
     - ``spread``: Monte Carlo statistics over samples of uncertain parameters; only with ``"want":
       ["spread"]``.
     - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
       ["clearance"]``.
     - ``redundancy``: the plan without each tile, each finger and each hand; only with ``"want":
       ["redundancy"]``.
+    - ``reliability``: probability that no tile slips; only with the objective ``max_reliability``,
+      where tiles are loaded and the limits can be kept.
     - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
       make the stance feasible come first, the smallest first; the rest follow by gain for their
       size.
@@ -186,9 +191,11 @@ class PlanReply(StanceReply, kw_only=True):
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
     open_loop: OpenLoop | UnsetType = UNSET
+    survival: Survival | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
     redundancy: Redundancy | UnsetType = UNSET
+    reliability: Reliability | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 

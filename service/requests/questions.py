@@ -11,7 +11,16 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from hand_models.base import Coordinate, Name, Strict
-from planner import BodyRange, Limits, Load, LostTile, Objective, OpenLoopSettings, Want
+from planner import (
+    BodyRange,
+    Limits,
+    Load,
+    LostTile,
+    Objective,
+    OpenLoopSettings,
+    SurvivalSettings,
+    Want,
+)
 from service.requests.request import (
     Detail,
     Identifier,
@@ -39,7 +48,10 @@ __all__ = [
 
 ObjectiveName = Annotated[
     Objective,
-    Meta(description="least utilisation, or least effort within limits.utilisation"),
+    Meta(
+        description="least utilisation; least effort within limits.utilisation; or largest "
+        "probability that no tile slips, at nearly the least utilisation"
+    ),
 ]
 Explain = Annotated[
     bool,
@@ -59,6 +71,7 @@ Radius = Annotated[
         description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
     ),
 ]
+Tolerance = Annotated[float, Meta(ge=0.001, le=1.0)]
 
 
 LostTiles = Annotated[list[LostTile], Meta(max_length=1000, description="tiles that have slipped")]
@@ -100,7 +113,10 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
       robot's weight at rest.
     - ``objective``: ``max_margin`` for the least utilisation, ``min_effort`` for the least effort
-      within ``limits.utilisation``.
+      within ``limits.utilisation``, ``max_reliability`` for the largest probability that no tile
+      slips, at nearly the least utilisation; that needs fixed wrists on all hands.
+    - ``tolerance``: part of the least utilisation by which a plan for ``max_reliability`` may
+      exceed it; 0.02 by default.
     - ``limits``: the cap on the utilisation, and the caller's own limits.
     - ``present``: present tensions of the four tendons [N], by limb; the reply's ``path`` says
       whether the straight way from them is safe.
@@ -113,6 +129,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``explain``: false leaves out the certificate of a stance that is overloaded or infeasible.
     - ``body_range``: how far advice may move the body.
     - ``open_loop``: samples of displaced hands for ``"want": ["open_loop"]``.
+    - ``survival``: draws of strengths for ``"want": ["survival"]``.
     """
 
     stance: Stance
@@ -129,14 +146,15 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     confidence: Later = None
     detail: Detail | None = None
     want: Annotated[
-        list[Want | Literal["redundancy"]],
+        list[Want | Literal["redundancy", "survival"]],
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
             "open_loop: the utilisation over displaced hands if the plan is executed as it is. "
             "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
             "clearance: the least distances of body, hands, links and rock. "
             "advice: what would make it hold, or hold more: verified changes. "
-            "redundancy: the plan without each tile, finger and hand, without moving"
+            "redundancy: the plan without each tile, finger and hand, without moving. "
+            "survival: how likely it is that no tile slips, and that all hands hold if some do"
         ),
     ] = []
     draws: Draws = []
@@ -145,6 +163,14 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     open_loop: Annotated[
         OpenLoopSettings | None,
         Meta(description="samples of displaced hands; only with open_loop in want"),
+    ] = None
+    survival: Annotated[
+        SurvivalSettings | None,
+        Meta(description="draws of strengths; only with survival in want"),
+    ] = None
+    tolerance: Annotated[
+        Tolerance | None,
+        Meta(description="part of the least utilisation that max_reliability may give away"),
     ] = None
 
 
@@ -290,7 +316,7 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     - ``name``: name of the route.
     - ``stance``: the start stance.
     - ``load``: mass and payloads from which the body wrench of every stance follows.
-    - ``objective``: ``max_margin`` or ``min_effort``, for every stance.
+    - ``objective``: ``max_margin``, ``min_effort`` or ``max_reliability``, for every stance.
     - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
     - ``moves``: the moves in climbing order.
     - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.

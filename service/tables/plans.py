@@ -18,6 +18,7 @@ from service import replies
 from service.tables.extras import (
     print_open_loop,
     print_spread,
+    print_survival,
     robust_sentence,
     with_interval,
 )
@@ -106,6 +107,8 @@ def _print_displaced(reply: replies.PlanReply, out: Console) -> None:
         out.print(robust_sentence(reply.robust))
     if isinstance(reply.open_loop, planner.OpenLoop):
         print_open_loop(reply.open_loop, out)
+    if isinstance(reply.survival, planner.Survival):
+        print_survival(reply.survival, out)
 
 
 def _print_prices(prices: Sequence[planner.Price], what: str, out: Console) -> None:
@@ -136,6 +139,8 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
     if spread is None:
         if reply.effort is not None:
             yield f"effort {reply.effort:.3g}"
+        if isinstance(reply.reliability, planner.Reliability):
+            yield f"no slip {reply.reliability.no_slip:.3g}"
         yield f"{1e3 * reply.time.total:.0f} ms"
 
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from contextlib import suppress
 from enum import Enum
 from functools import partial
-from typing import Any, Final, NamedTuple, TypeVar, get_args
+from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
 
 from hand_models.base import CruxError, InvalidInputError, LimitError, UnsupportedError
-from planner import Objective
 from service.replies import ErrorDetail, ErrorReply
 from service.requests import Identifier, ReplyBytes, SetPointsRequest, StreamRequest
 from service.wire.duplicate_keys import refuse_in_json, refuse_in_msgpack
@@ -196,12 +195,6 @@ def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.J
             partial(_plain, payload, form),
             lambda part: form.decode(form.encode(part), kind),
         )
-        if field == "objective" and "value 'max_reliability'" in str(error):
-            raise UnsupportedError(
-                "max_reliability is not supported in this version; valid are "
-                f"{' and '.join(get_args(Objective))}",
-                field=field,
-            ) from None
         raise InvalidInputError(message, field=field) from None
     try:
         if form is Format.JSON:

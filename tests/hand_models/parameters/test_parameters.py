@@ -13,6 +13,7 @@ from hand_models.parameters import (
     hand_table,
     scan_table,
     spine_table,
+    strength_table,
     surface_table,
 )
 
@@ -22,6 +23,7 @@ ENTRIES = [
         ("hand", hand_table()),
         ("surfaces", surface_table()),
         ("spines", spine_table()),
+        ("strength", strength_table()),
         ("scan", scan_table()),
         ("experiments", experiment_table()),
         ("draws", draw_table()),

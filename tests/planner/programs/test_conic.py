@@ -16,7 +16,7 @@ from scipy.sparse import csc_matrix
 from hand_models.base import stores
 from hand_models.rock import Cylinder
 from planner import deadline
-from planner.programs import TensionTrade, conic, program, solvers, stance_program
+from planner.programs import TensionTrade, conic, hazard, program, solvers, stance_program
 from planner.programs.conic import Columns, ConicProgram, ConicSolver, Solvers
 from planner.programs.stance_data import HandData, StanceData
 from planner.programs.stance_program import CLARABEL_SETTINGS, StanceProgram
@@ -77,8 +77,17 @@ KINDS: dict[str, Callable[[StanceData, Draw], StanceProgram]] = {
         [draw(len(hand.unit)) for hand in data.hands],
         np.arange(len(hard_rows(data))) % 3 == 0,
     ),
+    "Hazard": lambda data, draw: hazard.Hazard(data, 1.3, every_third(data)),
     "Nearest, some kept": lambda data, draw: program.Nearest(data, len(data.wrench) - 6),
 }
+
+
+def every_third(data: StanceData) -> hazard.TilePowers:
+    """Tiles of two rows each, which are every third of a stance's limits, with other moduli."""
+    rows = np.arange(0, data.rows.limits - 3, 3)
+    tile_of = np.arange(len(rows)) // 2
+    moduli = 2.0 + np.arange(tile_of[-1] + 1) % 4
+    return hazard.TilePowers(rows, tile_of, np.full(len(moduli), 1.0 / len(moduli)), moduli)
 
 
 def drawn(rng: np.random.Generator) -> Draw:
@@ -117,6 +126,7 @@ def dense(asked: ConicProgram) -> np.ndarray:
 
 def test_every_program_is_compared():
     kinds = {kind for kind in vars(program).values() if isinstance(kind, type)}
+    kinds.add(hazard.Hazard)
     programs = {kind for kind in kinds if issubclass(kind, StanceProgram)} - {StanceProgram}
     of_each = [
         KINDS[name](
@@ -144,9 +154,10 @@ def test_the_solver_gets_what_cvxpy_would_give_it(kind, shapes):
         P = theirs["P"].toarray() if "P" in theirs else np.zeros((len(ours.q),) * 2)
         np.testing.assert_allclose(np.diag(ours.P), P, rtol=1e-15)
         dims = theirs["dims"]
-        cones = ours.zero, len(ours.b) - ours.zero - ours.second_order
+        cones = ours.zero, len(ours.b) - ours.zero - ours.second_order - 3 * len(ours.powers)
         assert cones == (dims.zero, dims.nonneg)
         assert dims.soc == [ours.second_order] * bool(ours.second_order)
+        assert list(dims.p3d) == list(ours.powers)
 
 
 def hard_rows(data: StanceData) -> np.ndarray:
@@ -172,6 +183,7 @@ def real_programs(data: StanceData) -> dict[str, StanceProgram]:
             solvers.elastic, data, 2.0, loads, np.zeros(len(hard_rows(data)), dtype=bool)
         ),
         "Nearest": program.Nearest(data.turned(1e4 * data.wrench)),
+        "Hazard": hazard.Hazard(data, 1.1, every_third(data)),
     }
 
 

@@ -466,10 +466,10 @@ def test_a_route_file_takes_joints_and_an_objective(
     assert max(len(line) for line in out.splitlines() if str(tmp_path) not in line) <= 80
     assert "unreachable" in out
     assert "joints" in out
-    text["objective"] = "max_reliability"
+    text["objective"] = "max_margins"
     path.write_text(json.dumps(text), encoding="utf-8")
     assert run_command_line(["route", str(path), "-o", str(tmp_path / "out")]) == 2
-    assert capfd.readouterr().err.startswith("crux: objective: max_reliability is not supported")
+    assert capfd.readouterr().err.startswith("crux: objective: 'max_margins' is not")
 
 
 def test_what_is_odd_about_a_stage_is_told_once_with_its_moves(route, tmp_path: Path, capsys):

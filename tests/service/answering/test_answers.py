@@ -105,6 +105,7 @@ def test_what_is_asked_of_joints_forces_and_tensions_is_in_the_reply(form: str) 
     assert reply.utilisation <= 0.95
     assert reply.effort > 0.0
     assert reply.effort_prices is not None
+    assert reply.reliability is msgspec.UNSET
     limits = {limb: [200.0] * 7 for limb in JOINTS}
     limits |= {"front_left": [150.0] * 7, "rear_left": [180.0] * 7}
     assert reply.joint_torque_limit == limits
@@ -424,3 +425,14 @@ def test_robust_is_told_of_fixed_wrists_only():
     with pytest.raises(InvalidInputError, match="requires fixed or compliant") as caught:
         answering.answer_plan(msgspec.structs.replace(request, stance=stance, want=["robust"]))
     assert caught.value.field == "want"
+
+
+@pytest.mark.parametrize("form", [JSON, MSGPACK])
+def test_a_plan_of_least_hazard_says_how_likely_no_tile_slips(form: str) -> None:
+    request = wall_request() | {"objective": "max_reliability", "tolerance": 0.05}
+    found = reply_to(request, form)
+    part = found.reliability
+    assert found.status == "optimal"
+    assert part.no_slip == pytest.approx(math.exp(-part.hazard))
+    assert part.hazard < part.hazard_before
+    assert part.utilisation_before < found.utilisation <= 1.051 * part.utilisation_before

@@ -163,10 +163,10 @@ def test_the_client_gets_typed_replies(served: Served, form: Format) -> None:
 
 def test_the_client_raises_what_the_service_says(session: zenoh.Session) -> None:
     client = CruxClient(session, timeout=PATIENCE)
-    request = msgspec.structs.replace(plan_request(), objective="max_reliability")
-    with pytest.raises(ServiceError, match="objective: max_reliability is not supported") as caught:
+    request = msgspec.structs.replace(plan_request(), confidence=0.99)
+    with pytest.raises(ServiceError, match="confidence: not supported") as caught:
         client.plan(request)
-    assert (caught.value.kind, caught.value.field) == ("unsupported", "objective")
+    assert (caught.value.kind, caught.value.field) == ("unsupported", "confidence")
     stance = plan_request(flat_request()).stance
     with pytest.raises(ServiceError, match="no hand 'nose'") as caught:
         client.wrench_space(WrenchSpaceRequest(v=1, stance=stance, limb="nose"))
@@ -518,7 +518,7 @@ def test_a_log_line_a_question() -> None:
     server = Served(free_endpoint(), "-v", "--log-format", "json")
     with CruxClient(client_config(server.endpoint), timeout=PATIENCE) as client:
         client.plan(plan_request())
-        bad = msgspec.structs.replace(plan_request(), objective="max_reliability", id="bad")
+        bad = msgspec.structs.replace(plan_request(), confidence=0.99, id="bad")
         with pytest.raises(ServiceError):
             client.plan(bad)
     _, *lines = server.stop(signal.SIGTERM)[1].splitlines()

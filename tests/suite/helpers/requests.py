@@ -203,10 +203,7 @@ def dotted(path: tuple) -> str:
 
 
 HAND = "stance.hands[0]"
-LATER = (
-    (("objective",), "max_reliability", "objective"),
-    (("confidence",), 0.99, "confidence"),
-)
+LATER = ((("confidence",), 0.99, "confidence"),)
 """What the contract knows and this version does not: path, value, and the field to blame."""
 
 JUNK = (

@@ -1,0 +1,6 @@
+"""What happens when tiles slip: cascades at fixed tensions and with new set-points, survival."""
+
+import lazy_loader
+import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

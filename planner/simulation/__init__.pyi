@@ -1,0 +1,11 @@
+from .cascade import (
+    Cascade as Cascade,
+    CascadeOutcome as CascadeOutcome,
+    HandLoads as HandLoads,
+    Loads as Loads,
+    unit_names as unit_names,
+)
+from .survival import (
+    find_survival as find_survival,
+    plan_loads as plan_loads,
+)
