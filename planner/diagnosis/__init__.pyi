@@ -3,4 +3,4 @@ from .slip_diagnosis import (
     SlipFindings as SlipFindings,
     SuspectTile as SuspectTile,
 )
-from .slip_signatures import SlipSignature as SlipSignature, slip_signatures as slip_signatures
+from .signatures import SlipSignature as SlipSignature, slip_signatures as slip_signatures

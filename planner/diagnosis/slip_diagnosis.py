@@ -19,7 +19,7 @@ from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
 from hand_models.parameters import ParameterTable
 from hand_models.tile import TileStrengths
-from planner.diagnosis.slip_signatures import slip_signatures
+from planner.diagnosis.signatures import slip_signatures
 from planner.prepare import PreparedStance
 from planner.question import LostTile
 from planner.result import HandPlan
