@@ -24,6 +24,7 @@ from .explanation import (
 from .pictures import (
     plot_body_space as plot_body_space,
     plot_plan as plot_plan,
+    plot_survival as plot_survival,
     plot_wrench_space as plot_wrench_space,
     summary as summary,
     write_report as write_report,
@@ -59,6 +60,7 @@ from .question import (
     OpenLoopSettings as OpenLoopSettings,
     Question as Question,
     Stance as Stance,
+    SurvivalSettings as SurvivalSettings,
     Want as Want,
 )
 from .result import (
@@ -83,6 +85,8 @@ from .result import (
     SetPoints as SetPoints,
     Solver as Solver,
     Spread as Spread,
+    Survival as Survival,
+    SurvivalShare as SurvivalShare,
     TensionPath as TensionPath,
     Time as Time,
     WristPlan as WristPlan,
@@ -100,6 +104,7 @@ from .route import (
     RouteResult as RouteResult,
     evaluate as evaluate,
 )
+from .simulation import find_survival as find_survival
 from .solving import (
     KnownStance as KnownStance,
     PalmLoadFactors as PalmLoadFactors,

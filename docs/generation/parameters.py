@@ -21,7 +21,7 @@ FILES = {
         "experiments.toml",
         "draws.toml",
     ),
-    "planner.parameters": ("robosimian.toml", "scene.toml", "plans.toml"),
+    "planner.parameters": ("robosimian.toml", "scene.toml", "plans.toml", "slips.toml"),
 }
 
 SHOWN = 6

@@ -14,7 +14,7 @@ from .spine_calibration import (
     measured_tile_shear as measured_tile_shear,
     within_law as within_law,
 )
-from .strength import (
+from .strength_scatter import (
     StrengthScatter as StrengthScatter,
     TileStrengths as TileStrengths,
     weibull_modulus as weibull_modulus,

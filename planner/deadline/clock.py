@@ -52,6 +52,7 @@ Unfinished = Literal[
     "robust",
     "open_loop",
     "spread",
+    "survival",
     "advice",
 ]
 
@@ -68,6 +69,7 @@ UNFINISHED_RESULTS: Final[dict[Unfinished, str]] = {
     "robust": "the load factor was found at all places of the hands",
     "open_loop": "the plan was executed on all displaced hands",
     "spread": "a plan was found in all draws of the numbers",
+    "survival": "all draws of strengths were simulated",
     "advice": "all changes were tried that might make it hold",
 }
 """Results that a deadline can prevent, in words that follow "expired before"."""

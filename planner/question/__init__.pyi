@@ -26,3 +26,4 @@ from .stance import (
     checked_body_wrench as checked_body_wrench,
     known_limbs as known_limbs,
 )
+from .survival import SurvivalSettings as SurvivalSettings

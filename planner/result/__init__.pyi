@@ -40,3 +40,9 @@ from .spread import (
     Quantiles as Quantiles,
     Spread as Spread,
 )
+from .survival import (
+    Slip as Slip,
+    StrengthSource as StrengthSource,
+    Survival as Survival,
+    SurvivalShare as SurvivalShare,
+)

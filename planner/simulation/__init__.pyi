@@ -5,3 +5,7 @@ from .cascade import (
     Loads as Loads,
     unit_names as unit_names,
 )
+from .survival import (
+    find_survival as find_survival,
+    plan_loads as plan_loads,
+)

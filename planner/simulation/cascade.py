@@ -16,7 +16,9 @@ one tile: loaded in shear beyond its strength it slips, and carries no shear any
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -39,15 +41,20 @@ class CascadeSettings:
 
     balance: float = 1e-8
     """Missing wrench that counts as none: forces, and moments over 0.1 m [N]."""
+    lost: float = 1e-5
+    """Missing wrench beyond which there is no balance [N]: far above rounding."""
     rubs: float = 0.005
     """Part of the force that the body needs, up to which friction of tendons and drives holds what
-    is missing: it holds several hundredths of a tension, and without it a change of 0.02 N would
-    let fall a stance whose palms press nowhere."""
-    steps: int = 40  # of Newton's method; 3 to 8 are the rule
+    is missing along each axis: it holds several hundredths of a tension, and without it a change of
+    0.02 N would let fall a stance whose palms press nowhere."""
+    soft: float = 1e-3
+    """Stiffness of that friction over a tile's sideways: little, so that it holds what is left."""
+    steps: int = 60  # of Newton's method; 3 to 8 are the rule
     halvings: int = 20  # of a step
-    progress: float = 0.98  # of the missing wrench, above which a step ends the search
-    softest: float = 1e-9
-    """Part of the stiffest direction that keeps the others from being singular."""
+    singular: float = 1e-12
+    """Part of the stiffest direction that keeps others from being singular once all are at limits.
+    """
+    progress: float = 0.999  # of the missing wrench, above which a step ends the search
 
 
 SETTINGS: Final = CascadeSettings()
@@ -141,10 +148,7 @@ class Cascade:
         self._batch, self._loads = batch, loads
         places, T, H = batch.places, len(batch.engagement), len(batch.hands)
         self.units, F = T + H, len(places.phalanges)
-        before = np.zeros(T + H, dtype=bool) if slipped is None else slipped
-        self._gone = before
-        self.fingers = FingerStates.of(batch, loads.tiles, before[:T])
-        self._on = (batch.touch.touches > 0.0) & ~before[:T]
+        self._gone = np.zeros(T + H, dtype=bool) if slipped is None else slipped
         # where a unit's bit is in a state: phalanges by finger, bases after, then palms
         self._phalanx = np.full(T, -1)
         self._phalanx[places.phalanges] = np.arange(3)
@@ -176,11 +180,45 @@ class Cascade:
         )
         self._palm_most = np.where(np.isfinite(batch.palm_limits), batch.palm_limits, 0.0)
         self._planes = _half_planes(prepared)
-        self._hands_on = np.bincount(places.hand, self._on, H) > 0
-        start = np.zeros((1, 2 * F + H), dtype=np.uint8)
+        self._rub_stiffness = SETTINGS.soft * batch.hands[0].hand.lateral_stiffness
         self._rubs = SETTINGS.rubs * max(1.0, float(np.linalg.norm(prepared.wrench[:3])))
-        self._wrench = np.zeros(6)
-        self._wrench = -self._missing(start)[0]
+
+    def replanned(self, loads: Loads, slipped: Flags) -> Cascade:
+        """Return the tables of another plan of the same stance, made after slips.
+
+        Parameters
+        ----------
+        loads : Loads
+        slipped : ndarray of bool, shape (T + H,)
+            Tiles that drag or are off, and palms that have slipped, before the plan.
+        """
+        other = copy(self)
+        for name in ("fingers", "_wrench", "_on", "used"):
+            other.__dict__.pop(name, None)
+        other._loads, other._gone = loads, slipped
+        return other
+
+    @cached_property
+    def fingers(self) -> FingerStates:
+        """States of the fingers at the plan's tensions."""
+        return FingerStates.of(self._batch, self._loads.tiles, self._gone[: len(self._phalanx)])
+
+    @cached_property
+    def used(self) -> Array:
+        """Utilisation of each tile's strength and each palm's in shear in the plan, (T + H,)."""
+        tiles, palms = self._loads.tiles, self._loads.palms[None]
+        gone = np.zeros(palms.shape[:2], bool)
+        return np.asarray(self._used(tiles[None], palms, self._on[None], gone)[0])
+
+    @cached_property
+    def _on(self) -> Flags:
+        return (self._batch.touch.touches > 0.0) & ~self._gone[: len(self._phalanx)]
+
+    @cached_property
+    def _wrench(self) -> Array:
+        """What hands exert in the plan, in B, moments over 0.1 m."""
+        tiles, laterals = self._loads.tiles, self._loads.palms.ravel() @ self._per_palm
+        return np.asarray(np.einsum("tk,tki->i", tiles, self._per_load) + laterals)
 
     def start(self, draws: int) -> NDArray[np.uint8]:
         """Return the states of draws in which nothing has slipped since the plan."""
@@ -244,38 +282,41 @@ class Cascade:
         states : ndarray of uint8, shape (S, 2 F + H)
         """
         batch, H = self._batch, len(self._batch.hands)
-        T = len(self._phalanx)
         planar, _ = self._planar(states)
         holding = self._holding(states)
         x, springs, wrenches = self._laterals(holding)
         gone = states[:, -H:].astype(bool)
         of_palms, palm_springs, most = self._palms(gone)
+        others = np.concatenate([self._per_palm, np.eye(6)])
+        rubs = np.full((len(states), 6), self._rubs)
         passive, off = _balanced(
-            np.concatenate(
-                [wrenches, np.broadcast_to(self._per_palm, (len(states), 2 * H, 6))], axis=1
-            ),
-            np.hstack([x, of_palms]),
-            np.hstack([springs, palm_springs]),
-            np.hstack([np.full(x.shape, -np.inf), np.zeros_like(most)]),
-            np.hstack([np.full(x.shape, np.inf), most]),
+            np.concatenate([wrenches, np.broadcast_to(others, (len(states), *others.shape))], 1),
+            np.hstack([x, of_palms, np.zeros_like(rubs)]),
+            np.hstack([springs, palm_springs, np.full_like(rubs, self._rub_stiffness)]),
+            np.hstack([np.full(x.shape, -np.inf), np.zeros_like(most), -rubs]),
+            np.hstack([np.full(x.shape, np.inf), most, rubs]),
             self._missing(states),
         )
-        sides, palms = np.split(passive, [x.shape[1]], axis=1)
+        sides, palms, _ = np.split(passive, [x.shape[1], x.shape[1] + 2 * H], axis=1)
         shares = holding * self._spines
         sums = np.add.reduceat(shares, batch.places.first_of_finger, axis=1)
         parts = shares / np.where(sums > 0.0, sums, 1.0)[:, self._finger]
         tiles = np.concatenate([planar, (parts * sides[:, self._finger])[..., None]], axis=2)
+        palms = palms.reshape(-1, H, 2)
+        on = np.zeros((len(states), H))
+        np.add.at(on.T, batch.places.hand, holding.T)
+        had = np.bincount(batch.places.hand, self._on, H) > 0
+        lost = (off > SETTINGS.lost) | ((on == 0) & had).any(axis=1)
+        return HandLoads(self._used(tiles, palms, holding, gone), tiles, palms, holding, lost)
+
+    def _used(self, tiles: Array, palms: Array, holding: Flags, gone: Flags) -> Array:
+        """Return what loads use of strengths, (S, T + H)."""
         loaded = tiles.copy()
         loaded[..., 2] = np.abs(loaded[..., 2])
         used = np.einsum("tkj,stj->stk", self._planes, loaded).max(axis=2)
-        palms = palms.reshape(-1, H, 2)
-        sheared = palms[..., 0] / np.where(self._palm_most[:, 0] > 0.0, self._palm_most[:, 0], np.inf)
-        sheared = np.where(gone | self._gone[T:], 0.0, sheared)
-        on = np.zeros((len(states), H))
-        np.add.at(on.T, batch.places.hand, holding.T)
-        lost = (off > self._rubs) | ((on == 0) & self._hands_on).any(axis=1)
-        whole = np.concatenate([np.maximum(used * holding, 0.0), sheared], axis=1)
-        return HandLoads(whole, tiles, palms, holding, lost)
+        most = np.where(self._palm_most[:, 0] > 0.0, self._palm_most[:, 0], np.inf)
+        sheared = np.where(gone | self._gone[len(self._phalanx) :], 0.0, palms[..., 0] / most)
+        return np.concatenate([np.maximum(used * holding, 0.0), sheared], axis=1)
 
     def slipped(self, states: NDArray[np.uint8], unit: Indices) -> NDArray[np.uint8]:
         """Return the states after one tile or palm of each has slipped, and the fingers rest.
@@ -401,7 +442,7 @@ def _balanced(
         short = r - _times(kept, g)
         moving = k * ((free >= low) & (free <= high))
         slope = (g * moving[..., None]).swapaxes(1, 2) @ g
-        soft = SETTINGS.softest * (k[..., None] * g**2).sum(axis=(1, 2)) + 1e-30
+        soft = SETTINGS.singular * (k[..., None] * g**2).sum(axis=(1, 2)) + 1e-30
         step = np.linalg.solve(slope + soft[:, None, None] * np.eye(6), short[..., None])[..., 0]
         # along the step, the dual function's slope falls from `gain` and must not turn over far
         gain, per_step = (step * short).sum(axis=1), k * _along(g, step)
@@ -439,11 +480,11 @@ def _dual(free: Array, kept: Array, flexible: Array) -> Array:
     return np.asarray((kept * (free - 0.5 * kept) * flexible).sum(axis=1))
 
 
-def unit_names(prepared: PreparedStance) -> Sequence[tuple[str, str | None, str | None]]:
-    """Return limb, finger and phalanx of each tile, then of each palm (None twice)."""
+def unit_names(prepared: PreparedStance) -> Sequence[tuple[str, str | None, str]]:
+    """Return limb, finger and phalanx of each tile, then of each palm, whose finger is None."""
     named = [
         (limb, tile.finger, tile.phalanx)
         for limb, hand in zip(prepared.limbs, prepared.batch.hands, strict=True)
         for tile in hand.tiles
     ]
-    return [*named, *((limb, None, None) for limb in prepared.limbs)]
+    return [*named, *((limb, None, "palm") for limb in prepared.limbs)]

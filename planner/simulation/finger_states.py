@@ -130,7 +130,7 @@ class FingerStates:
         mu, share = batch.friction[at, None], batch.engagement[at, None]
         pressed = loads[at, :1] + mu * share * N[first, :, 0] + gives[at, None]
         lifts[first] = (pressed < -tolerance) & (touch.touches[at, None] > 0.0)
-        return cls(T, N, rests, slips, lifts)
+        return cls(T, np.asarray(N, dtype=float), rests, slips, lifts)
 
 
 def concatenated_allowances(batch: HandBatch) -> Array:
@@ -153,10 +153,7 @@ def _moments(batch: HandBatch) -> tuple[Array, Array]:
             x = places @ frame.along - joints.real[:, None]
             z = places[:, 2] - joints.imag[:, None]
             found.append(
-                [
-                    np.triu(x * axes[:, i, 2] - z * (axes[:, i] @ frame.along))
-                    for i in (1, 0)
-                ]
+                [np.triu(x * axes[:, i, 2] - z * (axes[:, i] @ frame.along)) for i in (1, 0)]
             )
     normals, shears = np.array(found).swapaxes(0, 1)
     return normals, shears

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
@@ -18,6 +19,7 @@ from service.answering.own_models import BUNDLED_ROBOTS, Robots, over_default
 from service.answering.questions import climb, question
 from service.answering.reply_sizes import fitted
 from service.answering.streams import LOCAL_STREAMS, Streams
+from service.answering.survival import add_survival, check_survival
 from service.replies import BriefPlanReply, PlanReply, Reply, StreamReply
 from service.requests import (
     BodySpaceRequest,
@@ -105,10 +107,17 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
         # compute only what the reply contains
         included = ["load_factor"] if detail == "hands" else []
         wanted = [want for want in request.want if want in included]
-        request = replace(request, want=wanted, draws=[], open_loop=None)
+        request = replace(request, want=wanted, draws=[], open_loop=None, survival=None)
+    check_survival(request)
     asked = question(request, robots)
+    start = time.perf_counter()
     answer = planner.plan(asked)
-    return Planned.of(asked, answer, request.id, detail, model="model" in request.want)
+    found = Planned.of(asked, answer, request.id, detail, model="model" in request.want)
+    if "survival" in request.want and isinstance(found.reply, PlanReply):
+        settings = request.survival or planner.SurvivalSettings()
+        with deadline.within(asked.deadline, started=start):
+            add_survival(found.reply, asked, answer, settings)
+    return found
 
 
 def answer_with_advice(answer: Planned) -> Planned:

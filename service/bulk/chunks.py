@@ -196,6 +196,7 @@ def _revised(setting: Setting, request: PlanRequest | RouteRequest) -> PlanReque
         want=want,
         draws=[],
         open_loop=None,
+        survival=None,
         detail="full" if explain else "hands",
         max_reply_bytes=None,
     )

@@ -71,6 +71,10 @@ COMMANDS_BY_NAME: Final = {
         "network",
         "Answer questions on zenoh until SIGTERM or Ctrl-C.",
     ),
+    "simulate": Entry(
+        "simulate",
+        "Let tiles slip at random: how often all hands hold, with new set-points or without.",
+    ),
     "stream": Entry(
         "stream",
         "Give set-points for one body wrench after another: one a line in, one a line out.",

@@ -198,7 +198,7 @@ def _without_palms(
     replace = msgspec.structs.replace
     hands = [replace(hand, grasp=replace(hand.grasp, palm=False)) for hand in request.stance.hands]
     stance = replace(request.stance, hands=hands)
-    plain = replace(request, want=["load_factor"], draws=[], open_loop=None)
+    plain = replace(request, want=["load_factor"], draws=[], open_loop=None, survival=None)
     alone = replace(plain, stance=stance, explain=False)
     try:
         reply = answering.answer_plan(alone, robots)

@@ -19,6 +19,7 @@ from planner import (
     RobustLoadFactor,
     Solver,
     Spread,
+    Survival,
     TensionPath,
     Time,
 )
@@ -113,7 +114,8 @@ class PlanReply(StanceReply, kw_only=True):
     - ``load_factor_status``: ``found``; ``at_least``, where floating hands may hold more; or why
       ``load_factor`` is null: ``unbounded``, ``none`` where no multiple can be held, ``not_asked``,
       ``not_finished`` by the deadline.
-    - ``survival_probability``: always null in this version.
+    - ``survival_probability``: probability that no tile and no palm slips, ``survival.no_slip``;
+      null where it was not asked for, or without a plan.
     - ``limiting``: the limit that is used most; null without a plan.
     - ``hands``: one entry for each hand; null where nothing balances the body.
     - ``joints``: joint angles planned for, by limb, from the body outward [rad]; [m] for joints
@@ -140,11 +142,14 @@ class PlanReply(StanceReply, kw_only=True):
       measured value.
     - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
       proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
-      ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``.
+      ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``,
+      ``survival``.
     - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
       ["robust"]``, and not for a body wrench of zero.
     - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;
       only with ``"want": ["open_loop"]``, and with a plan.
+    - ``survival``: how likely it is that no tile slips, and that all hands hold if some do; only
+      with ``"want": ["survival"]``, and with a plan.
     - ``spread``: Monte Carlo statistics over samples of uncertain parameters; only with ``"want":
       ["spread"]``.
     - ``clearance``: least distances of body, hands, links and rock; if ``want`` names it.
@@ -182,6 +187,7 @@ class PlanReply(StanceReply, kw_only=True):
     unfinished: list[str] = []
     robust: RobustLoadFactor | UnsetType = UNSET
     open_loop: OpenLoop | UnsetType = UNSET
+    survival: Survival | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
     reliability: Reliability | UnsetType = UNSET

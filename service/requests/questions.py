@@ -11,7 +11,16 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from hand_models.base import Coordinate, Name, Strict
-from planner import BodyRange, Limits, Load, LostTile, Objective, OpenLoopSettings, Want
+from planner import (
+    BodyRange,
+    Limits,
+    Load,
+    LostTile,
+    Objective,
+    OpenLoopSettings,
+    SurvivalSettings,
+    Want,
+)
 from service.requests.request import (
     Detail,
     Identifier,
@@ -123,6 +132,7 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``explain``: false leaves out the certificate of a stance that is overloaded or infeasible.
     - ``body_range``: how far advice may move the body.
     - ``open_loop``: samples of displaced hands for ``"want": ["open_loop"]``.
+    - ``survival``: draws of strengths for ``"want": ["survival"]``.
     """
 
     stance: Stance
@@ -139,13 +149,14 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     confidence: Later = None
     detail: Detail | None = None
     want: Annotated[
-        list[Want],
+        list[Want | Literal["survival"]],
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
             "open_loop: the utilisation over displaced hands if the plan is executed as it is. "
             "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
             "clearance: the least distances of body, hands, links and rock. "
-            "advice: what would make it hold, or hold more: verified changes"
+            "advice: what would make it hold, or hold more: verified changes. "
+            "survival: how likely it is that no tile slips, and that all hands hold if some do"
         ),
     ] = []
     draws: Draws = []
@@ -154,6 +165,10 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     open_loop: Annotated[
         OpenLoopSettings | None,
         Meta(description="samples of displaced hands; only with open_loop in want"),
+    ] = None
+    survival: Annotated[
+        SurvivalSettings | None,
+        Meta(description="draws of strengths; only with survival in want"),
     ] = None
     tolerance: Annotated[
         Tolerance | None,

@@ -212,7 +212,7 @@ def _read(question: PendingQuestion) -> None:
     if isinstance(seconds, int | float) and 0.0 < seconds <= LONGEST_DEADLINE:
         question.seconds = float(seconds)
     # these take many plans
-    extras = {"robust", "open_loop", "spread", "advice"}
+    extras = {"robust", "open_loop", "spread", "advice", "survival"}
     many = isinstance(want, list) and any(each in want for each in extras)
     unread = _is_long(head.want)
     question.dear = question.dear or many or unread

@@ -64,10 +64,11 @@ class Paths:
 
     @classmethod
     def into(cls, request: PlanRequest) -> Paths:
-        """Convert a plan request into a document, without samples (``draws``, ``open_loop``)."""
+        """Convert a plan request into a document, without samples of any kind."""
         document = _filled(request)
         del document["draws"]
         document.pop("open_loop", None)
+        document.pop("survival", None)
         document["stance"].setdefault("gravity", list(EARTH_GRAVITY))
         return cls(document)
 
@@ -208,7 +209,7 @@ class Paths:
                 names = field_names(place.kind for place in _meant(places, value))
                 # fields of a request that are no part of what is asked about
                 fixed = {"v", "id", "deadline", "max_reply_bytes", "confidence", "detail", "want"}
-                fixed |= {"draws", "open_loop", "explain"}
+                fixed |= {"draws", "open_loop", "survival", "explain"}
                 return [name for name in names if steps or name not in fixed]
             if isinstance(each.kind, inspect.TupleType):
                 return [str(i) for i in range(len(each.kind.item_types))]

@@ -1,6 +1,10 @@
 from .body_spaces import print_body_space as print_body_space
 from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus
-from .extras import print_advice as print_advice, words_of as words_of
+from .extras import (
+    print_advice as print_advice,
+    print_survival as print_survival,
+    words_of as words_of,
+)
 from .hands import (
     print_robust as print_robust,
     print_survey as print_survey,

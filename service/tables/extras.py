@@ -9,13 +9,14 @@ from types import MappingProxyType
 
 from rich.console import Console
 
-from planner import Advice, OpenLoop, Quantiles, RobustLoadFactor, Spread
+from planner import Advice, OpenLoop, Quantiles, RobustLoadFactor, Spread, Survival, SurvivalShare
 from service.replies import PlanReply
 from service.tables.layout import in_order, print_rows
 
 __all__ = [
     "print_advice",
     "print_open_loop",
+    "print_survival",
     "robust_sentence",
     "spread_sentence",
     "with_interval",
@@ -166,6 +167,44 @@ def print_open_loop(found: OpenLoop, out: Console) -> None:
     )
     heads = ("util 10 %", "50 %", "90 %", "dragged N")
     print_rows([row], in_order(heads, texts=["worst hand"]), out)
+
+
+def print_survival(found: Survival, out: Console) -> None:
+    """Print how likely it is that no tile slips, and that all hands hold if some do.
+
+    Parameters
+    ----------
+    found : Survival
+    out : Console
+        Console to print on.
+    """
+    moduli = ", ".join(f"m = {s.modulus:.3g} ({s.source})" for s in found.surfaces)
+    out.print(
+        f"strengths {found.strength:g} times those assumed, Weibull modulus {moduli}, scatter of "
+        f"holds {found.hold_scatter:g}, of the rock {found.rock_scatter:g}:"
+    )
+    out.print(
+        f"no tile slips with a probability of {found.no_slip:.3f}; of 0.9 with tiles "
+        f"{found.strength_90:.2f} times as strong as assumed, of 0.99 with {found.strength_99:.2f}"
+    )
+    if found.reason is not None:
+        out.print(found.reason)
+        return
+    simulated = (
+        ("something slips", found.slipped),
+        ("all hold, tensions fixed", found.holds),
+        (f"all hold, new set-points {found.delay:g} s after each slip", found.replanned),
+    )
+    rows = [(what, *_share(share)) for what, share in simulated if share is not None]
+    print_rows(rows, in_order(["simulated"], ("share", "low", "high", "draws")), out)
+    if found.first:
+        likely = ", ".join(f"{tile} {share:.3f}" for tile, share in list(found.first.items())[:4])
+        out.print(f"slips first, with a probability of: {likely}")
+
+
+def _share(share: SurvivalShare) -> tuple[str, ...]:
+    each = (share.probability, share.low, share.high)
+    return (*(f"{value:.3f}" for value in each), f"{share.draws}")
 
 
 def _refused(limbs: Mapping[str, int], reasons: Mapping[str, str] = MappingProxyType({})) -> str:

@@ -17,6 +17,7 @@ import planner
 from service import replies
 from service.tables.extras import (
     print_open_loop,
+    print_survival,
     robust_sentence,
     spread_sentence,
     with_interval,
@@ -106,6 +107,8 @@ def _print_displaced(reply: replies.PlanReply, out: Console) -> None:
         out.print(robust_sentence(reply.robust))
     if isinstance(reply.open_loop, planner.OpenLoop):
         print_open_loop(reply.open_loop, out)
+    if isinstance(reply.survival, planner.Survival):
+        print_survival(reply.survival, out)
 
 
 def _print_prices(prices: Sequence[planner.Price], what: str, out: Console) -> None:

@@ -62,6 +62,17 @@ EXECUTED = {
 }
 """A plan that is executed as it is."""
 
+SLIPS: dict[str, Any] = {
+    "draws": 20,
+    "replanned": 1,
+    "seed": 3,
+    "strength": 1.5,
+    "hold_scatter": 0.1,
+    "rock_scatter": 0.3,
+    "delay": 0.02,
+}
+"""Draws of strengths."""
+
 # of each field of each part of a request, what to write where
 VARIANTS: dict[str, list[dict[str, Any]]] = {
     "PlanRequest.v": [{}],
@@ -96,6 +107,8 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     "PlanRequest.explain": [{"explain": False, "load.mass": 200.0}],
     "PlanRequest.body_range": [{"body_range": {"shift": 0.1}}],
     "PlanRequest.open_loop": [{**EXECUTED, "open_loop": {"samples": 2}}],
+    "PlanRequest.survival": [{"want": ["survival"], "survival": SLIPS}],
+    **{f"SurvivalSettings.{part}": [{}] for part in SLIPS},
     "OpenLoopSettings.samples": [{}],
     "OpenLoopSettings.seed": [
         {

@@ -1,0 +1,108 @@
+"""Picture of a survival: a cascade as a timeline, survival over load, predicted over simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hand_models.base import whole_file
+from planner.result import Survival, SurvivalShare
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_survival"]
+
+
+def plot_survival(
+    found: Survival, over_load: Sequence[tuple[float, Survival]], path: Path, title: str
+) -> None:
+    """Draw a cascade, survival over the load, and predicted against simulated slips, to a file.
+
+    Parameters
+    ----------
+    found : Survival
+        Survival at the load that was asked for; slips were simulated.
+    over_load : sequence of (float, Survival)
+        Multiples of that load, in rising order, and survival there.
+    path : Path
+        Picture file; its suffix, PNG, PDF or SVG, is the format.
+    title : str
+    """
+    figure = Figure(figsize=(17.0, 5.6), layout="constrained")
+    timeline, curves, agreement = figure.subplots(1, 3, width_ratios=(1.25, 1.1, 0.9))
+    _draw_cascade(timeline, found)
+    _draw_curves(curves, over_load)
+    _draw_agreement(agreement, over_load)
+    moduli = ", ".join(f"m = {s.modulus:.3g}, {s.source}" for s in found.surfaces)
+    figure.suptitle(
+        f"{title}: when tiles slip\nWeibull modulus {moduli}; strengths {found.strength:g} times "
+        f"those assumed; scatter of holds {found.hold_scatter:g}, of the rock "
+        f"{found.rock_scatter:g}",
+        fontsize=11,
+        parse_math=False,
+    )
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=120, facecolor="white")
+
+
+def _draw_cascade(axes: Axes, found: Survival) -> None:
+    """Draw which tile slips at each step, and the largest load over strength that is left."""
+    names = [" ".join(p for p in (s.limb, s.finger, s.phalanx) if p) for s in found.cascade]
+    places = np.arange(len(names))
+    axes.barh(places, [s.load for s in found.cascade], height=0.55, color="tab:red", alpha=0.75,
+              label="the weakest, which slips")  # fmt: skip
+    left = [(i, s.most) for i, s in enumerate(found.cascade) if s.most is not None]
+    if left:
+        at, most = zip(*left, strict=True)
+        axes.plot(most, np.array(at) + 0.4, "D", color="black", markersize=5,
+                  label="the weakest of those left, afterwards")  # fmt: skip
+    axes.axvline(1.0, color="0.4", linewidth=1.0, linestyle="--")
+    axes.set_yticks(places, names, fontsize=8)
+    axes.set_ylim(len(names) + 0.3, -0.7)
+    end = "all hands hold" if found.cascade_holds else "the stance is lost"
+    axes.text(0.02, 0.02, f"then {end}" if names else "nothing slips", transform=axes.transAxes,
+              weight="bold")  # fmt: skip
+    axes.set(title="one cascade at fixed tensions, from above", xlabel="load over strength")
+    if names:
+        axes.legend(fontsize=8, loc="lower right")
+
+
+def _draw_curves(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> None:
+    """Draw the probabilities over the load, with their intervals."""
+    loads = [load for load, _ in over_load]
+    axes.plot(loads, [s.no_slip for _, s in over_load], color="black", label="no tile slips")
+    kinds = (
+        ("holds", "tab:blue", "all hands hold, tensions fixed"),
+        ("replanned", "tab:green", "all hands hold, new set-points after each slip"),
+    )
+    for name, colour, label in kinds:
+        known = [(load, getattr(s, name)) for load, s in over_load]
+        shares = [(load, share) for load, share in known if isinstance(share, SurvivalShare)]
+        if shares:
+            at = [load for load, _ in shares]
+            axes.plot(at, [s.probability for _, s in shares], "o-", color=colour, label=label)
+            axes.fill_between(at, [s.low for _, s in shares], [s.high for _, s in shares],
+                              color=colour, alpha=0.2, linewidth=0.0)  # fmt: skip
+    axes.axvline(1.0, color="0.6", linewidth=0.8)
+    axes.set(title="survival, with its interval of 95 %", xlabel="load over the one asked for",
+             ylabel="probability", ylim=(-0.02, 1.02))  # fmt: skip
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, loc="lower left")
+
+
+def _draw_agreement(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> None:
+    """Draw the simulated share without a slip over the formula's."""
+    known = [(s.no_slip, s.slipped) for _, s in over_load if s.slipped is not None]
+    formula = [no_slip for no_slip, _ in known]
+    none = np.array([1.0 - s.probability for _, s in known])
+    wide = [none - [1.0 - s.high for _, s in known], [1.0 - s.low for _, s in known] - none]
+    axes.plot([0.0, 1.0], [0.0, 1.0], color="0.6", linewidth=0.8)
+    axes.errorbar(formula, none, yerr=np.maximum(wide, 0.0), fmt="o", markersize=4, capsize=2.5)
+    axes.set(title="no tile slips", xlabel="by the formula", ylabel="simulated")
+    axes.set_aspect("equal")
+    axes.grid(alpha=0.3)
