@@ -13,6 +13,11 @@ from .capability import (
 from .deadline import (
     DeadlineError as DeadlineError,
 )
+from .diagnosis import (
+    SlipDiagnosis as SlipDiagnosis,
+    SlipFindings as SlipFindings,
+    SuspectTile as SuspectTile,
+)
 from .explanation import (
     constraint_words as constraint_words,
 )
@@ -29,6 +34,7 @@ from .prepare import (
     come_to_rest as come_to_rest,
     floating_wrist as floating_wrist,
     hand_space as hand_space,
+    prepare_stance as prepare_stance,
     resting_hand as resting_hand,
     settle_each as settle_each,
 )

@@ -226,16 +226,55 @@ class FingerTendon:
         after, shears = self._changed(state, shift, turn, state.motor_tension)
         return TendonState(state.motor_tension, after, shears)
 
+    def slipped(
+        self, state: TendonState, tile: int, shear: float, motor: float | None
+    ) -> TendonState:
+        """Return the state after a tile has let go of the rock, on which it drags on.
+
+        All phalanges stay where they are. The tile's shear is given, and its springs alone balance
+        the tendon.
+
+        Parameters
+        ----------
+        state : TendonState
+            At rest, not slack.
+        tile : int
+            Index of the tile.
+        shear : float
+            Its shear on the rock from then on [N].
+        motor : float or None
+            Tension that the motor keeps [N]; None if the motor stands still.
+        """
+        k, pushed = list(self.contact_stiffness), np.zeros(len(self.pulley_radii))
+        k[tile], pushed[tile] = 0.0, shear - state.shears[tile]
+        free = replace(self, contact_stiffness=tuple(k))
+        after, shears = free._changed(state, None, None, motor, pushed)
+        return TendonState(float(after[0]) if motor is None else motor, after, shears)
+
+    def drawn(self, before: TendonState, after: TendonState) -> float:
+        """Return the length of tendon that tiles give to the motor from one state to another [m].
+
+        The joints do not turn: c_p Σ δd_i, by the balance of each tile.
+        """
+        tensions, shears = after.tensions - before.tensions, after.shears - before.shears
+        moved = (self.pulley_ratio * tensions - shears) / self.spring_stiffness
+        return float(self.pulley_ratio * moved.sum())
+
     def _changed(
         self,
         state: TendonState,
         shift: Sequence[float] | Array | None,
         turn: Sequence[float] | Array | None,
         motor: float | None,
+        given: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Return tensions and shears after a change of load, at a motor's tension or held."""
+        """Return tensions and shears after a change of load, at a motor's tension or held.
+
+        ``given``: changes of shears besides those by the shift, shape (n,) [N].
+        """
         k, c, n = np.array(self.contact_stiffness), self.pulley_ratio, len(self.pulley_radii)
         pushed = k * self._of_phalanges("shift", shift)
+        pushed = pushed if given is None else pushed + given
         wound = np.array(self.pulley_radii) * self._of_phalanges("turn", turn)
         # how far a tile travels per newton, and a phalanx's share of tendon then [m/N]
         give = 1.0 / (k + self.spring_stiffness)
@@ -251,10 +290,10 @@ class FingerTendon:
         by_first, by_others = np.array(rows)[:, :1], np.array(rows)[:, 1:][:, rubs]
         moves = np.flatnonzero(rubs)
         if motor is None:
-            moves, tensions, given = np.append(0, moves), np.hstack([by_first, by_others]), 0.0
+            moves, tensions, first = np.append(0, moves), np.hstack([by_first, by_others]), 0.0
         else:
-            tensions, given = by_others, motor
-        known = given * by_first[:, 0]
+            tensions, first = by_others, motor
+        known = first * by_first[:, 0]
 
         def passed(given: Array) -> Array:
             """Return v, what the phalanges from each boundary on give, in newtons."""

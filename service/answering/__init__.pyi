@@ -1,6 +1,7 @@
 from .advice_requests import advised as advised, rewritten as rewritten
 from .answers import Planned as Planned
 from .body_space import explore as explore
+from .diagnosis import answer_diagnosis as answer_diagnosis
 from .dispatch import (
     SERVICES_BY_NAME as SERVICES_BY_NAME,
     answer_plan as answer_plan,

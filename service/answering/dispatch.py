@@ -23,6 +23,7 @@ from service.answering.survival import add_survival, check_survival
 from service.replies import BriefPlanReply, PlanReply, Reply, StreamReply
 from service.requests import (
     BodySpaceRequest,
+    DiagnosisRequest,
     PlanRequest,
     Query,
     Request,
@@ -170,6 +171,12 @@ def _body_space(asked: BodySpaceRequest, robots: Robots, _: Streams) -> Reply:
     return explore(asked, robots).reply
 
 
+def _diagnosis(asked: DiagnosisRequest, robots: Robots, _: Streams) -> Reply:
+    from service.answering.diagnosis import answer_diagnosis
+
+    return answer_diagnosis(asked, robots)
+
+
 def _climb(asked: RouteRequest, robots: Robots, _: Streams) -> Reply:
     return climb(asked, robots)
 
@@ -185,6 +192,7 @@ SERVICES_BY_NAME: Final[dict[str, _Service]] = {
     ServiceName.PLAN: _Service(PlanRequest, lambda asked, robots, _: planned(asked, robots)),
     ServiceName.WRENCH_SPACE: _Service(WrenchSpaceRequest, _wrench_space),
     ServiceName.BODY_SPACE: _Service(BodySpaceRequest, _body_space),
+    ServiceName.DIAGNOSIS: _Service(DiagnosisRequest, _diagnosis),
     ServiceName.STREAM: _Service(
         StreamRequest, lambda asked, robots, streams: streams.declare(asked, robots)
     ),

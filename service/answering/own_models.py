@@ -23,6 +23,7 @@ from hand_models.parameters import ParameterTable, load_own_hand, own_draw, own_
 from planner import Robot, RobotFile, robosimian, robot_of
 from service.requests import (
     BodySpaceRequest,
+    DiagnosisRequest,
     Draw,
     PlanRequest,
     RouteRequest,
@@ -47,7 +48,12 @@ __all__ = [
 
 RequestT = TypeVar(
     "RequestT",
-    bound=PlanRequest | WrenchSpaceRequest | BodySpaceRequest | StreamRequest | RouteRequest,
+    bound=PlanRequest
+    | WrenchSpaceRequest
+    | BodySpaceRequest
+    | StreamRequest
+    | DiagnosisRequest
+    | RouteRequest,
 )
 
 Builder = Callable[[ParameterTable | None], Robot]

@@ -1,3 +1,4 @@
+from .diagnosis import DiagnosisReply as DiagnosisReply, SuspectReply as SuspectReply
 from .plan import (
     BriefPlanReply as BriefPlanReply,
     CertificateReply as CertificateReply,

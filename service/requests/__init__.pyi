@@ -14,6 +14,7 @@ from .holds import (
 from .questions import (
     Axis as Axis,
     BodySpaceRequest as BodySpaceRequest,
+    DiagnosisRequest as DiagnosisRequest,
     Draw as Draw,
     LostTiles as LostTiles,
     PlanRequest as PlanRequest,

@@ -36,6 +36,7 @@ from service.requests.stance import Angles, Entries, Hand, HandEntries, Stance
 __all__ = [
     "Axis",
     "BodySpaceRequest",
+    "DiagnosisRequest",
     "Draw",
     "LostTiles",
     "PlanRequest",
@@ -71,6 +72,8 @@ Radius = Annotated[
         description="of an interpolation, along a force; along a moment a tenth, per metre [N]",
     ),
 ]
+Currents = Annotated[list[Annotated[float, Meta(ge=0.0, le=1e3)]], Meta(min_length=4, max_length=4)]
+Turns = Annotated[list[Annotated[float, Meta(ge=-1e3, le=1e3)]], Meta(min_length=4, max_length=4)]
 Tolerance = Annotated[float, Meta(ge=0.001, le=1.0)]
 
 
@@ -172,6 +175,33 @@ class PlanRequest(Query, frozen=True, kw_only=True):
         Tolerance | None,
         Meta(description="part of the least utilisation that max_reliability may give away"),
     ] = None
+
+
+class DiagnosisRequest(Query, frozen=True, kw_only=True):
+    """Request for the tile that has probably slipped, by the data of motors; fixed wrists only.
+
+    One of ``tensions``, ``currents`` and ``turns`` is needed, by limb; hands that are left out are
+    not suspected. The other fields are those of the plan request to whose plan the tendons have
+    been tightened.
+
+    - ``stance``, ``body_wrench``, ``load``, ``limits``, ``objective``, ``tolerance``: as of a plan.
+    - ``tensions``: tensions after the slip, with winches that stood still [N].
+    - ``currents``: in their place, currents of motors that tighten the tendons to them [A].
+    - ``turns``: turns of the winches since, with motors that kept their tension, positive as they
+      wind up tendon [rad].
+    """
+
+    stance: Stance
+    body_wrench: Annotated[
+        Wrench | None, Meta(description="that the rock must exert on the robot, in B; or load")
+    ] = None
+    load: Load | None = None
+    objective: ObjectiveName = "max_margin"
+    tolerance: Annotated[Tolerance | None, Meta(description="of max_reliability")] = None
+    limits: Limits = Limits()
+    tensions: Annotated[dict[Name, Tensions], Meta(description="after a slip, by limb [N]")] = {}
+    currents: Annotated[dict[Name, Currents], Meta(description="after a slip, by limb [A]")] = {}
+    turns: Annotated[dict[Name, Turns], Meta(description="of winches since, by limb [rad]")] = {}
 
 
 class WrenchSpaceRequest(Query, frozen=True, kw_only=True):

@@ -18,6 +18,7 @@ from hand_models.base import InvalidInputError
 from service.replies import (
     BodySpaceReply,
     BriefPlanReply,
+    DiagnosisReply,
     ErrorReply,
     PlanReply,
     Reply,
@@ -28,6 +29,7 @@ from service.replies import (
 from service.requests import (
     LONGEST_DEADLINE,
     BodySpaceRequest,
+    DiagnosisRequest,
     PlanRequest,
     Query,
     SetPointsRequest,
@@ -231,6 +233,13 @@ class CruxClient:
         Raises the errors that `plan` raises.
         """
         return _read(self._ask(ServiceName.SET_POINTS, request), SetPointsReply)
+
+    def diagnosis(self, request: DiagnosisRequest) -> DiagnosisReply:
+        """Ask which tile has probably slipped, by the data of motors, and return the reply.
+
+        Raises the errors that `plan` raises.
+        """
+        return _read(self._ask(ServiceName.DIAGNOSIS, request), DiagnosisReply)
 
     def _ask(self, name: str, request: Query) -> zenoh.Sample:
         """Return the reply that is no error; raise what `plan` raises."""

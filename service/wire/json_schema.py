@@ -11,6 +11,7 @@ from hand_models.parameters import Quantity
 from service.replies import (
     BodySpaceReply,
     BriefPlanReply,
+    DiagnosisReply,
     ErrorReply,
     HealthReply,
     PlanReply,
@@ -21,6 +22,7 @@ from service.replies import (
 )
 from service.requests import (
     BodySpaceRequest,
+    DiagnosisRequest,
     PlanRequest,
     RouteRequest,
     SetPointsRequest,
@@ -44,6 +46,8 @@ MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
     StreamReply,
     SetPointsRequest,
     SetPointsReply,
+    DiagnosisRequest,
+    DiagnosisReply,
     RouteRequest,
     RouteReply,
     HealthReply,
@@ -86,6 +90,7 @@ def schema() -> dict[str, Any]:
         ServiceName.BODY_SPACE: (BodySpaceRequest, BodySpaceReply),
         ServiceName.STREAM: (StreamRequest, StreamReply),
         ServiceName.SET_POINTS: (SetPointsRequest, SetPointsReply),
+        ServiceName.DIAGNOSIS: (DiagnosisRequest, DiagnosisReply),
         ServiceName.HEALTH: (None, HealthReply),
     }
     return {

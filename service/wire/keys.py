@@ -16,6 +16,7 @@ class ServiceName(StrEnum):
     BODY_SPACE = "body_space"
     STREAM = "stream"
     SET_POINTS = "set_points"
+    DIAGNOSIS = "diagnosis"
     HEALTH = "health"
     METRICS = "metrics"
     ROUTE = "route"

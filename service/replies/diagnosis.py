@@ -1,0 +1,41 @@
+"""Define the reply of a diagnosis: which tile has probably slipped."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from planner import LostTile
+from service.replies.reply import StanceReply
+
+__all__ = ["DiagnosisReply", "SuspectReply"]
+
+
+class SuspectReply(Struct, kw_only=True):
+    """A tile that may have slipped.
+
+    - ``limb``, ``finger``, ``phalanx``: its name.
+    - ``probability``: that it is this tile, if one tile has slipped.
+    - ``expected``: change that its slip makes: of the tension [N], or turn of the winch [rad].
+    """
+
+    limb: str
+    finger: str
+    phalanx: str
+    probability: float
+    expected: float
+
+
+class DiagnosisReply(StanceReply, kw_only=True):
+    """Which tile has probably slipped, by the data of motors.
+
+    - ``seen``: whether a slip explains the data better than none.
+    - ``tiles``: all tiles of the hands with data, the most probable first.
+    - ``suspects``: the first of them, which have 95 % of the probability together: as ``lost`` of
+      set-points.
+    - ``ambiguous``: pairs of tiles of one finger whose slips look alike.
+    """
+
+    seen: bool
+    tiles: list[SuspectReply]
+    suspects: list[LostTile]
+    ambiguous: list[list[LostTile]]
