@@ -22,7 +22,7 @@ __all__ = ["ORIENTATION_FIELDS", "check_orientation_form", "oriented_pose"]
 ORIENTATION_FIELDS: Final = ("orientation", "rpy", "x_axis", "z_axis")
 """Fields that give an orientation: the first, the second, or the last two."""
 
-FORMS: Final = "orientation (a quaternion [x, y, z, w]), rpy, or x_axis with z_axis"
+ORIENTATION_FORMS: Final = "orientation (a quaternion [x, y, z, w]), rpy, or x_axis with z_axis"
 
 
 def check_orientation_form(
@@ -38,14 +38,14 @@ def check_orientation_form(
     values = (orientation, rpy, x_axis, z_axis)
     given = [name for name, v in zip(ORIENTATION_FIELDS, values, strict=True) if v is not None]
     if not given:
-        raise InvalidFieldError(f"missing; give {FORMS}", field="orientation")
+        raise InvalidFieldError(f"missing; give {ORIENTATION_FORMS}", field="orientation")
     if given[0] in ("x_axis", "z_axis"):
         for name, other in (("x_axis", "z_axis"), ("z_axis", "x_axis")):
             if name not in given:
                 raise InvalidFieldError(f"missing; {other} requires {name}", field=name)
     elif len(given) > 1:
         raise InvalidFieldError(
-            f"give exactly one of {FORMS}, got {' and '.join(given)}", field=given[1]
+            f"give exactly one of {ORIENTATION_FORMS}, got {' and '.join(given)}", field=given[1]
         )
 
 

@@ -13,6 +13,7 @@ from hand_models.base import CruxError, InvalidInputError, LimitError
 from hand_models.parameters import ParameterTable
 from planner import DeadlineError, deadline
 from service.answering.answers import Planned, plan_reply
+from service.answering.body_space import with_com_region
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_models import BUNDLED_ROBOTS, Robots, over_default
 from service.answering.questions import climb, question
@@ -107,7 +108,8 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
         request = replace(request, want=wanted, draws=[], open_loop=None)
     asked = question(request, robots)
     answer = planner.plan(asked)
-    return Planned.of(asked, answer, request.id, detail, model="model" in request.want)
+    found = Planned.of(asked, answer, request.id, detail, model="model" in request.want)
+    return with_com_region(found) if "com_region" in request.want else found
 
 
 def answer_with_advice(answer: Planned) -> Planned:

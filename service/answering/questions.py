@@ -56,7 +56,7 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
         body_wrench=array_of(request.body_wrench),
         load=request.load or Load(),
         limits=request.limits,
-        want=frozenset(request.want),
+        want=frozenset(want for want in request.want if want != "com_region"),
         objective=request.objective,
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,

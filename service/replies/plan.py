@@ -22,6 +22,7 @@ from planner import (
     Time,
 )
 from service.replies.reply import Reply, SeatingReply, StanceReply, Vector, WrenchSet, Wrist
+from service.replies.spaces import ComRegionReply
 
 __all__ = [
     "BriefPlanReply",
@@ -149,10 +150,9 @@ class PlanReply(StanceReply, kw_only=True):
       ["robust"]``, and not for a body wrench of zero.
     - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;
       only with ``"want": ["open_loop"]``, and with a plan.
-    - ``spread``: Monte Carlo statistics over samples of uncertain parameters; only with ``"want":
-      ["spread"]``.
-    - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
-      ["clearance"]``.
+    - ``spread``: Monte Carlo statistics over samples of uncertain parameters; if in ``want``.
+    - ``clearance``: least distances of body, hands, links and rock; if in ``want``.
+    - ``com_region``: where the centre of mass may be; if in ``want``.
     - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
       make the stance feasible come first, the smallest first; the rest follow by gain for their
       size.
@@ -187,6 +187,7 @@ class PlanReply(StanceReply, kw_only=True):
     open_loop: OpenLoop | UnsetType = UNSET
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
+    com_region: ComRegionReply | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 

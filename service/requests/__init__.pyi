@@ -16,6 +16,7 @@ from .questions import (
     BodySpaceRequest as BodySpaceRequest,
     Draw as Draw,
     PlanRequest as PlanRequest,
+    PlanWant as PlanWant,
     RouteRequest as RouteRequest,
     SetPointsRequest as SetPointsRequest,
     SpaceWant as SpaceWant,

@@ -191,7 +191,12 @@ INVALID = [
     (("body_wrench",), [0.0] * 6, "body_wrench", "give body_wrench or load, not both"),
     (("objective",), "fun", "objective", "'fun' is not known; valid: max_margin, min_effort"),
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
-    (("want",), ["model", "price"], "want[1]", "valid: advice, clearance, load_factor, model"),
+    (
+        ("want",),
+        ["model", "price"],
+        "want[1]",
+        "valid: advice, clearance, com_region, load_factor, model",
+    ),
     (("id",), "x" * 257, "id", "length <= 256"),
     (
         ("stance", "joints"),
