@@ -5,9 +5,12 @@ from .capability import (
     WRENCH_COMPONENTS as WRENCH_COMPONENTS,
     BodySection as BodySection,
     BodySpace as BodySpace,
+    ComRegion as ComRegion,
     End as End,
     MeasurementStudy as MeasurementStudy,
+    Polygon as Polygon,
     Survey as Survey,
+    com_region as com_region,
     survey as survey,
 )
 from .deadline import (
@@ -23,6 +26,7 @@ from .explanation import (
 )
 from .pictures import (
     plot_body_space as plot_body_space,
+    plot_com_region as plot_com_region,
     plot_plan as plot_plan,
     plot_redundancy as plot_redundancy,
     plot_survival as plot_survival,

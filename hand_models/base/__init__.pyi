@@ -48,4 +48,9 @@ from .message_fields import (
     Strict as Strict,
     Tension as Tension,
 )
+from .orientations import (
+    ORIENTATION_FIELDS as ORIENTATION_FIELDS,
+    check_orientation_form as check_orientation_form,
+    oriented_pose as oriented_pose,
+)
 from .tolerances import BASE_TOLERANCES as BASE_TOLERANCES, BaseTolerances as BaseTolerances

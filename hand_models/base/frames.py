@@ -6,7 +6,7 @@ Wrenches are ``[fx, fy, fz, mx, my, mz]``: force first, moment about the frame's
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -147,31 +147,6 @@ class Pose:
         pose = cls(place, rotation)
         object.__setattr__(pose, "proper", True)
         return pose
-
-    @classmethod
-    def from_quaternions(
-        cls, given: Iterable[tuple[str, Sequence[float] | Array, Sequence[float] | Array]]
-    ) -> list[Pose]:
-        """Return the poses of several fields of a message.
-
-        Parameters
-        ----------
-        given : iterable of (str, sequence of float, sequence of float)
-            Path of the field, position [m] and quaternion ``[x, y, z, w]`` of each pose.
-
-        Raises
-        ------
-        InvalidInputError
-            If a number is not finite or a quaternion's norm is not 1; the error's field begins with
-            the path.
-        """
-        found = []
-        for path, position, orientation in given:
-            try:
-                found.append(cls.from_quaternion(position, orientation))
-            except InvalidInputError as error:
-                raise error.within(path) from None
-        return found
 
     def quaternion(self) -> Array:
         """Return the orientation as a unit quaternion ``[x, y, z, w]``, shape (4,), with w ≥ 0."""

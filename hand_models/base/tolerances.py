@@ -23,6 +23,8 @@ class BaseTolerances:
     """Share of its terms that a sum of a few may lose by rounding alone."""
     unit_norm: float = 1e-3
     """How far a quaternion's norm may be from one before it is refused: the contract's figure."""
+    right_angle: float = 1e-3
+    """How far two axes may be from right angles [rad]: what three digits of each may be off."""
 
 
 BASE_TOLERANCES = BaseTolerances()

@@ -11,4 +11,5 @@ from .measurements import (
     widths as widths,
 )
 from .polygon import Polygon as Polygon, SupportPoint as SupportPoint, enclose as enclose
+from .support_region import ComRegion as ComRegion, com_region as com_region
 from .wrist_survey import Survey as Survey, survey as survey

@@ -1,4 +1,5 @@
 from .body_plots import plot_body_space as plot_body_space
+from .com_plots import plot_com_region as plot_com_region
 from .hand_plots import plot_wrench_space as plot_wrench_space
 from .plan_plots import draw_plan as draw_plan, plot_plan as plot_plan
 from .redundancy_plots import plot_redundancy as plot_redundancy

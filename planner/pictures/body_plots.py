@@ -15,7 +15,7 @@ from planner.pictures.settings import PICTURE_SETTINGS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_body_space", "symbol_of"]
+__all__ = ["draw_polygon", "plot_body_space", "symbol_of"]
 
 
 class _View(NamedTuple):
@@ -99,7 +99,7 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
     if section.polygon is None:
         axes.text(0.5, 0.5, "nothing is held", transform=axes.transAxes, ha="center", color=held)
     else:
-        _draw_polygon(axes, section.polygon)
+        draw_polygon(axes, section.polygon)
     beside = ", beside this plane" if section.others == "zero" else ""
     weight = space.weight
     moves = weight is not None and not np.allclose(weight, space.needed, rtol=1e-9, atol=1e-6)
@@ -126,7 +126,7 @@ def _draw_section(axes: Axes, space: BodySpace, section: BodySection) -> None:
 
 
 def _draw_accelerations(axes: Axes, space: BodySpace, view: _View, outline: Polygon) -> None:
-    _draw_polygon(axes, outline)
+    draw_polygon(axes, outline)
     into_body = space.question.stance.body.rotation.T
 
     def flat(vector: Array) -> Array:
@@ -157,8 +157,16 @@ def _draw_legend(axes: Axes) -> None:
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=2)
 
 
-def _draw_polygon(axes: Axes, polygon: Polygon) -> None:
-    """Draw what is held, and the outline beyond which nothing is; a point as a point."""
+def draw_polygon(axes: Axes, polygon: Polygon) -> None:
+    """Draw what is held, and the outline beyond which nothing is; a point as a point.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes to draw on.
+    polygon : Polygon
+        Inner and outer polygon, in the units of the axes.
+    """
     colour = PICTURE_SETTINGS.held
     inner = np.vstack([polygon.inner, polygon.inner[:1]])
     outer = np.vstack([polygon.outer, polygon.outer[:1]])

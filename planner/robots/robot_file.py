@@ -20,7 +20,14 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-from hand_models.base import InvalidInputError, Pose, errors_under, in_file
+from hand_models.base import (
+    ORIENTATION_FIELDS,
+    InvalidInputError,
+    Pose,
+    errors_under,
+    in_file,
+    oriented_pose,
+)
 from hand_models.parameters import LONGEST_QUOTE, ParameterTable
 from planner.robots.tolerances import TOLERANCES
 
@@ -162,6 +169,9 @@ class RobotDescription:
         limb_units = {
             "position": "m",
             "orientation": "1",
+            "rpy": "rad",
+            "x_axis": "1",
+            "z_axis": "1",
             "hand_com": "m",
             "torque_limit": "N·m",
             "radius": "m",
@@ -180,7 +190,10 @@ class RobotDescription:
             _named(limb, "limbs")
             entries = dict(_mapping(entries, section))
             link = _string(entries.pop("link", None), f"{section}.link")
-            both = {**every, **entries}
+            # a limb's own form of orientation replaces that of every limb
+            turned = any(name in entries for name in ORIENTATION_FIELDS)
+            kept = [name for name in every if not (turned and name in ORIENTATION_FIELDS)]
+            both = {**{name: every[name] for name in kept}, **entries}
             mounts[limb] = _mount(link, section_table(both, section, limb_units), section)
         com = _triple(whole, "robot", "com") if "com" in whole.sections["robot"] else None
         capsules = _capsules(raw.get("capsules", {}))
@@ -308,12 +321,11 @@ def _direction(table: ParameterTable, section: str, name: str) -> tuple[float, .
 
 
 def _mount(link: str, table: ParameterTable, section: str) -> Mount:
-    position, orientation = (
-        _triple(table, section, "position"),
-        table.vector(section, "orientation"),
-    )
+    position = _triple(table, section, "position")
+    turned = [name for name in ORIENTATION_FIELDS if name in table.sections[section]]
+    orientation = {name: table.vector(section, name) for name in turned}
     with errors_under(section):
-        pose = Pose.from_quaternion(position, orientation)
+        pose = oriented_pose(position, **orientation)
     given = "hand_com" in table.sections[section]
     hand_com = _triple(table, section, "hand_com") if given else (0.0, 0.0, 0.0)
     limits = _torque_limits(table, section)

@@ -7,17 +7,28 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from hand_models.base import Array, InvalidInputError
-from planner import WRENCH_COMPONENTS, BodySection, BodySpace, End, Time
+from planner import (
+    WRENCH_COMPONENTS,
+    BodySection,
+    BodySpace,
+    ComRegion,
+    DeadlineError,
+    End,
+    Polygon,
+    Time,
+    com_region,
+)
 from service import replies
-from service.answering.answers import finite, placed_poses
+from service.answering.answers import Planned, finite, placed_poses
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.questions import question
 from service.replies import BodySpaceReply
 from service.requests import BodySpaceRequest, PlanRequest
 
-__all__ = ["Explored", "explore"]
+__all__ = ["Explored", "explore", "with_com_region"]
 
 
 class Explored(NamedTuple):
@@ -31,11 +42,14 @@ class Explored(NamedTuple):
         Polygon of the body space in the plane of the request's two axes.
     reply : BodySpaceReply
         Capability, section and accelerations as plain lists and numbers.
+    region : ComRegion or None
+        Where the centre of mass may be, if the request wants it.
     """
 
     space: BodySpace
     section: BodySection
     reply: BodySpaceReply
+    region: ComRegion | None = None
 
 
 def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explored:
@@ -86,6 +100,7 @@ def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explo
     about_axes = np.eye(6)[3:]
     turning = _accelerations(space, _ways("xyz", about_axes)) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
+    region = com_region(space) if "com_region" in request.want else None
     ended = time.perf_counter()
     found = space.plan
     reply = BodySpaceReply(
@@ -108,7 +123,70 @@ def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explo
         warnings=[*found.warnings, *_warnings(space, linear is not None, error)],
         findings=list(found.findings),
     )
-    return Explored(space, section, reply)
+    if region is not None:
+        reply.com_region = _region(region, space.exact)
+    return Explored(space, section, reply, region)
+
+
+def with_com_region(answer: Planned) -> Planned:
+    """Add to an answer where the centre of mass may be; a deadline leaves it out.
+
+    Parameters
+    ----------
+    answer : Planned
+        Answer to a plan request, with a full reply; a brief one stays as it is.
+
+    Returns
+    -------
+    Planned
+        Question, plan, and the reply with ``com_region``.
+
+    Raises
+    ------
+    InvalidInputError
+        If the request gives a body wrench, or an angular acceleration, or the load has no weight.
+    SolverError
+        If the solution of an optimisation problem does not pass its checks.
+    """
+    if not isinstance(answer.reply, replies.PlanReply):
+        return answer
+    try:
+        space = BodySpace(answer.question)
+        found = _region(com_region(space), space.exact)
+    except DeadlineError:
+        left = "com_region: not known before the deadline; allow more time"
+        reply = replace(
+            answer.reply,
+            warnings=[*answer.reply.warnings, left],
+            unfinished=[*answer.reply.unfinished, "com_region"],
+        )
+        return answer._replace(reply=reply)
+    return answer._replace(reply=replace(answer.reply, com_region=found))
+
+
+def _region(region: ComRegion, exact: bool) -> replies.ComRegionReply:
+    reply = replies.ComRegionReply(
+        axes=region.axes.tolist(),
+        up=region.up.tolist(),
+        com=region.com.tolist(),
+        inner=[],
+        outer=[],
+        gap=None,
+        limiting=[],
+        margin=region.margin,
+        exact=exact,
+    )
+    _fill(reply, region.polygon)
+    return reply
+
+
+def _fill(
+    reply: replies.ComRegionReply | replies.BodySectionReply, polygon: Polygon | None
+) -> None:
+    """Write a polygon into a reply that has none."""
+    if polygon is not None:
+        reply.inner, reply.outer = polygon.inner.tolist(), polygon.outer.tolist()
+        reply.gap, reply.limiting = finite(polygon.gap), list(polygon.limiting)
 
 
 def _unit(given: Sequence[float], field: str) -> Array:
@@ -139,10 +217,7 @@ def _section(section: BodySection) -> replies.BodySectionReply:
     reply = replies.BodySectionReply(
         axes=list(section.axes), others=section.others, inner=[], outer=[], gap=None, limiting=[]
     )
-    polygon = section.polygon
-    if polygon is not None:
-        reply.inner, reply.outer = polygon.inner.tolist(), polygon.outer.tolist()
-        reply.gap, reply.limiting = finite(polygon.gap), list(polygon.limiting)
+    _fill(reply, section.polygon)
     return reply
 
 

@@ -14,6 +14,7 @@ from hand_models.base import CruxError, InvalidInputError, LimitError
 from hand_models.parameters import ParameterTable
 from planner import DeadlineError, deadline
 from service.answering.answers import Planned, plan_reply
+from service.answering.body_space import with_com_region
 from service.answering.mesh_files import MeshFiles
 from service.answering.own_models import BUNDLED_ROBOTS, Robots, over_default
 from service.answering.questions import climb, question
@@ -119,7 +120,7 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
         if "survival" in request.want and isinstance(found.reply, PlanReply):
             settings = request.survival or planner.SurvivalSettings()
             add_survival(found.reply, asked, answer, settings)
-    return found
+    return with_com_region(found) if "com_region" in request.want else found
 
 
 def _add_redundancy(reply: PlanReply, asked: planner.Question) -> None:

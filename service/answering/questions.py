@@ -57,7 +57,11 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
         load=request.load or Load(),
         limits=request.limits,
         want=frozenset(
-            [want for want in request.want if want != "redundancy" and want != "survival"]
+            [
+                want
+                for want in request.want
+                if want != "redundancy" and want != "survival" and want != "com_region"
+            ]
         ),
         objective=request.objective,
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},

@@ -60,6 +60,8 @@ def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Repl
     modelled = isinstance(request, PlanRequest) and "model" in request.want
     if modelled and isinstance(found, Planned) and isinstance(reply, PlanReply):
         bare = found.in_detail("full").reply
+        if isinstance(bare, PlanReply):
+            bare = replace(bare, com_region=reply.com_region)
     without = {words: len(form.encode(less)) for words, less in _with_less_in_it(reply, bare)}
     sizes |= {words: size for words, size in without.items() if size < len(payload)}
     raise _too_large(len(payload), most, sizes)
@@ -81,7 +83,7 @@ def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
     ``bare``: the reply without the model, or the same reply if it has no model.
     """
     wanted = {"spread", "advice", "robust", "open_loop", "clearance", "redundancy", "survival"}
-    wanted |= {"prices"}
+    wanted |= {"com_region", "prices"}
     wanted |= {"vertices", "half_spaces"}
     blank: dict[str, Any] = {
         field.name: None if field.default is NODEFAULT else field.default

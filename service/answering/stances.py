@@ -12,7 +12,15 @@ import msgspec
 import numpy as np
 
 from hand_models import rock
-from hand_models.base import Array, BoundedStore, InvalidInputError, Pose, errors_under, turns_about
+from hand_models.base import (
+    Array,
+    BoundedStore,
+    InvalidInputError,
+    Pose,
+    errors_under,
+    oriented_pose,
+    turns_about,
+)
 from hand_models.fixed_wrist import ALONG_FINGERS, approach_frame
 from hand_models.hand import SpinyHand
 from hand_models.parameters import ParameterTable, own_hand
@@ -236,9 +244,14 @@ def poses_of(messages: Mapping[str, requests.Pose | None]) -> dict[str, Pose]:
     InvalidInputError
         If a pose is impossible, such as a quaternion of zeros; ``field`` begins with its path.
     """
-    given = {path: pose for path, pose in messages.items() if pose is not None}
-    found = Pose.from_quaternions([(at, p.position, p.orientation) for at, p in given.items()])
-    return dict(zip(given, found, strict=True))
+    found = {}
+    for path, pose in messages.items():
+        if pose is not None:
+            with errors_under(path):
+                found[path] = oriented_pose(
+                    pose.position, pose.orientation, pose.rpy, pose.x_axis, pose.z_axis
+                )
+    return found
 
 
 def joints_of(

@@ -112,6 +112,7 @@ def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[reque
     help="Whatever the other components; as asked for by default.",
 )
 @click.option("--pure", is_flag=True, help="With the other components zero.")
+@click.option("--com", is_flag=True, help="Show instead where the centre of mass may be.")
 @options.plot_option("Draw it there, and the largest accelerations in two planes.")
 @options.own_options
 @options.json_option
@@ -120,6 +121,7 @@ def body_space_command(
     axes: list[requests.Axis],
     projection: bool,
     pure: bool,
+    com: bool,
     picture: Path | None,
     own: options.Own,
     as_json: bool,
@@ -139,12 +141,16 @@ def body_space_command(
         present=plan.present,
         axes=axes,
         others="free" if projection else "zero" if pure else "needed",
+        want=["com_region"] if com else [],
     )
     with tables.waiting(f"exploring {stance}", plan):
         found = answering.explore(request, own.robots)
         if picture is not None:
             with tables.writing(picture):
-                planner.plot_body_space(found.space, found.section, picture, stance)
+                if found.region is None:
+                    planner.plot_body_space(found.space, found.section, picture, stance)
+                else:
+                    planner.plot_com_region(found.space, found.region, picture, stance)
     if as_json:
         tables.say(found.reply)
     else:

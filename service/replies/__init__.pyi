@@ -39,6 +39,7 @@ from .spaces import (
     BodySpaceReply as BodySpaceReply,
     ClosingSequenceReply as ClosingSequenceReply,
     ClosingStageReply as ClosingStageReply,
+    ComRegionReply as ComRegionReply,
     ContactReply as ContactReply,
     HalfSpaceEquations as HalfSpaceEquations,
     HalfSpacesReply as HalfSpacesReply,

@@ -25,6 +25,7 @@ from planner import (
     Time,
 )
 from service.replies.reply import Reply, SeatingReply, StanceReply, Vector, WrenchSet, Wrist
+from service.replies.spaces import ComRegionReply
 
 __all__ = [
     "BriefPlanReply",
@@ -155,6 +156,7 @@ class PlanReply(StanceReply, kw_only=True):
       ["spread"]``.
     - ``clearance``: least distances of body, hands, links and rock; only with ``"want":
       ["clearance"]``.
+    - ``com_region``: where the centre of mass may be; if in ``want``.
     - ``redundancy``: the plan without each tile, each finger and each hand; only with ``"want":
       ["redundancy"]``.
     - ``reliability``: probability that no tile slips; only with the objective ``max_reliability``,
@@ -196,6 +198,7 @@ class PlanReply(StanceReply, kw_only=True):
     clearance: Clearance | UnsetType = UNSET
     redundancy: Redundancy | UnsetType = UNSET
     reliability: Reliability | UnsetType = UNSET
+    com_region: ComRegionReply | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 

@@ -15,6 +15,7 @@ __all__ = [
     "BodySpaceReply",
     "ClosingSequenceReply",
     "ClosingStageReply",
+    "ComRegionReply",
     "ContactReply",
     "HalfSpaceEquations",
     "HalfSpacesReply",
@@ -271,6 +272,36 @@ class BodySectionReply(Struct, kw_only=True):
     limiting: list[LimitName | None]
 
 
+class ComRegionReply(Struct, kw_only=True):
+    """Region in which the centre of mass may be while hands and joints stay: a prism.
+
+    A point p of W is in the region if (axes[0] · p, axes[1] · p) is in the polygon, at any height
+    along ``up``. Every point of the inner polygon can be held, and no point outside the outer one.
+
+    - ``axes``: two unit vectors in W across the load; x and y of W where gravity is along its z.
+    - ``up``: unit vector in W against the load: against gravity, for a body at rest.
+    - ``com``: the centre of mass asked for, without payloads, in W [m].
+    - ``inner``, ``outer``: corners of the polygons along ``axes`` [m], counterclockwise; empty
+      where no centre of mass can be held.
+    - ``gap``: largest distance between the polygons [m]; null without corners.
+    - ``limiting``: the limit that is reached at each corner of the inner polygon; null where there
+      is none.
+    - ``margin``: distance of ``com`` from the border of the inner polygon [m], negative outside;
+      null without corners.
+    - ``exact``: false where a wrist moves; the wrench space of its hand is then linearised.
+    """
+
+    axes: list[Vector]
+    up: Vector
+    com: Vector
+    inner: list[Vector]
+    outer: list[Vector]
+    gap: float | None
+    limiting: list[LimitName | None]
+    margin: float | None
+    exact: bool
+
+
 class Acceleration(Struct, kw_only=True):
     """Largest acceleration of the body from rest that a stance can hold along a direction in W.
 
@@ -304,6 +335,7 @@ class BodySpaceReply(StanceReply, kw_only=True):
       null unless joints are known and the load is the robot's own, without ``com``.
     - ``along``: largest accelerations in the directions asked for; null where ``acceleration`` is
       null.
+    - ``com_region``: where the centre of mass may be; only with ``"want": ["com_region"]``.
     - ``time``: time that each part of the answer took [s].
     - ``warnings``: sentences about what is odd or left out.
     - ``findings``: what is odd about the stance, each with its ``field`` in the request.
@@ -322,6 +354,7 @@ class BodySpaceReply(StanceReply, kw_only=True):
     acceleration: dict[str, Acceleration] | None
     angular_acceleration: dict[str, Acceleration] | None
     along: list[Acceleration] | None
+    com_region: ComRegionReply | UnsetType = UNSET
     time: Time
     warnings: list[str] = []
     findings: list[Finding] = []

@@ -18,6 +18,7 @@ from .questions import (
     Draw as Draw,
     LostTiles as LostTiles,
     PlanRequest as PlanRequest,
+    PlanWant as PlanWant,
     RouteRequest as RouteRequest,
     SetPointsRequest as SetPointsRequest,
     SpaceWant as SpaceWant,

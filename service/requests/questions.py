@@ -40,6 +40,7 @@ __all__ = [
     "Draw",
     "LostTiles",
     "PlanRequest",
+    "PlanWant",
     "RouteRequest",
     "SetPointsRequest",
     "SpaceWant",
@@ -63,6 +64,7 @@ Explain = Annotated[
 ]
 Axis = Literal["fx", "fy", "fz", "mx", "my", "mz"]
 Direction = tuple[Coordinate, Coordinate, Coordinate]
+PlanWant = Literal[Want, "com_region", "redundancy", "survival"]
 SpaceWant = Literal["robust", "half_spaces", "vertices"]
 Radius = Annotated[
     float,
@@ -149,12 +151,13 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     confidence: Later = None
     detail: Detail | None = None
     want: Annotated[
-        list[Want | Literal["redundancy", "survival"]],
+        list[PlanWant],
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
             "open_loop: the utilisation over displaced hands if the plan is executed as it is. "
             "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
             "clearance: the least distances of body, hands, links and rock. "
+            "com_region: where the centre of mass may be. "
             "advice: what would make it hold, or hold more: verified changes. "
             "redundancy: the plan without each tile, finger and hand, without moving. "
             "survival: how likely it is that no tile slips, and that all hands hold if some do"
@@ -240,6 +243,7 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
     - ``axes``: two components of the body wrench, which span the plane of the section.
     - ``others``: the other four components in this plane: ``needed`` as asked for, ``zero``, or
       ``free``.
+    - ``want``: names of further results: ``com_region``, where the centre of mass may be.
     - ``directions``: directions in W along which the largest acceleration is computed; not zero, of
       any length.
     """
@@ -262,6 +266,9 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
             description="the plane's other components: as asked for, zero, or whatever they may be"
         ),
     ] = "needed"
+    want: Annotated[
+        list[Literal["com_region"]], Meta(description="com_region: where the mass may be")
+    ] = []
     directions: Annotated[
         list[Direction],
         Meta(

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal
 
 from msgspec import Meta
 
-from hand_models.base import Position, Strict
+from hand_models.base import Coordinate, Position, Strict, check_orientation_form
 
 __all__ = [
     "DEFAULT_DEADLINE",
@@ -33,6 +33,21 @@ QuaternionEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
 Quaternion = Annotated[
     tuple[QuaternionEntry, QuaternionEntry, QuaternionEntry, QuaternionEntry],
     Meta(description="[x, y, z, w], of norm 1 within 1e-3"),
+]
+TurnEntry = Annotated[float, Meta(ge=-1e3, le=1e3)]
+Turns = Annotated[
+    tuple[TurnEntry, TurnEntry, TurnEntry],
+    Meta(
+        description="roll, pitch and yaw about the fixed axes x, y and z, one after the other, as "
+        "in ROS; in place of orientation [rad]"
+    ),
+]
+PoseAxis = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate],
+    Meta(
+        description="direction of the frame's axis, of any length; x_axis and z_axis, at right "
+        "angles within 1e-3 rad, stand in place of orientation"
+    ),
 ]
 WrenchEntry = Annotated[float, Meta(ge=-1e6, le=1e6)]
 WrenchEntries = tuple[WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry, WrenchEntry]
@@ -65,14 +80,22 @@ Later = Annotated[Any, Meta(description="not supported in this version; leave it
 
 
 class Pose(Strict, frozen=True, kw_only=True):
-    """Pose of a frame in another frame.
+    """Pose of a frame in another frame; its orientation in exactly one of three forms.
 
     - ``position``: origin of the frame [m].
-    - ``orientation``: unit quaternion as [x, y, z, w].
+    - ``orientation``: unit quaternion as [x, y, z, w]; or
+    - ``rpy``: roll, pitch and yaw about the fixed axes x, y and z, one after the other [rad]; or
+    - ``x_axis``, ``z_axis``: directions of the frame's axes, of any length, at right angles.
     """
 
     position: Position
-    orientation: Quaternion
+    orientation: Quaternion | None = None
+    rpy: Turns | None = None
+    x_axis: PoseAxis | None = None
+    z_axis: PoseAxis | None = None
+
+    def __post_init__(self) -> None:
+        check_orientation_form(self.orientation, self.rpy, self.x_axis, self.z_axis)
 
 
 class Request(Strict, frozen=True, kw_only=True):

@@ -1,4 +1,7 @@
-from .body_spaces import print_body_space as print_body_space
+from .body_spaces import (
+    print_body_space as print_body_space,
+    print_com_region as print_com_region,
+)
 from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus
 from .extras import (
     print_advice as print_advice,

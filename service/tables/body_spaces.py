@@ -22,11 +22,13 @@ from service.tables.layout import (
     text,
 )
 
-__all__ = ["print_body_space"]
+__all__ = ["print_body_space", "print_com_region"]
 
 
 def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     """Print the body space of a stance: extents by axis, one section, and largest accelerations.
+
+    If the reply has the region of the centre of mass, only this region is printed.
 
     Parameters
     ----------
@@ -40,6 +42,9 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     out.print(Text.assemble(in_colour(reply.status, reply.status.upper()), known))
     out.print(reply.reason)
     print_warnings(reply.warnings, out)
+    if isinstance(reply.com_region, replies.ComRegionReply):
+        print_com_region(reply.com_region, out)
+        return
     asked = ", ".join(
         f"{axis} {value:z.1f}"
         for axis, value in zip(WRENCH_COMPONENTS, reply.body_wrench, strict=True)
@@ -57,12 +62,56 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
 
 def _lets_go() -> PrintedColumn:
     """Return the column of what lets go first."""
+    return text("first to let go", "1.limiting", _limit_words)
 
-    def words(limit: Any) -> str:
-        parts = (limit.limb, limit.joint, limit.finger, limit.phalanx, limit.limit)
-        return " ".join(part for part in parts if part is not None)
 
-    return text("first to let go", "1.limiting", words)
+def _limit_words(limit: Any) -> str:
+    parts = (limit.limb, limit.joint, limit.finger, limit.phalanx, limit.limit)
+    return " ".join(part for part in parts if part is not None)
+
+
+def print_com_region(region: replies.ComRegionReply, out: Console) -> None:
+    """Print where the centre of mass may be: its range along two axes, and what lets go there.
+
+    Parameters
+    ----------
+    region : ComRegionReply
+        Region of a stance, in W [m].
+    out : Console
+        Console to print on.
+    """
+    names = [_axis_name(axis) for axis in region.axes]
+    if not region.inner or region.margin is None or region.gap is None:
+        out.print("no centre of mass is held, whatever its place")
+        return
+    corners, com = np.array(region.inner), np.array(region.axes) @ np.array(region.com)
+    inside = "within" if region.margin >= 0.0 else "outside"
+    where = ", ".join(f"{axis} {value:z.3f} m" for axis, value in zip(names, com, strict=True))
+    out.print(f"centre of mass: {where}; {1e3 * abs(region.margin):.0f} mm {inside} its border")
+    rows = []
+    for i, axis in enumerate(names):
+        for sign, k in (("+", corners[:, i].argmax()), ("-", corners[:, i].argmin())):
+            far, limit = corners[k, i], region.limiting[k]
+            rows.append((f"{sign}{axis}", far, far - com[i], limit))
+    columns = (
+        name("axis", "0"),
+        number("farthest m", "1", "z.3f"),
+        number("shift m", "2", "z.3f"),
+        text("first to let go", "3", _limit_words),
+    )
+    print_rows(rows, columns, out, "how far the centre of mass may be along axes of W")
+    shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
+    out.print(f"{shape}, at any height; known to {1e3 * max(region.gap, 1e-5):.2g} mm")
+    if not region.exact:
+        out.print("wrists that move: linearised where the plan puts them")
+
+
+def _axis_name(axis: replies.Vector) -> str:
+    """Return the name of an axis of W, or its components."""
+    for letter, unit in zip("xyz", np.eye(3), strict=True):
+        if np.allclose(axis, unit, rtol=0.0, atol=1e-9):
+            return letter
+    return f"({', '.join(f'{value:z.3g}' for value in axis)})"
 
 
 def _print_section(section: replies.BodySectionReply, out: Console) -> None:

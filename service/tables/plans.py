@@ -15,6 +15,7 @@ from rich.text import Text
 
 import planner
 from service import replies
+from service.tables.body_spaces import print_com_region
 from service.tables.extras import (
     print_open_loop,
     print_spread,
@@ -90,6 +91,8 @@ def print_plan(
     _print_displaced(reply, out)
     if isinstance(reply.clearance, planner.Clearance):
         _print_clearance(reply.clearance, out)
+    if isinstance(reply.com_region, replies.ComRegionReply):
+        print_com_region(reply.com_region, out)
     if reply.hands is not None:
         _print_hands(reply.hands, out)
     if reply.joint_torque is not None and reply.joint_torque_limit is not None:

@@ -204,6 +204,12 @@ def entry(name, value, unit):
         ("[0.1, 0.0, 0.0]", "[0.1, 0.0]", "limbs.leg.position: must be 3 numbers"),
         ("[0.1, 0.0, 0.0]", "[0.1, nan, 0.0]", r"every_limb.position.value\[1\]: must be finite"),
         ("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.0, 1.0, 1.0]", "limbs.leg.orientation: a quaternion"),
+        (
+            'link = "foot"',
+            'link = "foot"\nrpy = [0.0, 90.0, 0.0]',
+            r"limbs.leg.rpy: pitch must be within ±12.57 rad .* got 90 rad",
+        ),
+        ('link = "foot"', 'link = "foot"\nx_axis = [1.0, 0.0, 0.0]', "limbs.leg.z_axis: missing"),
         ('unit = "m"', 'unit = "mm"', "every_limb.position.unit: must be in 'm', got 'mm'"),
         ('unit = "N·m"', 'unit = "Nm"', "every_limb.torque_limit.unit: must be in 'N·m', got 'Nm'"),
         ("80.0", "0.0", "limbs.leg.torque_limit: must be 0.001 to 1e.06 N·m, .* got 0"),
@@ -225,7 +231,25 @@ def test_what_is_wrong_with_a_file(old, new, message):
 @pytest.mark.parametrize("missing", ["position", "orientation"])
 def test_what_no_limb_can_do_without(missing):
     lines = [line for line in TOML.splitlines() if not line.startswith(missing)]
-    assert refused("\n".join(lines)) == f"limbs.leg.{missing}: missing; must be given"
+    assert refused("\n".join(lines)).startswith(f"limbs.leg.{missing}: missing; ")
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "rpy = [0.0, 3.141592653589793, 0.0]",
+        "x_axis = [-1.0, 0.0, 0.0]\nz_axis = [0.0, 0.0, -2.0]",
+    ],
+)
+def test_a_limb_may_turn_its_hand_by_angles_or_axes(form):
+    toml, text = arm(3, ("left", "right"))
+    robot = robot_of(RobotFile("arms", f"{toml}\n{form}\n", text))  # the last section: the right
+    mounts = robot.description.mounts
+    np.testing.assert_allclose(
+        mounts["right"].pose.rotation, np.diag([-1.0, 1.0, -1.0]), atol=1e-12
+    )
+    plain = robot_of(RobotFile("arms", toml, text)).description.mounts
+    np.testing.assert_array_equal(mounts["left"].pose.rotation, plain["left"].pose.rotation)
 
 
 @pytest.mark.parametrize(

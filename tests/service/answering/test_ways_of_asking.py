@@ -50,6 +50,13 @@ PLACED = {
 }
 """A hand on a ball of the wall, by its place."""
 
+
+def on_a_log(**orientation: list[float]) -> dict[str, Any]:
+    """The first hand on a log whose pose in H is given, with this orientation."""
+    pose = {"position": [0.0, 0.0, 0.002], **orientation}
+    return {HAND + "hold": {"shape": "cylinder", "diameter": 0.3, "pose_in_hand": pose}}
+
+
 LIMBS_GIVE = {"position": 5000.0, "angle": 100.0}
 TRAVEL = {"angle": 0.02}
 THERE = {"point": [0.0, -0.45, 0.6], "approach": [1.0, 0.0, 0.0]}
@@ -222,6 +229,9 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     "Place.up": [{**PLACED, HAND + "place": {**THERE, "up": [0.0, 0.3, 1.0]}}],
     "Pose.position": [{}],
     "Pose.orientation": [{}],
+    "Pose.rpy": [on_a_log(rpy=[0.0, 0.02, math.pi])],
+    "Pose.x_axis": [on_a_log(x_axis=[-1.0, 0.02, 0.0], z_axis=[0.0, 0.0, 2.0])],
+    "Pose.z_axis": [{}],
     "Draw.hand": [
         {
             "want": ["spread"],

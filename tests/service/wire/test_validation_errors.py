@@ -133,6 +133,43 @@ INVALID = [
         "stance.body.orientation",
         "the norm is 1.01",
     ),
+    (
+        ("stance", "body"),
+        {"position": [0.0] * 3},
+        "stance.body.orientation",
+        "missing; give orientation (a quaternion [x, y, z, w]), rpy, or x_axis with z_axis",
+    ),
+    (
+        (*FRONT, "pose", "rpy"),
+        [0.0] * 3,
+        f"{HAND}.pose.rpy",
+        "give exactly one of orientation (a quaternion [x, y, z, w]), rpy, or x_axis with z_axis, "
+        "got orientation and rpy",
+    ),
+    (
+        (*FRONT, "hold", "pose_in_hand"),
+        {"position": [0.0] * 3, "z_axis": [0.0, 0.0, 1.0]},
+        f"{HAND}.hold.pose_in_hand.x_axis",
+        "missing; z_axis requires x_axis",
+    ),
+    (
+        ("stance", "body"),
+        {"position": [0.0] * 3, "x_axis": [0.0, 0.0, 1.0], "z_axis": [-1.0, 0.0, 0.01]},
+        "stance.body.z_axis",
+        "right angles to x_axis within 0.001 rad, got 89.4271°",
+    ),
+    (
+        ("stance", "body"),
+        {"position": [0.0] * 3, "x_axis": [0.0, 0.0, 0.0], "z_axis": [-1.0, 0.0, 0.0]},
+        "stance.body.x_axis",
+        "must be a direction, not zero, got [0, 0, 0]",
+    ),
+    (
+        ("stance", "body"),
+        {"position": [0.0] * 3, "rpy": [0.0, -90.0, 0.0]},
+        "stance.body.rpy",
+        "pitch must be within ±12.57 rad (two turns), got -90 rad: in degrees? -90° are -1.571 rad",
+    ),
     ((*FRONT, "limb"), "nose", f"{HAND}.limb", "known are front_right"),
     ((*FRONT, "limb"), 3, f"{HAND}.limb", "a string, got a whole number"),
     ((*FRONT, "pose", "orientation"), [0.0] * 4, f"{HAND}.pose.orientation", "the norm is 0"),
@@ -159,7 +196,12 @@ INVALID = [
         "'fun' is not known; valid: max_margin, max_reliability, min_effort",
     ),
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
-    (("want",), ["model", "price"], "want[1]", "valid: advice, clearance, load_factor, model"),
+    (
+        ("want",),
+        ["model", "price"],
+        "want[1]",
+        "valid: advice, clearance, com_region, load_factor, model",
+    ),
     (("id",), "x" * 257, "id", "length <= 256"),
     (
         ("stance", "joints"),

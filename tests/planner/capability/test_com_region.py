@@ -1,0 +1,250 @@
+"""Where the centre of mass may be: against plans, another solver, and frames moved or mirrored."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from msgspec import structs
+from scipy.spatial import ConvexHull
+
+from hand_models.base import InvalidInputError, Pose, turns_about
+from planner.capability import BodySpace, ComRegion, com_region
+from planner.question import Limits, Load, Question
+from planner.robots import Payload
+from planner.solving import plan
+from service.answering import dispatch, questions
+from service.commands.cli import run_command_line
+from service.commands.stances import read_request
+from tests.suite.helpers import peer
+from tests.suite.helpers.commands import DONE, result
+from tests.suite.helpers.replies import PLAN, departures, refusal
+from tests.suite.helpers.requests import wall_request
+from tests.suite.helpers.stances import on_wall
+
+
+@cache
+def bundled(name: str) -> Question:
+    return questions.question(read_request(name)).bare()
+
+
+@cache
+def region_of(name: str) -> ComRegion:
+    return com_region(BodySpace(bundled(name)))
+
+
+def planned_at(question: Question, point_in_world: np.ndarray) -> bool:
+    """Whether a plan holds a centre of mass at a point of W."""
+    com = tuple(question.stance.body.inverse().apply(point_in_world).tolist())
+    moved = replace(question, load=structs.replace(question.load, com=com), explain=False)
+    return plan(moved).status == "optimal"
+
+
+def border_of_plans(question: Question, region: ComRegion, angle: float) -> float:
+    """Farthest shift from the region's middle at which a plan holds, by halving [m]."""
+    middle = region.polygon.inner.mean(axis=0)
+    way = np.array([np.cos(angle), np.sin(angle)])
+    held, lost = 0.0, 3.0
+    while lost - held > 1e-4:
+        half = 0.5 * (held + lost)
+        point = (middle + half * way) @ region.axes + 0.7 * region.up
+        held, lost = (half, lost) if planned_at(question, point) else (held, half)
+    return 0.5 * (held + lost)
+
+
+def border_of(region: ComRegion, polygon: np.ndarray, angle: float) -> float:
+    """Farthest shift from the region's middle within a polygon [m]."""
+    middle = region.polygon.inner.mean(axis=0)
+    facets = ConvexHull(polygon).equations
+    speed = facets[:, :2] @ [np.cos(angle), np.sin(angle)]
+    room = -(facets[:, :2] @ middle + facets[:, 2])
+    return float(np.min(room[speed > 1e-12] / speed[speed > 1e-12]))
+
+
+@pytest.mark.parametrize("name", ["wall-300", "wall-300-joints", "slab", "boulders"])
+def test_its_border_is_that_of_plans(name):
+    check_border(name, np.linspace(0.1, 2.0 * np.pi + 0.1, 3, endpoint=False))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["wall-300", "wall-300-joints", "slab", "overhang", "wall"])
+def test_its_border_is_that_of_plans_all_around(name):
+    check_border(name, np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False))
+
+
+def check_border(name: str, angles: np.ndarray) -> None:
+    question, region = bundled(name), region_of(name)
+    width = float(np.ptp(region.polygon.outer, axis=0).max())
+    assert region.polygon.gap <= 0.001 * width
+    for angle in angles:
+        scanned = border_of_plans(question, region, angle)
+        inner = border_of(region, region.polygon.inner, angle)
+        outer = border_of(region, region.polygon.outer, angle)
+        # a plan's utilisation may be 0.1 % above the least: half a millimetre of the border
+        assert inner - 5e-4 <= scanned <= outer + 2e-4
+        assert outer - inner <= 0.005 * width
+        assert abs(scanned - inner) <= 0.005 * width
+
+
+def test_each_corner_is_the_farthest_of_another_solver():
+    question = Question(on_wall(), load=Load(80.0, (0.0, 0.0, 0.05)))
+    region = com_region(BodySpace(question))
+    rows = peer.rows(question)
+    n = rows.L.shape[1]
+    stance = question.stance
+    force = 80.0 * stance.body.rotation.T @ -np.array(stance.gravity)
+    at_origin = np.concatenate([force, np.zeros(3)])
+    # c × F, by hand, for a shift by one metre along each axis
+    columns = np.array(
+        [np.concatenate([np.zeros(3), np.cross(stance.body.rotation.T @ axis, force)])
+         for axis in region.axes]
+    ).T  # fmt: skip
+    origin = region.axes @ stance.body.position
+    for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
+        goal = np.array([np.cos(angle), np.sin(angle)])
+        found = peer.solve(
+            np.concatenate([np.zeros(n), -goal]),
+            np.pad(np.vstack([rows.L, rows.H]), ((0, 0), (0, 2))),
+            np.concatenate([rows.s - rows.l0, rows.h]),
+            np.hstack([rows.B, -columns]),
+            at_origin - rows.b,
+        )
+        reach = goal @ origin - found.fun
+        inner, outer = (np.max(each @ goal) for each in _polygons(region))
+        assert inner - 1e-5 <= reach <= outer + 1e-5
+        assert outer - inner <= region.polygon.gap + 1e-9
+
+
+def _polygons(region: ComRegion) -> tuple[np.ndarray, np.ndarray]:
+    return region.polygon.inner, region.polygon.outer
+
+
+def width_in(region: ComRegion, way: np.ndarray) -> np.ndarray:
+    """Extent along a direction of W, least and largest."""
+    along = region.polygon.inner @ (region.axes @ way)
+    return np.array([along.min(), along.max()])
+
+
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_it_moves_with_the_world(seed):
+    rng = np.random.default_rng(seed)
+    question, region = bundled("slab"), region_of("slab")
+    by = Pose(rng.uniform(-5.0, 5.0, 3), turns_about(rng.normal(size=3)))
+    stance = question.stance
+    moved = replace(
+        stance,
+        gravity=by.rotation @ stance.gravity,
+        body=by @ stance.body,
+        hands=tuple(replace(hand, pose=by @ hand.pose) for hand in stance.hands),
+    )
+    found = com_region(BodySpace(replace(question, stance=moved)))
+    np.testing.assert_allclose(found.up, by.rotation @ region.up, atol=1e-9)
+    np.testing.assert_allclose(found.com, by.apply(region.com), atol=1e-9)
+    np.testing.assert_allclose(found.margin, region.margin, atol=1e-3)
+    # the same points: those of one are within the other, but for the gaps
+    way = region.axes[0] * 0.6 + region.axes[1] * 0.8
+    offset = (by.rotation @ way) @ by.position
+    np.testing.assert_allclose(
+        width_in(found, by.rotation @ way), width_in(region, way) + offset, atol=1e-3
+    )
+
+
+def test_a_mirrored_stance_has_a_mirrored_region_and_the_order_of_hands_does_not_matter():
+    # four pinches of a wall, alike on both sides of its plane x-z
+    question = bundled("wall-300")
+    low, high = width_in(region_of("wall-300"), np.array([0.0, 1.0, 0.0]))
+    assert low == pytest.approx(-high, abs=1e-3)
+    stance = question.stance
+    turned = replace(question, stance=replace(stance, hands=stance.hands[::-1]))
+    found = com_region(BodySpace(turned))
+    for way in (*np.eye(3)[:2], np.array([0.6, -0.8, 0.0])):
+        np.testing.assert_allclose(
+            width_in(found, way), width_in(region_of("wall-300"), way), atol=1e-3
+        )
+
+
+def test_limits_shrink_it_and_a_lighter_body_widens_it():
+    question = bundled("wall-300")
+    area = {
+        name: ConvexHull(com_region(BodySpace(each)).polygon.inner).volume
+        for name, each in {
+            "whole": question,
+            "capped": replace(question, limits=Limits(utilisation=0.98)),
+            "light": replace(question, load=Load(mass=60.0)),
+            "laden": replace(question, load=Load(payloads=(Payload(10.0, link="torso"),))),
+        }.items()
+    }
+    assert area["capped"] < area["whole"] < area["light"]
+    assert area["laden"] < area["whole"]
+
+
+def test_acceleration_tilts_the_prism():
+    question = replace(bundled("slab"), load=Load(acceleration=(1.0, 0.0, 0.0)))
+    region = com_region(BodySpace(question))
+    expected = np.array([1.0, 0.0, 9.81])
+    np.testing.assert_allclose(region.up, expected / np.linalg.norm(expected), atol=1e-6)
+    corner = region.polygon.inner[0] @ region.axes
+    inside = 0.99 * corner + 0.01 * (region.polygon.inner.mean(axis=0) @ region.axes)
+    beyond = 1.01 * corner - 0.01 * (region.polygon.inner.mean(axis=0) @ region.axes)
+    for height in (-0.5, 0.0, 0.8):
+        assert planned_at(question, inside + height * region.up)
+        assert not planned_at(question, beyond + height * region.up)
+
+
+def test_the_margin_is_the_distance_to_the_border():
+    region = region_of("slab")
+    point = region.axes @ region.com
+    facets = ConvexHull(region.polygon.inner).equations
+    distance = -np.max(facets[:, :2] @ point + facets[:, 2])
+    assert region.margin == pytest.approx(distance, abs=1e-9)
+    assert region_of("boulders").margin < 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"body_wrench": [0.0] * 6, "load": None}, "body_wrench"),
+        ({"load": {"acceleration": [0.0, 0.0, -9.81]}}, "load.acceleration"),
+    ],
+)
+def test_without_weight_there_is_none(change, field):
+    request = wall_request() | change | {"want": ["com_region"]}
+    if request["load"] is None:
+        del request["load"]
+    else:
+        request["stance"]["gravity"] = [0.0, 0.0, -9.81]
+    assert refusal(request)[:2] == ("invalid", field)
+
+
+def test_an_angular_acceleration_is_refused():
+    question = replace(bundled("wall-300-joints"), load=Load(angular_acceleration=(0.1, 0.0, 0.0)))
+    with pytest.raises(InvalidInputError) as caught:
+        com_region(BodySpace(question))
+    assert caught.value.field == "load.angular_acceleration"
+
+
+def test_a_plan_and_the_command_tell_it(capfd, tmp_path):
+    request = wall_request(50.0) | {"want": ["com_region"]}
+    answer = dispatch.handle(PLAN, json.dumps(request).encode())
+    told = json.loads(answer.payload)
+    assert departures("PlanReply", told) == []
+    region = told["com_region"]
+    path = tmp_path / "stance.json"
+    path.write_text(json.dumps(request))
+    picture = tmp_path / "com.png"
+    arguments = ["body-space", str(path), "--com", "--json", "--plot", str(picture)]
+    assert run_command_line(arguments) == DONE
+    again = result(capfd)
+    assert departures("BodySpaceReply", again) == []
+    assert again["com_region"] == region
+    assert region["exact"]
+    assert region["margin"] > 0.0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert run_command_line(["body-space", str(path), "--com"]) == DONE
+    printed = " ".join(capfd.readouterr().out.split())
+    assert f"{1e3 * region['margin']:.0f} mm within its border" in printed
