@@ -27,9 +27,7 @@ __all__ = ["HandPostures", "SettledHand", "SettledPalm", "SettledTile"]
 
 
 class HandPostures(NamedTuple):
-    """Postures and contacts of the four fingers in the order of `FINGERS`, arrays of shape (4, 3).
-
-    The second axis counts the phalanges, proximal first.
+    """Postures and contacts of each finger in `FINGERS`, proximal phalanx first: shape (4, 3).
 
     Attributes
     ----------

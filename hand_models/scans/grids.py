@@ -225,7 +225,7 @@ def _sides(cell: float | None, own: Cell | None) -> Cell:
     sides = own if cell is None else (cell, cell)
     if sides is None:
         raise InvalidInputError(
-            "must be given: the file has no cell size in a unit of length; use the file's unit",
+            "must be given: the file has no cell size in a unit of length; use that of the heights",
             field="cell",
         )
     if not all(math.isfinite(side) and side > 0.0 for side in sides):

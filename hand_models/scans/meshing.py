@@ -198,7 +198,7 @@ def _nothing_left(scan: Scan, made: Triangulated, hole: float) -> InvalidInputEr
                 f"{message}, {open_}; --hole {wider:g} bridges them", field="hole"
             )
     return InvalidInputError(
-        f"{message}, {open_}; rock is to be scanned with points less than that apart", field="hole"
+        f"{message}, {open_}; scan the rock with points less than that hole apart", field="hole"
     )
 
 

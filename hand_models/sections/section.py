@@ -112,7 +112,7 @@ class Section(ABC):
         """
 
     def clearance(self, point: Vector2) -> float:
-        """Return the approximate signed distance of a point (s, t) from the rock [m]."""
+        """Return the approximate signed distance of (s, t) from the rock, negative inside [m]."""
         return self.distance(complex(*point))
 
     def clearances(self, places: Complexes) -> Array:

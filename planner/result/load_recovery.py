@@ -332,8 +332,7 @@ def recover_floating_hand(
         The set's loads y: twist of the wrist from rest [m, rad]; for a compliant hand, tensions
         [N] and then the twist.
     pose : WristPlan
-        Planned wrist pose; whether the wrist is driven, the tiles' stretches, pose target and
-        stiffness are filled in.
+        Planned wrist pose. The returned plan has a copy with all else of `WristPlan` filled in.
     stiffness : LimbStiffness, optional
         Stiffness of the limb.
 

@@ -112,7 +112,8 @@ def sweep_command(
         result = sweeping.with_borders(design, sink.points, own.robot, tolerance)
     except processes.Interrupted:
         raise processes.Interrupted(
-            f"all points are answered in {table}, not all borders; --resume goes on"
+            f"all points are answered in {table}, but not all borders of what is feasible are "
+            "found; --resume goes on"
         ) from None
     with tables.filling_folder():
         sweeping.plot_sweep(result, picture, Path(stance).stem, pair)
