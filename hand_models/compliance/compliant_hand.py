@@ -277,7 +277,10 @@ class CompliantHands:
         self.lateral_stiffness = lateral_stiffness(settled, out, arms[..., 2])
         self._positions = positions[..., None]
         self._axes = np.array([each.axes for each in settled])[..., None]
-        self._joints = np.repeat(joints, len(PHALANGES), axis=1)[..., None]
+        # beside the fingers' planes, where tiles bear on one side
+        beside = np.array([each.postures.across for each in settled])[..., None]
+        places = joints[:, :, None] + beside * sideways[:, :, None]
+        self._joints = places.reshape(len(hands), -1, 3)[..., None]
         self._along = along[:, :, None, :, None]
         # where each tile is among those of all fingers, and which tiles are of phalanges
         counts, place = np.bincount(of), np.arange(len(of)) - first[of]

@@ -30,7 +30,7 @@ from hand_models.compliance.grasp import (
 )
 from hand_models.compliance.rolling import Numbers
 from hand_models.finger import PHALANGES
-from hand_models.fixed_wrist import layout_of
+from hand_models.fixed_wrist import layout_of, twist_arms
 from hand_models.hand import FINGERS, HELD_DIRECTIONS
 from hand_models.wrench_spaces import WrenchSpace
 
@@ -58,7 +58,7 @@ class FloatingWrist(CompliantGrasp):
     """Limits and wrench space of a hand with a floating wrist: motors stand still, the wrist moves.
 
     Its loads e are the tiles' shears, normals and laterals, the tensions, the palm's shear and
-    pressing, and the torques on stops.
+    pressing, the torques on stops, and the twists of joints.
 
     Attributes
     ----------
@@ -80,6 +80,7 @@ class FloatingWrist(CompliantGrasp):
     def __post_init__(self) -> None:
         self.layout = layout_of(self.hand.settled, sticking=False)
         self.palm_carries = bool(self.hand.settled.palm.engaged)
+        self._twist_arms = twist_arms(self.hand.settled, self.layout.twisted)
         self.load_rows = self._load_rows()
         # loads at the complex steps from poses, by the poses
         self._kept: BoundedStore[bytes, HandLoads] = BoundedStore(
@@ -93,7 +94,8 @@ class FloatingWrist(CompliantGrasp):
         n, structure = len(settled.tiles), settled.hand.structure
         tension, palm = 3 * n, 3 * n + len(FINGERS)
         stop = palm + 2
-        size, nl = stop + len(settled.stops), len(layout.limits) - len(HELD_DIRECTIONS)
+        twist, nl = stop + len(settled.stops), len(layout.limits) - len(HELD_DIRECTIONS)
+        size = twist + len(layout.twisted)
         P, p, s = np.zeros((nl, size)), np.zeros(nl), np.full(len(layout.limits), np.nan)
         tile, (planes,) = layout.plane_tiles, layout.planes([settled.surface])
         *slopes, capacity = planes.T
@@ -121,6 +123,9 @@ class FloatingWrist(CompliantGrasp):
         for t in layout.tips:
             P[k, n + t], s[k] = 1.0, structure.fingertip_force
             k += 1
+        for t in range(twist, size):
+            own = slice(k, k + 2)
+            P[own, t], s[own], k = (1.0, -1.0), structure.finger_twist, own.stop
         if settled.palm.engaged:
             P[k:, palm:stop] = np.eye(2)
             s[k:nl] = settled.palm.shear_limit, settled.palm.pressing_limit
@@ -135,7 +140,7 @@ class FloatingWrist(CompliantGrasp):
         Q[row, n + touching] = -friction
         base = layout.bases
         Q[row[np.isin(touching, base)], n + base + 1] = -friction * settled.engagement[base]
-        Q[len(those) :, stop:] = -np.diag(pushed)
+        Q[len(those) :, stop:twist] = -np.diag(pushed)
         q = np.zeros(len(Q))
         q[row] = settled.drag_allowances[touching]
         held = np.hstack([HELD_DIRECTIONS, np.zeros_like(HELD_DIRECTIONS)])
@@ -203,9 +208,13 @@ class FloatingWrist(CompliantGrasp):
         if not self.palm_carries:
             palm, wrenches = 0.0 * palm, wrenches - palm @ self.hand.palm_wrenches
         elements = [loads.shears, loads.normals, loads.laterals, loads.tensions, palm]
-        return GraspLoads(
-            np.concatenate([*elements, loads.stop_torques], axis=1), wrenches, loads.reached
-        )
+        elements += [loads.stop_torques, self._twists(loads)]
+        return GraspLoads(np.concatenate(elements, axis=1), wrenches, loads.reached)
+
+    def _twists(self, loads: HandLoads) -> Numbers:
+        """Return the twist of each joint of ``layout.twisted``, shape (m, k) [N·m]."""
+        in_plane = loads.tile_loads[..., :2, None] * loads.axes[..., :2, :]
+        return np.asarray(np.einsum("ktx,mtx->mk", self._twist_arms, in_plane.sum(axis=2)))
 
     def sieve(self, twists: Array) -> Indices:
         """Return the indices of those of m wrist poses (m, d) that keep the limits of finger tiles.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hand_models.base import Array, InvalidInputError
-from hand_models.parameters import ParameterTable
+from hand_models.parameters import ParameterTable, check_widths
 
 __all__ = ["PHALANGES", "FingerModel"]
 
@@ -133,12 +133,7 @@ class FingerModel:
                 f"got {begin:g} to {end:g} m (tile_centre ± tile_length / 2)",
                 field="finger.tile_centre",
             )
-        if not 0.0 <= model.tile_width <= model.frame_width:
-            raise InvalidInputError(
-                f"must be from 0 to finger.frame_width, {model.frame_width:g} m, "
-                f"got {model.tile_width:g} m",
-                field="finger.tile_width",
-            )
+        check_widths(table)
         for lower, upper in zip(model.joint_lower, model.joint_upper, strict=True):
             if not -math.pi <= lower < upper <= math.pi:
                 raise InvalidInputError(

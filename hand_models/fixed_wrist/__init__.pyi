@@ -6,6 +6,7 @@ from .contact_rest import (
     placed_by_contact as placed_by_contact,
     rests_on_rock as rests_on_rock,
 )
+from .finger_twist import FINGER_TWIST as FINGER_TWIST, twist_arms as twist_arms
 from .hold_trials import (
     AT_BORDER as AT_BORDER,
     HOLD_RANKS as HOLD_RANKS,

@@ -16,6 +16,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices
 from hand_models.finger import PHALANGES
+from hand_models.fixed_wrist.finger_twist import FINGER_TWIST, twisted_joints
 from hand_models.hand import (
     FINGERS,
     FINGERTIP_FORCE,
@@ -74,6 +75,8 @@ class RowLayout:
         Columns of the lateral reactions, and of the loads along nails that hook.
     stops : tuple of (int, int)
         Finger and joint of each joint that is at its stop.
+    twisted : tuple of (int, int)
+        Finger and joint of each joint that tiles twist which bear beside their finger's plane.
     palm : bool
         True if the palm is on rock: the last two columns are then its shear and its pressing.
     sticking : bool
@@ -99,6 +102,7 @@ class RowLayout:
     lateral_columns: tuple[int, ...]
     nail_columns: tuple[int, ...]
     stops: tuple[tuple[int, int], ...]
+    twisted: tuple[tuple[int, int], ...]
     palm: bool
     sticking: bool
 
@@ -138,6 +142,7 @@ def layout_of(settled: SettledHand, *, sticking: bool) -> RowLayout:
         settled.grasp.lateral,
         tuple([piece.limit for piece in inner_half_planes(settled.surface)]),
         tuple([(finger, joint) for finger, joint, _ in settled.stops]),
+        twisted_joints(closed),
         bool(closed.palm.engaged),
         sticking,
     )
@@ -149,6 +154,7 @@ def row_layout(
     lateral: bool,
     pieces: tuple[str, ...],
     stops: tuple[tuple[int, int], ...],
+    twisted: tuple[tuple[int, int], ...],
     palm: bool,
     sticking: bool,
 ) -> RowLayout:
@@ -163,6 +169,8 @@ def row_layout(
         Names of the half-planes that limit each tile.
     stops : tuple of (int, int)
         Finger and joint of each joint that is at its stop.
+    twisted : tuple of (int, int)
+        Finger and joint of each joint that tiles twist.
     palm : bool
         True if the palm is on rock.
     sticking : bool
@@ -198,6 +206,9 @@ def row_layout(
     limits += [(FINGERS[i], None, "finger_shear", "") for i in engaged]
     limits += [(FINGERS[i], None, "finger_lateral", sign) for i in reacting for sign in "+-"]
     limits += [(tiles[i].finger, "distal", FINGERTIP_FORCE, "") for i in tips]
+    limits += [
+        (FINGERS[i], PHALANGES[joint], FINGER_TWIST, s) for i, joint in twisted for s in "+-"
+    ]
     limits += [
         (each, NAIL, name, "") for each in clinging for name in (NAIL_SHEAR, FINGERTIP_FORCE)
     ]
@@ -239,6 +250,7 @@ def row_layout(
         lateral_columns=tuple(lateral_columns),
         nail_columns=tuple(nail_columns),
         stops=stops,
+        twisted=twisted,
         palm=palm,
         sticking=sticking,
     )

@@ -24,6 +24,7 @@ from typing import Final
 import numpy as np
 
 from hand_models.base import BASE_TOLERANCES, Array, check_positive, skew
+from hand_models.fixed_wrist.finger_twist import twist_moments
 from hand_models.fixed_wrist.row_layout import RowLayout, layout_of
 from hand_models.hand import FINGERS, HELD_DIRECTIONS, HandModel, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
@@ -135,7 +136,8 @@ def limit_rows(
     -------
     L, l0, s : ndarray, shapes (h, nl, m), (h, nl), (h, nl)
         Load of each limit per unit of each column, at zero load, and its capacity; in the order of
-        ``layout.limits``: tiles, tendons and motors, fingers, nails, palm, hand.
+        ``layout.limits``: tiles, tendons and motors, fingers, nails, palm, hand; [N], of motors
+        also [N·m] and [A], of the twist of joints [N·m].
     """
     (at_zero, V), finger_of = wrenches, layout.finger_of
     loads, structure = _of_tiles(hands, "loads"), model.structure
@@ -163,17 +165,21 @@ def limit_rows(
         L[:, own, :TENDON_COUNT], l0[:, own], s[:, own] = slope * EACH_TENDON, start, end
         k += TENDON_COUNT
     engaged, tips = np.array(layout.engaged, dtype=np.intp), layout.tips
-    signs = (1.0, -1.0)  # of a lateral reaction
+    signs = (1.0, -1.0)  # of a lateral reaction, and of a twist
     sideways, reacting = (
         np.repeat(np.array(each, dtype=np.intp), len(signs))
         for each in (layout.lateral_columns, layout.reacting)
     )
     shears = _of_fingers(layout, loads[:, :, 0])[:, engaged].transpose(2, 0, 1)
+    twisted = np.repeat(np.array([i for i, _ in layout.twisted], dtype=np.intp), len(signs))
+    twists = twist_moments(hands, layout.twisted).repeat(len(signs), axis=2)
+    twists *= np.resize(signs, len(twisted))
     either_way = np.array([np.zeros(len(sideways)), np.resize(signs, len(sideways))])
     for of, (start, slope), end in (
         (engaged, shears, structure.finger_shear),
         (sideways, either_way, np.array([_aside(hand)[reacting] for hand in hands])),
         (finger_of[tips], loads[:, tips, 1].transpose(2, 0, 1), structure.fingertip_force),
+        (twisted, twists, structure.finger_twist),
     ):
         row = k + np.arange(len(of))
         L[:, row, of], l0[:, row], s[:, row] = slope, start, end
@@ -288,11 +294,12 @@ def wrench_space(settled: SettledHand, tension_limit: float | None = None) -> Wr
         Columns: four tensions, the lateral reactions, the load along each nail that hooks, palm
         shear and palm pressing [N]. Limit rows: each tile's half-planes (with both signs of its
         lateral load); each tendon's tension, motor torque [N·m] and motor current [A]; the shear of
-        a finger's tiles together, a finger's lateral load, the pressing of its tip; two for each
-        nail; the palm; and, as wrench rows, the hand's force along the `HELD_DIRECTIONS`. Hard
-        rows: no negative tension or palm load; no tile dragged backwards; a joint's stop and a
-        frame beside its tile only push; a nail that hooks neither lifts nor slips nor closes its
-        finger; with friction in the tendons, no tension below closing, where they would stick.
+        a finger's tiles together, a finger's lateral load, the pressing of its tip, the twist
+        of its joints [N·m]; two for each nail; the palm; and, as wrench rows, the hand's force
+        along the `HELD_DIRECTIONS`. Hard rows: no negative tension or palm load; no tile dragged
+        backwards; a joint's stop and a frame beside its tile only push; a nail that hooks neither
+        lifts nor slips nor closes its finger; with friction in the tendons, no tension below
+        closing, where they would stick.
         Arrays are read-only.
 
     Raises

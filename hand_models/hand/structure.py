@@ -1,8 +1,8 @@
 """Bounds on load from the strength of the hand's structure, not of its spines (Sections 2, 3.2).
 
 The paper prints three figures: a finger sustains 500 N of shear, produces 600 N at its tip, and a
-hand grips under loads of up to 50 kg. The last limits the force F that a hand exerts on the rock,
-across the rock and away from it,
+hand grips under loads of up to 50 kg. What twist a finger bears about its axis is not printed. The
+50 kg limit the force F that a hand exerts on the rock, across the rock and away from it,
 
     |(F_x, F_y, min(F_z, 0))| ≤ R,
 
@@ -64,12 +64,16 @@ class Structure:
     fingertip_force : float
         Largest force with which the distal phalanx may press on rock [N]. The paper's 600 N are
         what a finger *can produce* at its tip, read here as a limit on pressing.
+    finger_twist : float
+        Largest moment that a joint carries about the axis of its phalanx from tiles that bear
+        beside the finger's plane [N·m].
     hand_load : float
         R, largest force of a hand across the rock and away from it [N].
     """
 
     finger_shear: float
     fingertip_force: float
+    finger_twist: float
     hand_load: float
 
     @classmethod
@@ -81,12 +85,11 @@ class Structure:
         InvalidInputError
             If a number is missing or not above zero.
         """
-        numbers = {
-            name: table.positive("structure", name)
-            for name in ("finger_shear", "fingertip_force", "held_mass", "standard_gravity")
-        }
+        names = ("finger_shear", "fingertip_force", "finger_twist", "held_mass", "standard_gravity")
+        numbers = {name: table.positive("structure", name) for name in names}
         return cls(
             finger_shear=numbers["finger_shear"],
             fingertip_force=numbers["fingertip_force"],
+            finger_twist=numbers["finger_twist"],
             hand_load=numbers["held_mass"] * numbers["standard_gravity"],
         )

@@ -8,6 +8,7 @@ from .draws import (
 )
 from .own import (
     LARGEST_BY_UNIT as LARGEST_BY_UNIT,
+    check_widths as check_widths,
     load_own_hand as load_own_hand,
     own_hand as own_hand,
     own_surfaces as own_surfaces,

@@ -1,7 +1,8 @@
 """Parameters of a caller's hand or surfaces: check entries that replace some of the bundled ones.
 
 The bundled table must have the entry, in the same unit and shape, and with a sign and size that are
-possible. Combinations of numbers are checked by the models that read them.
+possible. Combinations of numbers are checked by the models that read them, but for the widths of
+fingers, of which rock is cut without a model of a finger.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from hand_models.parameters.tables import (
     surface_table,
 )
 
-__all__ = ["load_own_hand", "own_hand", "own_surfaces"]
+__all__ = ["check_widths", "load_own_hand", "own_hand", "own_surfaces"]
 
 LARGEST_BY_UNIT: Final = {"m": 1.0, "rad": 2.0 * math.pi}
 """Largest magnitude of a hand's parameter, by unit; a larger one is in millimetres or degrees."""
@@ -75,11 +76,35 @@ def own_hand(own: ParameterTable, base: ParameterTable | None = None) -> Paramet
     Raises
     ------
     InvalidInputError
-        If an entry of ``own`` is unknown, or its unit, shape, sign or size is not possible; the
-        field is its section and name.
+        If an entry of ``own`` is unknown, or its unit, shape, sign or size is not possible, or the
+        hand's tiles are wider than its frames; the field is its section and name.
     """
     bundled = hand_table()
-    return (base or bundled).replaced(_checked(own, bundled.sections))
+    whole = (base or bundled).replaced(_checked(own, bundled.sections))
+    check_widths(whole)
+    return whole
+
+
+def check_widths(table: ParameterTable) -> None:
+    """Refuse a hand whose tiles are wider than the frames of its phalanges.
+
+    Parameters
+    ----------
+    table : ParameterTable
+        All entries of the hand.
+
+    Raises
+    ------
+    InvalidInputError
+        If ``finger.tile_width`` is not from 0 to ``finger.frame_width``.
+    """
+    tile, frame = (table.scalar("finger", name) for name in ("tile_width", "frame_width"))
+    if not 0.0 <= tile <= frame:
+        raise InvalidInputError(
+            f"must be from 0 to finger.frame_width, {frame:g} m, got {tile:g} m; lower it, or "
+            "raise frame_width",
+            field="finger.tile_width",
+        )
 
 
 def own_surfaces(own: ParameterTable) -> ParameterTable:

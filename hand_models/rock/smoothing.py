@@ -29,7 +29,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from hand_models.base import BASE_TOLERANCES, Array, Indices, InvalidInputError
-from hand_models.parameters import ParameterTable, hand_table, scan_table
+from hand_models.parameters import ParameterTable, check_widths, hand_table, scan_table
 from hand_models.rock.holds import Hold
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import unstrung
@@ -90,8 +90,14 @@ class Scale:
         ----------
         hand : ParameterTable, optional
             All parameters of the hand; the bundled ones by default.
+
+        Raises
+        ------
+        InvalidInputError
+            If the hand's tiles are wider than its frames.
         """
         hand, table = hand or hand_table(), scan_table()
+        check_widths(hand)
         usual = table.scalar("cut", "reach")
         reach = max(
             usual,

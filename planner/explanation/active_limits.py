@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, Indices
+from hand_models.fixed_wrist import FINGER_TWIST
 from hand_models.wrench_spaces import Row, WrenchSpace
 from planner.prepare import KEPT_NAMES
 from planner.programs import CAP_SLACK, JOINT_FORCE, JOINT_TORQUE
@@ -64,8 +65,9 @@ def limit_unit(limit: str) -> str:
     limit : str
         Kind of limit, such as ``motor_torque``; see `planner.result.LimitName`.
     """
-    units = {"motor_torque": "N·m", "motor_current": "A", JOINT_TORQUE: "N·m"}
-    return units.get(limit, "N")
+    if limit in ("motor_torque", FINGER_TWIST, JOINT_TORQUE):
+        return "N·m"
+    return "A" if limit == "motor_current" else "N"
 
 
 def limit_name(limb: str, row: Row) -> LimitName:

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array
-from hand_models.fixed_wrist import HAND_LOAD
+from hand_models.fixed_wrist import FINGER_TWIST, HAND_LOAD
 from hand_models.hand import NAIL
 from planner.explanation.active_limits import LimitUse
 from planner.explanation.infeasibility import HELD_WRENCH
@@ -58,6 +58,7 @@ LIMIT_WORDS: Final = {
     "palm_pressing": _Words(manner=" in pressing"),
     "nail_shear": _Words(manner=" along its finger"),
     "fingertip_force": _Words(manner=" in pressing"),
+    FINGER_TWIST: _Words(manner=" about its phalanx"),
     HAND_LOAD: _Words("the hand", "holds", "hold"),
     FORCE_CAP: _Words("the hand", "exerts", "exert", " allowed", "may exert no more that way"),
     HELD_WRENCH: _Words("the hand", barrier="must exert the wrench that it is given"),
@@ -87,6 +88,8 @@ def _bearer(name: LimitName) -> str:
     """Say what a limit is about: ``tile``."""
     if name.limit == "fingertip_force":
         return "fingertip"
+    if name.limit == FINGER_TWIST:
+        return f"{name.phalanx} joint"
     if name.phalanx is not None:
         return name.phalanx if name.phalanx == NAIL else "tile"
     if name.joint is not None:
@@ -119,7 +122,7 @@ def _barrier(limit: str) -> str:
 def _spoken_load(limit: str, load: float) -> str:
     if limit == "motor_torque":
         return f"{1e3 * load:.3g} mN·m"
-    if limit == JOINT_TORQUE:
+    if limit in (JOINT_TORQUE, FINGER_TWIST):
         return f"{load:.3g} N·m"
     if limit == "motor_current":
         return f"{load:.3g} A"

@@ -47,10 +47,11 @@ class LimitName(Struct, frozen=True):
         None if the limit is not a finger's, or not a tile's.
     limit : str
         What is limited: of a tile ``shear``, ``pull_off``; of a finger ``tendon_tension``,
-        ``motor_torque``, ``motor_current``, ``finger_shear``, ``finger_lateral`` and, with its
-        distal phalanx, ``fingertip_force``; of a hand ``palm_shear``, ``palm_pressing``,
-        ``hand_load`` and, if the question caps it, ``force_cap``; of a limb ``joint_torque``, or
-        ``joint_force`` of a prismatic joint; or a hard row's name.
+        ``motor_torque``, ``motor_current``, ``finger_shear``, ``finger_lateral``, with its distal
+        phalanx ``fingertip_force``, with the phalanx after a joint ``finger_twist``; of a hand
+        ``palm_shear``, ``palm_pressing``, ``hand_load`` and, if the question caps it,
+        ``force_cap``; of a limb ``joint_torque``, or ``joint_force`` of a prismatic joint; or a
+        hard row's name.
     joint : str or None
         Joint whose torque or force is limited; None for other limits.
     """

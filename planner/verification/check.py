@@ -24,7 +24,7 @@ from hand_models.base import SKEW_MATRICES, Array, BoundedStore
 from planner.prepare import HandBatch, Posture
 from planner.question import HandOnHold, LostTile, Question
 from planner.result import PlanArrays
-from planner.verification.fingers import DriveLimits, NailLimits
+from planner.verification.fingers import DriveLimits, NailLimits, TwistLimits
 from planner.verification.floating import recompute_floating
 from planner.verification.hands import HandLimits, check_contacts
 from planner.verification.joint_balance import JointBalance
@@ -87,7 +87,7 @@ class SettledLimits:
         self.nails = nails = NailLimits(names)
         drives = DriveLimits(names, balance.left, strength, nails.fingers)
         self.tiles = tiles = TileLimits(names, nails.tiles)
-        self.limits = (balance, tiles, drives, HandLimits(names))
+        self.limits = (balance, tiles, drives, TwistLimits(known), HandLimits(names))
 
     def recompute(self, found: list[str], arrays: PlanArrays) -> Recomputed:
         """Recompute the tile loads from a plan's tensions, or for floating wrists from their poses.

@@ -10,9 +10,9 @@ from enum import IntEnum
 
 import numpy as np
 
-from hand_models.base import Array, Indices
+from hand_models.base import BASE_TOLERANCES, Array, Indices
 from hand_models.hand import FINGERS, NAIL
-from planner.prepare import CONTACT_CODES
+from planner.prepare import CONTACT_CODES, HandBatch
 from planner.result import PlanArrays
 from planner.verification.residuals import (
     FINGER_COUNT,
@@ -24,7 +24,7 @@ from planner.verification.residuals import (
     claim,
 )
 
-__all__ = ["DriveLimits", "NailLimits"]
+__all__ = ["DriveLimits", "NailLimits", "TwistLimits"]
 
 
 class _Row(IntEnum):
@@ -121,6 +121,45 @@ class DriveLimits(ResidualLimits):
         drive, finger = divmod(i, len(self._hand))
         what = ("motor torque", "motor current", "winch angle")[drive]
         return self._names.finger(what, finger)
+
+
+class TwistLimits(ResidualLimits):
+    """Limits of the moments about fingers' phalanges, from tiles that bear on one side.
+
+    Parameters
+    ----------
+    known : HandBatch
+        The hands on their holds.
+    """
+
+    def __init__(self, known: HandBatch) -> None:
+        frames = [f for hand in known.hands for f in hand.hand.frames(hand.grasp.outer_rotation)]
+        joints, along, across = (
+            np.array([getattr(frame, name) for frame in frames])
+            for name in ("joint", "along", "across")
+        )
+        arms = known.points[known.places.phalanges] - joints[:, None]
+        beside = np.abs((arms * across[:, None]).sum(axis=2)).max(axis=1)
+        self._fingers = own = np.flatnonzero(beside > BASE_TOLERANCES.length)
+        self._tiles, self._joints = known.places.phalanges[own], joints[own, None]
+        angles = known.angles[own, :, None]
+        # unit vectors along the phalanges
+        self._axes = np.cos(angles) * along[own, None] + np.sin(angles) * [0.0, 0.0, 1.0]
+        self._most = known.hands[0].hand.structure.finger_twist
+
+    def recompute(self, again: Recomputed) -> list[Residual]:
+        """Return the utilisations of joints by moments that the tiles from there on exert.
+
+        Forces in the finger's plane count, about an axis in that plane: whatever its joint.
+        """
+        if not len(self._fingers):
+            return []
+        tiles, planned = self._tiles, again.arrays
+        in_plane = again.loads[tiles][..., :2, None] * planned.axes[tiles][..., :2, :]
+        moments = np.cross(planned.points[tiles] - self._joints, in_plane.sum(axis=2))
+        beyond = np.cumsum(moments[:, ::-1], axis=1)[:, ::-1]
+        used = (beyond * self._axes).sum(axis=2) / self._most
+        return [Residual("use", np.hstack([used, -used]), self._fingers // FINGER_COUNT)]
 
 
 class NailLimits:

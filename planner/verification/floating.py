@@ -110,7 +110,8 @@ def _move(
     """
     h, index = divmod(finger, FINGER_COUNT)
     hand = known.hands[h]
-    model, rest = hand.fingers[index].model, _resting(hand, index)
+    settled, rest = hand.fingers[index], _resting(hand, index)
+    model = settled.model
     frame, own, tiles = rest.frame, rest.own, known.places.phalanges[finger]
     rows = np.flatnonzero(known.places.finger == finger)
     fingers.points[rows], fingers.axes[rows] = arrays.points[rows], arrays.axes[rows]
@@ -125,8 +126,11 @@ def _move(
         point = np.array([place @ frame.along, place[2]])
         arm = point - joint
         rise = way[0] * arm[1] - way[1] * arm[0]
+        aside, beside = float(place @ frame.across), settled.contacts[j].across
         if not abs(rise - face.height) <= 1e-9:  # [m] rounding
             found.append(f"{name}: {PHALANGES[j]} contact is {rise:.6g} m above its joint")
+        if not abs(aside - beside) <= 1e-9:  # [m] rounding
+            found.append(f"{name}: {PHALANGES[j]} contact is {aside:.6g} m beside its finger")
         dragged = complex(way[0], way[1]) * cmath.rect(1.0, -rest.tilts[j])
         angles.append(cmath.phase(dragged))
         fingers.joints[finger, j] = joint

@@ -134,13 +134,15 @@ class RowReply(Struct, kw_only=True):
     No strength can change a hard row. With y, the variables of the ``generators`` in order, a
     ``limit`` row is coefficients · y + constant ≤ utilisation · capacity. A ``hard`` row is
     coefficients · y ≤ capacity, whatever the utilisation. Capacities are in newtons; those of
-    ``motor_torque`` and ``joint_torque`` in newton-metres, those of ``motor_current`` in amperes.
+    ``motor_torque``, ``finger_twist`` and ``joint_torque`` in newton-metres, those of
+    ``motor_current`` in amperes.
 
     - ``name``: name of the row, unique in its set.
     - ``kind``: ``limit`` or ``hard``.
     - ``finger``: the finger that the row limits; null where the row limits the palm or the whole
       hand.
-    - ``phalanx``: the phalanx whose tile the row limits; null where the row limits no single tile.
+    - ``phalanx``: the phalanx whose tile the row limits; null where the row limits no single tile
+      (of ``finger_twist``: the phalanx about whose axis its joint is twisted).
     - ``limit``: name of the limit.
     - ``joint``: the joint of the limb that the row limits; null for other rows.
     - ``coefficients``: one number for each variable in y.

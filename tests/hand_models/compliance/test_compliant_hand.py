@@ -12,9 +12,10 @@ from hand_models.compliance import COMPLEX_STEP, CompliantHand, FloatingWrist
 from hand_models.compliance.compliant_finger import CompliantFingers
 from hand_models.fixed_wrist import wrench_space
 from hand_models.hand import FINGERS, Grasp
-from hand_models.rock import Cylinder, Edge, Ellipsoid, Plane, Sphere
+from hand_models.rock import Cylinder, Edge, Ellipsoid, Mesh, Plane, Sphere
 from hand_models.tile import Surface
 from tests.suite.helpers.hands import HAND, changed_hand, partly
+from tests.suite.helpers.rocks import fractal_wall
 
 ROCK = Surface.named("rock")
 
@@ -52,6 +53,29 @@ def test_at_rest_it_carries_what_the_fixed_wrist_carries(name, tension):
     y = np.zeros(len(space.columns))
     y[: len(FINGERS)] = tension
     np.testing.assert_allclose(loads.wrenches[0], space.wrench(y), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_tiles_that_bear_on_one_side_exert_their_moments_where_the_wrist_gives_way(seed):
+    vertices, faces = fractal_wall(seed, size=0.45, count=91)
+    settled = HAND.settle(Mesh(vertices, faces), ROCK, Grasp(outer_rotation=math.pi))
+    assert np.abs(settled.postures.across).max() > 2e-3
+    loads = CompliantHand(settled).loads(np.zeros((1, 6)))
+    np.testing.assert_allclose(loads.positions[0], settled.positions, atol=1e-12)
+    space = wrench_space(settled)
+    y = np.zeros(len(space.columns))
+    y[: len(FINGERS)] = settled.closing_tension
+    np.testing.assert_allclose(loads.wrenches[0], space.wrench(y), atol=1e-8)
+    # rolling contacts keep their distance from the finger's plane
+    moved = CompliantHand(settled).loads(np.array([[1e-4, -2e-4, -1e-4, 1e-3, 5e-4, -1e-3]]))
+    for frame, own, beside in zip(
+        settled.hand.frames(math.pi),
+        [np.flatnonzero(settled.finger_of == i)[-3:] for i in range(4)],
+        settled.postures.across,
+        strict=True,
+    ):
+        aside = (moved.positions[0, own] - frame.joint) @ frame.across
+        np.testing.assert_allclose(aside, beside, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", [name for name in HOLDS if name != "edge"])

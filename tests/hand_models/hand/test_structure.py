@@ -182,7 +182,13 @@ def test_rows_of_a_hand_in_the_air_are_constant_and_leave_its_only_wrench():
 
 
 def test_a_structure_that_bears_nothing_is_refused_by_name():
-    for name in ["finger_shear", "fingertip_force", "held_mass", "standard_gravity"]:
+    for name in [
+        "finger_shear",
+        "fingertip_force",
+        "finger_twist",
+        "held_mass",
+        "standard_gravity",
+    ]:
         with pytest.raises(InvalidInputError) as caught:
             changed_hand("structure", name, 0.0)
         assert caught.value.field == f"structure.{name}"

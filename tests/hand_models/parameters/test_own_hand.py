@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import zenoh
 from hand_models import Cylinder, InvalidInputError, Mesh, SpinyHand, spiny_hand
 from hand_models.hand import FINGERS
 from hand_models.parameters import ParameterTable, Quantity, hand_table, load_own_hand, own_hand
+from hand_models.rock import Profile
 from planner.robots import robosimian
 from service.answering import dispatch, read_hand, with_hand
 from service.answering.own_models import over_default
@@ -273,6 +274,14 @@ BAD = {
         entry_toml("finger", "joint_spacing", 0.03),
         "finger.tile_centre: a tile must lie on its phalanx, from 0 to 0.03 m, got 0.0085 to",
     ),
+    "frames narrower than tiles": (
+        entry_toml("finger", "frame_width", 0.02),
+        "finger.tile_width: must be from 0 to finger.frame_width, 0.02 m, got 0.0215 m; lower it",
+    ),
+    "tiles wider than frames": (
+        entry_toml("finger", "tile_width", 0.03),
+        "finger.tile_width: must be from 0 to finger.frame_width, 0.029 m, got 0.03 m; lower it",
+    ),
     "a joint that cannot turn": (
         entry_toml("finger", "joint_lower", [1.8, -0.3, -0.3]),
         "finger.joint_upper: must be above finger.joint_lower, both within half a turn, got 1.75",
@@ -330,6 +339,26 @@ BAD = {
     "no TOML": ("[hand\n", "is not valid TOML: Expected"),
     "no text": (b"\xff\xfe", "is not in UTF-8 (byte 0xff in line 1); save it as TOML in UTF-8"),
 }
+
+
+def test_tiles_wider_than_frames_are_refused_wherever_a_hand_is_read(tmp_path: Path) -> None:
+    narrow = own("finger", "frame_width", 0.02)
+    path = tmp_path / "narrow.toml"
+    path.write_text(entry_toml("finger", "frame_width", 0.02))
+    line = [[-0.1, 0.01], [0.0, 0.0], [0.1, 0.01]]
+    readers: list[Callable[[], object]] = [
+        lambda: load_own_hand(path),
+        lambda: own_hand(narrow),
+        lambda: SpinyHand(hand_table().replaced(narrow)),
+        lambda: Profile(line, hand_table().replaced(narrow)),
+    ]
+    for reads in readers:
+        with pytest.raises(InvalidInputError, match="lower it, or raise frame_width") as caught:
+            reads()
+        assert "finger.tile_width" in f"{caught.value.field} {caught.value}"
+    # but not where the tiles are made narrower, too
+    thin = own_hand(own("finger", "tile_width", 0.015))
+    assert own_hand(narrow, thin).scalar("finger", "frame_width") == 0.02
 
 
 @pytest.mark.parametrize("what", BAD)
