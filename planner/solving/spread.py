@@ -58,7 +58,8 @@ def find_spread(
         hand.wrist != "fixed" and hand.surface.name != FITTED_SURFACE
         for hand in question.stance.hands
     )
-    drawn = drawn_hands(question.stance.robot.hand, question.draws, wrists_move=moving)
+    limbs = tuple(sorted(hand.limb for hand in question.stance.hands))
+    drawn = drawn_hands(question.stance.robot.hand, question.draws, wrists_move=moving, limbs=limbs)
     refused: Counter[str] = Counter()
     try:
         for each in drawn:
@@ -90,7 +91,10 @@ def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | I
     # hands that close alike close once
     outcomes = settle_hands(drawn.model, list(placements.values()))
     found = dict(zip(placements, outcomes, strict=True))
-    return [found[key] for key in keys]
+    pairs = [(limb, found[key]) for limb, key in zip(prepared.limbs, keys, strict=True)]
+    return [
+        drawn.closed(each, limb) if isinstance(each, SettledHand) else each for limb, each in pairs
+    ]
 
 
 def _planned(
