@@ -41,6 +41,8 @@ class FingerModel:
         tendon, contact stiffness k_c, spring K_p); a tile on a rotating base has the proximal g.
     spine_travel : float
         Distance that spines reach out of their tile [m].
+    engagement_exponent : float
+        p, exponent of the law of engagement (`engaged_share`).
     frame_radius : float
         Radius of the bare phalanx about the line of its joints [m].
     bed_stiffness : float
@@ -64,6 +66,7 @@ class FingerModel:
     base_engagement: float
     shear_gain: tuple[float, ...]
     spine_travel: float
+    engagement_exponent: float
     frame_radius: float
     bed_stiffness: float
     friction: float
@@ -96,6 +99,7 @@ class FingerModel:
             base_engagement=table.scalar("tile", "base_engagement"),
             shear_gain=tuple((pulleys * contact / (contact + spring)).tolist()),
             spine_travel=table.scalar("tile", "spine_travel"),
+            engagement_exponent=table.positive("tile", "engagement_exponent"),
             frame_radius=table.positive("finger", "frame_radius"),
             bed_stiffness=table.positive("tile", "bed_stiffness"),
             friction=table.scalar("tendon", "friction"),

@@ -52,7 +52,7 @@ SETTINGS_RECORD: Final = record_of(asdict(SETTINGS))
 CODE_RECORD: Final = record_of(asdict(CONTACT_CODES))
 """`ContactCodes`, as compiled functions take them."""
 
-SHAPE_FIELDS: Final = PhalanxShape(*[0.0] * 6).record.dtype
+SHAPE_FIELDS: Final = PhalanxShape(*[0.0] * len(PhalanxShape._fields)).record.dtype
 """Fields of `PhalanxShape.record`."""
 
 DRIVE_FIELDS: Final = np.dtype(

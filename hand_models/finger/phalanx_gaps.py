@@ -268,11 +268,11 @@ def _near_strips(
 
 
 @compiled()
-def _engaged(settings: Record, gap: float, travel: float) -> float:
+def _engaged(settings: Record, gap: float, travel: float, exponent: float) -> float:
     """Return the share of spines that reach the rock, as `hand_models.tile.engaged_share` does."""
     if gap <= 0.0:
         return 1.0
-    share = 1.0 - gap / travel if gap < travel else 0.0
+    share = 1.0 - (gap / travel) ** exponent if gap < travel else 0.0
     return share if share > settings.least_share else 0.0
 
 
@@ -294,7 +294,7 @@ def _on_rock(
     """
     strips, least = len(across), math.inf
     if strips == 1:
-        share = _engaged(settings, tile_gap, shape.travel)
+        share = _engaged(settings, tile_gap, shape.travel, shape.exponent)
         return share, across[0] * share / max(share, settings.sum_rounding)
     if tile_gap >= shape.travel:
         return 0.0, 0.0
@@ -310,7 +310,8 @@ def _on_rock(
                 farther[k] = min(farther[k], away[i] + behind[near[i], k])
     total, middle = 0.0, 0.0
     for k in range(strips):
-        part = _engaged(settings, tile_gap + (farther[k] - least), shape.travel)
+        away_there = tile_gap + (farther[k] - least)
+        part = _engaged(settings, away_there, shape.travel, shape.exponent)
         total += part
         middle += part * across[k]
     return total / strips, middle / max(total, settings.sum_rounding)
@@ -382,7 +383,7 @@ def put_around(
                 places, behind, strips, across, settings[0], bar, joint, along, tile_gap
             )
             # a phalanx that presses aside, with its end, has its spines beside the rock
-            share = _engaged(settings[0], 1.0 - share * push.imag, 1.0)
+            share = _engaged(settings[0], 1.0 - share * push.imag, 1.0, 1.0)
             if pose == 0:
                 found.gap[j], found.share[j] = gap, share
                 found.place[j], found.push[j], found.across[j] = place, push, middle

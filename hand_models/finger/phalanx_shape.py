@@ -38,6 +38,8 @@ class PhalanxShape(NamedTuple):
         Radius of the bar.
     travel : float
         Distance that spines reach out of the tile.
+    exponent : float
+        Exponent of the law of engagement (`engaged_share`) [1].
     """
 
     near: float
@@ -46,13 +48,15 @@ class PhalanxShape(NamedTuple):
     lift: float
     radius: float
     travel: float
+    exponent: float
 
     @classmethod
     def of(cls, model: FingerModel) -> PhalanxShape:
         """Return the shape of the phalanges of a finger model."""
         radius = min(model.frame_radius, model.tile_height)
         lift = model.tile_height - radius
-        return cls(*model.tile_range, model.joint_spacing, lift, radius, model.spine_travel)
+        spines = model.spine_travel, model.engagement_exponent
+        return cls(*model.tile_range, model.joint_spacing, lift, radius, *spines)
 
     @property
     def length(self) -> float:

@@ -82,6 +82,7 @@ class HandModel:
                 raise InvalidInputError(f"must be in [0, 1), got {mu:g}", field=f"tendon.{name}")
         self.tendon_friction = table.scalar("tendon", "holding_friction")
         self.spine_travel = table.scalar("tile", "spine_travel")
+        self.engagement_exponent = table.positive("tile", "engagement_exponent")
         self.least_share = table.positive("tile", "least_share")
         if self.least_share > 1.0:
             raise InvalidInputError(

@@ -103,7 +103,9 @@ def _base_tiles(placed: PlacedHands, tensions: Sequence[float]) -> Array:
     """Return the base tiles, which carry shear where rock is within the spines' travel."""
     model, tiles = placed.hand.finger, placed.frames.base_tiles
     depths = np.array(placed.gaps)[:, : STACK_ROWS.base_count]
-    shares = engaged_share(np.abs(depths), placed.hand.spine_travel)
+    shares = engaged_share(
+        np.abs(depths), placed.hand.spine_travel, placed.hand.engagement_exponent
+    )
     shares[[placement.grasp.fingernail for placement in placed.placements]] = 0.0
     engaged = shares.nonzero()
     if not len(engaged[0]):
@@ -175,7 +177,7 @@ def palms_on_rock(placed: PlacedHands) -> list[SettledPalm]:
     """
     hand = placed.hand
     gaps = np.array(placed.gaps)[:, STACK_ROWS.base_count :]
-    shares = engaged_share(gaps, hand.spine_travel)
+    shares = engaged_share(gaps, hand.spine_travel, hand.engagement_exponent)
     gaps.setflags(write=False)
     places = np.zeros((len(gaps), 3))
     palms = []

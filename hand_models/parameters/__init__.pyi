@@ -3,7 +3,6 @@ from .draws import (
     ParameterSample as ParameterSample,
     bundled_draws as bundled_draws,
     draws_of as draws_of,
-    even_quantiles as even_quantiles,
     own_draw as own_draw,
 )
 from .own import (
@@ -13,6 +12,7 @@ from .own import (
     own_hand as own_hand,
     own_surfaces as own_surfaces,
 )
+from .quantiles import even_quantiles as even_quantiles
 from .tables import (
     LONGEST_QUOTE as LONGEST_QUOTE,
     ParameterTable as ParameterTable,

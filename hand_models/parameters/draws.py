@@ -3,21 +3,23 @@
 The published data leave parameters uncertain; ``draws.toml`` has, of each quantity that was fitted,
 a list over the sets, and the ranges of quantities that no fit can find. One set makes one Monte
 Carlo sample. Of everything that has a range (the strength of a tile on each surface but the fitted
-sandpaper, and the seat) the samples have evenly spaced quantiles, u = (r + ½) / n with
-r = 0 … n − 1 the rank of the sample's term in an additive recurrence of low discrepancy,
-
-    x_kj = k φ⁻ʲ mod 1,    φ^(d+1) = φ + 1,    k = 1 … n samples,  j = 1 … d ranges,
-
-so that the same sets make the same samples everywhere. Samples for wrists that move also have a
-contact stiffness on rock, log-uniform by a recurrence of its own, so that all else in them is as
-without it. A caller's samples are entries in the form of ``hand.toml`` and ``surfaces.toml``
+sandpaper, the seat, the law of engagement, the palm's stiffness, the law of a tile) the samples
+have evenly spaced quantiles (`even_quantiles`), so that the same sets make the same samples
+everywhere. Samples for wrists that move also have a contact stiffness on rock; all else in them is
+as without it. A caller's samples are entries in the form of ``hand.toml`` and ``surfaces.toml``
 (`own_draw`).
+
+What the model itself is wrong by is a factor on the strength of each limb's hand, log-normal,
+
+    exp(δ (√ρ z + √(1 − ρ) z_i)),
+
+with δ the discrepancy, z a normal number that all hands have in common, z_i each limb's own.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -26,6 +28,7 @@ from msgspec import structs
 
 from hand_models.base import Array, InvalidInputError, errors_under, stored
 from hand_models.parameters.own import own_hand, own_surfaces
+from hand_models.parameters.quantiles import even_quantiles
 from hand_models.parameters.tables import (
     ParameterTable,
     Quantity,
@@ -39,7 +42,6 @@ __all__ = [
     "ParameterSample",
     "bundled_draws",
     "draws_of",
-    "even_quantiles",
     "own_draw",
 ]
 
@@ -53,6 +55,13 @@ ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
 """Pattern of an entry's name, or of one number of an entry that is a list, such as ``radii[1]``."""
 
 
+DRAWN_RANGES: Final = ("seated_contact", "engagement_exponent", "palm_stiffness", "half_planes")
+"""Ranges of ``draws.toml`` beside the strengths of surfaces, in the order of their quantiles."""
+
+OWN_FACTORS: Final = 8
+"""Number of limbs with a factor of their own; a body with more has some twice."""
+
+
 class ParameterSample(NamedTuple):
     """One Monte Carlo sample of uncertain parameters: changed entries of hand and surfaces.
 
@@ -63,10 +72,17 @@ class ParameterSample(NamedTuple):
     surfaces : ParameterTable
         Changed entries of preset surfaces, in the form of ``surfaces.toml``. A caller's surface is
         known, so no sample changes it.
+    half_planes : int or None
+        Pieces of the law of tiles on preset surfaces; as the stance has them by default.
+    discrepancy : tuple of float
+        Factors on the strengths of hands: that of all, then that of each limb, in the order of the
+        limbs' names. Empty if the sample has none.
     """
 
     hand: ParameterTable
     surfaces: ParameterTable
+    half_planes: int | None = None
+    discrepancy: tuple[float, ...] = ()
 
 
 def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
@@ -84,12 +100,13 @@ def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
         If a key or an entry is unknown, a value is not possible, or no entry is given; the field is
         the entry's path.
     """
-    unknown = sorted(set(raw) - set(ParameterSample._fields))
+    fields = "hand", "surfaces"
+    unknown = sorted(set(raw) - set(fields))
     if unknown:
-        valid = " and ".join(ParameterSample._fields)
+        valid = " and ".join(fields)
         raise InvalidInputError(f"unknown; a sample has {valid}", field=unknown[0])
     tables = {}
-    for name in ParameterSample._fields:
+    for name in fields:
         entries = {} if raw.get(name) is None else raw[name]
         if not isinstance(entries, Mapping):
             raise InvalidInputError(
@@ -97,7 +114,7 @@ def own_draw(raw: Mapping[str, Any]) -> ParameterSample:
             )
         with errors_under(name):
             tables[name] = ParameterTable.of(entries)
-    draw = ParameterSample(**tables)
+    draw = ParameterSample(tables["hand"], tables["surfaces"])
     _check(draw, None)
     if not (list(draw.hand) or list(draw.surfaces)):
         raise InvalidInputError(
@@ -163,42 +180,25 @@ def draws_of(
     hand = hand or hand_table()
     count = _checked_count(sets)
     known = hand.difference(hand_table())
-    quantiles = even_quantiles(count, len(_ranged()) + 1)
-    ratios = _stiffness_ratios(sets, known, count) if wrists_move else None
+    surfaces = len(_ranged())
+    first = surfaces + len(DRAWN_RANGES)
+    quantiles = even_quantiles(count, first + 2 + OWN_FACTORS)
+    ratios = _stiffness_ratios(sets, known, quantiles[:, first]) if wrists_move else None
+    factors = _discrepancies(sets, quantiles[:, first + 1 :]).tolist()
+    planes = sets.vector("ranges", "half_planes")
     draws = []
     for k in range(count):
-        strengths = _strengths(sets, k, quantiles[k, :-1])
-        of_hand = _hand_of(sets, k, hand, known, float(quantiles[k, -1]))
+        strengths = _strengths(sets, k, quantiles[k, :surfaces])
+        *of_hand, of_law = quantiles[k, surfaces:first].tolist()
+        own = _hand_of(sets, k, hand, known, of_hand)
         if ratios is not None:
-            of_hand = of_hand.replaced(ParameterTable({"tile": {STIFFNESS_RATIO: ratios[k]}}))
-        draw = ParameterSample(of_hand, strengths)
+            own = own.replaced(ParameterTable({"tile": {STIFFNESS_RATIO: ratios[k]}}))
+        law = int(planes[int(of_law * len(planes))])
+        draw = ParameterSample(own, strengths, law, tuple(factors[k]))
         with errors_under(f"[{k}]"):
             _check(draw, hand)
         draws.append(draw)
     return tuple(draws)
-
-
-def even_quantiles(count: int, ranges: int) -> Array:
-    """Return evenly spaced quantiles for Monte Carlo samples of several ranges.
-
-    Each range has every (r + ½) / count once; the module's text says in which order.
-
-    Parameters
-    ----------
-    count, ranges : int
-        Numbers of samples and of ranges.
-
-    Returns
-    -------
-    ndarray, shape (count, ranges)
-        Quantiles in (0, 1): a row for each sample, a column for each range.
-    """
-    ratio = 1.0
-    for _ in range(64):
-        ratio = (1.0 + ratio) ** (1.0 / (ranges + 1))
-    terms = np.outer(np.arange(1, count + 1), ratio ** -np.arange(1.0, ranges + 1)) % 1.0
-    ranks = terms.argsort(axis=0).argsort(axis=0)
-    return np.asarray((ranks + 0.5) / count)
 
 
 def _ranged() -> list[str]:
@@ -235,11 +235,20 @@ def _checked_count(sets: ParameterTable) -> int:
                 f"must be from 0 to 1 (1: off the data by their whole tolerance), got {misfit:g}",
                 field=f"fit.misfit.value[{k}]",
             )
-    for name in ("rock_ratio", "rock_stiffness"):
+    for name in ("rock_ratio", "rock_stiffness", "engagement_exponent", "palm_stiffness"):
         if (size := len(sets.vector("ranges", name))) != 2:
             raise InvalidInputError(
                 f"two numbers are needed, the least and the largest, got {size}",
                 field=f"ranges.{name}",
+            )
+    for name in ("discrepancy", "discrepancy_common"):
+        if not 0.0 <= (value := sets.scalar("ranges", name)) <= 1.0:
+            raise InvalidInputError(f"must be from 0 to 1, got {value:g}", field=f"ranges.{name}")
+    for i, planes in enumerate(sets.vector("ranges", "half_planes")):
+        if not (1 <= planes <= 64 and planes == int(planes)):
+            raise InvalidInputError(
+                f"must be a whole number from 1 to 64, got {planes:g}",
+                field=f"ranges.half_planes.value[{i}]",
             )
     return count
 
@@ -269,9 +278,16 @@ def _check_entry(section: str, name: str, quantity: Quantity) -> None:
 
 
 def _hand_of(
-    sets: ParameterTable, k: int, hand: ParameterTable, known: ParameterTable, quantile: float
+    sets: ParameterTable,
+    k: int,
+    hand: ParameterTable,
+    known: ParameterTable,
+    quantiles: Sequence[float],
 ) -> ParameterTable:
-    """Return what a draw changes of a hand, but for entries that are known."""
+    """Return what a draw changes of a hand, but for entries that are known.
+
+    ``quantiles``: of the seat, of the law of engagement and of the palm's stiffness.
+    """
     found: dict[str, dict[str, Quantity]] = {}
 
     def change(section: str, name: str, value: float, quantity: Quantity, place: int) -> None:
@@ -293,21 +309,42 @@ def _hand_of(
                 change(section, "base_engagement", value, quantity, 0)
     aside = sets.quantity("ranges", "seated_contact")
     middle, half = hand.scalar("finger", "seated_contact"), sets.scalar("ranges", "seated_contact")
-    change("finger", "seated_contact", middle + half * (2.0 * quantile - 1.0), aside, 0)
+    seat, law, palm = quantiles
+    change("finger", "seated_contact", middle + half * (2.0 * seat - 1.0), aside, 0)
+    entry = sets.quantity("ranges", "engagement_exponent")
+    exponent = _log_even(sets, "engagement_exponent", law)
+    change("tile", "engagement_exponent", exponent, entry, 0)
+    factor = _log_even(sets, "palm_stiffness", palm)
+    unit = hand.quantity("palm", "contact_stiffness").unit
+    entry = structs.replace(sets.quantity("ranges", "palm_stiffness"), unit=unit)
+    for i, stiffness in enumerate(hand.vector("palm", "contact_stiffness")):
+        change("palm", "contact_stiffness", factor * stiffness, entry, i)
     return ParameterTable(found)
 
 
+def _log_even(sets: ParameterTable, name: str, quantile: float) -> float:
+    """Return a quantile of a range of which the logarithm is evenly distributed."""
+    least, most = sets.vector("ranges", name)
+    return float(least * (most / least) ** quantile)
+
+
+def _discrepancies(sets: ParameterTable, quantiles: Array) -> Array:
+    """Return the factors on strengths of all hands and of each limb's, shape (count, 1 + limbs)."""
+    common = sets.scalar("ranges", "discrepancy_common")
+    wide = np.full(quantiles.shape[1], np.sqrt(1.0 - common))
+    wide[0] = np.sqrt(common)
+    scores = scipy.special.ndtri(quantiles)
+    return np.asarray(np.exp(sets.scalar("ranges", "discrepancy") * wide * scores))
+
+
 def _stiffness_ratios(
-    sets: ParameterTable, known: ParameterTable, count: int
+    sets: ParameterTable, known: ParameterTable, quantiles: Array
 ) -> list[Quantity] | None:
     """Return each sample's contact stiffness on rock over that of the fit; None where known."""
     if {STIFFNESS_RATIO, "contact_stiffness"} & known.sections.get("tile", {}).keys():
         return None
-    least, most = sets.vector("ranges", "rock_stiffness")
-    # the first range of a longer recurrence than that of all other ranges
-    own = even_quantiles(count, len(_ranged()) + 3)[:, 0]
     entry = sets.quantity("ranges", "rock_stiffness")
-    values: list[float] = (least * (most / least) ** own).tolist()
+    values = [_log_even(sets, "rock_stiffness", u) for u in quantiles.tolist()]
     return [structs.replace(entry, value=value) for value in values]
 
 

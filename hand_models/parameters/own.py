@@ -185,8 +185,8 @@ def _check(own: Quantity, bundled: Quantity, field: str) -> None:
     least = 0.0 if usual.min() >= 0.0 and not coordinate else -largest
     if not (least <= got.min() and got.max() <= largest):
         unit = "" if own.unit == "1" else f" {own.unit}"
-        # a hand divides by this ratio, and refuses zero
-        positive = field == "tile.rock_stiffness_ratio"
+        # a hand divides by the ratio, or is nowhere on rock with the exponent, and refuses zero
+        positive = field in ("tile.rock_stiffness_ratio", "tile.engagement_exponent")
         start = "above 0 and at most" if positive else f"from {least:.4g} to"
         raise InvalidInputError(
             f"must be {start} {largest:.4g}{unit}, got {own.value}", field=field

@@ -211,6 +211,11 @@ class Surface:
         numbers = _by_ratios(values["shear_limit"], "defaults", surface_table())
         return cls(**(numbers | dict(values)))  # type: ignore[arg-type]
 
+    def times(self, factor: float) -> Surface:
+        """Return the surface with all strengths multiplied by a factor."""
+        names = "shear_limit", "pull_off_limit", "lateral_limit", "shear_scatter"
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
+
     def strength(self, angle: ArrayLike, azimuth: ArrayLike = 0.0) -> Array:
         """Return the largest load of a tile in a direction, F(φ, θ); f_s(φ) of Eq. 21 if θ = 0.
 
@@ -307,12 +312,12 @@ def pull_strength(
     return np.asarray(most - (most - np.asarray(pull_off_limit)) * ratio**pull_off_exponent)
 
 
-def engaged_share(gap: ArrayLike, travel: float) -> Array:
-    """Return the spine engagement of a tile at a gap to the rock: φ = 1 − gap / travel, in [0, 1].
+def engaged_share(gap: ArrayLike, travel: float, exponent: float = 1.0) -> Array:
+    """Return the spine engagement of a tile at a gap to the rock: φ = 1 − (gap / travel)^p.
 
     Spines slide out of their tile by up to their travel; the farther they have to, the fewer find
-    an asperity that is near enough. φ is 1 where the tile touches; below a millionth it counts as
-    0.
+    an asperity that is near enough. φ is in [0, 1], and 1 where the tile touches; below a millionth
+    it counts as 0.
 
     Parameters
     ----------
@@ -320,6 +325,9 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
         Distance from the tile's face to the rock, infinite where there is none [m].
     travel : float
         Distance that spines reach, ``spine_travel`` of ``hand.toml`` [m].
+    exponent : float, optional
+        p, ``engagement_exponent`` of ``hand.toml``: above 1 φ stays high over most of the travel,
+        below it φ falls at once.
 
     Returns
     -------
@@ -328,7 +336,9 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
     """
     off = np.asarray(gap, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(off > 0.0, np.minimum(1.0 - off / travel, 1.0), 1.0)
+        # no gap counts as negative, which has no power
+        part = np.maximum(off / travel, 0.0) ** exponent
+        share = np.where(off > 0.0, 1.0 - part, 1.0)
     return np.where(share > LEAST_SHARE, share, 0.0)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from hand_models.base import Array, errors_under, stored
-from hand_models.hand import HandModel
+from hand_models.hand import HandModel, SettledHand
 from hand_models.parameters import (
     ParameterSample,
     ParameterTable,
@@ -24,7 +24,7 @@ __all__ = ["DrawnHand", "drawn_hands", "drawn_quantities"]
 
 
 class DrawnHand(NamedTuple):
-    """Hand model and surface parameters of one sample.
+    """Hand model, surface parameters and discrepancies of one sample.
 
     Attributes
     ----------
@@ -32,10 +32,16 @@ class DrawnHand(NamedTuple):
         Hand with the sample's parameter values.
     surfaces : ParameterTable
         The sample's parameters of all surfaces.
+    half_planes : int or None
+        Pieces of the law of tiles on presets; None for as many as the stance has.
+    factors : mapping of str to float
+        Factors on strengths: ``common`` on that of every hand, and by limb on that of its hand.
     """
 
     model: HandModel
     surfaces: ParameterTable
+    half_planes: int | None
+    factors: Mapping[str, float]
 
     def surface(self, usual: Surface) -> Surface:
         """Return a stance's surface with this sample's parameter values.
@@ -44,15 +50,24 @@ class DrawnHand(NamedTuple):
         ----------
         usual : Surface
             Surface in the stance. If it is one of the presets, its values are replaced by the
-            sample's, and its number of half-planes stays. A surface with the caller's values is
-            returned unchanged.
+            sample's, and its number of half-planes stays if the sample has none. A surface with the
+            caller's values is returned unchanged.
         """
         if usual.name is None:
             return usual
         planes = usual.half_planes
         if replace(Surface.named(usual.name), half_planes=planes) != usual:
             return usual
-        return replace(Surface.named(usual.name, self.surfaces), half_planes=planes)
+        found = Surface.named(usual.name, self.surfaces)
+        return replace(found, half_planes=self.half_planes or planes)
+
+    def closed(self, hand: SettledHand, limb: str) -> SettledHand:
+        """Return a limb's hand, closed as it is, its tiles as strong as by the discrepancy."""
+        factor = self.factors.get("common", 1.0) * self.factors.get(limb, 1.0)
+        if factor == 1.0:
+            return hand
+        palm = hand.palm._replace(shear_limit=factor * hand.palm.shear_limit)
+        return replace(hand, surface=hand.surface.times(factor), palm=palm)
 
 
 @stored("hands of draws", 8)  # those used last
@@ -61,6 +76,7 @@ def drawn_hands(
     draws: tuple[ParameterSample, ...] | None = None,
     *,
     wrists_move: bool = False,
+    limbs: tuple[str, ...] = (),
 ) -> tuple[DrawnHand, ...]:
     """Return the hand model and the surfaces of each Monte Carlo sample. Cached.
 
@@ -73,6 +89,8 @@ def drawn_hands(
     wrists_move : bool, optional
         Whether the bundled samples are for compliant or floating wrists, and so have a contact
         stiffness on rock.
+    limbs : tuple of str, optional
+        Limbs with hands. Bundled samples have a factor on the strength of each one's hand.
 
     Returns
     -------
@@ -96,7 +114,11 @@ def drawn_hands(
                 for name in surface_names():
                     with errors_under(name):
                         Surface.named(name, surfaces)
-        found.append(DrawnHand(model, surfaces))
+        common, own = draw.discrepancy[:1], draw.discrepancy[1:]
+        factors = dict(zip(("common",), common, strict=False))
+        if own:
+            factors |= {limb: own[k % len(own)] for k, limb in enumerate(sorted(limbs))}
+        found.append(DrawnHand(model, surfaces, draw.half_planes, factors))
     return tuple(found)
 
 
@@ -116,7 +138,8 @@ def drawn_quantities(
     Returns
     -------
     dict of str to ndarray, shape (draws,)
-        Values in SI units. A name is ``section.entry``, with ``[i]`` for each number of a list.
+        Values in SI units. A name is ``section.entry``, with ``[i]`` for each number of a list;
+        ``tile.half_planes`` and ``discrepancy.common`` or that of a limb are no entries.
     """
     named = {name for name in surfaces if name is not None}
     on_presets = named | {"defaults"} if named else named
@@ -132,7 +155,13 @@ def drawn_quantities(
                 if np.ptp(values) > 0.0:
                     entry = name if over.ndim == 1 else f"{name}[{i}]"
                     found[f"{section}.{entry}"] = values
-    return found
+    other: dict[str, list[float]] = {}
+    if named and drawn:
+        other["tile.half_planes"] = [each.half_planes or 0.0 for each in drawn]
+    for name in drawn[0].factors if drawn else ():
+        other[f"discrepancy.{name}"] = [each.factors[name] for each in drawn]
+    varied = {name: np.array(each) for name, each in other.items()}
+    return found | {name: each for name, each in varied.items() if np.ptp(each) > 0.0}
 
 
 def _value(table: ParameterTable, section: str, name: str) -> float | list[float]:

@@ -92,7 +92,8 @@ def find_spread(
     moving = any(
         hand.wrist != "fixed" and hand.surface.name != FITTED_SURFACE for hand in stance.hands
     )
-    drawn = drawn_hands(stance.robot.hand, question.draws, wrists_move=moving)
+    limbs = tuple(sorted(hand.limb for hand in stance.hands))
+    drawn = drawn_hands(stance.robot.hand, question.draws, wrists_move=moving, limbs=limbs)
     fixed = len(hands) > 0 and not prepared.floating
     limbs_hold = len(prepared.floating) == len(hands) > 0 and stance.limb_stiffness is not None
     bare, tensions = without_margins(prepared), [hand.tensions for hand in hands]
@@ -140,6 +141,9 @@ def find_spread(
 def _source(drawn: DrawnHand, name: str) -> str:
     """Return the source of an uncertain parameter, by its name in `drawn_quantities`."""
     section, _, entry = name.partition(".")
+    for drawn_range in ("discrepancy", "half_planes"):
+        if drawn_range in (section, entry):
+            return draw_table().quantity("ranges", drawn_range).source
     entry, table = entry.split("[")[0], drawn.model.table
     if section not in table.sections:
         table = drawn.surfaces
@@ -159,7 +163,7 @@ def _threshold(
     def on_rock(ratio: float) -> DrawnHand:
         strength = table.quantity(ROCK_PRESET, "shear_limit").changed(ratio * sandpaper)
         own = ParameterTable({ROCK_PRESET: {"shear_limit": strength}})
-        return DrawnHand(stance.robot.hand, table.replaced(own))
+        return DrawnHand(stance.robot.hand, table.replaced(own), None, {})
 
     @cache
     def beyond(weakness: float) -> float:
@@ -206,7 +210,10 @@ def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | I
     # hands that close alike close once
     outcomes = settle_hands(drawn.model, list(placements.values()))
     found = dict(zip(placements, outcomes, strict=True))
-    return [found[key] for key in keys]
+    pairs = [(limb, found[key]) for limb, key in zip(prepared.limbs, keys, strict=True)]
+    return [
+        drawn.closed(each, limb) if isinstance(each, SettledHand) else each for limb, each in pairs
+    ]
 
 
 def _with_hands(prepared: PreparedStance, settled: Sequence[SettledHand]) -> PreparedStance | None:

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from hand_models.finger.closing import around_rock
+from hand_models.finger.model import FingerModel
+from hand_models.finger.path_state import OpenFinger, drives
 from hand_models.finger.phalanx_shape import PhalanxShape, fan_out
+from hand_models.parameters import ParameterTable, own_hand
 from hand_models.sections import Disc, FingerRock, Outlines, Wall
+from hand_models.tile import Surface
 from tests.suite.helpers import phalanges
 from tests.suite.helpers.hands import HAND
 
@@ -175,3 +180,17 @@ def test_of_the_points_that_may_press_phalanges_are_as_beside_all_rock(seed):
         for value, want in zip(found, phalanges.beside(rock, SHAPE, joints, u, depth), strict=True):
             np.testing.assert_allclose(value, want, rtol=1e-9, atol=1e-12)
         assert sum(len(each) for each in near) < 3 * rock.points.shape[1]
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 3.0])
+def test_the_share_of_spines_across_a_gap_follows_the_hands_law(exponent):
+    entry = {"value": exponent, "unit": "1", "source": "assumed"}
+    table = own_hand(ParameterTable.of({"tile": {"engagement_exponent": entry}}))
+    model = FingerModel.from_table(table)
+    for gap in (1e-3, 2.5e-3, 4.9e-3):
+        rock = FingerRock(flat(H + gap))
+        drive = drives(model, [OpenFinger(rock, Surface.named("rock"), 37.0)])
+        outlines = Outlines.of([rock], 0.2, SHAPE.spacing)
+        around = around_rock(outlines, PhalanxShape.of(model), drive, np.zeros((1, 3)))
+        expected = 1.0 - (gap / 5e-3) ** exponent
+        np.testing.assert_allclose(around["share"][0], expected, atol=2e-3)

@@ -113,7 +113,7 @@ def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAN
             place = frame.joint + (hand.base_tile_reach - hand.outer_reach) * frame.along
             place[2] = hand.base_tile_surface
             gap = hold.entry(inverse.apply(place), into)
-            share = 0.0 if grasp.fingernail else max(1.0 - abs(gap) / hand.spine_travel, 0.0)
+            share = 0.0 if grasp.fingernail else on_rock(abs(gap), hand)
             on = share > 0.0
             assert settled.tiles[row] == (name, "base", "face" if on else "none")
             np.testing.assert_allclose(
@@ -174,11 +174,17 @@ def check_hand(placement: Placement, settled: SettledHand, hand: SpinyHand = HAN
     assert settled.palm.engaged == tuple(engaged)
     if engaged:
         places = hand.palm_tiles[engaged] + np.array(gaps)[engaged, None] * UP
-        shares = [min(1.0 - gaps[i] / hand.spine_travel, 1.0) for i in engaged]
+        shares = [on_rock(gaps[i], hand) for i in engaged]
         np.testing.assert_allclose(settled.palm.engagement, shares, atol=1e-8)
         np.testing.assert_allclose(
             settled.palm.centre, np.average(places, axis=0, weights=shares), atol=1e-9
         )
+
+
+def on_rock(gap: float, hand: SpinyHand) -> float:
+    """Share of a tile's spines that are on rock across a gap."""
+    part = min(max(gap / hand.spine_travel, 0.0), 1.0)
+    return 1.0 - part**hand.engagement_exponent
 
 
 def turned(frame, angle):
@@ -196,6 +202,16 @@ def test_hands_settled_together_are_as_their_fingers_closed_one_by_one(seed):
     for placement, settled in zip(placements, HAND.settle_each(placements), strict=True):
         if isinstance(settled, SettledHand):
             check_hand(placement, settled)
+
+
+@given_some(2, 10, seeds)
+def test_another_law_of_engagement_is_that_of_all_tiles(seed):
+    rng = np.random.default_rng(seed)
+    hand = changed_hand("tile", "engagement_exponent", 3.0)
+    placements = [random_placement(rng, rough=0.0) for _ in range(3)]
+    for placement, settled in zip(placements, hand.settle_each(placements), strict=True):
+        if isinstance(settled, SettledHand):
+            check_hand(placement, settled, hand)
 
 
 @given_some(2, 10, seeds)

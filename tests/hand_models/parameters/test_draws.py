@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import qmc, spearmanr, truncnorm
+from scipy.stats import norm, qmc, spearmanr, truncnorm
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import HandModel
@@ -85,6 +85,50 @@ def test_what_has_a_range_is_spread_evenly_over_it():
         np.testing.assert_allclose(drawn, told.ppf(even), rtol=5e-3)
     seats = np.sort([draw.hand.scalar("finger", "seated_contact") for draw in draws])
     np.testing.assert_allclose(seats, 0.0247 + 0.001 * (2.0 * even - 1.0), rtol=1e-9)
+    # 0.5 to 8, and 0.2 to 2, of which the logarithms are even
+    laws = np.sort([draw.hand.scalar("tile", "engagement_exponent") for draw in draws])
+    np.testing.assert_allclose(laws, 0.5 * 16.0**even)
+    palms = [draw.hand.vector("palm", "contact_stiffness") for draw in draws]
+    np.testing.assert_allclose(np.sort([palm[0] for palm in palms]), 2e3 * 10.0**even)
+    assert all(len(palm) == 8 and len(set(palm)) == 1 for palm in palms)
+    counts = np.bincount([draw.half_planes for draw in draws])
+    assert (np.abs(counts - len(draws) * np.array([0.0, 0.5, 0.25, 0.0, 0.25])) < 1.0).all()
+
+
+def test_the_models_discrepancy_is_log_normal_with_a_common_part():
+    draws, sets = bundled_draws(), draw_table()
+    told, shared = (sets.scalar("ranges", n) for n in ("discrepancy", "discrepancy_common"))
+    factors = np.log([draw.discrepancy for draw in draws])
+    even = (np.arange(len(draws)) + 0.5) / len(draws)
+    for column, share in zip(factors.T, [shared] + [1.0 - shared] * 8, strict=True):
+        normal = norm.ppf(even, 0.0, told * np.sqrt(share))
+        np.testing.assert_allclose(np.sort(column), normal, atol=1e-9)
+    whole = factors[:, :1] + factors[:, 1:]
+    np.testing.assert_allclose(whole.std(axis=0), told, rtol=0.12)
+    # of two hands' strengths, that share is common
+    assert np.corrcoef(whole[:, 0], whole[:, 1])[0, 1] == pytest.approx(shared, abs=0.12)
+
+
+def test_no_range_goes_up_or_down_with_another():
+    draws = bundled_draws(wrists_move=True)
+    columns = [
+        *(
+            [draw.surfaces.scalar(name, "shear_limit") for draw in draws]
+            for name in ("concrete-fine", "concrete-coarse")
+        ),
+        [draw.hand.scalar("finger", "seated_contact") for draw in draws],
+        [draw.hand.scalar("tile", "engagement_exponent") for draw in draws],
+        [draw.hand.scalar("tile", "rock_stiffness_ratio") for draw in draws],
+        [draw.hand.vector("palm", "contact_stiffness")[0] for draw in draws],
+        [
+            draw.surfaces.scalar("rock", "shear_limit")
+            / draw.surfaces.scalar("sandpaper-36", "shear_limit")
+            for draw in draws
+        ],
+        *np.transpose([draw.discrepancy for draw in draws]),
+    ]
+    found = np.abs(spearmanr(np.transpose(columns)).statistic - np.eye(len(columns)))
+    assert found.max() < 0.15
 
 
 @pytest.mark.parametrize("count", [30, 37, 64])
@@ -145,13 +189,24 @@ def test_numbers_that_the_caller_knows_are_not_drawn():
             "engagement",
             "base_engagement",
             "contact_stiffness",
+            "engagement_exponent",
         }
+
+
+def test_laws_and_palms_that_the_caller_knows_are_not_drawn():
+    mine = {
+        "tile": {"engagement_exponent": own(2.0, "1")},
+        "palm": {"contact_stiffness": own([5e3] * 8, "N/m")},
+    }
+    for draw in bundled_draws(own_hand(ParameterTable.of(mine))):
+        assert "engagement_exponent" not in draw.hand.sections["tile"]
+        assert "palm" not in draw.hand.sections
 
 
 def test_where_engagement_is_known_so_is_that_of_base_tiles():
     mine = {"tile": {"engagement": own([0.13, 0.19, 0.21], "1")}}
     for draw in bundled_draws(own_hand(ParameterTable.of(mine))):
-        assert set(draw.hand.sections["tile"]) == {"contact_stiffness"}
+        assert set(draw.hand.sections["tile"]) == {"contact_stiffness", "engagement_exponent"}
 
 
 @pytest.mark.parametrize(
@@ -172,6 +227,11 @@ def test_where_engagement_is_known_so_is_that_of_base_tiles():
         (changed("finger", "pulley_radii[1]", value=[3.0] * 30), "[0].hand.finger.pulley_radii"),
         (changed("ranges", "seated_contact"), "ranges.seated_contact"),
         (changed("ranges", "rock_stiffness", value=[0.5]), "ranges.rock_stiffness"),
+        (changed("ranges", "palm_stiffness", value=[0.5]), "ranges.palm_stiffness"),
+        (changed("ranges", "engagement_exponent"), "ranges.engagement_exponent"),
+        (changed("ranges", "half_planes", value=[1.0, 1.5]), "ranges.half_planes.value[1]"),
+        (changed("ranges", "discrepancy", value=-0.1), "ranges.discrepancy"),
+        (changed("ranges", "discrepancy_common", value=1.1), "ranges.discrepancy_common"),
     ],
 )
 def test_a_table_that_makes_no_draws_is_refused_by_its_entry(table, field):

@@ -11,7 +11,14 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import spearmanr
 
 from hand_models.base import InvalidInputError, Pose
-from hand_models.parameters import ParameterSample, bundled_draws, own_draw, own_hand, own_surfaces
+from hand_models.parameters import (
+    ParameterSample,
+    ParameterTable,
+    bundled_draws,
+    own_draw,
+    own_hand,
+    own_surfaces,
+)
 from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.capability import BodySpace
@@ -79,8 +86,7 @@ def on_draw(asked: Question, draw: ParameterSample) -> Question:
 def planned_apart(asked: Question) -> list[DrawnPlan]:
     """What plans of all draws say that are asked for one by one."""
     found = []
-    moving = any(hand.wrist != "fixed" for hand in asked.stance.hands)
-    for draw in asked.draws or bundled_draws(wrists_move=moving):
+    for draw in asked.draws:
         try:
             answer = plan(on_draw(asked, draw))
         except InvalidInputError:
@@ -95,6 +101,10 @@ def almost(values):
     return [None if value is None else pytest.approx(value, rel=1e-5) for value in values]
 
 
+PLAIN = tuple(
+    draw._replace(half_planes=None, discrepancy=())
+    for draw in bundled_draws()  # as questions can have them
+)
 MIXED = replace(
     on_wall(),
     hands=tuple(
@@ -111,7 +121,7 @@ MIXED = replace(
 @pytest.mark.parametrize(
     "asked",
     [
-        pytest.param(ask(MIXED, "spread"), marks=pytest.mark.slow),
+        pytest.param(ask(MIXED, "spread", draws=PLAIN), marks=pytest.mark.slow),
         ask(on_wall(), "spread", draws=FEW, limits=Limits(utilisation=0.8, tendon_tension=150.0)),
         ask(on_wall(), "spread", draws=FEW, objective="min_effort"),
         pytest.param(asked_of("wall-300-joints", draws=FEW), marks=pytest.mark.slow),
@@ -147,7 +157,10 @@ def test_it_is_what_each_draw_has_by_itself(asked):
 @pytest.mark.parametrize("mass", [60.0, None])
 def test_floating_wrists_that_begin_at_the_usual_plan_are_no_worse_than_by_themselves(mass):
     """Their searches end at a local optimum, and bracket load factors no closer than this."""
-    asked = replace(asked_of("wall-300-floating"), explain=False)
+    plain = tuple(
+        draw._replace(half_planes=None, discrepancy=()) for draw in bundled_draws(wrists_move=True)
+    )
+    asked = replace(asked_of("wall-300-floating", draws=plain), explain=False)
     if mass is not None:
         asked = replace(asked, load=structs.replace(asked.load, mass=mass))
     found, apart = plan(asked).spread, planned_apart(asked)
@@ -201,7 +214,7 @@ def test_only_wrists_that_move_on_rock_draw_its_stiffness(wrist, surface, moves,
     # with samples of the caller, no threshold is sought
     asked, seen = replace(asked, draws=STRENGTHS), []
 
-    def none(hand, draws, *, wrists_move):
+    def none(hand, draws, *, wrists_move, limbs):
         seen.append(wrists_move)
         return ()
 
@@ -252,7 +265,8 @@ def test_on_a_callers_own_numbers_only_the_hand_varies():
     other = plan(ask(on_wall(surface=changed), "spread", draws=STRENGTHS)).spread
     assert other.load_factors == almost([other.load_factors[0]] * len(STRENGTHS))
     bundled = plan(ask(on_wall(surface=mine), "spread")).spread
-    assert {each.quantity.split(".")[0] for each in bundled.sensitive_to} <= {"finger", "tile"}
+    known = {"finger", "tile", "palm", "discrepancy"}
+    assert {each.quantity.split(".")[0] for each in bundled.sensitive_to} <= known
 
 
 def test_half_planes_that_were_asked_for_stay():
@@ -295,7 +309,53 @@ def test_a_hand_of_the_callers_own_stays_in_what_it_changes():
     stance = replace(on_wall(surface=TILE_60N), robot=robosimian(mine))
     found = plan(ask(stance, "spread")).spread
     assert found.sensitive_to
-    assert {each.quantity.split(".")[0] for each in found.sensitive_to} == {"tile"}
+    sections = {each.quantity.split(".")[0] for each in found.sensitive_to}
+    assert sections <= {"tile", "palm", "discrepancy"}
+
+
+NOTHING = ParameterSample(ParameterTable({}), ParameterTable({}))
+LIMBS = sorted(hand.limb for hand in on_wall().hands)
+
+
+def test_a_common_discrepancy_is_that_much_stronger_rock():
+    """Where closed fingers are laid on the rock, whatever it holds."""
+    factors = (0.8, 1.0, 1.25)
+    drawn_by = tuple(NOTHING._replace(discrepancy=(f, *[1.0] * 8)) for f in factors)
+    found = plan(ask(on_wall(), "spread", draws=drawn_by)).spread
+    rocks = tuple(drawn(68.1 * f) for f in factors)
+    stronger = plan(ask(on_wall(), "spread", draws=rocks)).spread
+    assert found.load_factors == almost(stronger.load_factors)
+    assert [each.quantity for each in found.sensitive_to] == ["discrepancy.common"]
+
+
+@pytest.mark.parametrize("weak", range(4))
+def test_each_limb_has_its_own_discrepancy_by_its_name(weak):
+    own = [1.0] * 8
+    own[weak] = 0.6
+    draws = (NOTHING._replace(discrepancy=(1.0, *own)),)
+    found = plan(ask(on_wall(), "spread", draws=draws)).spread
+    usual = Surface.named("rock")
+    hands = tuple(
+        replace(hand, surface=usual.times(0.6)) if hand.limb == LIMBS[weak] else hand
+        for hand in on_wall().hands
+    )
+    alone = plan(ask(replace(on_wall(), hands=hands), "load_factor"))
+    assert found.load_factors == almost([alone.load_factor])
+    backwards = replace(on_wall(), hands=on_wall().hands[::-1])
+    assert plan(ask(backwards, "spread", draws=draws)).spread.load_factors == almost(
+        found.load_factors
+    )
+
+
+def test_a_law_of_more_pieces_is_that_of_more_half_planes():
+    draws = tuple(NOTHING._replace(half_planes=n) for n in (1, 2, 4))
+    found = plan(ask(on_wall(), "spread", draws=draws)).spread
+    for planes, factor in zip((1, 2, 4), found.load_factors, strict=True):
+        finer = replace(Surface.named("rock"), half_planes=planes)
+        alone = plan(ask(on_wall(surface=finer), "load_factor"))
+        assert factor == pytest.approx(alone.load_factor, rel=1e-5)
+    assert found.load_factors == sorted(found.load_factors)
+    assert [each.quantity for each in found.sensitive_to] == ["tile.half_planes"]
 
 
 def test_shares_are_squared_rank_correlations():

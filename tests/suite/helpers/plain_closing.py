@@ -132,7 +132,7 @@ class PlainFinger:
     def beside(self, q: np.ndarray) -> Beside:
         joints, u = fan_out(q, self.shape.end)
         found = phalanges.beside(self.rock, self.shape, joints, u, self.depth)
-        share = engaged_share(found.tile_gap, self.shape.travel)
+        share = engaged_share(found.tile_gap, self.shape.travel, self.shape.exponent)
         share = engaged_share(1.0 - share * found.push.imag, 1.0)
         arms = (joints + found.place * u)[None, :] - joints[:, None]
         # in the axes of the contact's force: it presses along +i and drags along −1
