@@ -90,8 +90,7 @@ class SettledTile(NamedTuple):
     phalanx : str
         ``base``, ``proximal``, ``middle``, ``distal``, or ``nail`` in a fingernail grasp.
     contact : {'face', 'edge', 'frame', 'nail', 'slipped', 'none'}
-        Part that touches the rock; ``frame`` if the bare phalanx beside the tile does; ``slipped``
-        if the tile's spines have let go, and it drags on along the rock.
+        Part on the rock; ``frame``: the bare phalanx beside it; ``slipped``: it drags on.
     """
 
     finger: str

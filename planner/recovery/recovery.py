@@ -23,8 +23,9 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, PreparedStance
 from planner.programs import Columns, ScaledRows, StanceData
 from planner.question import LostTile
+from planner.recovery.superposition import superposed
 from planner.result import Plan
-from planner.solving import Checks, Solution, StanceAnswer, Verified, answer_on, idle_joints
+from planner.solving import Checks, FixedSolution, StanceAnswer, Verified, answer_on, idle_joints
 
 __all__ = ["Recovered", "Recovery"]
 
@@ -129,7 +130,7 @@ class Recovery:
         self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
             "stances without tiles", 4
         )
-        self._near: BoundedStore[tuple[_HandKey, ...], Solution] = BoundedStore(
+        self._near: BoundedStore[tuple[_HandKey, ...], FixedSolution] = BoundedStore(
             "plans without tiles", 256
         )
         self._keep([(h, (t,), (), True) for h, t in self._places.values()])
@@ -221,21 +222,23 @@ class Recovery:
             prepared = prepared.turned(body_wrench)
         checks = Checks.of(prepared, self._idle, lost)
         found = answer_on(prepared, start, checks, self._nearest(keys))
-        if isinstance(found.answer, Verified):
+        solution = found.answer.solution
+        if isinstance(found.answer, Verified) and isinstance(solution, FixedSolution):
             # a start is all that is needed of it
-            kept = replace(found.answer.solution, sets=self.prepared.at_rest)
-            self._near.keep([(keys, kept)])
+            self._near.keep([(keys, replace(solution, sets=self.prepared.at_rest))])
         open_fingers = [
             (prepared.limbs[h], finger) for h, *_ in keys for finger in _released(prepared, h)
         ]
         return Recovered(found, lost, tuple(open_fingers))
 
-    def _nearest(self, keys: tuple[_HandKey, ...]) -> Solution | None:
-        """Return a known solution to start from: of the same losses, or of one tile of them."""
+    def _nearest(self, keys: tuple[_HandKey, ...]) -> FixedSolution | None:
+        """Return a solution to start from: of the same losses, or superposed from single ones."""
         single = [((h, (t,), (), True),) for h, tiles, _, _ in keys for t in tiles]
-        same, *others = self._near.find([keys, *single])
-        known = [each for each in others if each is not None]
-        return same or max(known, key=lambda each: each.least.value, default=None)
+        same, whole, *others = self._near.find([keys, (), *single])
+        starts = [each.start for each in others if each is not None and each.start is not None]
+        if same is not None or whole is None or whole.start is None or len(starts) < len(single):
+            return same
+        return replace(whole, start=superposed(whole.start, starts))
 
     def _keys(
         self,

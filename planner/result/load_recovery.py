@@ -212,7 +212,6 @@ class LoadRecovery:
             end, columns = WRENCH_ROWS + len(own.L), own.L.shape[1]
             mine[:WRENCH_ROWS, :columns], mine[WRENCH_ROWS:end, :columns] = own.generators, own.L
             rest[:WRENCH_ROWS], rest[WRENCH_ROWS:end] = own.origin, own.l0
-        # loads of what is off the rock since tiles slipped exert no wrench
         slipped = np.array([[hand.closed is not None] for hand in settled])
         self._released = layout.columns[slipped & ~self.rows[:, :WRENCH_ROWS].any(axis=1)]
         self._drawn = _drawn_tendons(known)
