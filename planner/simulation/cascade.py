@@ -39,7 +39,7 @@ Flags = NDArray[np.bool_]
 class CascadeSettings:
     """Tolerances of the balance of passive loads."""
 
-    balance: float = 1e-8
+    balance: float = 1e-7
     """Missing wrench that counts as none: forces, and moments over 0.1 m [N]."""
     lost: float = 1e-5
     """Missing wrench beyond which there is no balance [N]: far above rounding."""
@@ -47,14 +47,19 @@ class CascadeSettings:
     """Part of the force that the body needs, up to which friction of tendons and drives holds what
     is missing along each axis: it holds several hundredths of a tension, and without it a change of
     0.02 N would let fall a stance whose palms press nowhere."""
-    soft: float = 1e-3
+    soft: float = 1e-2
     """Stiffness of that friction over a tile's sideways: little, so that it holds what is left."""
+    moved: float = 0.1
+    """Way, and turn over 0.1 m, by which a body has moved off its hands [m]: springs reach by
+    millimetres."""
     steps: int = 60  # of Newton's method; 3 to 8 are the rule
-    halvings: int = 20  # of a step
+    good_step: float = 0.1
+    """Part of the slope along a step that may be left at its end, without a search for the least."""
     singular: float = 1e-12
     """Part of the stiffest direction that keeps others from being singular once all are at limits.
     """
-    progress: float = 0.999  # of the missing wrench, above which a step ends the search
+    far: float = 1e3
+    """The same, at which the search for a balance ends [m]: a step on the way may go far."""
 
 
 SETTINGS: Final = CascadeSettings()
@@ -271,7 +276,11 @@ class Cascade:
         kept = np.ones((len(gone), gone.shape[1], 2))
         kept[..., 0] = ~(gone | self._gone[len(self._phalanx) :])
         loads, springs = self._loads.palms * kept, self._palm_springs * kept
-        most = np.where([True, False], np.inf, self._palm_most) * np.ones_like(kept)
+        # an overloaded plan may press more than palms bear
+        pressed = np.maximum(self._palm_most[:, 1], self._loads.palms[:, 1])
+        most = np.broadcast_to(
+            np.column_stack([np.full_like(pressed, np.inf), pressed]), kept.shape
+        )
         return tuple(each.reshape(len(gone), -1) for each in (loads, springs, most))  # type: ignore[return-value]
 
     def loads(self, states: NDArray[np.uint8]) -> HandLoads:
@@ -409,9 +418,10 @@ def _balanced(
 ) -> tuple[Array, Array]:
     """Return passive loads (S, n) and the largest part of the wrench that they miss, (S,).
 
+    Infinite where the body would move off its hands.
     See the module's equation.
 
-    Newton's method on the convex dual function of b, with steps halved until it decreases.
+    Newton's method on the convex dual function of b, to the least along each step.
 
     Parameters
     ----------
@@ -425,44 +435,74 @@ def _balanced(
     found, twist = loads.copy(), np.zeros(missing.shape)
     due = missing + _times(loads, wrenches)
     off = np.abs(missing).max(axis=1)
-    going, before = np.flatnonzero(off > SETTINGS.balance), np.full(len(off), np.inf)
+    going = np.flatnonzero(off > SETTINGS.balance)
     for _ in range(SETTINGS.steps):
         if not len(going):
             break
         g, x, k, low, high = (each[going] for each in (wrenches, loads, springs, least, most))
         r, b = due[going], twist[going]
-        moves = k > 0.0
-        flexible = np.divide(1.0, k, out=np.zeros_like(k), where=moves)
-
-        def kept_at(free: Array, low: Array = low, high: Array = high) -> Array:
-            return np.clip(free, low, high)
-
         free = x + k * _along(g, b)
-        kept = kept_at(free)
-        short = r - _times(kept, g)
+        short = r - _times(np.clip(free, low, high), g)
         moving = k * ((free >= low) & (free <= high))
         slope = (g * moving[..., None]).swapaxes(1, 2) @ g
         soft = SETTINGS.singular * (k[..., None] * g**2).sum(axis=(1, 2)) + 1e-30
         step = np.linalg.solve(slope + soft[:, None, None] * np.eye(6), short[..., None])[..., 0]
-        # along the step, the dual function's slope falls from `gain` and must not turn over far
-        gain, per_step = (step * short).sum(axis=1), k * _along(g, step)
-        value, share = _dual(free, kept, flexible), np.ones(len(going))
-        work = (step * r).sum(axis=1)
-        fixed = (np.where(moves, 0.0, x) * _along(g, step)).sum(axis=1)
-        for _ in range(SETTINGS.halvings):
-            there = free + share[:, None] * per_step
-            rise = _dual(there, kept_at(there), flexible) - value - share * (work - fixed)
-            worse = rise > -1e-4 * share * gain + 1e-12 * np.abs(value)
-            if not worse.any():
-                break
-            share[worse] *= 0.5
+        along = _along(g, step)
+        share = _least_along(free, k * along, low, high, along, (step * r).sum(axis=1))
         twist[going] = b + share[:, None] * step
-        found[going] = kept = kept_at(x + k * _along(g, twist[going]))
+        found[going] = kept = np.clip(x + k * _along(g, twist[going]), low, high)
         off[going] = np.abs(r - _times(kept, g)).max(axis=1)
-        slow = off[going] > SETTINGS.progress * before[going]
-        before[going] = np.minimum(off[going], before[going])
-        going = going[(off[going] > SETTINGS.balance) & ~slow]
+        gone = ~(np.abs(twist[going]).max(axis=1) < SETTINGS.far)
+        going = going[(off[going] > SETTINGS.balance) & ~gone]
+    off[np.abs(twist).max(axis=1) > SETTINGS.moved] = np.inf
     return found, off
+
+
+def _least_along(
+    free: Array, change: Array, low: Array, high: Array, along: Array, work: Array
+) -> Array:
+    """Return the multiple of a step at which the dual function is least, shape (S,).
+
+    Its slope Σ a_i clip(f_i + t c_i, l_i, h_i) − w rises with t, linearly between the t at which
+    loads meet their limits. Where it never reaches zero, a multiple far beyond is returned.
+
+    Parameters
+    ----------
+    free, change, low, high, along : ndarray, shape (S, n)
+        f, c, l, h and a.
+    work : ndarray, shape (S,)
+        w.
+    """
+
+    def slope(at: Array) -> Array:
+        loads = free[:, None] + at[..., None] * change[:, None]
+        return np.asarray(
+            (np.clip(loads, low[:, None], high[:, None]) @ along[..., None])[..., 0] - work[:, None]
+        )
+
+    found = np.ones(len(free))
+    whole = slope(np.array([[0.0, 1.0]] * len(free)))
+    # with a whole step that is as good as the least, there is nothing to search
+    hard = np.flatnonzero(np.abs(whole[:, 1]) > SETTINGS.good_step * np.abs(whole[:, 0]))
+    if not len(hard):
+        return found
+    free, change, low, high, along, work = (
+        each[hard] for each in (free, change, low, high, along, work)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meets = np.hstack([(low - free) / change, (high - free) / change])
+    meets = np.sort(np.where(np.isfinite(meets) & (meets > 0.0), meets, 0.0), axis=1)
+    ends = np.hstack([meets, 2.0 * meets[:, -1:] + 1.0])
+    slopes = slope(ends)
+    rises = slopes >= 0.0
+    last, row = ends.shape[1] - 1, np.arange(len(hard))
+    j = np.where(rises.any(axis=1), rises.argmax(axis=1), last)
+    i = np.maximum(j - 1, 0)
+    (t0, d0), (t1, d1) = ((ends[row, at], slopes[row, at]) for at in (i, j))
+    steep = np.where(t1 > t0, (d1 - d0) / np.where(t1 > t0, t1 - t0, 1.0), 0.0)
+    exact = t0 - d0 / np.where(steep > 0.0, steep, 1.0)
+    found[hard] = np.where(steep > 0.0, exact, np.where(d1 < 0.0, 1e12, t1))
+    return found
 
 
 def _along(wrenches: Array, twists: Array) -> Array:
@@ -473,11 +513,6 @@ def _along(wrenches: Array, twists: Array) -> Array:
 def _times(loads: Array, wrenches: Array) -> Array:
     """Return Σ x_i g_i, shape (S, 6)."""
     return np.asarray((loads[:, None] @ wrenches)[:, 0])
-
-
-def _dual(free: Array, kept: Array, flexible: Array) -> Array:
-    """Return the energy of passive loads that would be ``free`` of their limits, and are not."""
-    return np.asarray((kept * (free - 0.5 * kept) * flexible).sum(axis=1))
 
 
 def unit_names(prepared: PreparedStance) -> Sequence[tuple[str, str | None, str]]:
