@@ -2,13 +2,8 @@
 
 Motors keep their tensions and the hands their postures. A tile that slips changes the loads of its
 finger (`planner.simulation.finger_states`); the lateral reactions of fingers and the palms' loads
-take over what is then missing in the balance. They are springs between a rigid body and the rock,
-so that the body moves by the twist b that solves
-
-    Σ g_i clip(x_i + k_i g_iᵀ b, l_i, h_i) = r
-
-over their loads x_i before, their stiffnesses k_i, their wrenches g_i per newton, and the limits of
-palms, which press and shear one way only. It is the least elastic energy. A lateral reaction leaves
+take over what is then missing in the balance, as springs between a rigid body and the rock
+(`planner.simulation.passive_loads`); palms press and shear one way only. A lateral reaction leaves
 the tiles that have slipped, and stays in the others in proportion to their spines. A palm counts as
 one tile: loaded in shear beyond its strength it slips, and carries no shear any more.
 """
@@ -17,9 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,40 +23,11 @@ from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.prepare import PreparedStance
 from planner.simulation.finger_states import HOLDS, STATE_DIGITS, FingerStates
+from planner.simulation.passive_loads import BALANCE_SETTINGS, balanced
 
 __all__ = ["Cascade", "CascadeOutcome", "HandLoads", "Loads"]
 
 Flags = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class CascadeSettings:
-    """Tolerances of the balance of passive loads."""
-
-    balance: float = 1e-7
-    """Missing wrench that counts as none: forces, and moments over 0.1 m [N]."""
-    lost: float = 1e-5
-    """Missing wrench beyond which there is no balance [N]: far above rounding."""
-    rubs: float = 0.005
-    """Part of the force that the body needs, up to which friction of tendons and drives holds what
-    is missing along each axis: it holds several hundredths of a tension, and without it a change of
-    0.02 N would let fall a stance whose palms press nowhere."""
-    soft: float = 1e-2
-    """Stiffness of that friction over a tile's sideways: little, so that it holds what is left."""
-    moved: float = 0.1
-    """Way, and turn over 0.1 m, by which a body has moved off its hands [m]: springs reach by
-    millimetres."""
-    steps: int = 60  # of Newton's method; 3 to 8 are the rule
-    good_step: float = 0.1
-    """Part of the slope along a step that may be left at its end, without a search for the least."""
-    singular: float = 1e-12
-    """Part of the stiffest direction that keeps others from being singular once all are at limits.
-    """
-    far: float = 1e3
-    """The same, at which the search for a balance ends [m]: a step on the way may go far."""
-
-
-SETTINGS: Final = CascadeSettings()
 
 
 class Loads(NamedTuple):
@@ -185,8 +150,8 @@ class Cascade:
         )
         self._palm_most = np.where(np.isfinite(batch.palm_limits), batch.palm_limits, 0.0)
         self._planes = _half_planes(prepared)
-        self._rub_stiffness = SETTINGS.soft * batch.hands[0].hand.lateral_stiffness
-        self._rubs = SETTINGS.rubs * max(1.0, float(np.linalg.norm(prepared.wrench[:3])))
+        self._rub_stiffness = BALANCE_SETTINGS.soft * batch.hands[0].hand.lateral_stiffness
+        self._rubs = BALANCE_SETTINGS.rubs * max(1.0, float(np.linalg.norm(prepared.wrench[:3])))
 
     def replanned(self, loads: Loads, slipped: Flags) -> Cascade:
         """Return the tables of another plan of the same stance, made after slips.
@@ -238,7 +203,8 @@ class Cascade:
         gone = states[:, -len(self._batch.hands) :].astype(bool)
         palms = self._palms(gone)[0]
         planar = tiles.reshape(len(states), -1) @ self._per_load[:, :2].reshape(-1, 6)
-        return np.asarray(self._wrench - planar - _times(x, wrenches) - palms @ self._per_palm)
+        passive = (x[:, None] @ wrenches)[:, 0] + palms @ self._per_palm
+        return np.asarray(self._wrench - planar - passive)
 
     def _planar(self, states: NDArray[np.uint8]) -> tuple[Array, Indices]:
         """Return shear and normal load of each tile, (S, T, 2) [N], and the fingers' states."""
@@ -298,7 +264,7 @@ class Cascade:
         of_palms, palm_springs, most = self._palms(gone)
         others = np.concatenate([self._per_palm, np.eye(6)])
         rubs = np.full((len(states), 6), self._rubs)
-        passive, off = _balanced(
+        passive, off = balanced(
             np.concatenate([wrenches, np.broadcast_to(others, (len(states), *others.shape))], 1),
             np.hstack([x, of_palms, np.zeros_like(rubs)]),
             np.hstack([springs, palm_springs, np.full_like(rubs, self._rub_stiffness)]),
@@ -315,7 +281,7 @@ class Cascade:
         on = np.zeros((len(states), H))
         np.add.at(on.T, batch.places.hand, holding.T)
         had = np.bincount(batch.places.hand, self._on, H) > 0
-        lost = (off > SETTINGS.lost) | ((on == 0) & had).any(axis=1)
+        lost = (off > BALANCE_SETTINGS.lost) | ((on == 0) & had).any(axis=1)
         return HandLoads(self._used(tiles, palms, holding, gone), tiles, palms, holding, lost)
 
     def _used(self, tiles: Array, palms: Array, holding: Flags, gone: Flags) -> Array:
@@ -411,108 +377,6 @@ def _half_planes(prepared: PreparedStance) -> Array:
         # one that has fewer than others repeats its last
         found[first : first + len(hand.tiles), len(own) :] = (rows / capacity / shares)[:, -1:]
     return found
-
-
-def _balanced(
-    wrenches: Array, loads: Array, springs: Array, least: Array, most: Array, missing: Array
-) -> tuple[Array, Array]:
-    """Return passive loads (S, n) and the largest part of the wrench that they miss, (S,).
-
-    Infinite where the body would move off its hands.
-    See the module's equation.
-
-    Newton's method on the convex dual function of b, to the least along each step.
-
-    Parameters
-    ----------
-    wrenches : ndarray, shape (S, n, 6)
-        g of each load, moments over 0.1 m.
-    loads, springs, least, most : ndarray, shape (S, n)
-        x, k, l and h.
-    missing : ndarray, shape (S, 6)
-        r − Σ g x.
-    """
-    found, twist = loads.copy(), np.zeros(missing.shape)
-    due = missing + _times(loads, wrenches)
-    off = np.abs(missing).max(axis=1)
-    going = np.flatnonzero(off > SETTINGS.balance)
-    for _ in range(SETTINGS.steps):
-        if not len(going):
-            break
-        g, x, k, low, high = (each[going] for each in (wrenches, loads, springs, least, most))
-        r, b = due[going], twist[going]
-        free = x + k * _along(g, b)
-        short = r - _times(np.clip(free, low, high), g)
-        moving = k * ((free >= low) & (free <= high))
-        slope = (g * moving[..., None]).swapaxes(1, 2) @ g
-        soft = SETTINGS.singular * (k[..., None] * g**2).sum(axis=(1, 2)) + 1e-30
-        step = np.linalg.solve(slope + soft[:, None, None] * np.eye(6), short[..., None])[..., 0]
-        along = _along(g, step)
-        share = _least_along(free, k * along, low, high, along, (step * r).sum(axis=1))
-        twist[going] = b + share[:, None] * step
-        found[going] = kept = np.clip(x + k * _along(g, twist[going]), low, high)
-        off[going] = np.abs(r - _times(kept, g)).max(axis=1)
-        gone = ~(np.abs(twist[going]).max(axis=1) < SETTINGS.far)
-        going = going[(off[going] > SETTINGS.balance) & ~gone]
-    off[np.abs(twist).max(axis=1) > SETTINGS.moved] = np.inf
-    return found, off
-
-
-def _least_along(
-    free: Array, change: Array, low: Array, high: Array, along: Array, work: Array
-) -> Array:
-    """Return the multiple of a step at which the dual function is least, shape (S,).
-
-    Its slope Σ a_i clip(f_i + t c_i, l_i, h_i) − w rises with t, linearly between the t at which
-    loads meet their limits. Where it never reaches zero, a multiple far beyond is returned.
-
-    Parameters
-    ----------
-    free, change, low, high, along : ndarray, shape (S, n)
-        f, c, l, h and a.
-    work : ndarray, shape (S,)
-        w.
-    """
-
-    def slope(at: Array) -> Array:
-        loads = free[:, None] + at[..., None] * change[:, None]
-        return np.asarray(
-            (np.clip(loads, low[:, None], high[:, None]) @ along[..., None])[..., 0] - work[:, None]
-        )
-
-    found = np.ones(len(free))
-    whole = slope(np.array([[0.0, 1.0]] * len(free)))
-    # with a whole step that is as good as the least, there is nothing to search
-    hard = np.flatnonzero(np.abs(whole[:, 1]) > SETTINGS.good_step * np.abs(whole[:, 0]))
-    if not len(hard):
-        return found
-    free, change, low, high, along, work = (
-        each[hard] for each in (free, change, low, high, along, work)
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        meets = np.hstack([(low - free) / change, (high - free) / change])
-    meets = np.sort(np.where(np.isfinite(meets) & (meets > 0.0), meets, 0.0), axis=1)
-    ends = np.hstack([meets, 2.0 * meets[:, -1:] + 1.0])
-    slopes = slope(ends)
-    rises = slopes >= 0.0
-    last, row = ends.shape[1] - 1, np.arange(len(hard))
-    j = np.where(rises.any(axis=1), rises.argmax(axis=1), last)
-    i = np.maximum(j - 1, 0)
-    (t0, d0), (t1, d1) = ((ends[row, at], slopes[row, at]) for at in (i, j))
-    steep = np.where(t1 > t0, (d1 - d0) / np.where(t1 > t0, t1 - t0, 1.0), 0.0)
-    exact = t0 - d0 / np.where(steep > 0.0, steep, 1.0)
-    found[hard] = np.where(steep > 0.0, exact, np.where(d1 < 0.0, 1e12, t1))
-    return found
-
-
-def _along(wrenches: Array, twists: Array) -> Array:
-    """Return g_iᵀ b, shape (S, n)."""
-    return np.asarray((wrenches @ twists[..., None])[..., 0])
-
-
-def _times(loads: Array, wrenches: Array) -> Array:
-    """Return Σ x_i g_i, shape (S, 6)."""
-    return np.asarray((loads[:, None] @ wrenches)[:, 0])
 
 
 def unit_names(prepared: PreparedStance) -> Sequence[tuple[str, str | None, str]]:

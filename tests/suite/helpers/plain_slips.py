@@ -128,7 +128,7 @@ class PlainSlips:
         self.rest(h, i)
 
     def used(self) -> dict[tuple[int, int | None], float]:
-        """What each tile and palm that holds uses of its strength; raise `LostError` without balance."""
+        """What each tile and palm that holds uses of its strength; an error without balance."""
         stance = self.prepared.question.stance
         body, planar = stance.body, {}
         missing, columns = np.zeros(6), []
