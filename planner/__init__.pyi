@@ -19,6 +19,7 @@ from .explanation import (
 from .pictures import (
     plot_body_space as plot_body_space,
     plot_plan as plot_plan,
+    plot_redundancy as plot_redundancy,
     plot_survival as plot_survival,
     plot_wrench_space as plot_wrench_space,
     summary as summary,
@@ -57,6 +58,11 @@ from .question import (
     SurvivalSettings as SurvivalSettings,
     Want as Want,
 )
+from .recovery import (
+    Recovered as Recovered,
+    Recovery as Recovery,
+    find_redundancy as find_redundancy,
+)
 from .result import (
     Advice as Advice,
     Certificate as Certificate,
@@ -68,12 +74,14 @@ from .result import (
     HandPlan as HandPlan,
     LimitName as LimitName,
     LoadFactorStatus as LoadFactorStatus,
+    Loss as Loss,
     OpenLoop as OpenLoop,
     OpenLoopSample as OpenLoopSample,
     Palm as Palm,
     Plan as Plan,
     Price as Price,
     Quantiles as Quantiles,
+    Redundancy as Redundancy,
     Reliability as Reliability,
     RobustLoadFactor as RobustLoadFactor,
     SetPoints as SetPoints,

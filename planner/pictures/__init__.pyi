@@ -1,5 +1,6 @@
 from .body_plots import plot_body_space as plot_body_space
 from .hand_plots import plot_wrench_space as plot_wrench_space
 from .plan_plots import draw_plan as draw_plan, plot_plan as plot_plan
+from .redundancy_plots import plot_redundancy as plot_redundancy
 from .report import summary as summary, write_report as write_report
 from .survival_plots import plot_survival as plot_survival

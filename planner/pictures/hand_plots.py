@@ -37,6 +37,7 @@ CONTACT_STYLES: Final = {
     "face": ("tab:green", "tile's face"),
     "edge": ("tab:orange", "tile's edge"),
     "frame": ("tab:purple", "bare frame"),
+    "slipped": ("tab:pink", "slipped tile"),
     "nail": ("tab:red", "fingernail"),
     "none": ("0.55", "no contact"),
 }

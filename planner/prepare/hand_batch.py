@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -96,12 +97,13 @@ TILE_PARTS: Final = {nails: _parts_of_hand(nails=nails) for nails in (False, Tru
 """Finger and part of each tile of a hand, by whether the hand has nails."""
 
 
-def tile_index_of(counts: Sequence[int]) -> TileIndex:
+@lru_cache(maxsize=KEPT_NAMES)
+def tile_index_of(counts: tuple[int, ...]) -> TileIndex:
     """Return the index arrays of all tiles.
 
     Parameters
     ----------
-    counts : sequence of int, length H
+    counts : tuple of int, length H
         Number of tiles (and nails) of each hand.
     """
     hand = np.arange(len(counts)).repeat(counts)

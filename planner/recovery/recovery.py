@@ -23,8 +23,9 @@ from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, PreparedStance
 from planner.programs import Columns, ScaledRows, StanceData
 from planner.question import LostTile
+from planner.recovery.superposition import superposed
 from planner.result import Plan
-from planner.solving import Checks, Solution, StanceAnswer, Verified, answer_on, idle_joints
+from planner.solving import Checks, FixedSolution, StanceAnswer, Verified, answer_on, idle_joints
 
 __all__ = ["Recovered", "Recovery"]
 
@@ -124,11 +125,12 @@ class Recovery:
             if hand.touching[t]
         }
         self._pattern = _pattern(data)
-        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", 1024)
+        most = 2 * len(self._places) + 16  # each tile alone, and as many losses of several
+        self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", most)
         self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
-            "stances without tiles", 16
+            "stances without tiles", 4
         )
-        self._near: BoundedStore[tuple[_HandKey, ...], Solution] = BoundedStore(
+        self._near: BoundedStore[tuple[_HandKey, ...], FixedSolution] = BoundedStore(
             "plans without tiles", 256
         )
         self._keep([(h, (t,), (), True) for h, t in self._places.values()])
@@ -183,10 +185,6 @@ class Recovery:
         second = self._answer(start, lost, by_hand, gone | more, off, body_wrench)
         return second if second.utilisation < first.utilisation else first
 
-    def without(self, lost: Sequence[LostTile]) -> PreparedStance:
-        """Return the stance without tiles that have slipped, prepared for the solver."""
-        return self._prepared(self._keys(self._by_hand(dict.fromkeys(lost)), (), ()))
-
     def _by_hand(self, lost: Iterable[LostTile]) -> dict[int, list[int]]:
         """Return the tiles that have slipped, by the index of their hand."""
         found: dict[int, list[int]] = {}
@@ -224,18 +222,23 @@ class Recovery:
             prepared = prepared.turned(body_wrench)
         checks = Checks.of(prepared, self._idle, lost)
         found = answer_on(prepared, start, checks, self._nearest(keys))
-        if isinstance(found.answer, Verified):
-            self._near.keep([(keys, found.answer.solution)])
-        hands = zip(prepared.limbs, prepared.batch.hands, strict=True)
-        open_fingers = [(limb, finger) for limb, hand in hands for finger in _released(hand)]
+        solution = found.answer.solution
+        if isinstance(found.answer, Verified) and isinstance(solution, FixedSolution):
+            # a start is all that is needed of it
+            self._near.keep([(keys, replace(solution, sets=self.prepared.at_rest))])
+        open_fingers = [
+            (prepared.limbs[h], finger) for h, *_ in keys for finger in _released(prepared, h)
+        ]
         return Recovered(found, lost, tuple(open_fingers))
 
-    def _nearest(self, keys: tuple[_HandKey, ...]) -> Solution | None:
-        """Return a known solution to start from: of the same losses, or of one tile of them."""
+    def _nearest(self, keys: tuple[_HandKey, ...]) -> FixedSolution | None:
+        """Return a solution to start from: of the same losses, or superposed from single ones."""
         single = [((h, (t,), (), True),) for h, tiles, _, _ in keys for t in tiles]
-        same, *others = self._near.find([keys, *single])
-        known = [each for each in others if each is not None]
-        return same or max(known, key=lambda each: each.least.value, default=None)
+        same, whole, *others = self._near.find([keys, (), *single])
+        starts = [each.start for each in others if each is not None and each.start is not None]
+        if same is not None or whole is None or whole.start is None or len(starts) < len(single):
+            return same
+        return replace(whole, start=superposed(whole.start, starts))
 
     def _keys(
         self,
@@ -287,16 +290,12 @@ class Recovery:
         return Columns.of(whole, self._pattern)
 
 
-def _released(hand: SettledHand) -> Iterator[str]:
+def _released(prepared: PreparedStance, h: int) -> Iterator[str]:
     """Yield the fingers of a hand that are off the rock since tiles have slipped."""
-    for finger in FINGERS:
-        on = [
-            (now.contact, then.contact)
-            for now, then in zip(hand.tiles, hand.as_closed.tiles, strict=True)
-            if now.finger == finger
-        ]
-        if all(now == "none" for now, _ in on) and any(then != "none" for _, then in on):
-            yield finger
+    hand = prepared.batch.hands[h]
+    bearing = {tile.finger for tile in hand.tiles if tile.contact != "none"}
+    before = {tile.finger for tile in hand.as_closed.tiles if tile.contact != "none"}
+    yield from (finger for finger in FINGERS if finger in before - bearing)
 
 
 def _pattern(data: StanceData) -> NDArray[np.bool_]:

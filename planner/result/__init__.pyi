@@ -18,6 +18,7 @@ from .plain_parts import (
     Price as Price,
     Reliability as Reliability,
     Solver as Solver,
+    Status as Status,
     TensionPath as TensionPath,
     Tile as Tile,
     Time as Time,
@@ -27,8 +28,8 @@ from .plan import (
     Plan as Plan,
     SetPoints as SetPoints,
     SetPointSource as SetPointSource,
-    Status as Status,
 )
+from .redundancy import Loss as Loss, LossKind as LossKind, Redundancy as Redundancy
 from .robust_load_factor import (
     RobustLoadFactor as RobustLoadFactor,
     RobustQuantiles as RobustQuantiles,

@@ -24,6 +24,7 @@ __all__ = [
     "Price",
     "Reliability",
     "Solver",
+    "Status",
     "TensionPath",
     "Tile",
     "Time",
@@ -84,6 +85,9 @@ class Price(LimitName, frozen=True, kw_only=True):
         """The limit without its price."""
         return LimitName(self.limb, self.finger, self.phalanx, self.limit, self.joint)
 
+
+Status = Literal["optimal", "overloaded", "infeasible", "failed"]
+"""Status of a plan."""
 
 LoadFactorStatus = Literal["found", "at_least", "unbounded", "none", "not_asked", "not_finished"]
 """Status of a load factor.
@@ -306,7 +310,8 @@ class Tile(Struct, frozen=True):
         ``base``, ``proximal``, ``middle`` or ``distal``, or ``nail``.
     contact : str
         ``face``; ``edge``; ``frame``: the phalanx only presses on rock beside the tile; ``nail``;
-        ``none``: the tile touches nothing and carries no load.
+        ``slipped``: the tile's spines have let go, and it drags on with friction; ``none``: the
+        tile touches nothing and carries no load.
     position : list of float, length 3
     force : list of float, length 3
         shear·shear_axis + normal·normal_axis + lateral·lateral_axis.

@@ -24,6 +24,7 @@ from planner.result.plain_parts import (
     Price,
     Reliability,
     Solver,
+    Status,
     TensionPath,
     Time,
 )
@@ -32,7 +33,6 @@ from planner.result.spread import Spread
 
 __all__ = ["Certificate", "Plan", "SetPointSource", "SetPoints", "Status"]
 
-Status = Literal["optimal", "overloaded", "infeasible", "failed"]
 SetPointSource = Literal["interpolated", "blended", "solved"]
 
 

@@ -1,4 +1,5 @@
 from .dual_bounds import is_least as is_least, least_bound as least_bound
+from .fixed_wrists import FixedSolution as FixedSolution
 from .objectives import (
     NAMED_OBJECTIVES as NAMED_OBJECTIVES,
     CappedObjective as CappedObjective,
@@ -10,7 +11,7 @@ from .palm_parts import (
     PalmLoadFactors as PalmLoadFactors,
     load_factors_without_palm_loads as load_factors_without_palm_loads,
 )
-from .solution import Infeasible as Infeasible, Solution as Solution, Verified as Verified
+from .solution import Infeasible as Infeasible, Verified as Verified
 from .solve import (
     KnownStance as KnownStance,
     StanceAnswer as StanceAnswer,
@@ -19,5 +20,8 @@ from .solve import (
     try_stance as try_stance,
     with_advice as with_advice,
 )
-from .unique_plan import least_utilisation as least_utilisation
+from .unique_plan import (
+    LeastUtilisation as LeastUtilisation,
+    least_utilisation as least_utilisation,
+)
 from .verified import Checks as Checks, idle_joints as idle_joints

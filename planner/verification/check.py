@@ -35,6 +35,7 @@ from planner.verification.residuals import (
     PartNames,
     Recomputed,
     Residual,
+    ResidualLimits,
     allowed_errors,
     claim,
     is_near,
@@ -172,8 +173,11 @@ class Check:
         self.settled = _settled_limits(known, stance.hands, self.strength)
         self.limbs = self.settled.names.limbs
         asked = AskedLimits(question, self.settled.names, self.settled.tiles)
-        self._slipped = SlippedTiles(self.settled.names, lost)
-        self._limits = (*self.settled.limits, asked, self._slipped)
+        self._limits: tuple[ResidualLimits, ...] = (*self.settled.limits, asked)
+        self._slipped: SlippedTiles | None = None
+        if lost or not all(hand.closed is None for hand in hands):
+            self._slipped = SlippedTiles(self.settled.names, lost)
+            self._limits += (self._slipped,)
         poses = [place.pose for place in stance.hands]
         into_body = stance.body.rotation.T
         turns = into_body @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)
@@ -213,7 +217,8 @@ class Check:
             joints = self.joints(found, arrays.wrenches, body_wrench)
             residuals, _, used = self.recompute(found, arrays, joints)
             misplaced = [*self._wrists(arrays), *check_contacts(self.settled.names, arrays)]
-            misplaced += self._slipped.contacts(arrays)
+            if self._slipped is not None:
+                misplaced += self._slipped.contacts()
             if misplaced or not is_near(residuals):
                 allowed = allowed_errors(self.known, arrays)
                 for residual in residuals:

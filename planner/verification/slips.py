@@ -11,9 +11,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from planner.prepare import CONTACT_CODES
+from planner.prepare import CONTACT_CODES, contact_pattern_of
 from planner.question import LostTile
-from planner.result import PlanArrays
 from planner.verification.residuals import PartNames, Recomputed, Residual, ResidualLimits
 
 __all__ = ["SlippedTiles"]
@@ -33,14 +32,11 @@ class SlippedTiles(ResidualLimits):
     def __init__(self, names: PartNames, lost: Sequence[LostTile]) -> None:
         self._names, known = names, names.known
         gone = {(tile.limb, tile.finger, tile.phalanx) for tile in lost}
-        each = [
-            (limb, tile.finger, tile.phalanx)
-            for limb, hand in zip(names.limbs, known.hands, strict=True)
-            for tile in hand.tiles
-        ]
-        self._lost = np.array([name in gone for name in each])
-        self._tiles = np.flatnonzero(self._lost)
-        self._found = len(self._tiles) == len(gone)
+        pairs = zip(names.limbs, known.hands, strict=True)
+        named = [(limb, *tile[:2]) for limb, hand in pairs for tile in hand.tiles]
+        tiles = [t for t, name in enumerate(named) if name in gone]
+        self._tiles = np.array(tiles, dtype=np.intp)
+        self._found = len(tiles) == len({*lost})
         self._friction = known.friction[self._tiles]
 
     def recompute(self, again: Recomputed) -> list[Residual]:
@@ -55,20 +51,21 @@ class SlippedTiles(ResidualLimits):
             Residual("least", normal, hand, self._name, pulled, (-normal,)),
         ]
 
-    def contacts(self, arrays: PlanArrays) -> Iterator[str]:
-        """Yield an error message for each tile with a contact state that it cannot have."""
+    def contacts(self) -> Iterator[str]:
+        """Yield an error message for each tile with a contact state that it cannot have.
+
+        `check_contacts` compares the plan's contact states with those of the hands.
+        """
         if not self._found:
             yield "a tile that is said to have slipped is not in this stance"
         known = self._names.known
-        codes = np.array([CONTACT_CODES[tile.contact] for own in arrays.tiles for tile in own])
-        closed = np.array(
-            [CONTACT_CODES[tile.contact] for hand in known.hands for tile in hand.as_closed.tiles]
-        )
-        off = codes == CONTACT_CODES["none"]
+        now = known.touch.contacts
+        closed = contact_pattern_of(tuple([hand.as_closed.tiles for hand in known.hands])).contacts
+        off = now == CONTACT_CODES["none"]
         whole = np.logical_and.reduceat(off, known.places.first_of_finger)[known.places.finger]
-        slipped = codes == CONTACT_CODES["slipped"]
-        wrong = np.where(self._lost, ~(slipped | (off & whole)), (codes != closed) & ~(off & whole))
-        for t in np.flatnonzero(wrong).tolist():
+        wrong = now != closed
+        wrong[self._tiles] = now[self._tiles] != CONTACT_CODES["slipped"]
+        for t in np.flatnonzero(wrong & ~(off & whole)).tolist():
             yield f"{self._names.tile(t)} has another contact than its slip leaves it"
 
     def _name(self, i: int) -> str:

@@ -116,7 +116,19 @@ def planned(request: PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> Planned:
         settings = request.survival or planner.SurvivalSettings()
         with deadline.within(asked.deadline, started=start):
             add_survival(found.reply, asked, answer, settings)
+    if "redundancy" in request.want and isinstance(found.reply, PlanReply):
+        with deadline.within(asked.deadline, started=start):
+            _add_redundancy(found.reply, asked)
     return found
+
+
+def _add_redundancy(reply: PlanReply, asked: planner.Question) -> None:
+    """Add the plans without each tile, finger and hand to a reply, if there is time."""
+    try:
+        reply.redundancy = planner.find_redundancy(asked)
+    except DeadlineError:
+        reply.unfinished.append("redundancy")
+        reply.warnings.append("the deadline left no time for the redundancy")
 
 
 def answer_with_advice(answer: Planned) -> Planned:

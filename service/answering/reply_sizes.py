@@ -80,8 +80,8 @@ def _with_less_in_it(reply: Reply, bare: Reply) -> Iterator[tuple[str, Reply]]:
 
     ``bare``: the reply without the model, or the same reply if it has no model.
     """
-    wanted = {"spread", "advice", "robust", "open_loop", "clearance", "prices", "survival"}
-    wanted |= {"vertices", "half_spaces"}
+    wanted = {"spread", "advice", "robust", "open_loop", "clearance", "redundancy", "prices"}
+    wanted |= {"survival", "vertices", "half_spaces"}
     blank: dict[str, Any] = {
         field.name: None if field.default is NODEFAULT else field.default
         for field in fields(reply)

@@ -58,6 +58,10 @@ COMMANDS_BY_NAME: Final = {
     ),
     "plan": Entry("plans", "Make one plan, without the network."),
     "query": Entry("network", "Ask a running service for a plan."),
+    "redundancy": Entry(
+        "plans",
+        "Plan without each tile, finger and hand, one at a time, without moving.",
+    ),
     "rock": Entry(
         "rock",
         "Make a mesh hold of a scan: points, a grid of heights, or triangles.",

@@ -1,4 +1,4 @@
-"""Define ``crux plan``: plan one stance in this process, without the network."""
+"""Define ``crux plan`` and ``crux redundancy``: plans of one stance, without the network."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hand_models.base import InvalidInputError
 from service import answering, replies, requests, tables
 from service.commands import options, stances
 
-__all__ = ["plan_command"]
+__all__ = ["plan_command", "redundancy_command"]
 
 
 @click.command("plan")
@@ -117,6 +117,36 @@ def plan_command(
     return tables.ExitStatus.of(answer.reply.status)
 
 
+@click.command("redundancy")
+@options.stance_argument
+@options.plot_option("Draw it there.")
+@options.own_options
+@options.json_option
+def redundancy_command(stance: str, picture: Path | None, own: options.Own, as_json: bool) -> int:
+    """Plan without each tile, finger and hand, one at a time, without moving.
+
+    A tile that slips drags on while it is pressed. A finger that is lost is off the rock, with a
+    hand that is lost all its fingers and its palm. All wrists must be fixed.
+
+    Exit status: 3 where the stance does not hold without some tile.
+    """
+    request = own.asked(stances.read_request(stance))
+    alone = msgspec.structs.replace(request, want=[], draws=[], open_loop=None)
+    asked = answering.question(alone, own.robots)
+    with tables.waiting(f"planning losses of {stance}", alone):
+        with planner.deadline.within(request.deadline):
+            found = planner.find_redundancy(asked)
+        if picture is not None:
+            with tables.writing(picture):
+                planner.plot_redundancy(found, picture, stance)
+    if as_json:
+        tables.say(found)
+    else:
+        tables.print_redundancy(found, tables.console())
+    held, count = found.held["tile"]
+    return tables.ExitStatus.DONE if held == count else tables.ExitStatus.OVERLOADED
+
+
 def _print(
     answer: answering.Planned,
     without_palm: replies.PlanReply | None,
@@ -132,6 +162,8 @@ def _print(
         palm_parts=palm_parts,
         brief=brief,
     )
+    if isinstance(answer.reply.redundancy, planner.Redundancy):
+        tables.print_redundancy(answer.reply.redundancy, tables.console())
     tables.tell_solver(answer.reply)
     sys.stdout.flush()
 

@@ -15,6 +15,7 @@ from planner import (
     OpenLoop,
     Palm,
     Price,
+    Redundancy,
     Reliability,
     RobustLoadFactor,
     Solver,
@@ -143,7 +144,7 @@ class PlanReply(StanceReply, kw_only=True):
     - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
       proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
       ``path``, ``certificate``, ``explanation``, ``robust``, ``open_loop``, ``spread``, ``advice``,
-      ``survival``.
+      ``survival``, ``redundancy``.
     - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
       ["robust"]``, and not for a body wrench of zero.
     - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;
@@ -155,6 +156,8 @@ class PlanReply(StanceReply, kw_only=True):
     - ``clearance``: least distances of body, hands, links and rock; if ``want`` names it.
     - ``reliability``: probability that no tile slips; only with the objective ``max_reliability``,
       where tiles are loaded and the limits can be kept.
+    - ``redundancy``: the plan without each tile, each finger and each hand; only with ``"want":
+      ["redundancy"]``.
     - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
       make the stance feasible come first, the smallest first; the rest follow by gain for their
       size.
@@ -191,6 +194,7 @@ class PlanReply(StanceReply, kw_only=True):
     spread: Spread | UnsetType = UNSET
     clearance: Clearance | UnsetType = UNSET
     reliability: Reliability | UnsetType = UNSET
+    redundancy: Redundancy | UnsetType = UNSET
     advice: list[Advice] | UnsetType = UNSET
 
 

@@ -146,14 +146,15 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     confidence: Later = None
     detail: Detail | None = None
     want: Annotated[
-        list[Want | Literal["survival"]],
+        list[Want | Literal["redundancy", "survival"]],
         Meta(
             description="robust: the least load factor over a scatter of the hands' places, too. "
             "open_loop: the utilisation over displaced hands if the plan is executed as it is. "
             "spread: utilisation and load factor over draws of the hand's and the rock's numbers. "
             "clearance: the least distances of body, hands, links and rock. "
             "advice: what would make it hold, or hold more: verified changes. "
-            "survival: how likely it is that no tile slips, and that all hands hold if some do"
+            "survival: how likely it is that no tile slips, and that all hands hold if some do. "
+            "redundancy: the plan without each tile, finger and hand, without moving"
         ),
     ] = []
     draws: Draws = []

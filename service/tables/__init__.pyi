@@ -29,6 +29,7 @@ from .layout import (
 )
 from .output_lock import write_alone as write_alone
 from .plans import print_plan as print_plan, print_route as print_route
+from .redundancy import print_redundancy as print_redundancy
 from .sweeps import print_sweep as print_sweep
 from .terminal import (
     filling_folder as filling_folder,

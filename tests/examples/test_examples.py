@@ -54,6 +54,18 @@ def test_a_client_reads_set_points_of_a_wrench_that_drifts(tmp_path: Path):
     assert points[5][2:] != points[15][2:]
 
 
+def test_a_robot_stays_on_the_wall_while_tiles_slip(tmp_path: Path):
+    server = Served(free_endpoint(), "--workers", "1")
+    try:
+        lines = run("recover_from_slips", tmp_path, server.endpoint).splitlines()
+    finally:
+        server.process.kill()
+        server.process.communicate()
+    assert len(lines) == 8
+    assert all(re.search(r": (holds, utilisation|overloaded, save \w+ first)", x) for x in lines)
+    assert "holds" in lines[0]
+
+
 def test_a_sweep_becomes_a_table(tmp_path: Path):
     printed = run("sweep_to_table", tmp_path).splitlines()
     with (tmp_path / "sweep.csv").open(encoding="utf-8") as file:

@@ -255,3 +255,18 @@ def test_a_tile_lost_twice_counts_once(recoveries):
     recovery = recoveries["wall-300"]
     tile = recovery.tiles[5]
     assert recovery.plan([tile, tile]).utilisation == recovery.plan([tile]).utilisation
+
+
+@pytest.mark.parametrize("name", ["wall-300", "boulders"])
+def test_a_plan_does_not_depend_on_where_its_search_starts(recoveries, name):
+    """From plans without one tile each, superposed; and from nothing."""
+    known, cold = recoveries[name], Recovery(recoveries[name].prepared)
+    losses = [lost for lost in some(known, 7, 12) if len(lost) > 1]
+    for tile in {tile for lost in losses for tile in lost}:
+        known.plan([tile])
+    known.plan(())
+    for lost in losses:
+        one, two = known.plan(lost), cold.plan(lost)
+        assert one.utilisation == pytest.approx(two.utilisation, abs=1e-5)
+        tensions = [each.verified.arrays.tensions for each in (one, two)]
+        assert tensions[0] == pytest.approx(tensions[1], abs=0.05)

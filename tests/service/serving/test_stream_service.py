@@ -366,10 +366,10 @@ def test_a_failure_is_worse_than_an_overload(stance_file, monkeypatch, capfd) ->
     given(monkeypatch, HEAVIER, WRENCH)
     answers = WrenchStream.set_points
 
-    def failing(self: WrenchStream, wrench: object) -> object:
+    def failing(self: WrenchStream, wrench: object, lost: object) -> object:
         if list(wrench) == WRENCH:
             return SetPoints("failed", np.array(wrench), verified=False, reason="a reason")
-        return answers(self, wrench)
+        return answers(self, wrench, lost)
 
     monkeypatch.setattr(WrenchStream, "set_points", failing)
     assert run_command_line(["stream", stance_file(wall_request())]) == FAILED

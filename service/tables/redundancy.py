@@ -1,0 +1,46 @@
+"""Print what a stance can lose, as a table of fingers and tiles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from planner import Loss, Redundancy
+from service.tables.layout import name, number, print_rows
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["print_redundancy"]
+
+
+def print_redundancy(redundancy: Redundancy, out: Console) -> None:
+    """Print the utilisation without each tile, finger and hand, and the worst of each kind.
+
+    Parameters
+    ----------
+    redundancy : Redundancy
+    out : Console
+        Console to print on.
+    """
+    rows: dict[tuple[str, str], dict[str, str]] = {}
+    for loss in redundancy.losses:
+        row = rows.setdefault((loss.limb, loss.finger or "all fingers, palm"), {})
+        row[loss.phalanx or "whole"] = _used(loss)
+    heads = ("base", "proximal", "middle", "distal", "whole")
+    shown = [
+        {"hand": limb, "finger": finger} | dict.fromkeys(heads) | row
+        for limb in dict.fromkeys(limb for limb, _ in rows)
+        for (at, finger), row in rows.items()
+        if at == limb
+    ]
+    columns = [name("hand"), name("finger"), *map(number, heads)]
+    print_rows(shown, columns, out, "utilisation without a part; * no plan within the cap")
+    for sentence in redundancy.sentences:
+        out.print(sentence, soft_wrap=True)
+
+
+def _used(loss: Loss) -> str:
+    """Return the utilisation without a part, with a star if it is beyond the cap."""
+    if loss.utilisation is None:
+        return "none*"
+    return f"{loss.utilisation:.3f}" + ("" if loss.holds else "*")
