@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hand_models.base import InvalidInputError, errors_under
 from hand_models.parameters import ParameterSample, own_draw
-from planner import Load, Question, Want
+from planner import Load, Question
 from service import requests
 from service.answering.own_models import BUNDLED_ROBOTS, Robots
 from service.answering.stances import (
@@ -56,7 +56,10 @@ def question(request: requests.PlanRequest, robots: Robots = BUNDLED_ROBOTS) -> 
         body_wrench=array_of(request.body_wrench),
         load=request.load or Load(),
         limits=request.limits,
-        want=frozenset([want for want in request.want if want in get_args(Want)]),
+        want=frozenset(
+            # the other two are no part of a plan
+            [each for each in request.want if each != "redundancy" and each != "survival"]
+        ),
         objective=request.objective,
         present={limb: np.array(tensions) for limb, tensions in request.present.items()},
         deadline=request.deadline,
