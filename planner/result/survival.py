@@ -33,7 +33,7 @@ class SurvivalShare(Struct, frozen=True):
         middle = (share + z**2 / (2 * draws)) / (1.0 + z**2 / draws)
         wide = share * (1.0 - share) / draws + z**2 / (4.0 * draws**2)
         wide = z * math.sqrt(wide) / (1.0 + z**2 / draws)
-        return cls(share, max(middle - wide, 0.0), min(middle + wide, 1.0), draws)
+        return cls(share, max(min(middle - wide, share), 0.0), max(middle + wide, share), draws)
 
     @classmethod
     def merged(cls, parts: Sequence[SurvivalShare | None]) -> SurvivalShare | None:

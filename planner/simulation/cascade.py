@@ -2,13 +2,8 @@
 
 Motors keep their tensions and the hands their postures. A tile that slips changes the loads of its
 finger (`planner.simulation.finger_states`); the lateral reactions of fingers and the palms' loads
-take over what is then missing in the balance. They are springs between a rigid body and the rock,
-so that the body moves by the twist b that solves
-
-    Σ g_i clip(x_i + k_i g_iᵀ b, l_i, h_i) = r
-
-over their loads x_i before, their stiffnesses k_i, their wrenches g_i per newton, and the limits of
-palms, which press and shear one way only. It is the least elastic energy. A lateral reaction leaves
+take over what is then missing in the balance, as springs between a rigid body and the rock
+(`planner.simulation.passive_loads`); palms press and shear one way only. A lateral reaction leaves
 the tiles that have slipped, and stays in the others in proportion to their spines. A palm counts as
 one tile: loaded in shear beyond its strength it slips, and carries no shear any more.
 """
@@ -17,9 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,35 +23,11 @@ from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.prepare import PreparedStance
 from planner.simulation.finger_states import HOLDS, STATE_DIGITS, FingerStates
+from planner.simulation.passive_loads import BALANCE_SETTINGS, balanced
 
 __all__ = ["Cascade", "CascadeOutcome", "HandLoads", "Loads"]
 
 Flags = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class CascadeSettings:
-    """Tolerances of the balance of passive loads."""
-
-    balance: float = 1e-8
-    """Missing wrench that counts as none: forces, and moments over 0.1 m [N]."""
-    lost: float = 1e-5
-    """Missing wrench beyond which there is no balance [N]: far above rounding."""
-    rubs: float = 0.005
-    """Part of the force that the body needs, up to which friction of tendons and drives holds what
-    is missing along each axis: it holds several hundredths of a tension, and without it a change of
-    0.02 N would let fall a stance whose palms press nowhere."""
-    soft: float = 1e-3
-    """Stiffness of that friction over a tile's sideways: little, so that it holds what is left."""
-    steps: int = 60  # of Newton's method; 3 to 8 are the rule
-    halvings: int = 20  # of a step
-    singular: float = 1e-12
-    """Part of the stiffest direction that keeps others from being singular once all are at limits.
-    """
-    progress: float = 0.999  # of the missing wrench, above which a step ends the search
-
-
-SETTINGS: Final = CascadeSettings()
 
 
 class Loads(NamedTuple):
@@ -180,8 +150,8 @@ class Cascade:
         )
         self._palm_most = np.where(np.isfinite(batch.palm_limits), batch.palm_limits, 0.0)
         self._planes = _half_planes(prepared)
-        self._rub_stiffness = SETTINGS.soft * batch.hands[0].hand.lateral_stiffness
-        self._rubs = SETTINGS.rubs * max(1.0, float(np.linalg.norm(prepared.wrench[:3])))
+        self._rub_stiffness = BALANCE_SETTINGS.soft * batch.hands[0].hand.lateral_stiffness
+        self._rubs = BALANCE_SETTINGS.rubs * max(1.0, float(np.linalg.norm(prepared.wrench[:3])))
 
     def replanned(self, loads: Loads, slipped: Flags) -> Cascade:
         """Return the tables of another plan of the same stance, made after slips.
@@ -233,7 +203,8 @@ class Cascade:
         gone = states[:, -len(self._batch.hands) :].astype(bool)
         palms = self._palms(gone)[0]
         planar = tiles.reshape(len(states), -1) @ self._per_load[:, :2].reshape(-1, 6)
-        return np.asarray(self._wrench - planar - _times(x, wrenches) - palms @ self._per_palm)
+        passive = (x[:, None] @ wrenches)[:, 0] + palms @ self._per_palm
+        return np.asarray(self._wrench - planar - passive)
 
     def _planar(self, states: NDArray[np.uint8]) -> tuple[Array, Indices]:
         """Return shear and normal load of each tile, (S, T, 2) [N], and the fingers' states."""
@@ -271,7 +242,11 @@ class Cascade:
         kept = np.ones((len(gone), gone.shape[1], 2))
         kept[..., 0] = ~(gone | self._gone[len(self._phalanx) :])
         loads, springs = self._loads.palms * kept, self._palm_springs * kept
-        most = np.where([True, False], np.inf, self._palm_most) * np.ones_like(kept)
+        # an overloaded plan may press more than palms bear
+        pressed = np.maximum(self._palm_most[:, 1], self._loads.palms[:, 1])
+        most = np.broadcast_to(
+            np.column_stack([np.full_like(pressed, np.inf), pressed]), kept.shape
+        )
         return tuple(each.reshape(len(gone), -1) for each in (loads, springs, most))  # type: ignore[return-value]
 
     def loads(self, states: NDArray[np.uint8]) -> HandLoads:
@@ -289,7 +264,7 @@ class Cascade:
         of_palms, palm_springs, most = self._palms(gone)
         others = np.concatenate([self._per_palm, np.eye(6)])
         rubs = np.full((len(states), 6), self._rubs)
-        passive, off = _balanced(
+        passive, off = balanced(
             np.concatenate([wrenches, np.broadcast_to(others, (len(states), *others.shape))], 1),
             np.hstack([x, of_palms, np.zeros_like(rubs)]),
             np.hstack([springs, palm_springs, np.full_like(rubs, self._rub_stiffness)]),
@@ -306,7 +281,7 @@ class Cascade:
         on = np.zeros((len(states), H))
         np.add.at(on.T, batch.places.hand, holding.T)
         had = np.bincount(batch.places.hand, self._on, H) > 0
-        lost = (off > SETTINGS.lost) | ((on == 0) & had).any(axis=1)
+        lost = (off > BALANCE_SETTINGS.lost) | ((on == 0) & had).any(axis=1)
         return HandLoads(self._used(tiles, palms, holding, gone), tiles, palms, holding, lost)
 
     def _used(self, tiles: Array, palms: Array, holding: Flags, gone: Flags) -> Array:
@@ -402,82 +377,6 @@ def _half_planes(prepared: PreparedStance) -> Array:
         # one that has fewer than others repeats its last
         found[first : first + len(hand.tiles), len(own) :] = (rows / capacity / shares)[:, -1:]
     return found
-
-
-def _balanced(
-    wrenches: Array, loads: Array, springs: Array, least: Array, most: Array, missing: Array
-) -> tuple[Array, Array]:
-    """Return passive loads (S, n) and the largest part of the wrench that they miss, (S,).
-
-    See the module's equation.
-
-    Newton's method on the convex dual function of b, with steps halved until it decreases.
-
-    Parameters
-    ----------
-    wrenches : ndarray, shape (S, n, 6)
-        g of each load, moments over 0.1 m.
-    loads, springs, least, most : ndarray, shape (S, n)
-        x, k, l and h.
-    missing : ndarray, shape (S, 6)
-        r − Σ g x.
-    """
-    found, twist = loads.copy(), np.zeros(missing.shape)
-    due = missing + _times(loads, wrenches)
-    off = np.abs(missing).max(axis=1)
-    going, before = np.flatnonzero(off > SETTINGS.balance), np.full(len(off), np.inf)
-    for _ in range(SETTINGS.steps):
-        if not len(going):
-            break
-        g, x, k, low, high = (each[going] for each in (wrenches, loads, springs, least, most))
-        r, b = due[going], twist[going]
-        moves = k > 0.0
-        flexible = np.divide(1.0, k, out=np.zeros_like(k), where=moves)
-
-        def kept_at(free: Array, low: Array = low, high: Array = high) -> Array:
-            return np.clip(free, low, high)
-
-        free = x + k * _along(g, b)
-        kept = kept_at(free)
-        short = r - _times(kept, g)
-        moving = k * ((free >= low) & (free <= high))
-        slope = (g * moving[..., None]).swapaxes(1, 2) @ g
-        soft = SETTINGS.singular * (k[..., None] * g**2).sum(axis=(1, 2)) + 1e-30
-        step = np.linalg.solve(slope + soft[:, None, None] * np.eye(6), short[..., None])[..., 0]
-        # along the step, the dual function's slope falls from `gain` and must not turn over far
-        gain, per_step = (step * short).sum(axis=1), k * _along(g, step)
-        value, share = _dual(free, kept, flexible), np.ones(len(going))
-        work = (step * r).sum(axis=1)
-        fixed = (np.where(moves, 0.0, x) * _along(g, step)).sum(axis=1)
-        for _ in range(SETTINGS.halvings):
-            there = free + share[:, None] * per_step
-            rise = _dual(there, kept_at(there), flexible) - value - share * (work - fixed)
-            worse = rise > -1e-4 * share * gain + 1e-12 * np.abs(value)
-            if not worse.any():
-                break
-            share[worse] *= 0.5
-        twist[going] = b + share[:, None] * step
-        found[going] = kept = kept_at(x + k * _along(g, twist[going]))
-        off[going] = np.abs(r - _times(kept, g)).max(axis=1)
-        slow = off[going] > SETTINGS.progress * before[going]
-        before[going] = np.minimum(off[going], before[going])
-        going = going[(off[going] > SETTINGS.balance) & ~slow]
-    return found, off
-
-
-def _along(wrenches: Array, twists: Array) -> Array:
-    """Return g_iᵀ b, shape (S, n)."""
-    return np.asarray((wrenches @ twists[..., None])[..., 0])
-
-
-def _times(loads: Array, wrenches: Array) -> Array:
-    """Return Σ x_i g_i, shape (S, 6)."""
-    return np.asarray((loads[:, None] @ wrenches)[:, 0])
-
-
-def _dual(free: Array, kept: Array, flexible: Array) -> Array:
-    """Return the energy of passive loads that would be ``free`` of their limits, and are not."""
-    return np.asarray((kept * (free - 0.5 * kept) * flexible).sum(axis=1))
 
 
 def unit_names(prepared: PreparedStance) -> Sequence[tuple[str, str | None, str]]:

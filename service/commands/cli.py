@@ -76,7 +76,7 @@ COMMANDS_BY_NAME: Final = {
         "Answer questions on zenoh until SIGTERM or Ctrl-C.",
     ),
     "simulate": Entry(
-        "simulate",
+        "sweep",
         "Let tiles slip at random: how often all hands hold, with new set-points or without.",
     ),
     "stream": Entry(

@@ -1,4 +1,4 @@
-"""Survival: the formula against samples, known figures, new set-points, and what is not simulated."""
+"""Survival: the formula against samples, known figures, new set-points, what is not simulated."""
 
 import itertools
 import math

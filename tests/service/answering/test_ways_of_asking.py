@@ -357,6 +357,10 @@ def test_a_question_is_answered_alike_in_every_way(name: str, i: int):
         there = [sample["utilisation"] for sample in served["open_loop"]["samples"]]
         np.testing.assert_allclose(there, told["open_loop"], atol=UTILISATION)
 
+    if "survival" in served:
+        assert served["survival"] == msgspec.to_builtins(in_batch.survival)
+        assert served["survival_probability"] == in_batch.survival.no_slip
+
     again = KnownStance(as_question).plan(answer.body_wrench)
     assert again.status == answer.status, again.reason
     alike(told, numbers(again), UTILISATION)

@@ -16,10 +16,10 @@ from planner import Plan
 from planner.prepare import PreparedStance
 
 PHALANGES = ("proximal", "middle", "distal")
-RUBS, SOFT = 0.005, 1e-3
+RUBS, SOFT, MOVED = 0.005, 1e-2, 0.1
 
 
-class Lost(Exception):
+class LostError(Exception):
     """A hand holds no more, or nothing balances the body."""
 
 
@@ -128,13 +128,13 @@ class PlainSlips:
         self.rest(h, i)
 
     def used(self) -> dict[tuple[int, int | None], float]:
-        """What each tile and palm that holds uses of its strength; raise `Lost` without balance."""
+        """What each tile and palm that holds uses of its strength; an error without balance."""
         stance = self.prepared.question.stance
         body, planar = stance.body, {}
         missing, columns = np.zeros(6), []
         held = self.holding()
         if {h for h, _ in held} != self.start:
-            raise Lost
+            raise LostError
 
         def in_body(h: int, force: np.ndarray, place: np.ndarray) -> np.ndarray:
             pose = stance.hands[h].pose
@@ -179,7 +179,7 @@ class PlainSlips:
                         ((h, "shear"), along, -float(hand.palm.force[0]), shear, 0.0, np.inf)
                     )
                 up = in_body(h, np.array([0.0, 0.0, 1.0]), place)
-                most = palm.pressing_limit
+                most = max(palm.pressing_limit, float(hand.palm.force[2]))
                 columns.append(((h, "press"), up, float(hand.palm.force[2]), pressing, 0.0, most))
         passive = self._passive(columns, missing)
         found: dict[tuple[int, int | None], float] = {}
@@ -220,7 +220,10 @@ class PlainSlips:
         problem = cp.Problem(cp.Minimize(energy), limits)
         problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-10)
         if problem.status not in ("optimal", "optimal_inaccurate"):
-            raise Lost
+            raise LostError
+        # the multipliers of the balance are the way of the body
+        if np.abs(limits[0].dual_value).max() / (2.0 * unit) > MOVED:
+            raise LostError
         return dict(zip(names, x.value.tolist(), strict=True))
 
     def run(self, strength: dict[tuple[int, int | None], float]) -> tuple[bool, list]:
@@ -229,7 +232,7 @@ class PlainSlips:
         while True:
             try:
                 over = {key: used / strength[key] for key, used in self.used().items()}
-            except Lost:
+            except LostError:
                 return False, slipped
             weakest = max(over, key=over.__getitem__)
             if over[weakest] <= 1.0:
