@@ -1,5 +1,6 @@
 from .conic import (
     INFEASIBLE_STATUSES as INFEASIBLE_STATUSES,
+    OUT_OF_TIME as OUT_OF_TIME,
     Outcome as Outcome,
     Reached as Reached,
 )
@@ -8,6 +9,12 @@ from .program import (
     TIE_WEIGHT as TIE_WEIGHT,
     Elastic as Elastic,
     tie_weight as tie_weight,
+)
+from .robust import (
+    Robust as Robust,
+    SampleData as SampleData,
+    feedback_price as feedback_price,
+    sample_value as sample_value,
 )
 from .set_points import (
     Kept as Kept,

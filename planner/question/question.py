@@ -51,15 +51,17 @@ class Question:
     want : frozenset of str
         Extras: 'load_factor', 'prices', 'model', 'robust', 'open_loop', 'spread', 'clearance' and
         'advice'.
-    objective : {'max_margin', 'min_effort'} or planner.solving.Objective
+    objective : {'max_margin', 'min_effort', 'max_robust'} or planner.solving.Objective
         'max_margin': least utilisation. 'min_effort': least sum of squared relative tensions and
-        joint torques, at a utilisation within the limits. Or an object with the caller's objective.
+        joint torques, at a utilisation within the limits. 'max_robust': least mean utilisation over
+        samples of the parameters, with the same tensions, at a utilisation within the limits. Or an
+        object with the caller's objective.
     present : mapping of str to ndarray, shape (4,)
         Present tendon tensions by limb [N]; only of hands with fixed wrists.
     deadline : float, optional
         Time that the answer may take [s]; unbounded by default.
     draws : tuple of ParameterSample, optional
-        Samples of the ``spread``; those of ``draws.toml`` by default.
+        Samples of the ``spread`` and of 'max_robust'; those of ``draws.toml`` by default.
     explain : bool
         Whether an overloaded or infeasible stance is explained by a certificate. Whether a plan is
         the least, and whether there is none, is checked in any case.
@@ -134,7 +136,7 @@ class Question:
             )
 
     def _check_draws(self) -> None:
-        if "spread" not in self.want:
+        if "spread" not in self.want and self.objective != "max_robust":
             if self.draws is not None:
                 raise InvalidInputError(
                     "requires 'spread' in want; add 'spread', or remove draws", field="draws"

@@ -3,6 +3,7 @@ from .objectives import (
     NAMED_OBJECTIVES as NAMED_OBJECTIVES,
     CappedObjective as CappedObjective,
     MaxMargin as MaxMargin,
+    MaxRobust as MaxRobust,
     Objective as Objective,
     objective_of as objective_of,
 )

@@ -102,6 +102,7 @@ class FixedSolution(Solution):
             return self
         # where the least utilisation is the cap itself, rounding must not empty the set
         cap, data = max(self.cap, used + 0.5 * CAP_SLACK), self.sets.data
+        objective = objective.on(prepared)
         best = objective.solve(data, cap)
         if not best.solved:
             if deadline.expired():

@@ -82,7 +82,7 @@ Draws = Annotated[
     Meta(
         min_length=1,
         max_length=100,
-        description="samples for the spread; by default those of draws.toml",
+        description="samples for the spread and max_robust; by default those of draws.toml",
     ),
 ]
 
@@ -96,7 +96,8 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``load``: mass, acceleration and payloads from which the body wrench follows; by default the
       robot's weight at rest.
     - ``objective``: ``max_margin`` for the least utilisation, ``min_effort`` for the least effort
-      within ``limits.utilisation``.
+      within ``limits.utilisation``, ``max_robust`` for the least mean utilisation over samples with
+      the same tensions, also within it.
     - ``limits``: the cap on the utilisation, and the caller's own limits.
     - ``present``: present tensions of the four tendons [N], by limb; the reply's ``path`` says
       whether the straight way from them is safe.
@@ -104,8 +105,8 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``detail``: how much the reply contains: ``set_points``, ``hands`` or ``full``; by default
       ``full``, or as much as fits in ``max_reply_bytes``.
     - ``want``: names of further results.
-    - ``draws``: samples of uncertain parameters for ``"want": ["spread"]``; by default the bundled
-      samples.
+    - ``draws``: samples of uncertain parameters for the spread and ``max_robust``; by default the
+      bundled samples.
     - ``explain``: false leaves out the certificate of a stance that is overloaded or infeasible.
     - ``body_range``: how far advice may move the body.
     - ``open_loop``: samples of displaced hands for ``"want": ["open_loop"]``.
@@ -280,13 +281,13 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     - ``name``: name of the route.
     - ``stance``: the start stance.
     - ``load``: mass and payloads from which the body wrench of every stance follows.
-    - ``objective``: ``max_margin`` or ``min_effort``, for every stance.
+    - ``objective``: ``max_margin``, ``min_effort`` or ``max_robust``, for every stance.
     - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
     - ``moves``: the moves in climbing order.
     - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.
     - ``want``: names of further results for every stance.
-    - ``draws``: samples of uncertain parameters for ``"want": ["spread"]``; by default the bundled
-      samples.
+    - ``draws``: samples of uncertain parameters for the spread and ``max_robust``; by default the
+      bundled samples.
     """
 
     id: Identifier | None = None

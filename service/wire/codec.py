@@ -199,7 +199,7 @@ def decode_request(payload: bytes, kind: type[MessageT], form: Format = Format.J
         if field == "objective" and "value 'max_reliability'" in str(error):
             raise UnsupportedError(
                 "max_reliability is not supported in this version; valid are "
-                f"{' and '.join(get_args(Objective))}",
+                f"{', '.join(get_args(Objective))}",
                 field=field,
             ) from None
         raise InvalidInputError(message, field=field) from None

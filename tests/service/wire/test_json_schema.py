@@ -34,7 +34,7 @@ def test_the_schema_names_every_message_and_every_part_of_it() -> None:
     assert request["properties"]["v"]["enum"] == [1]
     # what is refused is not offered
     assert "confidence" not in request["properties"]
-    assert request["properties"]["objective"]["enum"] == ["max_margin", "min_effort"]
+    assert request["properties"]["objective"]["enum"] == ["max_margin", "max_robust", "min_effort"]
 
 
 def test_names_are_of_messages_and_not_of_modules() -> None:

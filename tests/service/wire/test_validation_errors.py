@@ -152,7 +152,7 @@ INVALID = [
     (("load", "mass"), "heavy", "load.mass", "a number or null, got a string"),
     (("load", "acceleration"), None, "load.acceleration", "a list"),
     (("body_wrench",), [0.0] * 6, "body_wrench", "give body_wrench or load, not both"),
-    (("objective",), "fun", "objective", "'fun' is not known; valid: max_margin, min_effort"),
+    (("objective",), "fun", "objective", "valid: max_margin, max_robust, min_effort"),
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
     (("want",), ["model", "price"], "want[1]", "valid: advice, clearance, load_factor, model"),
     (("id",), "x" * 257, "id", "length <= 256"),
