@@ -26,7 +26,6 @@ from planner.programs.conic import Columns, ConicProgram
 from planner.programs.program import Best, Residuals, tie_weight
 from planner.programs.stance_data import LOAD_UNIT, StanceData
 from planner.programs.stance_program import (
-    CLARABEL_SETTINGS,
     REFINED_SETTINGS,
     SHARP_SETTINGS,
     Definition,
@@ -111,7 +110,11 @@ class Robust(StanceProgram):
         Largest utilisation of the own hands.
     """
 
-    settings = (CLARABEL_SETTINGS, {**REFINED_SETTINGS, "equilibrate_enable": True})
+    # at a high price of feedback, multipliers of 1e-9 prove little
+    settings = (
+        {**SHARP_SETTINGS, "tol_feas": 1e-11},
+        {**REFINED_SETTINGS, "equilibrate_enable": True},
+    )
     reused = False  # a solver takes some 10 MB
 
     def __init__(
