@@ -1,4 +1,4 @@
-"""What a plan's tensions do on hands that are not as planned: kept, or balanced by feedback.
+"""Judge a plan's tensions on hands that are not as planned: kept, or balanced by feedback.
 
 The tensions are set-points: nobody plans anew, and nobody knows the strengths. Wrists are fixed:
 with tensions kept, palms and lateral reactions balance the body as far as they can.

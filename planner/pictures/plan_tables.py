@@ -28,8 +28,9 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     plan : Plan
-        With loads.
+        A plan that has loads.
     question : Question
         Question that the plan answers.
     """
@@ -78,6 +79,7 @@ def draw_joints(axes: Any, used: Mapping[str, Array]) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     used : mapping of str to ndarray, shape (n,)
         Utilisation of the n joints of each limb, from the body outward.
     """
@@ -124,8 +126,9 @@ def draw_shortfall(axes: Any, plan: Plan) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     plan : Plan
-        Without loads.
+        An infeasible plan, without loads.
     """
     axes.set_axis_off()
     proof = plan.certificate
@@ -236,8 +239,9 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     spread : Spread
-        With load factors.
+        Spread that has load factors.
     nominal : float or None
         Load factor of the plan with nominal parameters.
     """

@@ -39,6 +39,7 @@ class PreparedStance:
     Attributes
     ----------
     question : Question
+        The question, as it was asked.
     where : Posture or None
         Joint angles and torques; None if the question has no joints.
     batch : HandBatch
@@ -148,6 +149,7 @@ def assemble(
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective.
     where : Posture or None
         Joint angles and torques; None if joints are not known.
     wrench : ndarray, shape (6,)

@@ -83,6 +83,7 @@ class JointLoads(NamedTuple):
     Attributes
     ----------
     names : tuple of str, length n
+        Names of the joints, from the body outward.
     sliding : ndarray of bool, shape (n,)
         True for prismatic joints.
     gravity : ndarray, shape (n,)

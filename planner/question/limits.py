@@ -322,14 +322,14 @@ class OpenLoopSettings(Strict, frozen=True, kw_only=True):
     def ranges(
         self, put: tuple[float, float], contact: tuple[float, float]
     ) -> tuple[float, float, float, float]:
-        """Return position, height, tilt and yaw, with a hand's parameters for those left out.
+        """Return the ranges of position, height [m], tilt and yaw [rad], with defaults of a hand.
 
         Parameters
         ----------
         put : tuple of float
-            The hand's ranges of position [m] and yaw [rad].
+            Default ranges of position [m] and yaw [rad], from the hand's parameters.
         contact : tuple of float
-            Its ranges of height [m] and tilt [rad].
+            Default ranges of height [m] and tilt [rad], likewise.
         """
         given = (self.position, self.height, self.tilt, self.yaw)
         usual = (put[0], *contact, put[1])

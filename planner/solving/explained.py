@@ -71,7 +71,9 @@ def explained_plan(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     checks : Checks
+        Recovery and checks of the stance's loads.
     answer : Answer
         Verified loads, a proof of infeasibility, or a failure.
     factor : LoadFactor
@@ -166,8 +168,11 @@ def reason_beyond(prepared: PreparedStance, checks: Checks, answer: Answer) -> s
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     checks : Checks
+        Recovery and checks of the stance's loads.
     answer : Answer
+        Verified loads, a proof of infeasibility, or a failure.
     """
     if not isinstance(answer, Verified):
         return _reason_of_none(prepared, answer)
@@ -231,6 +236,7 @@ def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinishe
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     proof : Certificate
         Complete if it has both an irreducible infeasible subset and sufficient changes.
     """

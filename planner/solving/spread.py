@@ -37,10 +37,10 @@ from planner.solving.solution import Solution
 
 __all__ = ["find_spread"]
 
-LATE: Final = "all samples were planned"
+ALL_PLANNED: Final = "all samples were planned"
 """What a deadline may leave unfinished."""
 
-ROCK: Final = "rock"
+ROCK_PRESET: Final = "rock"
 """Preset surface whose strength has an assumed range."""
 
 
@@ -104,7 +104,7 @@ def find_spread(
     closed: dict[int, Sequence[SettledHand]] = {}
     try:
         for k, each in enumerate(drawn):
-            deadline.check(LATE)
+            deadline.check(ALL_PLANNED)
             outcomes = settled_as_drawn(prepared, each)
             pairs = zip(prepared.limbs, outcomes, strict=True)
             refused.update(limb for limb, hand in pairs if not isinstance(hand, SettledHand))
@@ -122,7 +122,7 @@ def find_spread(
                 kept[k] = SentPlan(sample.utilisation, sample.holds)
         own_samples = question.draws is not None
         threshold = None if own_samples else _threshold(prepared, idle, usual, attempt)
-        deadline.check(LATE)
+        deadline.check(ALL_PLANNED)
     except DeadlineError:
         return None
     quantities = drawn_quantities(drawn, surfaces)
@@ -158,14 +158,14 @@ def _threshold(
     cap = prepared.question.limits.utilisation + CAP_SLACK
 
     def on_rock(ratio: float) -> DrawnHand:
-        strength = table.quantity(ROCK, "shear_limit").changed(ratio * sandpaper)
-        own = ParameterTable({ROCK: {"shear_limit": strength}})
+        strength = table.quantity(ROCK_PRESET, "shear_limit").changed(ratio * sandpaper)
+        own = ParameterTable({ROCK_PRESET: {"shear_limit": strength}})
         return DrawnHand(stance.robot.hand, table.replaced(own))
 
     @cache
     def beyond(weakness: float) -> float:
         """Return by how much the utilisation exceeds the cap on rock of 1 / weakness."""
-        deadline.check(LATE)
+        deadline.check(ALL_PLANNED)
         there = with_drawn_hands(prepared, settled_as_drawn(prepared, on_rock(1.0 / weakness)))
         if there is None:
             return THRESHOLD_SETTINGS.none
@@ -184,7 +184,7 @@ def _threshold(
         ratio = 1.0 / float(scipy.optimize.brentq(beyond, 1.0 / most, 1.0 / least, xtol=accuracy))
     share = 0.0 if ratio is None else (most - ratio) / (most - least)
     strength = None if ratio is None else ratio * sandpaper
-    return StrengthThreshold(ROCK, strength, ratio, [least, most], share)
+    return StrengthThreshold(ROCK_PRESET, strength, ratio, [least, most], share)
 
 
 def _tried(

@@ -59,6 +59,7 @@ def check_limbs(
     found : list of str
         Error messages so far; further ones are appended.
     question : Question
+        Stance, load, limits and objective.
     wrenches : mapping of str to ndarray, shape (6,)
         Wrench of each hand on the rock in its H, by limb [N, N·m].
     body_wrench : ndarray, shape (6,)
@@ -109,6 +110,7 @@ def recompute_joints(limb: str, h: int, use: JointUse) -> list[Residual]:
     Parameters
     ----------
     limb : str
+        Name of the limb.
     h : int
         Index of the limb's hand.
     use : JointUse
@@ -233,6 +235,7 @@ class AskedLimits(ResidualLimits):
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective.
     names : PartNames
         Names of the hands' parts.
     tiles : TileLimits

@@ -1,4 +1,4 @@
-"""Print the extras of a plan: advice, spread over samples, and robustness."""
+"""Print the extras of a plan: advice, spread over samples with sensitivities, robustness."""
 
 from __future__ import annotations
 
