@@ -10,7 +10,7 @@ from planner.prepare import HandBatch, assemble
 from planner.programs import solvers
 from planner.result import LoadRecovery
 from planner.solving import plan
-from planner.solving.dual_bounds import unique_bound
+from planner.programs import unique_bound
 from planner.verification import Check
 from service.answering.answers import plan_reply
 from tests.suite.helpers import peer

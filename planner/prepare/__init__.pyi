@@ -1,3 +1,7 @@
+from .drawn_stance import (
+    settled_as_drawn as settled_as_drawn,
+    with_drawn_hands as with_drawn_hands,
+)
 from .hand_batch import (
     CONTACT_CODES as CONTACT_CODES,
     KEPT_NAMES as KEPT_NAMES,

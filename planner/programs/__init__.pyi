@@ -1,8 +1,25 @@
+from .active_set import (
+    TOLERANCES as TOLERANCES,
+    ApartError as ApartError,
+    Optimum as Optimum,
+    Point as Point,
+    Rows as Rows,
+    optimum as optimum,
+)
 from .conic import (
     INFEASIBLE_STATUSES as INFEASIBLE_STATUSES,
+    OUT_OF_TIME as OUT_OF_TIME,
     Columns as Columns,
     Outcome as Outcome,
     Reached as Reached,
+)
+from .dual_bounds import (
+    convex_bound as convex_bound,
+    hazard_bound as hazard_bound,
+    is_least as is_least,
+    least_bound as least_bound,
+    unique_bound as unique_bound,
+    unproven_sentences as unproven_sentences,
 )
 from .hazard import Hazard as Hazard, TilePowers as TilePowers
 from .program import (
@@ -10,6 +27,12 @@ from .program import (
     TIE_WEIGHT as TIE_WEIGHT,
     Elastic as Elastic,
     tie_weight as tie_weight,
+)
+from .robust import (
+    Robust as Robust,
+    SampleData as SampleData,
+    feedback_price as feedback_price,
+    sample_value as sample_value,
 )
 from .set_points import (
     Kept as Kept,

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from importlib import resources
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,10 +17,10 @@ import scipy
 from numpy.typing import NDArray
 
 from hand_models.base import Array
-from hand_models.parameters import ParameterTable
 from planner import deadline
 from planner.programs.conic import OUT_OF_TIME, Outcome, Reached
 from planner.programs.program import Best, Elastic, Nearest, Reach, Residuals, tie_weight
+from planner.programs.robust import plan_table
 from planner.programs.stance_data import StanceData
 
 __all__ = [
@@ -103,8 +102,7 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
 @cache
 def _tension_numbers() -> tuple[float, float]:
     """Return the part of the least utilisation that is given away at most, and w."""
-    path = resources.files("planner.parameters").joinpath("plans.toml")
-    table = ParameterTable.read(path.read_text("utf-8"), path.name)
+    table = plan_table()
     return table.positive("tension", "given_away"), table.positive("tension", "weight")
 
 

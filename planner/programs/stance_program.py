@@ -109,6 +109,8 @@ class StanceProgram(ABC):
     settings: Sequence[Mapping[str, Any]] = (CLARABEL_SETTINGS, REFINED_SETTINGS)
     wanted: int = 0
     """Number of leading variables, before the loads, that `run` returns."""
+    reused: bool = True
+    """Whether solvers of this program are kept for the next of its pattern."""
 
     def __init__(self, data: StanceData) -> None:
         self.data = data
@@ -209,7 +211,10 @@ class StanceProgram(ABC):
             The `wanted` variables before the loads; None without a solution.
         """
         program = self.conic()
-        found = WAITING_SOLVERS.solve(program, self.settings[0])
+        if self.reused:
+            found = WAITING_SOLVERS.solve(program, self.settings[0])
+        else:
+            found = ConicSolver(program, self.settings[0]).solve()
         # after which nothing else is tried
         ends = ("optimal", "infeasible", "unbounded", OUT_OF_TIME)
         for settings in self.settings[1:]:

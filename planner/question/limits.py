@@ -25,7 +25,7 @@ __all__ = [
     "no_torque",
 ]
 
-Objective = Literal["max_margin", "min_effort", "max_reliability"]
+Objective = Literal["max_margin", "min_effort", "max_reliability", "max_robust"]
 
 Want = Literal[
     "load_factor", "prices", "model", "robust", "open_loop", "spread", "clearance", "advice"

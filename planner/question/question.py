@@ -77,11 +77,12 @@ class Question:
     want : frozenset of str
         Extras: 'load_factor', 'prices', 'model', 'robust', 'open_loop', 'spread', 'clearance' and
         'advice'.
-    objective : {'max_margin', 'min_effort', 'max_reliability'} or planner.solving.Objective
+    objective : str or planner.solving.Objective
         'max_margin': least utilisation. 'min_effort': least sum of squared relative tensions and
         joint torques, at a utilisation within the limits. 'max_reliability': largest probability
         that no tile slips, at nearly the least utilisation; only with fixed wrists on all hands.
-        Or an object with the caller's objective.
+        'max_robust': least mean utilisation over samples of the parameters, with the same
+        tensions, at a utilisation within the limits. Or an object with the caller's objective.
     tolerance : float, optional
         Part of the least utilisation by which a plan of 'max_reliability' may exceed it, from
         0.001 to 1; that of ``plans.toml`` by default.
@@ -90,7 +91,7 @@ class Question:
     deadline : float, optional
         Time that the answer may take [s]; unbounded by default.
     draws : tuple of ParameterSample, optional
-        Samples of the ``spread``; those of ``draws.toml`` by default.
+        Samples of the ``spread`` and of 'max_robust'; those of ``draws.toml`` by default.
     explain : bool
         Whether an overloaded or infeasible stance is explained by a certificate. Whether a plan is
         the least, and whether there is none, is checked in any case.
@@ -203,7 +204,7 @@ class Question:
         return _usual_tolerance() if self.tolerance is None else self.tolerance
 
     def _check_draws(self) -> None:
-        if "spread" not in self.want:
+        if "spread" not in self.want and self.objective != "max_robust":
             if self.draws is not None:
                 raise InvalidInputError(
                     "requires 'spread' in want; add 'spread', or remove draws", field="draws"

@@ -76,7 +76,7 @@ class Route:
         Mass, payloads and acceleration of the body, the same in every stage.
     limits : Limits
         Limits of every stage. A cap on a hand's force counts while the hand is on the rock.
-    objective : {'max_margin', 'min_effort', 'max_reliability'}
+    objective : {'max_margin', 'min_effort', 'max_reliability', 'max_robust'}
         Objective of every stage.
     explain : bool
         Whether each stage without a plan is explained by a certificate, as in `Question`.

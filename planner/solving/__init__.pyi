@@ -1,16 +1,18 @@
-from .dual_bounds import is_least as is_least, least_bound as least_bound
 from .fixed_wrists import FixedSolution as FixedSolution
-from .objectives import (
-    NAMED_OBJECTIVES as NAMED_OBJECTIVES,
+from .objective import (
     CappedObjective as CappedObjective,
     MaxMargin as MaxMargin,
     Objective as Objective,
+)
+from .objectives import (
+    NAMED_OBJECTIVES as NAMED_OBJECTIVES,
     objective_of as objective_of,
 )
 from .palm_parts import (
     PalmLoadFactors as PalmLoadFactors,
     load_factors_without_palm_loads as load_factors_without_palm_loads,
 )
+from .robust_tensions import MaxRobust as MaxRobust
 from .solution import Infeasible as Infeasible, Verified as Verified
 from .solve import (
     KnownStance as KnownStance,

@@ -50,7 +50,7 @@ from planner.result import (
 )
 from planner.scene import clearance, scene_of, wrench_findings
 from planner.solving.fixed_wrists import FixedSolution
-from planner.solving.objectives import CappedObjective
+from planner.solving.objective import CappedObjective
 from planner.solving.robust import find_robust_load_factor
 from planner.solving.solution import Answer, Failed, Infeasible, Verified
 from planner.solving.spread import find_spread

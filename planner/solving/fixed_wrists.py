@@ -17,10 +17,16 @@ from hand_models.base import Array
 from planner import deadline, programs
 from planner.deadline import Budget, Unfinished, late
 from planner.prepare import HandSets, PreparedStance, Sets
-from planner.programs import CAP_SLACK, Outcome, StanceData, tension_trade
+from planner.programs import (
+    CAP_SLACK,
+    Outcome,
+    StanceData,
+    least_bound,
+    tension_trade,
+    unproven_sentences,
+)
 from planner.result import LoadFactor
-from planner.solving.dual_bounds import least_bound, unproven_sentences
-from planner.solving.objectives import MAX_MARGIN, CappedObjective
+from planner.solving.objective import MAX_MARGIN, CappedObjective
 from planner.solving.solution import Solution
 from planner.solving.spare_hands import SpareHand, less_tense
 from planner.solving.unique_plan import LeastUtilisation, least_utilisation

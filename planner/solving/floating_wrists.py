@@ -20,10 +20,15 @@ from planner.floating import (
     with_room,
 )
 from planner.prepare import HandSets, PreparedStance
-from planner.programs import CAP_SLACK, StanceData, tension_trade
+from planner.programs import (
+    CAP_SLACK,
+    StanceData,
+    least_bound,
+    tension_trade,
+    unproven_sentences,
+)
 from planner.result import LoadFactor, WristPlan
-from planner.solving.dual_bounds import least_bound, unproven_sentences
-from planner.solving.objectives import MAX_MARGIN, CappedObjective
+from planner.solving.objective import MAX_MARGIN, CappedObjective
 from planner.solving.solution import Solution
 
 __all__ = ["FloatingSolution", "floating_solution", "next_solution", "wrench_is_given"]

@@ -14,7 +14,7 @@ from planner.deadline import Budget, Unfinished
 from planner.prepare import PreparedStance, Sets
 from planner.programs import CAP_SLACK, Outcome
 from planner.result import Certificate, HandPlan, LoadFactor, PlanArrays, WristPlan
-from planner.solving.objectives import CappedObjective, Objective
+from planner.solving.objective import CappedObjective, Objective
 
 __all__ = [
     "Answer",

@@ -1,11 +1,10 @@
 """Spread: plan a stance anew for Monte Carlo samples of the hand's and the rock's parameters.
 
 A sample changes the hands and the strength of their tiles. Body, poses of the hands, joints and
-body wrench stay the same. A hand with a seat is closed at the seat of the sample's hand: H stays
-where it is, and the rock is elsewhere. A hand whose best seat was searched for keeps that seat. The
-search for floating wrists starts from the solution for the question's hands. A sample's plan has no
-certificate, no prices and no explanation. Beside it stands what the question's own plan does in the
-sample, its tensions kept or balanced by feedback (`planner.execution`).
+body wrench stay the same. The search for floating wrists starts from the solution for the
+question's hands. A sample's plan has no certificate, no prices and no explanation. Beside it stands
+what the question's own plan does in the sample, its tensions kept or balanced by feedback
+(`planner.execution`).
 
 The contact stiffness on rock is uncertain, too, but counts only where wrists move: samples have it
 if a wrist that is compliant or floating is on another surface than that of the calibration.
@@ -16,25 +15,25 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
 import scipy
 
-from hand_models.base import InvalidInputError
-from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
+from hand_models.hand import SettledHand
 from hand_models.parameters import FITTED_SURFACE, ParameterTable, draw_table, surface_table
-from hand_models.tile import Surface
 from planner import deadline
 from planner.advice import Attempt, StanceTrial
 from planner.deadline import DeadlineError
 from planner.execution import Passes, execute_closed, sent_plans, without_margins
 from planner.explanation import LimitUse
-from planner.prepare import PreparedStance
+from planner.prepare import PreparedStance, settled_as_drawn, with_drawn_hands
 from planner.programs import CAP_SLACK
 from planner.question import DrawnHand, drawn_hands, drawn_quantities
 from planner.result import DrawnPlan, HandPlan, SentPlan, Spread, StrengthThreshold
+from planner.solving.objective import MAX_MARGIN, Objective
+from planner.solving.objectives import MAX_ROBUST, objective_of
 from planner.solving.solution import Solution
 
 __all__ = ["find_spread"]
@@ -87,6 +86,10 @@ def find_spread(
     Spread or None
         None if the deadline passed before all samples were planned.
     """
+    if objective_of(prepared.question) is MAX_ROBUST:
+        # planned anew with the sample known, tensions need not serve other samples
+        known: Objective = MAX_MARGIN
+        prepared = replace(prepared, question=replace(prepared.question, objective=known))
     question, stance = prepared.question, prepared.question.stance
     surfaces = frozenset(hand.surface.name for hand in stance.hands)
     moving = any(
@@ -100,18 +103,17 @@ def find_spread(
     used = max([each.utilisation for each in idle], default=0.0)
     plans, refused = [DrawnPlan()] * len(drawn), Counter[str]()
     kept, feedback = [SentPlan()] * len(drawn), [SentPlan()] * len(drawn)
-    closed: dict[int, list[SettledHand]] = {}
+    closed: dict[int, Sequence[SettledHand]] = {}
     try:
         for k, each in enumerate(drawn):
             deadline.check(ALL_PLANNED)
-            outcomes = _settled(prepared, each)
-            own = [hand for hand in outcomes if isinstance(hand, SettledHand)]
+            outcomes = settled_as_drawn(prepared, each)
             pairs = zip(prepared.limbs, outcomes, strict=True)
             refused.update(limb for limb, hand in pairs if not isinstance(hand, SettledHand))
-            there = _with_hands(prepared, own) if len(own) == len(outcomes) else None
+            there = with_drawn_hands(prepared, outcomes)
             if there is None:
                 continue
-            closed[k] = own
+            closed[k] = own = there.batch.hands
             plans[k] = _planned(_tried(prepared, there, idle, usual, attempt))
             if fixed:
                 sent = there if bare is prepared else bare.with_hands(own)
@@ -169,12 +171,7 @@ def _threshold(
     def beyond(weakness: float) -> float:
         """Return by how much the utilisation exceeds the cap on rock of 1 / weakness."""
         deadline.check(ALL_PLANNED)
-        own = [
-            hand
-            for hand in _settled(prepared, on_rock(1.0 / weakness))
-            if isinstance(hand, SettledHand)
-        ]
-        there = _with_hands(prepared, own) if len(own) == len(stance.hands) else None
+        there = with_drawn_hands(prepared, settled_as_drawn(prepared, on_rock(1.0 / weakness)))
         if there is None:
             return THRESHOLD_SETTINGS.none
         used = _tried(prepared, there, idle, usual, attempt).utilisation
@@ -193,35 +190,6 @@ def _threshold(
     share = 0.0 if ratio is None else (most - ratio) / (most - least)
     strength = None if ratio is None else ratio * sandpaper
     return StrengthThreshold(ROCK_PRESET, strength, ratio, [least, most], share)
-
-
-def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | InvalidInputError]:
-    """Return the hands closed as those of a draw; errors in place of those that cannot be."""
-    placements, surfaces, keys = {}, dict[Surface, Surface](), list[PlacementKey]()
-    for hand, usual in zip(prepared.question.stance.hands, prepared.batch.hands, strict=True):
-        seat, at = hand.placed_hold(), hand.at
-        if hand.seat == "best":
-            seat, at = usual.seating.pose, None
-        if hand.surface not in surfaces:
-            surfaces[hand.surface] = drawn.surface(hand.surface)
-        placement = Placement(hand.hold, surfaces[hand.surface], hand.grasp, seat, at)
-        keys.append(PlacementKey(placement))
-        placements[keys[-1]] = placement
-    # hands that close alike close once
-    outcomes = settle_hands(drawn.model, list(placements.values()))
-    found = dict(zip(placements, outcomes, strict=True))
-    pairs = [(limb, found[key]) for limb, key in zip(prepared.limbs, keys, strict=True)]
-    return [
-        drawn.closed(each, limb) if isinstance(each, SettledHand) else each for limb, each in pairs
-    ]
-
-
-def _with_hands(prepared: PreparedStance, settled: Sequence[SettledHand]) -> PreparedStance | None:
-    """Return the stance with a draw's hands; None if one does not hold the preload that it has."""
-    try:
-        return prepared.with_hands(settled)
-    except InvalidInputError:
-        return None
 
 
 def _tried(

@@ -2,7 +2,7 @@
 
 An interior-point solver ends near the optimum of `programs.unique`. The second term of that program
 is so small that tensions may be off by newtons although the objective is accurate. The solver's
-result nearly shows which rows are active, and the active-set method (`planner.solving.active_set`)
+result nearly shows which rows are active, and the active-set method (`planner.programs.active_set`)
 computes the exact plan. If the rows that were active at another body wrench are still active, no
 solver is needed: one linear system, and the signs of its multipliers, prove the plan.
 
@@ -24,16 +24,20 @@ from hand_models.base import Array
 from planner import deadline, programs
 from planner.programs import (
     TIE_WEIGHT,
+    TOLERANCES,
+    ApartError,
+    Optimum,
     Outcome,
+    Point,
+    Rows,
     StanceData,
     TensionTrade,
+    is_least,
+    optimum,
     parted,
     tension_trade,
     tie_weight,
 )
-from planner.solving import dual_bounds
-from planner.solving.active_set import TOLERANCES, ApartError, Optimum, Point, Rows, optimum
-from planner.solving.dual_bounds import is_least
 from planner.solving.spare_hands import SpareHand, at_closing, spare_hands
 
 __all__ = ["LeastUtilisation", "active_set_optimum", "least_utilisation"]
@@ -104,7 +108,7 @@ def least_utilisation(
         return LeastUtilisation(outcome, -math.inf)
     exact = active_set_optimum(data, outcome, share)
     if exact is None:
-        return LeastUtilisation(outcome, dual_bounds.unique_bound(data, outcome, share))
+        return LeastUtilisation(outcome, programs.unique_bound(data, outcome, share))
     return _meant(data, exact, cap, closing)._replace(outcome=outcome)
 
 

@@ -13,7 +13,7 @@ from hand_models.hand import SettledHand
 from planner import programs
 from planner.explanation import LimitUse, joint_name, oddities
 from planner.prepare import HandBatch, PreparedStance
-from planner.programs import CAP_SLACK
+from planner.programs import CAP_SLACK, is_least
 from planner.question import LostTile
 from planner.result import (
     Finding,
@@ -23,8 +23,7 @@ from planner.result import (
     PlanArrays,
     recover_floating_hand,
 )
-from planner.solving.dual_bounds import is_least
-from planner.solving.objectives import CappedObjective
+from planner.solving.objective import CappedObjective
 from planner.solving.solution import ByHand, Failed, Solution, Verified
 from planner.verification import Check, execution_problems
 

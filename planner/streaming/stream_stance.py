@@ -15,11 +15,18 @@ import numpy as np
 from hand_models.base import Array
 from hand_models.hand import FINGERS
 from hand_models.wrench_spaces import WrenchSpace
-from planner import programs, solving
-from planner.programs import LOAD_UNIT, WRENCH_UNIT, Outcome, tension_trade
+from planner import programs
+from planner.programs import (
+    LOAD_UNIT,
+    WRENCH_UNIT,
+    Outcome,
+    is_least,
+    least_bound,
+    tension_trade,
+)
 from planner.question import Question
 from planner.result import LoadRecovery, Plan, PlanArrays
-from planner.solving import KnownStance, is_least, least_utilisation
+from planner.solving import KnownStance, least_utilisation
 from planner.streaming.affine_bounds import AffineBound, affine_bound
 from planner.verification import Check, LoadsCheck
 
@@ -162,7 +169,7 @@ class StreamStance:
             outcome = programs.margin(data)
             if not outcome.solved:
                 return None
-            bound = solving.least_bound(data, outcome)
+            bound = least_bound(data, outcome)
             if not is_least(outcome.value, bound):
                 return None
         if meant is None:

@@ -104,7 +104,7 @@ Draws = Annotated[
     Meta(
         min_length=1,
         max_length=100,
-        description="samples for the spread; by default those of draws.toml",
+        description="samples for the spread and max_robust; by default those of draws.toml",
     ),
 ]
 
@@ -119,7 +119,8 @@ class PlanRequest(Query, frozen=True, kw_only=True):
       robot's weight at rest.
     - ``objective``: ``max_margin`` for the least utilisation, ``min_effort`` for the least effort
       within ``limits.utilisation``, ``max_reliability`` for the largest probability that no tile
-      slips, at nearly the least utilisation; that needs fixed wrists on all hands.
+      slips, at nearly the least utilisation, ``max_robust`` for the least mean utilisation over
+      samples with the same tensions; both need fixed wrists on all hands.
     - ``tolerance``: part of the least utilisation by which a plan for ``max_reliability`` may
       exceed it; 0.02 by default.
     - ``limits``: the cap on the utilisation, and the caller's own limits.
@@ -129,8 +130,8 @@ class PlanRequest(Query, frozen=True, kw_only=True):
     - ``detail``: how much the reply contains: ``set_points``, ``hands`` or ``full``; by default
       ``full``, or as much as fits in ``max_reply_bytes``.
     - ``want``: names of further results.
-    - ``draws``: samples of uncertain parameters for ``"want": ["spread"]``; by default the bundled
-      samples.
+    - ``draws``: samples of uncertain parameters for the spread and ``max_robust``; by default the
+      bundled samples.
     - ``explain``: false leaves out the certificate of a stance that is overloaded or infeasible.
     - ``body_range``: how far advice may move the body.
     - ``open_loop``: samples of displaced hands for ``"want": ["open_loop"]``.
@@ -353,13 +354,13 @@ class RouteRequest(Request, frozen=True, kw_only=True):
     - ``name``: name of the route.
     - ``stance``: the start stance.
     - ``load``: mass and payloads from which the body wrench of every stance follows.
-    - ``objective``: ``max_margin``, ``min_effort`` or ``max_reliability``, for every stance.
+    - ``objective``: as in a plan's request, for every stance.
     - ``limits``: the cap on the utilisation, and the caller's own limits, for every stance.
     - ``moves``: the moves in climbing order.
     - ``explain``: false leaves out the certificates of stances that are overloaded or infeasible.
     - ``want``: names of further results for every stance.
-    - ``draws``: samples of uncertain parameters for ``"want": ["spread"]``; by default the bundled
-      samples.
+    - ``draws``: samples of uncertain parameters for the spread and ``max_robust``; by default the
+      bundled samples.
     """
 
     id: Identifier | None = None

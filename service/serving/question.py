@@ -33,6 +33,7 @@ class _Head(msgspec.Struct):
     deadline: msgspec.Raw = msgspec.Raw()
     max_reply_bytes: msgspec.Raw = msgspec.Raw()
     want: msgspec.Raw = msgspec.Raw()
+    objective: msgspec.Raw = msgspec.Raw()
     stance: msgspec.Raw = msgspec.Raw()
 
 
@@ -203,8 +204,9 @@ def _read(question: PendingQuestion) -> None:
     except (MalformedError, msgspec.ValidationError):
         # its process says what is wrong with it
         return
-    name, seconds, want = (
-        _value(field, question.form) for field in (head.id, head.deadline, head.want)
+    name, seconds, want, objective = (
+        _value(field, question.form)
+        for field in (head.id, head.deadline, head.want, head.objective)
     )
     if isinstance(name, str):
         question.id = name
@@ -215,7 +217,7 @@ def _read(question: PendingQuestion) -> None:
     extras = {"robust", "open_loop", "spread", "advice", "survival"}
     many = isinstance(want, list) and any(each in want for each in extras)
     unread = _is_long(head.want)
-    question.dear = question.dear or many or unread
+    question.dear = question.dear or many or unread or objective == "max_robust"
     most = _value(head.max_reply_bytes, question.form)
     if isinstance(most, int) and most >= LEAST_REPLY_BYTES:
         question.most = min(most, LARGEST_ERROR)

@@ -30,7 +30,6 @@ from planner.question import Limits, Question
 from planner.result import Plan
 from planner.robots import pose_search
 from planner.solving import (
-    dual_bounds,
     plan,
     solve,
     unique_plan,
@@ -241,7 +240,7 @@ def test_the_spread_is_left_out_and_nothing_else(monkeypatch, clock):
 
 def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock):
     monkeypatch.setattr(unique_plan, "active_set_optimum", lambda *_: None)
-    monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
+    monkeypatch.setattr(programs, "unique_bound", lambda *_: -np.inf)
     late_at(monkeypatch, clock, programs, "margin")
     answer = late(QUESTION)
     assert answer.unfinished == ("least_utilisation", "load_factor")
@@ -253,7 +252,7 @@ def test_a_plan_that_is_not_proven_the_least_is_told_as_such(monkeypatch, clock)
 
 def test_a_tie_that_is_not_broken_leaves_the_plan_of_least_utilisation(monkeypatch, clock):
     monkeypatch.setattr(unique_plan, "active_set_optimum", lambda *_: None)
-    monkeypatch.setattr(dual_bounds, "unique_bound", lambda *_: -np.inf)
+    monkeypatch.setattr(programs, "unique_bound", lambda *_: -np.inf)
     late_at(monkeypatch, clock, programs, "less_tension")
     answer = late(QUESTION)
     assert answer.unfinished == ("tie_break", "load_factor")

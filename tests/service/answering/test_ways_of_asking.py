@@ -89,7 +89,7 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
     "PlanRequest.stance": [{}],
     "PlanRequest.body_wrench": [{"body_wrench": [700.0, 20.0, -30.0, 5.0, 210.0, -8.0]}],
     "PlanRequest.load": [{}],
-    "PlanRequest.objective": [{"objective": "min_effort"}],
+    "PlanRequest.objective": [{"objective": "min_effort"}, {"objective": "max_robust"}],
     "PlanRequest.limits": [{}],
     "PlanRequest.present": [{"present": {RIGHT: [50.0, 60.0, 60.0, 50.0]}}],
     "PlanRequest.tolerance": [

@@ -34,7 +34,7 @@ def test_the_schema_names_every_message_and_every_part_of_it() -> None:
     assert request["properties"]["v"]["enum"] == [1]
     # what is refused is not offered
     assert "confidence" not in request["properties"]
-    objectives = ["max_margin", "max_reliability", "min_effort"]
+    objectives = ["max_margin", "max_reliability", "max_robust", "min_effort"]
     assert request["properties"]["objective"]["enum"] == objectives
 
 

@@ -193,7 +193,7 @@ INVALID = [
         ("objective",),
         "fun",
         "objective",
-        "'fun' is not known; valid: max_margin, max_reliability, min_effort",
+        "'fun' is not known; valid: max_margin, max_reliability, max_robust, min_effort",
     ),
     (("limits",), {"utilisation": 0.0}, "limits.utilisation", "a number >= 0.001"),
     (

@@ -7,8 +7,11 @@ import math
 import numpy as np
 
 from hand_models.base import Array
-from planner.programs import TIE_WEIGHT, Outcome, StanceData, TilePowers, tie_weight
-from planner.solving.active_set import TOLERANCES
+from planner.programs.active_set import TOLERANCES
+from planner.programs.conic import Outcome
+from planner.programs.hazard import TilePowers
+from planner.programs.program import TIE_WEIGHT, tie_weight
+from planner.programs.stance_data import StanceData
 
 __all__ = [
     "convex_bound",

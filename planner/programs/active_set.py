@@ -31,7 +31,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hand_models.base import Array
-from planner.programs import StanceData
+from planner.programs.stance_data import StanceData
 
 __all__ = [
     "TOLERANCES",
