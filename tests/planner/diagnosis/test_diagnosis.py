@@ -63,9 +63,7 @@ def test_the_fall_of_the_tension_is_that_of_springs_in_parallel():
         shear = max(after.loads[slipped, 0] @ (1.0, each.tensions[0]), 0.0) * drags
         lost = shear - hand.loads[slipped, 0] @ (1.0, f)
         others = [
-            contact.get(hand.tiles[t].phalanx, contact["proximal"])
-            for t in own
-            if t != slipped
+            contact.get(hand.tiles[t].phalanx, contact["proximal"]) for t in own if t != slipped
         ]
         given = sum(c**2 * fall / (k + K) for k in others) + c * (c * fall - lost) / K
         assert given == pytest.approx(0.0, abs=1e-7)

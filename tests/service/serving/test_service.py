@@ -20,7 +20,7 @@ import zenoh
 
 from hand_models.base import InvalidInputError
 from planner.robots import RobotFile
-from service import BodySpaceRequest, CruxClient, WrenchSpaceRequest
+from service import BodySpaceRequest, CruxClient, DiagnosisRequest, WrenchSpaceRequest
 from service.answering import dispatch
 from service.replies import ErrorReply, PlanReply
 from service.serving import PlanService, closed, exposed, listening, open_session, zenoh_config
@@ -156,6 +156,9 @@ def test_the_client_gets_typed_replies(served: Served, form: Format) -> None:
         space = client.wrench_space(WrenchSpaceRequest(v=1, stance=stance, limb="front_left"))
         assert space.limb == "front_left"
         assert space.vertices
+        tensions = {"front_left": (50.0, 50.0, 50.0, 50.0)}
+        found = client.diagnosis(DiagnosisRequest(v=1, stance=stance, tensions=tensions))
+        assert {tile.limb for tile in found.tiles} == {"front_left"}
         body = client.body_space(BodySpaceRequest(v=1, stance=stance, axes=["fx", "my"]))
         assert body.section.axes == ["fx", "my"]
         assert body.section.inner
