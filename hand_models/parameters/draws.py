@@ -140,7 +140,7 @@ def draws_of(
     Parameters
     ----------
     sets : ParameterTable
-        In the form of ``draws.toml``.
+        Fitted sets and ranges, in the form of ``draws.toml``.
     hand : ParameterTable, optional
         All parameters of the hand; the bundled ones by default. Entries that differ from the
         bundled hand are taken as known: no sample changes them.
@@ -191,7 +191,7 @@ def even_quantiles(count: int, ranges: int) -> Array:
     Returns
     -------
     ndarray, shape (count, ranges)
-        In (0, 1).
+        Quantiles in (0, 1): a row for each sample, a column for each range.
     """
     ratio = 1.0
     for _ in range(64):

@@ -3,8 +3,9 @@
     min ½ xᵀ diag(P) x + qᵀ x   with   A x + s = b,  s ∈ K.
 
 The cone K is a product of zeros, nonnegative numbers, a second-order cone and power cones, in this
-order. A is passed sparse: dense it costs three times as much. A solver is set up for one sparsity
-pattern, is kept in `Solvers`, and takes later programs of it; solutions do not depend on them.
+order. A is passed sparse: a dense A costs three times as much. A solver is set up for one sparsity
+pattern, kept in the cache `Solvers`, and given the numbers of later programs of that pattern. No
+solution depends on the programs that were solved before it.
 """
 
 from __future__ import annotations
@@ -373,8 +374,8 @@ class Outcome:
     value : float
         Objective; NaN if not solved.
     loads : tuple of ndarray, shape (m,)
-        Loads y of each hand [N], or pose of a compliant or floating wrist [m, rad]; empty if not
-        solved.
+        Loads y of each hand [N]; of a floating wrist its twist [m, rad], of a compliant one
+        tensions [N] and twist. Empty if not solved.
     limit_duals, hard_duals : tuple of ndarray, shapes (nl,), (nh,)
         Dual values of each hand's limits and hard rows, or the Farkas certificate; empty without.
     balance_dual : ndarray, shape (nb,), or None
