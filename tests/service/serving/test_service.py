@@ -52,7 +52,8 @@ WRENCH_SPACE = service_key("robosimian", "wrench_space")
 BODY_SPACE = service_key("robosimian", "body_space")
 STREAM = service_key("robosimian", "stream")
 SET_POINTS = service_key("robosimian", "set_points")
-KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, STREAM, SET_POINTS]
+DIAGNOSIS = service_key("robosimian", "diagnosis")
+KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, DIAGNOSIS, STREAM, SET_POINTS]
 
 
 @pytest.fixture(scope="module")
