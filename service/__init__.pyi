@@ -1,6 +1,7 @@
 from .processes import Planners as Planners, plan_many as plan_many
 from .requests import (
     BodySpaceRequest as BodySpaceRequest,
+    DiagnosisRequest as DiagnosisRequest,
     PlanRequest as PlanRequest,
     SetPointsRequest as SetPointsRequest,
     StreamRequest as StreamRequest,

@@ -21,7 +21,13 @@ FILES = {
         "experiments.toml",
         "draws.toml",
     ),
-    "planner.parameters": ("robosimian.toml", "scene.toml", "plans.toml", "slips.toml"),
+    "planner.parameters": (
+        "robosimian.toml",
+        "scene.toml",
+        "plans.toml",
+        "slips.toml",
+        "diagnosis.toml",
+    ),
 }
 
 SHOWN = 6

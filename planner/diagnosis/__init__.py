@@ -1,4 +1,4 @@
-"""Which tile has probably slipped, by what the motors show of it."""
+"""Diagnosis of slips: the tile that has probably slipped, by the data of motors."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,4 +1,4 @@
-"""What a slip of each tile does to its motor: fall of the tension, or turn of the winch.
+"""Signatures of slips: how each tile's slip changes the tension, or turns the winch.
 
 The wrist is fixed, so that a slip concerns its own finger alone. The phalanges stay where they are.
 The tile that lets go drags on with friction while it is pressed (`fixed_wrist.slipped_hand`), or
@@ -29,7 +29,7 @@ __all__ = ["SlipSignature", "slip_signatures"]
 
 
 class SlipSignature(NamedTuple):
-    """What the motor of a tile's finger shows if the tile slips.
+    """Signature of a tile's slip in the data of its finger's motor.
 
     Attributes
     ----------

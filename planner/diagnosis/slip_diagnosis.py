@@ -1,4 +1,4 @@
-"""Find the tile that has probably slipped from motors' data, and those that it cannot be told from.
+"""Find the tile that has probably slipped from motors' data, and the tiles that look alike.
 
 Of each tile it is known what its motor would show (`slip_signatures`). With normal errors of the
 data, Bayes' rule gives the probability of each tile if one has slipped. Before the data, a tile is
@@ -46,7 +46,7 @@ class SuspectTile(NamedTuple):
 
 
 class SlipFindings(NamedTuple):
-    """Which tile has probably slipped.
+    """Result of a diagnosis: the tiles that have probably slipped.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class SlipFindings(NamedTuple):
 
 
 class _Shown(NamedTuple):
-    """What motors show of each tile's slip, shape (2, T), and without one, shape (T,).
+    """Data that motors show after each tile's slip, shape (2, T), and without one, shape (T,).
 
     ``meant``, ``rests``: values; ``errors``, ``rest_errors``: their standard deviations.
     """

@@ -26,7 +26,7 @@ class SuspectReply(Struct, kw_only=True):
 
 
 class DiagnosisReply(StanceReply, kw_only=True):
-    """Which tile has probably slipped, by the data of motors.
+    """Diagnosis of a slip: the tiles that have probably slipped, by the data of motors.
 
     - ``seen``: whether a slip explains the data better than none.
     - ``tiles``: all tiles of the hands with data, the most probable first.

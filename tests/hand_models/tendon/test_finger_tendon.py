@@ -217,3 +217,31 @@ def test_tiles_partly_on_the_rock_give_that_part_of_a_whole_tiles_shear():
         .shears
     )
     np.testing.assert_allclose(drags[1], share[:, None] * drags[0], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("motor", [None, CLOSING])
+@pytest.mark.parametrize("mu", [0.0, MU])
+@pytest.mark.parametrize("tile", range(3))
+def test_a_tile_that_lets_go_keeps_the_tendons_laws(tile, mu, motor):
+    finger = replace(SLIDING, friction=mu)
+    before = finger.closed(CLOSING, ENGAGED)
+    after = finger.slipped(before, tile, 0.5, motor)
+    assert after.shears[tile] == pytest.approx(0.5)
+    # each tile's balance, and the shears of those that hold
+    rise, lost = after.tensions - before.tensions, after.shears - before.shears
+    travel = (CP * rise - lost) / KP
+    others = np.arange(3) != tile
+    np.testing.assert_allclose(lost[others], (K * travel)[others], atol=1e-9)
+    # the tendon's length and friction, at each boundary
+    passed = np.cumsum((CP * travel)[::-1])[::-1]
+    assert finger.drawn(before, after) == pytest.approx(passed[0])
+    if motor is None:
+        assert passed[0] == pytest.approx(0.0, abs=1e-12)
+        assert after.motor_tension <= CLOSING + 1e-9
+    else:
+        assert passed[0] >= -1e-12
+    ratios = after.tensions[1:] / after.tensions[:-1]
+    for v, ratio in zip(passed[1:], ratios, strict=True):
+        assert 1.0 - mu - 1e-9 <= ratio <= 1.0 + mu + 1e-9
+        if abs(v) > 1e-9:
+            assert ratio == pytest.approx(1.0 - mu if v > 0.0 else 1.0 + mu)

@@ -20,7 +20,7 @@ import zenoh
 
 from hand_models.base import InvalidInputError
 from planner.robots import RobotFile
-from service import BodySpaceRequest, CruxClient, WrenchSpaceRequest
+from service import BodySpaceRequest, CruxClient, DiagnosisRequest, WrenchSpaceRequest
 from service.answering import dispatch
 from service.replies import ErrorReply, PlanReply
 from service.serving import PlanService, closed, exposed, listening, open_session, zenoh_config
@@ -52,7 +52,8 @@ WRENCH_SPACE = service_key("robosimian", "wrench_space")
 BODY_SPACE = service_key("robosimian", "body_space")
 STREAM = service_key("robosimian", "stream")
 SET_POINTS = service_key("robosimian", "set_points")
-KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, STREAM, SET_POINTS]
+DIAGNOSIS = service_key("robosimian", "diagnosis")
+KEYS = [PLAN, WRENCH_SPACE, BODY_SPACE, DIAGNOSIS, STREAM, SET_POINTS]
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +157,9 @@ def test_the_client_gets_typed_replies(served: Served, form: Format) -> None:
         space = client.wrench_space(WrenchSpaceRequest(v=1, stance=stance, limb="front_left"))
         assert space.limb == "front_left"
         assert space.vertices
+        tensions = {"front_left": (50.0, 50.0, 50.0, 50.0)}
+        found = client.diagnosis(DiagnosisRequest(v=1, stance=stance, tensions=tensions))
+        assert {tile.limb for tile in found.tiles} == {"front_left"}
         body = client.body_space(BodySpaceRequest(v=1, stance=stance, axes=["fx", "my"]))
         assert body.section.axes == ["fx", "my"]
         assert body.section.inner
