@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import get_args
@@ -41,7 +42,8 @@ def find_redundancy(question: Question) -> Redundancy:
         own = [loss for loss in losses if loss.kind == kind]
         if own:
             held[kind] = [sum(loss.holds for loss in own), len(own)]
-            worst[kind] = max(own, key=lambda loss: loss.utilisation or float("inf"))
+            # of mirror images, which differ by rounding, the first
+            worst[kind] = max(own, key=_rounded)
     return Redundancy(None if whole.verified is None else whole.utilisation, losses, held, worst)
 
 
@@ -69,3 +71,7 @@ def _loss(found: Recovered, kind: LossKind, *names: str) -> Loss:
     limb, finger, phalanx = (*names, None, None)[:3]
     assert limb is not None
     return Loss(kind, limb, finger, phalanx, status, used, status != "failed")
+
+
+def _rounded(loss: Loss) -> float:
+    return math.inf if loss.utilisation is None else round(loss.utilisation, 4)

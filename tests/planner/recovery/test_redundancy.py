@@ -32,7 +32,8 @@ def test_each_tile_finger_and_hand_is_lost_once(redundancy: Redundancy):
     for kind, (held, _) in redundancy.held.items():
         own = [loss for loss in redundancy.losses if loss.kind == kind]
         assert held == sum(loss.utilisation <= 1.0 + 1e-6 for loss in own)
-        assert redundancy.worst[kind].utilisation == max(loss.utilisation for loss in own)
+        most = max(loss.utilisation for loss in own)
+        assert redundancy.worst[kind].utilisation == pytest.approx(most, abs=1e-4)
 
 
 def test_losses_are_the_plans_without_them(redundancy: Redundancy):
