@@ -46,7 +46,7 @@ class StrengthSettings:
     halvings: int = 60  # of a factor's logarithm, from ± 12: to 2e-17
 
 
-SETTINGS: Final = StrengthSettings()
+STRENGTH_SETTINGS: Final = StrengthSettings()
 
 
 def weibull_modulus(variation: float) -> float:
@@ -68,9 +68,9 @@ def weibull_modulus(variation: float) -> float:
         raise InvalidInputError(
             f"a coefficient of variation must be 0 to 100, got {variation:g}", field="variation"
         )
-    aim = math.log1p(max(variation, SETTINGS.least_scatter) ** 2)
+    aim = math.log1p(max(variation, STRENGTH_SETTINGS.least_scatter) ** 2)
     low, high = 0.0, 20.0  # of 1/m
-    for _ in range(SETTINGS.halvings + 10):
+    for _ in range(STRENGTH_SETTINGS.halvings + 10):
         x = 0.5 * (low + high)
         if math.lgamma(1.0 + 2.0 * x) - 2.0 * math.lgamma(1.0 + x) < aim:
             low = x
@@ -195,7 +195,7 @@ class TileStrengths:
         if not np.isfinite(hazards).any():
             return 0.0
         low, high = -12.0, 12.0
-        for _ in range(SETTINGS.halvings):
+        for _ in range(STRENGTH_SETTINGS.halvings):
             middle = 0.5 * (low + high)
             if self._no_slip(hazards, middle) < probability:
                 low = middle
@@ -236,5 +236,5 @@ def _nodes(spread: float) -> tuple[Array, Array]:
     """Return nodes and weights of quadrature over the logarithm of a factor of mean 1."""
     if spread == 0.0:
         return np.zeros(1), np.ones(1)
-    nodes, weights = np.polynomial.hermite_e.hermegauss(SETTINGS.nodes)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(STRENGTH_SETTINGS.nodes)
     return spread * nodes - 0.5 * spread**2, weights / weights.sum()

@@ -161,7 +161,7 @@ class Survival(Struct, frozen=True, kw_only=True):
 
     @property
     def tail(self) -> str | None:
-        """What to know of a survival above 0.95; None if there is none."""
+        """Sentence about a survival above 0.95; None if there is none."""
         shares = [share.probability for share in (self.holds, self.replanned) if share is not None]
         if max([self.no_slip, *shares]) <= 0.95:
             return None

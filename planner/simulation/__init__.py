@@ -1,4 +1,4 @@
-"""What happens when tiles slip: cascades at fixed tensions and with new set-points, survival."""
+"""Simulation of slips: cascades at fixed tensions and with new set-points, and survival."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

@@ -1,8 +1,8 @@
 from .cascade import (
     Cascade as Cascade,
     CascadeOutcome as CascadeOutcome,
-    HandLoads as HandLoads,
     Loads as Loads,
+    StateLoads as StateLoads,
     unit_names as unit_names,
 )
 from .survival import (

@@ -22,10 +22,10 @@ from hand_models.base import Array, Indices
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WRENCH_SCALE
 from planner.prepare import PreparedStance
-from planner.simulation.finger_states import HOLDS, STATE_DIGITS, FingerStates
+from planner.simulation.finger_states import PHALANX_HOLDS, STATE_DIGITS, FingerStates
 from planner.simulation.passive_loads import BALANCE_SETTINGS, balanced
 
-__all__ = ["Cascade", "CascadeOutcome", "HandLoads", "Loads"]
+__all__ = ["Cascade", "CascadeOutcome", "Loads", "StateLoads"]
 
 Flags = NDArray[np.bool_]
 
@@ -48,7 +48,7 @@ class Loads(NamedTuple):
     palms: Array
 
 
-class HandLoads(NamedTuple):
+class StateLoads(NamedTuple):
     """Loads of S states of slipped tiles.
 
     Attributes
@@ -73,7 +73,7 @@ class HandLoads(NamedTuple):
 
 
 class CascadeOutcome(NamedTuple):
-    """How n draws of strengths end.
+    """Outcome of n draws of strengths.
 
     Attributes
     ----------
@@ -186,7 +186,7 @@ class Cascade:
 
     @cached_property
     def _wrench(self) -> Array:
-        """What hands exert in the plan, in B, moments over 0.1 m."""
+        """Wrench of the plan's hands on the rock, in B, moments over 0.1 m."""
         tiles, laterals = self._loads.tiles, self._loads.palms.ravel() @ self._per_palm
         return np.asarray(np.einsum("tk,tki->i", tiles, self._per_load) + laterals)
 
@@ -221,7 +221,7 @@ class Cascade:
         """Return which tiles hold in each state, shape (S, T)."""
         places, F = self._batch.places, len(self._batch.places.phalanges)
         held = np.zeros((len(states), len(self._phalanx)), dtype=bool)
-        held[:, places.phalanges] = (STATE_DIGITS == HOLDS)[states[:, :F]]
+        held[:, places.phalanges] = (STATE_DIGITS == PHALANX_HOLDS)[states[:, :F]]
         held[:, places.bases] = states[:, F : 2 * F][:, places.base_fingers] == 0
         return held & self._on
 
@@ -249,7 +249,7 @@ class Cascade:
         )
         return tuple(each.reshape(len(gone), -1) for each in (loads, springs, most))  # type: ignore[return-value]
 
-    def loads(self, states: NDArray[np.uint8]) -> HandLoads:
+    def loads(self, states: NDArray[np.uint8]) -> StateLoads:
         """Return the loads of S states, and what they use of strengths.
 
         Parameters
@@ -282,7 +282,7 @@ class Cascade:
         np.add.at(on.T, batch.places.hand, holding.T)
         had = np.bincount(batch.places.hand, self._on, H) > 0
         lost = (off > BALANCE_SETTINGS.lost) | ((on == 0) & had).any(axis=1)
-        return HandLoads(self._used(tiles, palms, holding, gone), tiles, palms, holding, lost)
+        return StateLoads(self._used(tiles, palms, holding, gone), tiles, palms, holding, lost)
 
     def _used(self, tiles: Array, palms: Array, holding: Flags, gone: Flags) -> Array:
         """Return what loads use of strengths, (S, T + H)."""

@@ -24,9 +24,9 @@ from hand_models.finger import CONTACT_KINDS
 from hand_models.hand import FINGERS
 from planner.prepare import HandBatch
 
-__all__ = ["DRAGS", "HOLDS", "OFF", "STATE_DIGITS", "FingerStates"]
+__all__ = ["PHALANX_DRAGS", "PHALANX_HOLDS", "PHALANX_OFF", "STATE_DIGITS", "FingerStates"]
 
-HOLDS, DRAGS, OFF = 0, 1, 2
+PHALANX_HOLDS, PHALANX_DRAGS, PHALANX_OFF = 0, 1, 2
 
 STATE_DIGITS: Final = np.array([[s // 9, s // 3 % 3, s % 3] for s in range(27)])
 """State of the proximal, middle and distal phalanx in each of the 27 states of a finger."""
@@ -45,7 +45,7 @@ class FingerStateSettings:
     """Lever arm that is none [m]: with it, contacts cannot balance a joint, and all are off."""
 
 
-SETTINGS: Final = FingerStateSettings()
+FINGER_STATE_SETTINGS: Final = FingerStateSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,10 @@ class FingerStates:
         """
         places, touch = batch.places, batch.touch
         own = places.phalanges
-        count, tolerance = len(own), SETTINGS.force * max(1.0, float(np.abs(loads).max()))
+        count, tolerance = (
+            len(own),
+            FINGER_STATE_SETTINGS.force * max(1.0, float(np.abs(loads).max())),
+        )
         friction = batch.friction[own]
         gives = concatenated_allowances(batch)
         A, B = _moments(batch)
@@ -95,8 +98,8 @@ class FingerStates:
         joint_of, bears = _supports(batch)
         touching = (touch.touches[own] > 0.0)[:, None]
         framed = (touch.framed[own] > 0.0)[:, None]
-        held = STATE_DIGITS == HOLDS
-        drags = (STATE_DIGITS == DRAGS) & touching
+        held = STATE_DIGITS == PHALANX_HOLDS
+        drags = (STATE_DIGITS == PHALANX_DRAGS) & touching
         lifted = ~held & ~drags
         # rows: of each phalanx the joint that it supports
         row = np.arange(count)[:, None]
@@ -107,7 +110,7 @@ class FingerStates:
         right = due[:, None] - np.einsum("fij,fsj->fsi", rubs, given)
         idle = lifted | ~bears[:, None]
         M = np.where(idle[..., None], np.eye(3), np.where(idle[:, :, None], 0.0, M))
-        bad = np.abs(np.linalg.det(M)) < SETTINGS.singular
+        bad = np.abs(np.linalg.det(M)) < FINGER_STATE_SETTINGS.singular
         M[bad], right[bad] = np.eye(3), 0.0
         N = np.linalg.solve(M, np.where(idle, 0.0, right)[..., None])[..., 0]
         T = np.where(drags, friction[:, None] * N, given)
@@ -118,11 +121,13 @@ class FingerStates:
         room = np.where(drags | (held & framed), N, room)
         short = room.min(axis=2) < -tolerance
         worst = room.argmin(axis=2)
-        after = np.arange(27) + (OFF - STATE_DIGITS[np.arange(27), worst]) * PLACE_VALUES[worst]
+        after = (
+            np.arange(27) + (PHALANX_OFF - STATE_DIGITS[np.arange(27), worst]) * PLACE_VALUES[worst]
+        )
         rests = np.where(short, after, np.arange(27))
         for _ in range(2 * len(PLACE_VALUES)):
             rests = rests[row, rests]
-        kind = np.where(N >= 0.0, DRAGS, OFF)
+        kind = np.where(N >= 0.0, PHALANX_DRAGS, PHALANX_OFF)
         slipped = np.arange(27)[:, None] + (kind - STATE_DIGITS) * PLACE_VALUES
         slips = rests[row[:, None], np.where(held & touching & ~drags, slipped, rests[..., None])]
         lifts = np.zeros((count, 27), dtype=bool)

@@ -18,7 +18,7 @@ from service.commands.batch import answer_rest, writing_answers
 
 __all__ = ["simulate_command", "sweep_command"]
 
-LOADS = np.linspace(0.25, 1.25, 9).tolist()
+LOAD_MULTIPLES = np.linspace(0.25, 1.25, 9).tolist()
 """Multiples of the load for which the picture has the survival."""
 
 
@@ -178,7 +178,7 @@ def simulate_command(
     as_json: bool,
     **chosen: Any,
 ) -> int:
-    """Let tiles slip at random: tell how often all hands hold, with new set-points or without.
+    """Let tiles slip at random: count how often all hands hold, with new set-points or without.
 
     The strengths of all tiles are drawn, and the weakest slips until all rest or a hand is lost.
     What a STANCE says of survival counts where no option says otherwise.
@@ -205,11 +205,11 @@ def simulate_command(
         curve = []
         if picture is not None and found.reason is None:
             fewer = msgspec.structs.replace(settings, replanned=settings.replanned // 4)
-            asked = [_at_load(first, whole[0], load, fewer) for load in LOADS]
+            asked = [_at_load(first, whole[0], load, fewer) for load in LOAD_MULTIPLES]
             answers = _replies(planners.plan_many(asked, progress))
             curve = [
                 (load, _survival(each))
-                for load, each in zip(LOADS, answers, strict=True)
+                for load, each in zip(LOAD_MULTIPLES, answers, strict=True)
                 if each.survival is not msgspec.UNSET
             ]
     if picture is not None and found.reason is None:

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from hand_models.tile import TileStrengths
 from planner import Plan, Question, SurvivalSettings, SurvivalShare, find_survival, plan
+from planner.prepare import prepare_stance
 from planner.result import Survival
+from planner.simulation import Cascade, plan_loads
 from service.answering import question
 from service.commands.stances import read_request
 from service.requests import PlanRequest
@@ -176,11 +179,17 @@ def test_the_formula_is_in_the_simulators_interval_on_random_stances():
         answer = plan(asked)
         if answer.hands is None:
             continue
-        strength = min(max(0.8 * (answer.utilisation or 1.0), 0.01), 100.0)
-        settings = SurvivalSettings(draws=10_000, replanned=0, seed=seed, strength=strength)
-        found = find_survival(asked, answer.hands, settings)
-        if found.slipped is None:
+        prepared = prepare_stance(asked)
+        cascade = Cascade(prepared, plan_loads(prepared, answer.hands))
+        hand = np.concatenate([prepared.batch.places.hand, np.arange(len(answer.hands))])
+        law = TileStrengths.of([each.surface for each in prepared.batch.hands], hand)
+        due = np.random.default_rng(seed).uniform(0.05, 0.95)
+        strength = law.factor_for(cascade.used, due)
+        if strength == 0.0:
             continue
+        outcome = cascade.run(law.sample(10_000, seed, strength), most=1)
+        share = SurvivalShare.of(int((outcome.slips == 0).sum()), 10_000)
         count += 1
-        inside += found.slipped.low <= 1.0 - found.no_slip <= found.slipped.high
+        inside += share.low <= law.no_slip(cascade.used, strength) <= share.high
+    print(f"{inside} of {count} stances inside")
     assert inside >= 180
