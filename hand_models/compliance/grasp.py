@@ -127,7 +127,7 @@ class CompliantGrasp(ABC):
         Parameters
         ----------
         twists : ndarray, shape (m, d)
-            m poses, real or with complex steps.
+            m poses of the wrist, real or with imaginary steps (`complex_steps`).
         """
 
     @property

@@ -169,7 +169,7 @@ class GripperFit:
             yield Datum(f"M_y : F_x best for {kind}", "m", arm, 0.4 * arm, False)
 
     def start(self) -> Array:
-        """Return the values in `table` as shares x, shape (n,), of their plausible ranges.
+        """Return the parameters' values in ``table`` as shares x, (n,), of their plausible ranges.
 
         Values outside a range are clipped to its ends, 0 and 1.
         """

@@ -358,7 +358,8 @@ class SettledHand:
         Returns
         -------
         tuple of HalfPlane
-            ``nail_shear`` with the capacity ``finger_shear``, and ``fingertip_force`` [N].
+            Limits ``nail_shear``, with capacity `Structure.finger_shear`, and
+            ``fingertip_force`` [N].
         """
         structure = self.hand.structure
         base = -self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]].along

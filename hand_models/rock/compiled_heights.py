@@ -12,7 +12,7 @@ import numpy as np
 
 from hand_models.base import Array, Indices, compiled
 
-__all__ = ["heights_across", "rock_ends", "seen_triangles"]
+__all__ = ["facing_triangles", "heights_across", "rock_ends"]
 
 Point = tuple[float, float, float]
 
@@ -54,7 +54,7 @@ def _along_s(triangle: Array) -> tuple[Point, Point, Point]:
 
 
 @compiled("f2", "i2", "i1", "f2", "f0", "f0")
-def seen_triangles(
+def facing_triangles(
     vertices: Array, faces: Indices, some: Indices, plane: Array, half: float, reach: float
 ) -> Array:
     """Return the corners (s, y, t) of those triangles that are seen along t in a box.
@@ -105,7 +105,7 @@ def heights_across(triangles: Array, s: Array, halves: Array, lines: Array, slac
     Parameters
     ----------
     triangles : ndarray, shape (n, 3, 3)
-        Corners (s, y, t) of the triangles, from `seen_triangles` [m].
+        Corners (s, y, t) of the triangles, from `facing_triangles` [m].
     s : ndarray, shape (g,)
         Places in equal steps, ascending [m].
     halves : ndarray, shape (h,)

@@ -1,4 +1,4 @@
-"""What is seen of outlines in a finger's plane, and the envelope across the finger (compiled).
+"""Outlines as seen in the plane of a finger, and the envelope across the finger (compiled).
 
 Coordinates (s, t) of a finger's plane: s along the finger, t into the rock. Rock is seen along t.
 Several polylines are an array of their points, one after another, and the index at which each ends.

@@ -40,7 +40,7 @@ def corners(points: Array) -> tuple[Array, Array]:
     Returns
     -------
     points : ndarray, shape (n, 2)
-        Each different from the one before [m].
+        Points that are left, each different from the one before [m].
     lengths : ndarray, shape (n,)
         Length of the polyline up to each point [m].
     """

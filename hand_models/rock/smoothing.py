@@ -314,11 +314,11 @@ class OutlinedHold(Hold):
 
     def _heights_of(self, triangles: Triangles, some: Indices, plane: Array) -> Heights:
         """Return heights of some triangles across a finger."""
-        from hand_models.rock.compiled_heights import heights_across, rock_ends, seen_triangles
+        from hand_models.rock.compiled_heights import facing_triangles, heights_across, rock_ends
 
         scale, s = self._scale, self._scale.places
         halves = 0.5 * np.array([scale.tile_width, scale.frame_width])
-        seen = seen_triangles(*triangles, some, plane, float(halves.max()), scale.reach)
+        seen = facing_triangles(*triangles, some, plane, float(halves.max()), scale.reach)
         least = heights_across(seen, s, halves, scale.lines, BASE_TOLERANCES.length)
         ends = np.full((2, 2, len(s), 2), np.nan)
         for row, half in enumerate(halves.tolist()):

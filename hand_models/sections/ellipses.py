@@ -65,7 +65,7 @@ class Ellipse(SmoothSection):
     rho : float
         ρ, radius of that disc.
     size : float
-        Factor from distances to that disc to approximate distances to the ellipse [m].
+        Factor by which a distance from that disc becomes an approximate one from the ellipse.
     """
 
     def __init__(

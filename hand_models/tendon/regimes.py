@@ -43,7 +43,7 @@ class TendonResponse(NamedTuple):
     shears : ndarray, shape (F, n, m)
         T_i, shear of each tile on the rock [N].
     regime : ndarray of int, shape (F, m)
-        Index of the regime of stick and slip.
+        Index of the regime (which boundaries stick, and which way the others slip), among all 3ⁿ.
     """
 
     tensions: NDArray[Any]

@@ -136,7 +136,7 @@ def within_law(angles: Array, pull_off_angle: float) -> Array:
     Returns
     -------
     ndarray of bool
-        The shape of ``angles``.
+        Flags in the shape of ``angles``.
     """
     return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + BASE_TOLERANCES.angle))
 

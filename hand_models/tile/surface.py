@@ -324,7 +324,7 @@ def engaged_share(gap: ArrayLike, travel: float) -> Array:
     Returns
     -------
     ndarray
-        The shape of ``gap``.
+        φ, in the shape of ``gap``.
     """
     off = np.asarray(gap, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""What a plan's tensions do on hands that are not as planned: kept, or balanced by feedback.
+"""Judge a plan's tensions on hands that are not as planned: kept, or balanced by feedback.
 
 The tensions are set-points: nobody plans anew, and nobody knows the strengths. Wrists are fixed:
 with tensions kept, palms and lateral reactions balance the body as far as they can.
@@ -31,10 +31,10 @@ def without_margins(prepared: PreparedStance) -> PreparedStance:
     prepared : PreparedStance
     """
     question, hands = prepared.question, prepared.hands
-    if not (question.limits.hold_margin or question.limits.least_tension):
+    limits = structs.replace(question.limits, hold_margin=0.0, palm_margin=0.0, least_tension=0.0)
+    if limits == question.limits:
         return prepared
-    limits = structs.replace(question.limits, hold_margin=0.0, least_tension=0.0)
-    added = tuple([replace(each, margin=0.0, least=0.0) for each in hands.added])
+    added = tuple([replace(each, margin=0.0, palm=0.0, least=0.0) for each in hands.added])
     bare = replace(prepared, question=replace(question, limits=limits))
     return replace(bare, hands=replace(hands, added=added)).with_hands(prepared.batch.hands)
 

@@ -213,7 +213,7 @@ class Goal(ABC):
 
 
 class LeastUse(Goal):
-    """Goal of least utilisation; among points of equal utilisation, about least effort."""
+    """Goal of least utilisation; of points of equal utilisation, one of about the least effort."""
 
     least_penalty = 10.0
     promised = None

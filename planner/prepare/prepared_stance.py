@@ -200,7 +200,7 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
     """Return what joints, caps and present tensions add to the set of each hand."""
     stance, limits = question.stance, question.limits
     change = limits.tension_change
-    margins = limits.hold_margin > 0.0 or limits.least_tension > 0.0
+    margins = max(limits.hold_margin, limits.least_tension, limits.palm_margin) > 0.0
     found = []
     for hand in stance.hands:
         cap, frame = limits.per_hand.get(hand.limb), None
@@ -223,6 +223,7 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
                 change=math.inf if change is None else change,
                 margin=limits.hold_margin,
                 least=limits.least_tension,
+                palm=limits.palm_margin,
             )
         )
     return tuple(found)

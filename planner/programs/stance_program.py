@@ -2,8 +2,8 @@
 
 `StanceProgram.define` writes the program in CVXPY, as readable mathematics. `StanceProgram.conic`
 writes the same program in the solver's form, which takes a fraction of the time. `run` solves the
-second; if the solver returns neither a solution nor a certificate, it retries with finer settings,
-and at last CVXPY solves the first.
+second; if the solver returns neither a solution nor a certificate, a retry uses iterative
+refinement, and at last CVXPY solves the first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Monte Carlo samples of a stance's uncertain parameters: hand model and surfaces of each."""
+"""Monte Carlo samples of a stance's uncertain parameters, as hand models in a cache."""
 
 from __future__ import annotations
 

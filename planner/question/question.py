@@ -25,7 +25,7 @@ __all__ = ["MOST_DRAWS", "OwnObjective", "Question"]
 
 
 class OwnObjective(Protocol):
-    """Objective that the caller defines: an object as `planner.solving.Objective`."""
+    """Objective that the caller defines: an object like a `planner.solving.Objective`."""
 
     name: ClassVar[str]
 

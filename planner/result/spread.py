@@ -39,7 +39,7 @@ class SpreadSettings:
 
 SPREAD_SETTINGS: Final = SpreadSettings()
 
-STRENGTH: Final = ".shear_limit"
+STRENGTH_SUFFIX: Final = ".shear_limit"
 """How the names of strengths of a tile on a surface end."""
 
 
@@ -82,7 +82,7 @@ class Quantiles(Struct, frozen=True):
 
 
 class SentPlan(Struct, frozen=True):
-    """What set-points of tensions do in one sample, verified; None for a missing value.
+    """Outcome of set-points of tensions in one sample, verified; None for a missing value.
 
     Attributes
     ----------
@@ -347,7 +347,7 @@ def _apart(
         if np.ptp(own) == 0.0:
             continue
         own = (own - own.mean()) / own.std()
-        if name.endswith(STRENGTH):
+        if name.endswith(STRENGTH_SUFFIX):
             columns += [own, own**2]
         else:
             # a quantity that goes with one before says the same

@@ -39,10 +39,10 @@ from planner.solving.solution import Solution
 
 __all__ = ["find_spread"]
 
-LATE: Final = "all samples were planned"
+ALL_PLANNED: Final = "all samples were planned"
 """What a deadline may leave unfinished."""
 
-ROCK: Final = "rock"
+ROCK_PRESET: Final = "rock"
 """Preset surface whose strength has an assumed range."""
 
 
@@ -102,7 +102,7 @@ def find_spread(
     closed: dict[int, list[SettledHand]] = {}
     try:
         for k, each in enumerate(drawn):
-            deadline.check(LATE)
+            deadline.check(ALL_PLANNED)
             outcomes = _settled(prepared, each)
             own = [hand for hand in outcomes if isinstance(hand, SettledHand)]
             pairs = zip(prepared.limbs, outcomes, strict=True)
@@ -121,7 +121,7 @@ def find_spread(
                 kept[k] = SentPlan(sample.utilisation, sample.holds)
         own_samples = question.draws is not None
         threshold = None if own_samples else _threshold(prepared, idle, usual, attempt)
-        deadline.check(LATE)
+        deadline.check(ALL_PLANNED)
     except DeadlineError:
         return None
     quantities = drawn_quantities(drawn, surfaces)
@@ -157,14 +157,14 @@ def _threshold(
     cap = prepared.question.limits.utilisation + CAP_SLACK
 
     def on_rock(ratio: float) -> DrawnHand:
-        strength = table.quantity(ROCK, "shear_limit").changed(ratio * sandpaper)
-        own = ParameterTable({ROCK: {"shear_limit": strength}})
+        strength = table.quantity(ROCK_PRESET, "shear_limit").changed(ratio * sandpaper)
+        own = ParameterTable({ROCK_PRESET: {"shear_limit": strength}})
         return DrawnHand(stance.robot.hand, table.replaced(own))
 
     @cache
     def beyond(weakness: float) -> float:
         """Return by how much the utilisation exceeds the cap on rock of 1 / weakness."""
-        deadline.check(LATE)
+        deadline.check(ALL_PLANNED)
         own = [
             hand
             for hand in _settled(prepared, on_rock(1.0 / weakness))
@@ -188,7 +188,7 @@ def _threshold(
         ratio = 1.0 / float(scipy.optimize.brentq(beyond, 1.0 / most, 1.0 / least, xtol=accuracy))
     share = 0.0 if ratio is None else (most - ratio) / (most - least)
     strength = None if ratio is None else ratio * sandpaper
-    return StrengthThreshold(ROCK, strength, ratio, [least, most], share)
+    return StrengthThreshold(ROCK_PRESET, strength, ratio, [least, most], share)
 
 
 def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | InvalidInputError]:

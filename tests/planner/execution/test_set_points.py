@@ -20,6 +20,7 @@ from planner.solving import plan
 from service.answering.questions import question
 from service.commands.stances import read_request
 from tests.planner.solving.test_spread import STRENGTHS, drawn, entry, seat, with_wrists
+from tests.suite.helpers.checks import problems
 from tests.suite.helpers.stances import ask, moved, on_wall
 
 STIFFER = drawn(tile={"contact_stiffness": entry([5500.0, 6500.0, 9500.0], "N/m")})
@@ -140,6 +141,21 @@ def test_a_tile_that_would_be_dragged_back_leaves_no_balance_until_a_margin_keep
     assert spared.kept.without == 0
     tight = replace(asked, limits=Limits(hold_margin=5.0), draws=(drawn(68.1), STIFFER))
     assert judged(tight).kept.without == 0
+
+
+def test_palms_that_press_can_also_give_less():
+    asked = question(read_request("ledge"))
+    bound = replace(asked, limits=Limits(palm_margin=15.0))
+    free, pressed = plan(asked), plan(bound)
+    for answer, least in ((free, 0.0), (pressed, 15.0)):
+        presses = [hand.palm.force[2] for hand in answer.hands if hand.palm.engaged]
+        assert min(presses) == pytest.approx(least, abs=1e-5)
+    assert pressed.utilisation > free.utilisation
+    assert problems(bound, pressed) == []
+    assert any("its palm presses with" in each for each in problems(bound, free))
+    before, after = judged(asked), judged(bound)
+    assert after.kept.without < before.kept.without / 2
+    assert after.kept.holds > before.kept.holds
 
 
 def test_neither_place_nor_order_of_hands_matters():
