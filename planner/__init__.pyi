@@ -6,11 +6,13 @@ from .capability import (
     BodySection as BodySection,
     BodySpace as BodySpace,
     ComRegion as ComRegion,
+    ComSolid as ComSolid,
     End as End,
     MeasurementStudy as MeasurementStudy,
     Polygon as Polygon,
     Survey as Survey,
     com_region as com_region,
+    com_solid as com_solid,
     survey as survey,
 )
 from .deadline import (

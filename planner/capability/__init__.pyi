@@ -11,5 +11,10 @@ from .measurements import (
     widths as widths,
 )
 from .polygon import Polygon as Polygon, SupportPoint as SupportPoint, enclose as enclose
-from .support_region import ComRegion as ComRegion, com_region as com_region
+from .support_region import (
+    ComRegion as ComRegion,
+    ComSolid as ComSolid,
+    com_region as com_region,
+    com_solid as com_solid,
+)
 from .wrist_survey import Survey as Survey, survey as survey

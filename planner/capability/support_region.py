@@ -5,23 +5,38 @@ body's acceleration a and gravity g. It is affine in c, and does not change wher
 So the feasible c are a convex prism along F, whose section across F is a plane section of the body
 space: `polygon` encloses it. At rest, F is against gravity, and the prism is upright.
 
+Under several accelerations, which tilt the prisms, the centre of mass must be in all of them: in a
+solid that is bounded in three dimensions. Where c is feasible under each, it is under every
+acceleration in their convex hull.
+
 Hands, joint angles and payloads stay, and with them the torques of the limbs' own weight: the
 region says where the body's mass may be, not where the body can go.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
 
 import numpy as np
+from msgspec import structs
 
-from hand_models.base import Array, InvalidInputError, skew
+from hand_models.base import Array, EmptySetError, InvalidInputError, finite_vector, skew
+from hand_models.wrench_spaces import linear_program
 from planner.capability.body_space import BodySpace
 from planner.capability.polygon import Polygon, SupportPoint, enclose
 from planner.prepare import posture_at
 from planner.programs import WRENCH_UNIT
+from planner.question import Question
 
-__all__ = ["ComRegion", "com_region"]
+__all__ = ["ComRegion", "ComSolid", "com_region", "com_solid"]
+
+LEAST_TILT: Final = 1e-3
+"""Angle between loads below which they count as parallel [rad]: a prism of a kilometre."""
+
+LEAST_ROOM: Final = 1e-4
+"""Radius of the ball that a solid has room for at least [m]: that of a polygon's gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +81,131 @@ class ComRegion:
         away = point - starts
         left = edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0]
         return nearest if len(ends) > 2 and bool(np.all(left >= 0.0)) else -nearest
+
+
+@dataclass(frozen=True, eq=False)
+class ComSolid:
+    """Centres of mass that are feasible under several accelerations: a solid in three dimensions.
+
+    Attributes
+    ----------
+    accelerations : ndarray, shape (k, 3)
+        Accelerations of the body in W, that of the question's load first [m/s²].
+    inner : ndarray, shape (n, 3)
+        Vertices of a polytope in W within which every centre of mass is feasible under all
+        accelerations in their convex hull [m].
+    outer : ndarray, shape (m, 3)
+        Vertices of a polytope outside which none is [m].
+    gap : float
+        Largest distance of a point of the outer polytope from the inner one [m].
+    """
+
+    accelerations: Array
+    inner: Array
+    outer: Array
+    gap: float
+
+
+def com_solid(
+    question: Question, com_accelerations: Sequence[Sequence[float] | Array]
+) -> ComSolid | None:
+    """Return where the centre of mass may be while the body takes each of several accelerations.
+
+    Parameters
+    ----------
+    question : Question
+        As for `com_region`; the acceleration of its load counts, too.
+    com_accelerations : sequence of array_like, shape (3,)
+        Accelerations of the body in W [m/s²].
+
+    Returns
+    -------
+    ComSolid or None
+        None if no centre of mass with room around it is feasible under all accelerations.
+
+    Raises
+    ------
+    InvalidInputError
+        If all accelerations are along gravity, so that the solid has no end there; or as for
+        `com_region`.
+    SolverError
+        If a program is not solved.
+    """
+    given = [
+        finite_vector(a, 3, f"com_accelerations[{i}]") for i, a in enumerate(com_accelerations)
+    ]
+    whole = np.vstack([np.array(question.load.acceleration), *given])
+    regions = []
+    for x, y, z in whole.tolist():
+        load = structs.replace(question.load, acceleration=(x, y, z))
+        regions.append(com_region(BodySpace(replace(question, load=load, explain=False))))
+    ups = np.stack([region.up for region in regions])
+    if np.linalg.norm(np.cross(ups[0], ups), axis=1).max() < LEAST_TILT:
+        raise InvalidInputError(
+            "are all along gravity, so that the solid has no end in height; give others, too",
+            field="com_accelerations",
+        )
+    com = regions[0].com
+    try:
+        A, b = _half_spaces(regions, "inner", com)
+        inner, outer = _vertices(A, b), _vertices(*_half_spaces(regions, "outer", com))
+    except EmptySetError:
+        return None
+    gap = max(_distance(A, b, point) for point in outer)
+    return ComSolid(whole, com + inner, com + outer, gap)
+
+
+def _half_spaces(
+    regions: Sequence[ComRegion], which: Literal["inner", "outer"], origin: Array
+) -> tuple[Array, Array]:
+    """Return A, b of the points p with A (p − origin) ≤ b that are in the polygons of all regions.
+
+    Raises
+    ------
+    EmptySetError
+        If a polygon is empty, a point or a segment.
+    """
+    normals, offsets = [], []
+    for region in regions:
+        corners = np.zeros((0, 2)) if region.polygon is None else getattr(region.polygon, which)
+        if len(corners) < 3:
+            raise EmptySetError("a region of the centre of mass has no area")
+        edges = np.roll(corners, -1, axis=0) - corners
+        outward = np.column_stack([edges[:, 1], -edges[:, 0]])
+        outward /= np.linalg.norm(outward, axis=1)[:, None]
+        normals.append(outward @ region.axes)
+        offsets.append(np.sum(outward * corners, axis=1) - normals[-1] @ origin)
+    return np.vstack(normals), np.concatenate(offsets)
+
+
+def _vertices(A: Array, b: Array) -> Array:
+    """Return the vertices (n, 3) of { p : A p ≤ b }, bounded; rows of unit length.
+
+    Raises
+    ------
+    EmptySetError
+        If no ball of `LEAST_ROOM` is inside.
+    """
+    from scipy.spatial import HalfspaceIntersection
+
+    # the centre of the largest ball inside
+    bounds = [(None, None)] * 3 + [(0.0, None)]
+    rows, cost = np.column_stack([A, np.ones(len(b))]), np.array([0.0, 0.0, 0.0, -1.0])
+    ball = linear_program(cost, rows, b, "the region of the centre of mass", bounds=bounds)
+    if ball is None or ball[-1] < LEAST_ROOM:
+        raise EmptySetError("the regions of the centre of mass have no room in common")
+    found = HalfspaceIntersection(np.column_stack([A, -b]), ball[:3]).intersections
+    return found[np.unique(found.round(9), axis=0, return_index=True)[1]]
+
+
+def _distance(A: Array, b: Array, point: Array) -> float:
+    """Return the distance of a point from { p : A p ≤ b } (least distance programming)."""
+    from scipy.optimize import nnls
+
+    # Lawson and Hanson, Solving Least Squares Problems, chapter 23
+    E, f = np.vstack([-A.T, A @ point - b]), np.array([0.0, 0.0, 0.0, 1.0])
+    rest = E @ nnls(E, f)[0] - f
+    return float(np.linalg.norm(rest[:3] / rest[3]))
 
 
 def com_region(space: BodySpace) -> ComRegion:

@@ -18,8 +18,10 @@ from planner import (
     DeadlineError,
     End,
     Polygon,
+    Question,
     Time,
     com_region,
+    com_solid,
 )
 from service import replies
 from service.answering.answers import Planned, finite, placed_poses
@@ -101,6 +103,7 @@ def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explo
     turning = _accelerations(space, _ways("xyz", about_axes)) if space.turns else None
     along = [_acceleration(space, direction) for direction in directions]
     region = com_region(space) if "com_region" in request.want else None
+    solid = _solid(asked, request)
     ended = time.perf_counter()
     found = space.plan
     reply = BodySpaceReply(
@@ -125,6 +128,7 @@ def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explo
     )
     if region is not None:
         reply.com_region = _region(region, space.exact)
+        reply.com_region.solid = solid
     return Explored(space, section, reply, region)
 
 
@@ -178,6 +182,22 @@ def _region(region: ComRegion, exact: bool) -> replies.ComRegionReply:
     )
     _fill(reply, region.polygon)
     return reply
+
+
+def _solid(asked: Question, request: BodySpaceRequest) -> replies.ComSolidReply | None:
+    given = request.com_accelerations
+    if not given:
+        return None
+    if "com_region" not in request.want:
+        raise InvalidInputError("requires com_region in want; add it", field="com_accelerations")
+    found = com_solid(asked, given)
+    if found is None:
+        return None
+    parts = (found.accelerations, found.inner, found.outer)
+    accelerations, inner, outer = (part.tolist() for part in parts)
+    return replies.ComSolidReply(
+        accelerations=accelerations, inner=inner, outer=outer, gap=found.gap
+    )
 
 
 def _fill(

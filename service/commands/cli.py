@@ -56,6 +56,10 @@ COMMANDS_BY_NAME: Final = {
         "holds",
         "Propose holds on ROCK, a mesh in metres (of a scan, `crux rock` makes one).",
     ),
+    "new": Entry(
+        "plans",
+        "Write a commented start of a stance, a route, a robot or a hand, as TOML that runs.",
+    ),
     "plan": Entry("plans", "Make one plan, without the network."),
     "query": Entry("network", "Ask a running service for a plan."),
     "redundancy": Entry(
@@ -247,8 +251,8 @@ def _hint(error: click.ClickException) -> str:
 def crux() -> None:
     """Plan which hand of a climbing robot carries how much.
 
-    STANCE is the path of a JSON file with a plan request, - for standard input, or the name of a
-    bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-300-floating,
+    STANCE is the path of a JSON or TOML file with a plan request, - for standard input, or the name
+    of a bundled stance: boulders, ledge, overhang, slab, wall, wall-300, wall-300-floating,
     wall-300-joints, wall-700.
     ROUTE is the same for a climb; six-moves is bundled. LIMB is front_right, rear_right, rear_left
     or front_left. --hand FILE puts numbers of your own in place of the bundled hand's, --robot FILE

@@ -1,8 +1,10 @@
-"""Define ``crux plan`` and ``crux redundancy``: plans of one stance, without the network."""
+"""Define ``crux plan``, ``crux redundancy`` and ``crux new``: stances, without the network."""
 
 from __future__ import annotations
 
+import re
 import sys
+from importlib import resources
 from pathlib import Path
 from time import perf_counter
 
@@ -10,11 +12,20 @@ import click
 import msgspec
 
 import planner
-from hand_models.base import InvalidInputError
+from hand_models.base import InvalidInputError, whole_file
 from service import answering, replies, requests, tables
 from service.commands import options, stances
 
-__all__ = ["plan_command", "redundancy_command"]
+__all__ = ["new_command", "plan_command", "redundancy_command"]
+
+ROBOT_COMMENT = """\
+# A robot: its URDF, where its hands are mounted, and what its joints bear. This is RoboSimian.
+# Use it with: crux plan STANCE --robot FILE
+# A bare number is in SI units and counts as assumed. In place of a limb's orientation, a quaternion
+# [x, y, z, w]: rpy = [roll, pitch, yaw], or x_axis and z_axis.
+
+"""
+"""What begins a new robot's file."""
 
 
 @click.command("plan")
@@ -246,3 +257,46 @@ def _without_palm_loads(answer: answering.Planned) -> planner.PalmLoadFactors | 
         return planner.load_factors_without_palm_loads(answer.question)
     except planner.DeadlineError:
         return None
+
+
+@click.command("new")
+@click.argument("kind", type=click.Choice(["stance", "route", "robot", "hand"]))
+@click.option(
+    "-o",
+    "--output",
+    "file",
+    type=options.OutputFile(".toml"),
+    metavar="FILE",
+    help="File to write, .toml, which must not exist; a robot's URDF is written beside it.",
+)
+def new_command(kind: str, file: Path | None) -> int:
+    """Write a commented start of a stance, a route, a robot or a hand, as TOML that runs."""
+    if kind == "robot":
+        if file is None:
+            raise click.UsageError("a robot requires -o FILE: its URDF is written beside FILE")
+        robot, urdf = planner.RobotFile.bundled(), file.with_suffix(".urdf")
+        _check_new(file)
+        _write(urdf, robot.urdf)
+        text = re.sub(r"\A(#.*\n)+\n", ROBOT_COMMENT, robot.toml)
+        text = text.replace(f'name = "{robot.name}"', 'name = "mine"', 1)
+        text = re.sub(r'(?m)^urdf = "[^"]*"', f'urdf = "{urdf.name}"', text)
+    else:
+        start = resources.files("service") / "examples" / "starts" / f"{kind}.toml"
+        text = start.read_text(encoding="utf-8")
+    if file is None:
+        click.echo(text, nl=False)
+    else:
+        _write(file, text)
+        tables.remark(f"wrote {file}")
+    return tables.ExitStatus.DONE
+
+
+def _check_new(path: Path) -> None:
+    if path.exists():
+        raise InvalidInputError(f"{path} exists; name another file", field="-o")
+
+
+def _write(path: Path, text: str) -> None:
+    _check_new(path)
+    with whole_file(path) as part:
+        part.write_text(text, encoding="utf-8")

@@ -96,6 +96,18 @@ def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[reque
     return axes
 
 
+def _shaken(load: planner.Load | None, shake: float | None) -> list[tuple[float, float, float]]:
+    """Return accelerations along ± each axis of W, added to that of the load."""
+    if shake is None:
+        return []
+    x, y, z = (load or planner.Load()).acceleration
+    return [
+        accelerated
+        for by in (shake, -shake)
+        for accelerated in ((x + by, y, z), (x, y + by, z), (x, y, z + by))
+    ]
+
+
 @click.command("body-space")
 @options.stance_argument
 @click.option(
@@ -113,6 +125,12 @@ def _check_axes(_: click.Context, __: click.Parameter, given: str) -> list[reque
 )
 @click.option("--pure", is_flag=True, help="With the other components zero.")
 @click.option("--com", is_flag=True, help="Show instead where the centre of mass may be.")
+@click.option(
+    "--shake",
+    type=options.FiniteRange(0.0, 1e2, min_open=True),
+    metavar="A",
+    help="With --com, in three dimensions: under accelerations of A m/s² along ± each axis of W.",
+)
 @options.plot_option("Draw it there, and the largest accelerations in two planes.")
 @options.own_options
 @options.json_option
@@ -122,6 +140,7 @@ def body_space_command(
     projection: bool,
     pure: bool,
     com: bool,
+    shake: float | None,
     picture: Path | None,
     own: options.Own,
     as_json: bool,
@@ -129,6 +148,8 @@ def body_space_command(
     """Show what the body can bear: which wrenches, and which accelerations."""
     if projection and pure:
         raise click.UsageError("give --projection or --pure, not both")
+    if shake is not None and not com:
+        raise click.UsageError("--shake requires --com")
 
     plan = own.asked(stances.read_request(stance))
     request = requests.BodySpaceRequest(
@@ -142,6 +163,7 @@ def body_space_command(
         axes=axes,
         others="free" if projection else "zero" if pure else "needed",
         want=["com_region"] if com else [],
+        com_accelerations=_shaken(plan.load, shake),
     )
     with tables.waiting(f"exploring {stance}", plan):
         found = answering.explore(request, own.robots)

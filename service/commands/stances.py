@@ -1,16 +1,18 @@
 """Read the stance or the route of a command from a file, standard input, or the bundled examples.
 
+A request is JSON, or TOML in a file that ends in .toml or a text that begins with a comment (#).
 Mesh files that holds name are read here, too, so that the request is complete.
 """
 
 from __future__ import annotations
 
 import sys
+import tomllib
 from codecs import BOM_UTF8
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
 
@@ -28,7 +30,7 @@ class Given(NamedTuple, Generic[RequestT]):
     Attributes
     ----------
     text : bytes
-        JSON text of the request.
+        JSON text of the request; of one in TOML, the same in JSON.
     request : Request
         Decoded text, still with the names of its mesh files.
     files : MeshFiles or None
@@ -58,7 +60,7 @@ def read_request(source: str) -> requests.PlanRequest:
     Parameters
     ----------
     source : str
-        Path of a JSON file, ``-`` for standard input, or the name of a bundled stance.
+        Path of a JSON or TOML file, ``-`` for standard input, or the name of a bundled stance.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def read_route(source: str) -> requests.RouteRequest:
     Parameters
     ----------
     source : str
-        Path of a JSON file, ``-`` for standard input, or the name of a bundled route.
+        Path of a JSON or TOML file, ``-`` for standard input, or the name of a bundled route.
 
     Returns
     -------
@@ -113,7 +115,7 @@ def limbs_of(source: str | None) -> tuple[str, ...]:
     Parameters
     ----------
     source : str or None
-        Path of a JSON file, or the name of a bundled stance.
+        Path of a JSON or TOML file, or the name of a bundled stance.
 
     Returns
     -------
@@ -126,15 +128,35 @@ def limbs_of(source: str | None) -> tuple[str, ...]:
         else Path(source or "")
     )
     try:
-        asked = msgspec.json.decode(path.read_bytes())
+        text = _text(path)
+        asked = _from_toml(text) if _is_toml(text, path.name) else msgspec.json.decode(text)
         return tuple(str(hand["limb"]) for hand in asked["stance"]["hands"])
-    except (OSError, msgspec.DecodeError, LookupError, TypeError):
+    except (OSError, wire.MalformedError, msgspec.DecodeError, LookupError, TypeError):
         return ("front_right", "rear_right", "rear_left", "front_left")
 
 
-def _text(path: Path) -> bytes:
+def _text(path: Traversable) -> bytes:
     """Return the content of a file, without a byte order mark."""
     return path.read_bytes().removeprefix(BOM_UTF8)
+
+
+def _is_toml(text: bytes, name: str) -> bool:
+    """Return True if a request is written in TOML; no JSON begins with a comment."""
+    return name.lower().endswith(".toml") or text.lstrip()[:1] == b"#"
+
+
+def _from_toml(text: bytes) -> dict[str, Any]:
+    """Return the content of TOML text.
+
+    Raises
+    ------
+    MalformedError
+        If the text is not TOML in UTF-8.
+    """
+    try:
+        return tomllib.loads(text.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise wire.MalformedError(f"not valid TOML: {error or 'nested too deep'}") from None
 
 
 def _folder(kind: type[requests.Request]) -> Traversable:
@@ -146,16 +168,17 @@ def _read(
     source: str, kind: type[RequestT], field: str, noun: str
 ) -> tuple[RequestT, Given[RequestT]]:
     if source == "-":
-        return _decoded(sys.stdin.buffer.read(), kind, Path())
+        return _decoded(sys.stdin.buffer.read(), kind, Path("-"))
     path = Path(source)
     if path.is_file() or path.is_fifo():
         try:
-            return _decoded(_text(path), kind, path.parent)
+            return _decoded(_text(path), kind, path)
         except OSError as error:
             raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
     if source in bundled(kind):
         with resources.as_file(_folder(kind)) as folder:
-            whole, given = _decoded((folder / f"{source}.json").read_bytes(), kind, Path(folder))
+            path = folder / f"{source}.json"
+            whole, given = _decoded(path.read_bytes(), kind, path)
             return whole, given._replace(files=None)
     raise InvalidInputError(
         f"no such file, and no bundled {noun} {source!r}; bundled are {', '.join(bundled(kind))}",
@@ -163,8 +186,14 @@ def _read(
     )
 
 
-def _decoded(text: bytes, kind: type[RequestT], folder: Path) -> tuple[RequestT, Given[RequestT]]:
-    """Return a request with its scans and its text; its files are relative to a folder."""
-    files = answering.MeshFiles(folder)
-    request = wire.decode_request(text, kind)
+def _decoded(text: bytes, kind: type[RequestT], path: Path) -> tuple[RequestT, Given[RequestT]]:
+    """Return a request with its scans and its text; its files are relative to that of the text."""
+    files = answering.MeshFiles(path.parent)
+    if _is_toml(text, path.name):
+        content = _from_toml(text)
+        # unlike JSON, MessagePack has the numbers that are not finite, which are refused
+        request = wire.decode_request(msgspec.msgpack.encode(content), kind, wire.Format.MSGPACK)
+        text = msgspec.json.encode(content)
+    else:
+        request = wire.decode_request(text, kind)
     return files.whole(request), Given(text, request, files)

@@ -40,6 +40,7 @@ from .spaces import (
     ClosingSequenceReply as ClosingSequenceReply,
     ClosingStageReply as ClosingStageReply,
     ComRegionReply as ComRegionReply,
+    ComSolidReply as ComSolidReply,
     ContactReply as ContactReply,
     HalfSpaceEquations as HalfSpaceEquations,
     HalfSpacesReply as HalfSpacesReply,

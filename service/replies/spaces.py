@@ -16,6 +16,7 @@ __all__ = [
     "ClosingSequenceReply",
     "ClosingStageReply",
     "ComRegionReply",
+    "ComSolidReply",
     "ContactReply",
     "HalfSpaceEquations",
     "HalfSpacesReply",
@@ -272,6 +273,21 @@ class BodySectionReply(Struct, kw_only=True):
     limiting: list[LimitName | None]
 
 
+class ComSolidReply(Struct, kw_only=True):
+    """Region in which the centre of mass may be under several accelerations: a polytope in W.
+
+    - ``accelerations``: accelerations of the body in W, the load's first [m/s²].
+    - ``inner``: vertices of a polytope, each point of which can be held under all of them [m].
+    - ``outer``: vertices of a polytope outside which no point can be [m].
+    - ``gap``: largest distance between the polytopes [m].
+    """
+
+    accelerations: list[Vector]
+    inner: list[Vector]
+    outer: list[Vector]
+    gap: float
+
+
 class ComRegionReply(Struct, kw_only=True):
     """Region in which the centre of mass may be while hands and joints stay: a prism.
 
@@ -289,6 +305,8 @@ class ComRegionReply(Struct, kw_only=True):
     - ``margin``: distance of ``com`` from the border of the inner polygon [m], negative outside;
       null without corners.
     - ``exact``: false where a wrist moves; the wrench space of its hand is then linearised.
+    - ``solid``: where it may be under the request's ``com_accelerations``, too; null without them,
+      or where no place with room around it is held under all.
     """
 
     axes: list[Vector]
@@ -300,6 +318,7 @@ class ComRegionReply(Struct, kw_only=True):
     limiting: list[LimitName | None]
     margin: float | None
     exact: bool
+    solid: ComSolidReply | None = None
 
 
 class Acceleration(Struct, kw_only=True):

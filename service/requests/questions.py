@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from hand_models.base import Coordinate, Name, Strict
+from hand_models.base import Acceleration, Coordinate, Name, Strict
 from planner import (
     BodyRange,
     Limits,
@@ -245,6 +245,8 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
     - ``others``: the other four components in this plane: ``needed`` as asked for, ``zero``, or
       ``free``.
     - ``want``: names of further results: ``com_region``, where the centre of mass may be.
+    - ``com_accelerations``: accelerations of the body in W, under each of which the centre of mass
+      may be in ``com_region.solid``, besides that of the load [m/s²].
     - ``directions``: directions in W along which the largest acceleration is computed; not zero, of
       any length.
     """
@@ -269,6 +271,10 @@ class BodySpaceRequest(Query, frozen=True, kw_only=True):
     ] = "needed"
     want: Annotated[
         list[Literal["com_region"]], Meta(description="com_region: where the mass may be")
+    ] = []
+    com_accelerations: Annotated[
+        list[Acceleration],
+        Meta(max_length=32, description="of com_region.solid: requires com_region in want [m/s²]"),
     ] = []
     directions: Annotated[
         list[Direction],

@@ -102,6 +102,17 @@ def print_com_region(region: replies.ComRegionReply, out: Console) -> None:
     print_rows(rows, columns, out, "how far the centre of mass may be along axes of W")
     shape = {1: "a point", 2: "a segment"}.get(len(corners), f"{len(corners)} corners")
     out.print(f"{shape}, at any height; known to {1e3 * max(region.gap, 1e-5):.2g} mm")
+    if region.solid is not None:
+        spans = np.array(region.solid.inner)
+        size = ", ".join(
+            f"{axis} {low:z.3f} to {high:z.3f} m"
+            for axis, low, high in zip("xyz", spans.min(axis=0), spans.max(axis=0), strict=True)
+        )
+        out.print(
+            f"under {len(region.solid.accelerations)} accelerations: {len(spans)} corners, "
+            f"known to {1e3 * region.solid.gap:.2g} mm"
+        )
+        out.print(size)
     if not region.exact:
         out.print("wrists that move: linearised where the plan puts them")
 

@@ -13,7 +13,7 @@ from msgspec import structs
 from scipy.spatial import ConvexHull
 
 from hand_models.base import InvalidInputError, Pose, turns_about
-from planner.capability import BodySpace, ComRegion, com_region
+from planner.capability import BodySpace, ComRegion, com_region, com_solid
 from planner.question import Limits, Load, Question
 from planner.robots import Payload
 from planner.solving import plan
@@ -21,10 +21,12 @@ from service.answering import dispatch, questions
 from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from tests.suite.helpers import peer
-from tests.suite.helpers.commands import DONE, result
+from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
 from tests.suite.helpers.replies import PLAN, departures, refusal
 from tests.suite.helpers.requests import wall_request
 from tests.suite.helpers.stances import on_wall
+
+KEY = "crux/robosimian/body_space"
 
 
 @cache
@@ -65,7 +67,7 @@ def border_of(region: ComRegion, polygon: np.ndarray, angle: float) -> float:
     return float(np.min(room[speed > 1e-12] / speed[speed > 1e-12]))
 
 
-@pytest.mark.parametrize("name", ["wall-300", "wall-300-joints", "slab", "boulders"])
+@pytest.mark.parametrize("name", ["wall-300-joints", "boulders"])
 def test_its_border_is_that_of_plans(name):
     check_border(name, np.linspace(0.1, 2.0 * np.pi + 0.1, 3, endpoint=False))
 
@@ -196,6 +198,43 @@ def test_acceleration_tilts_the_prism():
         assert not planned_at(question, beyond + height * region.up)
 
 
+def test_under_several_accelerations_it_is_a_solid_that_plans_confirm():
+    question = bundled("slab")
+    shakes = np.vstack([1.5 * np.eye(3), -1.5 * np.eye(3)])
+    solid = com_solid(question, shakes)
+    np.testing.assert_array_equal(solid.accelerations, [[0.0, 0.0, 0.0], *shakes])
+    width = np.ptp(solid.inner[:, :2], axis=0).max()
+    assert solid.gap <= 0.01 * width
+    middle = solid.inner.mean(axis=0)
+
+    def held(point: np.ndarray) -> list[bool]:
+        return [
+            planned_at(replace(question, load=Load(acceleration=tuple(each.tolist()))), point)
+            for each in solid.accelerations
+        ]
+
+    rng = np.random.default_rng(3)
+    for _ in range(2):
+        inside = rng.dirichlet(np.full(len(solid.inner), 0.05)) @ solid.inner
+        assert all(held(middle + 0.995 * (inside - middle)))
+    # through the middle of a facet, and beyond
+    facets = ConvexHull(solid.outer).equations
+    for way in facets[:: len(facets) // 3, :3]:
+        speed = facets[:, :3] @ way
+        room = -(facets[:, :3] @ middle + facets[:, 3])
+        reach = np.min(room[speed > 1e-9] / speed[speed > 1e-9])
+        assert not all(held(middle + (reach + 0.005 * width) * way))
+
+
+def test_a_solid_needs_accelerations_across_gravity_and_room():
+    with pytest.raises(InvalidInputError, match="no end in height") as caught:
+        com_solid(bundled("slab"), [[0.0, 0.0, 1.0]])
+    assert caught.value.field == "com_accelerations"
+    assert com_solid(bundled("wall-300"), [[40.0, 0.0, 0.0], [-40.0, 0.0, 0.0]]) is None
+    request = {"v": 1, "stance": wall_request()["stance"], "com_accelerations": [[1, 0, 0]]}
+    assert refusal(request, KEY)[:2] == ("invalid", "com_accelerations")
+
+
 def test_the_margin_is_the_distance_to_the_border():
     region = region_of("slab")
     point = region.axes @ region.com
@@ -248,3 +287,9 @@ def test_a_plan_and_the_command_tell_it(capfd, tmp_path):
     assert run_command_line(["body-space", str(path), "--com"]) == DONE
     printed = " ".join(capfd.readouterr().out.split())
     assert f"{1e3 * region['margin']:.0f} mm within its border" in printed
+    assert run_command_line(["body-space", str(path), "--com", "--shake", "0.3", "--json"]) == DONE
+    solid = result(capfd)["com_region"]["solid"]
+    assert len(solid["accelerations"]) == 7
+    assert solid["gap"] < 0.02
+    assert run_command_line(["body-space", str(path), "--shake", "0.3"]) == BAD_INPUT
+    assert "--shake requires --com" in complaint(capfd)
