@@ -51,7 +51,7 @@ _listing = Lock()
 
 
 def enlist(store: Store) -> None:
-    """Register a cache for `stores`, for as long as its owner keeps it alive (weak reference)."""
+    """Register a cache in the statistics of `stores`, until the cache is garbage-collected."""
     with _listing:
         _stores.add(store)
 
@@ -81,7 +81,7 @@ class BoundedStore(Generic[Question, Answer]):
     most : int
         Largest number of answers; the least recently used is dropped first.
     size : callable, optional
-        Returns the total size of some answers, in any unit.
+        Called with several answers; returns their total size, in the unit of ``largest``.
     largest : float, optional
         Largest total size; no bound by default.
     """
@@ -123,7 +123,7 @@ class BoundedStore(Generic[Question, Answer]):
         Returns
         -------
         list of Answer or None
-            In the order of ``questions``; None for an answer that is not in the cache.
+            The answers in the order of ``questions``; None for one that is not in the cache.
         """
         with self._lock:
             answers = self._answers
@@ -147,7 +147,7 @@ class BoundedStore(Generic[Question, Answer]):
         return answer
 
     def keep(self, answers: Iterable[tuple[Question, Answer]]) -> None:
-        """Add pairs (question, answer), and drop the least recently used beyond the bounds."""
+        """Add pairs (question, answer), and drop the least recently used ones beyond the bounds."""
         with self._lock:
             for question, answer in answers:
                 self._answers[question] = answer

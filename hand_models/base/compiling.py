@@ -16,19 +16,19 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def compiled(*arguments: str | np.dtype[Any]) -> Callable[[Function], Function]:
     """Return a decorator that compiles a function for arguments of given types.
 
-    The function is compiled where it is defined, or loaded from numba's cache if the cache has it
-    of the same module. Modules with compiled functions are imported where these are used, as numba
-    takes a quarter of a second. Such a function calls no compiled one of another module: the cache
-    would not notice a change there. For the same reason it has numbers of other modules as
-    arguments.
+    The function is compiled when its module is imported, or loaded from numba's cache if the module
+    has not changed since. Import such modules only where their functions are used: importing numba
+    takes a quarter of a second. A compiled function may not call compiled functions of other
+    modules or read their numbers, since numba's cache does not notice a change there; it takes such
+    numbers as arguments.
 
     Parameters
     ----------
     *arguments : str or numpy.dtype
         For each argument ``f`` (float), ``c`` (complex), ``i`` (int) or ``b`` (bool), then the
-        number of its dimensions, 0 for a number. An array lies in one piece, row by row, and is not
-        written to. Or the fields of records: for an array of these, which may be written to.
-        Without arguments the function is for other compiled ones of its module alone.
+        number of its dimensions, 0 for a number. Such an array is contiguous, row by row, and is
+        not written to. A dtype stands for an array of its records, which may be written to. A
+        function without ``arguments`` can only be called by compiled functions of its own module.
     """
     import numba
 
@@ -46,7 +46,7 @@ def compiled(*arguments: str | np.dtype[Any]) -> Callable[[Function], Function]:
 
 
 def record_of(numbers: Mapping[str, float]) -> NDArray[np.void]:
-    """Return numbers with their names as an array of one record, for compiled functions."""
+    """Return named numbers as an array of one record, shape (1,), for compiled functions."""
     fields = [(name, np.asarray(number).dtype) for name, number in numbers.items()]
     return np.array([tuple(numbers.values())], dtype=fields)
 

@@ -234,7 +234,7 @@ def wrench_transports(body: Pose, poses: Sequence[Pose]) -> Array:
     Returns
     -------
     ndarray, shape (n, 6, 6)
-        See `wrench_transport`.
+        The matrix of each frame, as of `wrench_transport`.
     """
     inverse = body.rotation.T
     rotations = inverse @ np.concatenate([pose.rotation for pose in poses]).reshape(-1, 3, 3)

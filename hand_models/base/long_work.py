@@ -18,7 +18,8 @@ _check: ContextVar[Callable[[], object] | None] = ContextVar("_check", default=N
 def broken_off_by(check: Callable[[], object] | None) -> Iterator[None]:
     """Context manager that makes long work inside it cancellable.
 
-    `go_on` calls ``check`` again and again; an exception that ``check`` raises ends the work.
+    The work calls `go_on` again and again, and `go_on` calls ``check``: an exception that ``check``
+    raises ends the work.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ class FingerAtRest(NamedTuple):
 
     @property
     def losses(self) -> Array:
-        """Tendon tension at each tile over the motor's tension at rest (Eq. 8), shape (n,)."""
+        """Ratio of the tendon's tension at each tile to the motor's at rest (Eq. 8), shape (n,)."""
         return np.asarray((1.0 - self.closing_friction) ** np.arange(len(self.shears), dtype=float))
 
     @property

@@ -75,7 +75,7 @@ class CompliantHand:
     Parameters
     ----------
     settled : SettledHand
-        Not in a fingernail grasp.
+        Closed hand, not in a fingernail grasp.
     preload : array_like, shape (4,), optional
         Tension of each tendon before the wrist moves [N]; the closing tension by default.
     scheme : {'held', 'tension'}, optional
@@ -149,33 +149,33 @@ class CompliantHand:
         return self._batch.loads([twists], [tensions])[0]
 
     def finger_loads(self, i: int, twists: Numbers) -> FingerLoads:
-        """Return the loads of one finger in its plane at twists of the wrist.
+        """Return the loads of one finger in its plane at m twists of the wrist.
 
         Parameters
         ----------
         i : int
             Index of the finger in `FINGERS`.
         twists : ndarray, shape (m, 6)
-            [m, rad]
+            Twists of the hand frame H, as in `loads` [m, rad].
         """
         x, z, turned, slip = (self._batch.bases[0, :, i] @ _terms(twists))[:, None]
         tension = np.full((1, len(twists)), self.preload[i])
         return self._alone[i].loads(x, z, turned, tension, slip).of(0)
 
     def lateral_loads(self, i: int, twists: Numbers) -> Numbers:
-        """Return the lateral loads of one finger's tiles at twists of the wrist.
+        """Return the lateral loads of one finger's tiles at m twists of the wrist.
 
         Parameters
         ----------
         i : int
             Index of the finger in `FINGERS`.
         twists : ndarray, shape (m, 6)
-            [m, rad]
+            Twists of the hand frame H, as in `loads` [m, rad].
 
         Returns
         -------
         ndarray, shape (m, n_i)
-            For the n_i tiles of the finger, from the base outward [N].
+            Load of each of the finger's n_i tiles, from the base outward [N].
         """
         own = self._own[i]
         moved = self._batch.aside[0, own] @ _terms(twists)
@@ -186,9 +186,9 @@ class CompliantHand:
         return self._own[i]
 
     def pushing(self, torques: Numbers) -> Numbers:
-        """Return the torques on stops, (m, k), of those on all joints, (m, 12) [N·m].
+        """Select the torques on stops, (m, k), from the torques of all joints, (m, 12) [N·m].
 
-        Positive where they are pushed.
+        k: joints of `SettledHand.stops`. A torque is positive where it pushes against the stop.
         """
         stops = [(i, j) for i, j, _ in self.settled.stops]
         upper = [self.settled.fingers[i].contacts[j].stop == "upper" for i, j in stops]
@@ -201,7 +201,7 @@ class CompliantHand:
         return np.asarray(self._batch.palm_wrenches[0].T)
 
     def palm_travel(self, twists: Numbers) -> Numbers:
-        """Return the palm's travel toward −x and into the rock, (m, 2) [m], at twists (m, 6)."""
+        """Return the palm's travel toward −x of H and along +z, (m, 2) [m], at twists (m, 6)."""
         return np.asarray((self._batch.palm[0] @ _terms(twists)).T)
 
     def stiffness(self, twist: ArrayLike | None = None) -> Array:
@@ -212,7 +212,7 @@ class CompliantHand:
         Parameters
         ----------
         twist : array_like, shape (6,), optional
-            [m, rad]; at rest by default.
+            Twist of the hand frame H, as in `loads` [m, rad]; at rest by default.
 
         Returns
         -------
@@ -234,16 +234,16 @@ class CompliantHands:
     Attributes
     ----------
     bases : ndarray, shape (H, 4, 4, 15)
-        Moves x, z, turn from x toward z, and slip of its tile, of each finger's base in its plane,
-        per term of a twist (`_terms`).
+        Motions (second axis: x, z, turn from x toward z, slip of the base tile) of each finger's
+        base in its plane, per term of a twist: its 6 numbers, then 9 products of its rotations.
     aside, palm : ndarray, shapes (H, n, 15), (H, 2, 15)
-        Moves, likewise, of each tile across its finger's plane, and of the palm toward −x and into
-        the rock.
+        Displacement of each tile across its finger's plane, and of the palm toward −x and +z of
+        the hand frame, per term of a twist.
     lateral_stiffness : ndarray, shape (H, n, n)
-        Of the tiles across their fingers' planes [N/m].
+        Stiffness of each hand's tiles across their fingers' planes [N/m].
     palm_springs : PalmSprings
     palm_wrenches : ndarray, shape (H, 6, 2)
-        Wrench on the rock of each newton of the palm's shear and of its pressing.
+        Wrench on the rock per newton of the palm's shear, and of its pressing.
     """
 
     def __init__(self, hands: Sequence[CompliantHand]) -> None:

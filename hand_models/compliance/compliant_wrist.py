@@ -36,9 +36,9 @@ class CompliantWrist(FloatingWrist):
     hand : CompliantHand
         Its motors keep their tensions (scheme ``tension``).
     tension_limit : float, optional
-        A caller's cap on every tendon [N].
+        Cap on every tendon's tension; the hand's maximum if that is less [N].
     travel : WristTravel, optional
-        Range of the wrist's twist; the default range if left out.
+        Range of the wrist's twist; the default `WristTravel` if left out.
     """
 
     columns = (*TENDONS, *WRIST_COLUMNS)

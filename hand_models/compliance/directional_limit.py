@@ -71,7 +71,7 @@ def farthest(
     direction : array_like, shape (6,)
         Direction d of the wrench.
     start : array_like, shape (d,), optional
-        Pose of the wrist to begin at; zeros by default.
+        Pose of the wrist at which the search begins; zeros by default.
 
     Raises
     ------
@@ -108,20 +108,22 @@ def farthest(
 
 
 def linear_extreme(space: WrenchSpace, direction: Array) -> tuple[Array | None, float]:
-    """Return the pose of a linearised set with the largest d · w, and that product.
+    """Return the wrist pose whose wrench is farthest in a direction, in a linearised set (an LP).
 
     Parameters
     ----------
     space : WrenchSpace
+        Set linearised about a pose (`CompliantGrasp.linearised`); its d columns are the components
+        of the wrist's pose.
     direction : ndarray, shape (6,)
-        Direction d of the wrench w.
+        Direction of the wrench on the rock.
 
     Returns
     -------
-    pose : ndarray or None
-        None if the set is empty.
+    pose : ndarray, shape (d,), or None
+        Pose of the wrist [m, rad, or N for tensions]; None if the set is empty.
     reach : float
-        d · w; −∞ if the set is empty.
+        Product of the direction and the wrench at that pose; −∞ if the set is empty.
 
     Raises
     ------

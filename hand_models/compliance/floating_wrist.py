@@ -64,7 +64,7 @@ class FloatingWrist(CompliantGrasp):
     ----------
     hand : CompliantHand
     tension_limit : float, optional
-        A caller's cap on every tendon [N]; the hand's maximum if that is less.
+        Cap on every tendon's tension; the hand's maximum if that is less [N].
     palm_carries : bool
         Whether the palm's springs carry load; only if one of its tiles is engaged.
     """
@@ -159,7 +159,7 @@ class FloatingWrist(CompliantGrasp):
         Parameters
         ----------
         y : ndarray, shape (d,)
-            The pose; here the tensions are the hand's preload whatever it is.
+            Pose of the wrist. In this class it has no effect: the tensions are the preload.
 
         Returns
         -------
@@ -208,7 +208,7 @@ class FloatingWrist(CompliantGrasp):
         )
 
     def sieve(self, twists: Array) -> Indices:
-        """Return the indices of the poses (m, d) that satisfy the limits of all finger tiles.
+        """Return the indices of those of m wrist poses (m, d) that keep the limits of finger tiles.
 
         Fingers are tested one after another, each only at the poses that passed before.
         """
@@ -243,7 +243,7 @@ class FloatingWrist(CompliantGrasp):
         return y
 
     def palm_mode(self, y: Array) -> PalmMode:
-        """Return how the palm carries at a pose y, shape (d,)."""
+        """Return which of the palm's springs carry load at a wrist pose y, shape (d,)."""
         twist = y[-len(WRIST_COLUMNS) :]
         shear, inward = self.hand.palm_travel(twist[None])[0].tolist()
         presses = inward > self.hand.settled.palm.nearest_gap
@@ -257,7 +257,7 @@ class FloatingWrist(CompliantGrasp):
 
     @property
     def travel_rows(self) -> tuple[Array, Array]:
-        """Hard rows A y ≤ b that bound the wrist's travel, shapes (k, d), (k,) [N]; here none."""
+        """A and b of hard rows A y ≤ b on the wrist pose y, shapes (k, d), (k,); here none."""
         return np.zeros((0, len(self.columns))), np.zeros(0)
 
     def linearised(
@@ -268,7 +268,8 @@ class FloatingWrist(CompliantGrasp):
     def linearised_each(self, twists: Array, within: ArrayLike | None = None) -> list[WrenchSpace]:
         """Return the wrench space linearised about each of k poses of the wrist.
 
-        The loads at all poses are computed at once, and cached by pose: other ranges reuse them.
+        The loads at all poses are computed in one call and cached by pose, so that a later call
+        with another ``within`` reuses them.
 
         Parameters
         ----------
@@ -308,7 +309,7 @@ class FloatingWrist(CompliantGrasp):
         Returns
         -------
         HandLoads
-            Of this pose alone (m = 1).
+            Loads at this pose alone (m = 1).
         """
         (steps,) = self._stepped(y[None])
         return HandLoads(*[part[:1].real for part in steps])
@@ -318,11 +319,12 @@ class FloatingWrist(CompliantGrasp):
         return None not in self._kept.find([at.tobytes() for at in poses])
 
     def keep(self, poses: Array, loads: HandLoads) -> list[tuple[bytes, HandLoads]]:
-        """Put the loads at the complex steps from k poses into the cache, and return them by pose.
+        """Add the loads at the complex steps from k wrist poses to the cache, and return both.
 
         Parameters
         ----------
         poses : ndarray, shape (k, d)
+            Poses of the wrist.
         loads : HandLoads
             Loads at the `complex_steps` from each pose, one pose after the other, k d in all.
 

@@ -39,7 +39,7 @@ class GraspLoads(NamedTuple):
     Attributes
     ----------
     elements : ndarray, shape (m, k)
-        e, k loads in the order that the class of the grasp describes.
+        e, k loads in the order that the class of the grasp describes [N, or N·m for torques].
     wrenches : ndarray, shape (m, 6)
         w, wrench on the rock [N, N·m].
     reached : ndarray of bool, shape (m,)
@@ -127,7 +127,7 @@ class CompliantGrasp(ABC):
         Parameters
         ----------
         twists : ndarray, shape (m, d)
-            m poses, real or with complex steps.
+            m poses of the wrist, real or with imaginary steps (`complex_steps`).
         """
 
     @property

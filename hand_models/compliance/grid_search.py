@@ -85,7 +85,7 @@ def search(grasp: CompliantGrasp, per_axis: int, progress: Progress | None = Non
     per_axis : int
         Poses along each axis of the box, at least 2.
     progress : callable, optional
-        Called with the number of poses done and the number of all poses.
+        Called with (poses done, poses in all).
 
     Raises
     ------
@@ -149,15 +149,16 @@ def boundary(
 ) -> WristSearch:
     """Return the boundary of a wrench space by rays of poses from the middle of a box.
 
-    The rays are evenly spread over the box's axes. Finer than a grid of as many poses, if every
-    feasible pose is visible from the middle.
+    The rays are evenly spread over the box's axes. They find the boundary more finely than a grid
+    of as many poses, if every feasible pose is visible from the middle of the box.
 
     Parameters
     ----------
     grasp : CompliantGrasp
     box : SearchBox
+        Box of wrist poses.
     rays : int
-        Count of rays.
+        Number of rays.
     toward : ndarray, shape (k, 6), optional
         Directions of the wrench to refine: three rounds of further rays, ever closer about the two
         rays that reach farthest in each direction.

@@ -32,7 +32,7 @@ GRIPPER_SIDES: Final = ("right", "left")
 
 
 def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
-    """Return the parameters of the gripper: the experiment's take the place of the hand's.
+    """Return the parameters of the gripper: the hand's, with those of the experiments put in.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ def gripper_table(hand: ParameterTable | None = None) -> ParameterTable:
 class Gripper(CompliantGrasp):
     """Gripper of two opposed fingers on a round surface, its wrist free to move in the plane.
 
-    A pose is (x, z, ω_y) [m, m, rad]. The loads e are the tiles' shears, then their normals, the
-    right side's first.
+    A pose is (x, z, ω_y) [m, m, rad]. The loads e are the shears of the tiles, then their normal
+    loads, those of the right finger first [N].
 
     Parameters
     ----------

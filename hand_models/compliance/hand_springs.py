@@ -35,7 +35,8 @@ class PalmSprings:
     Attributes
     ----------
     stiffness : ndarray, shape (H, 2, 9)
-        Of the palm's shear, and of each tile's pressing [N/m].
+        Row 0: stiffness of the palm's shear, in column 0; row 1: stiffness of the pressing of each
+        of its 8 tiles, in columns 1 to 8; all else zero [N/m].
     """
 
     def __init__(self, hands: Sequence[SettledHand]) -> None:
@@ -54,9 +55,9 @@ class PalmSprings:
         self._onset = np.array([1e-4] + [2e-5] * tiles)[:, None]
 
     def loads(self, travel: Numbers) -> Numbers:
-        """Return the palms' shear toward −x and pressing, shape (H, 2, m) [N].
+        """Return the palms' shear toward −x of H and pressing along +z, shape (H, 2, m) [N].
 
-        ``travel``: of each palm toward −x and into the rock, shape (H, 2, m) [m].
+        ``travel``: displacement of each palm toward −x and +z of H, shape (H, 2, m) [m].
         """
         onset, beyond = self._onset, travel[:, self._of_travel] - self._gaps
         part = np.where(beyond.real < onset, np.where(beyond.real > 0.0, beyond, 0.0), onset)

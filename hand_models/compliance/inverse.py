@@ -60,8 +60,8 @@ def wrist_pose(hand: CompliantHand, wrench: ArrayLike) -> WristPose:
     Returns
     -------
     WristPose
-        The first that converged, searched from rest outward; else that of least residual. Limits
-        are not checked.
+        The first pose at which the search converges, begun at rest and then farther out; if it
+        never does, the pose of least residual. Limits are not checked.
 
     Raises
     ------

@@ -30,8 +30,10 @@ class Piece:
     Attributes
     ----------
     twist, within : ndarray, shape (d,)
-        The pose, and the largest change of each of its components [m, rad].
+        The pose of the wrist, and the largest change of each of its components for which the
+        piece is used [m, rad].
     space : WrenchSpace
+        The linearised set.
     """
 
     twist: Array
@@ -50,7 +52,8 @@ class PieceList:
     directions : ndarray, shape (n, 6)
         Directions of the wrench in which support functions were compared.
     exact, covered : ndarray, shape (n,)
-        Support function of the exact set and of the union, both from the wrench at rest.
+        Support function of the exact set and of the union, both less the product of the direction
+        and the wrench at rest.
     """
 
     pieces: tuple[Piece, ...]
@@ -77,8 +80,8 @@ def pieces(
     ----------
     grasp : CompliantGrasp
     directions : array_like, shape (n, 6)
-        Directions of the wrench in which support functions are compared; more of them make other
-        directions more certain.
+        Directions of the wrench in which support functions are compared; the more there are, the
+        better the tolerance holds between them.
     tolerance : float, optional
         Largest relative difference to aim for.
     most : int, optional

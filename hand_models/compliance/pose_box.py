@@ -39,7 +39,7 @@ class SearchBox:
     range: Array
 
     def poses(self, t: Array) -> Array:
-        """Return the poses ``centre + axes · t`` for m coordinates ``t``, shape (m, d)."""
+        """Return the m poses of the wrist at coordinates ``t``, both of shape (m, d)."""
         return np.asarray(self.centre + t @ self.axes.T)
 
     def grid(self, per_axis: int, start: int, end: int) -> Array:
@@ -50,7 +50,8 @@ class SearchBox:
         per_axis : int
             Poses along each axis.
         start, end : int
-            Indices of the first pose and after the last, of per_axis ** d poses.
+            First pose to return, and the one after the last, as indices among the
+            ``per_axis ** d`` poses of the grid.
 
         Returns
         -------
@@ -63,10 +64,10 @@ class SearchBox:
 
 
 def linear_box(grasp: CompliantGrasp) -> SearchBox:
-    """Return the box of the set linearised at rest: its ellipsoid's axes, its range.
+    """Return the box about a grasp's set linearised at rest: axes of its ellipsoid, its ranges.
 
-    If neither the ellipsoid's centre nor rest is within every limit, the set is linearised about
-    the centre, up to six times.
+    The ellipsoid is that of Dikin about the set's analytic centre. If neither this centre nor rest
+    is within every limit, the set is linearised about the centre, up to six times.
 
     Raises
     ------
@@ -87,7 +88,7 @@ def linear_box(grasp: CompliantGrasp) -> SearchBox:
 
 
 def search_box(grasp: CompliantGrasp) -> SearchBox:
-    """Return the `linear_box` of a grasp, its range adapted to feasible poses by sparse grids.
+    """Return the `linear_box` of a grasp, its ranges adapted to feasible poses by sparse grids.
 
     Raises
     ------

@@ -189,6 +189,7 @@ def _unit(angle: Numbers) -> Numbers:
 
 
 def dot(a: Numbers, b: Numbers) -> Numbers:
+    """Return inner products (..., m) of vectors (x, z), shape (..., 2, m), without conjugation."""
     return np.asarray(a[..., 0, :] * b[..., 0, :] + a[..., 1, :] * b[..., 1, :])
 
 
@@ -213,9 +214,9 @@ class RollingContact:
     Parameters
     ----------
     fingers : sequence of SettledFinger, length F
-        Fingers at rest, each with its proximal joint at the origin of its F.
-    sections : sequence of Section or None
-        Rock in each finger's plane, in its F; None if there is none.
+        Fingers at rest, each with its proximal joint at the origin of its finger frame F.
+    sections : sequence of Section or None, length F
+        Rock in each finger's plane, in its frame F; None if there is none.
     depths : array_like, shape (F, 3), optional
         Depth to which tiles are pressed into their beds of springs [m]; zero by default.
     """

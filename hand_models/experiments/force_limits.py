@@ -65,7 +65,7 @@ class HullPoints:
     wrenches : ndarray, shape (n, 3)
         F_x, F_z, M_y in the paper's signs [N, N, N·m].
     poses : ndarray, shape (n, 3)
-        Poses of the wrist, (x, z, ω_y) [m, m, rad].
+        Pose of the wrist of each wrench, (x, z, ω_y) [m, m, rad].
     phalanges : tuple of (str or None), length n
         Phalanx whose contact fails first at the pose; None where a tile is about to be dragged
         backwards.
@@ -100,7 +100,7 @@ class HullPoints:
         Parameters
         ----------
         wrenches, poses : ndarray, shape (k, 3)
-            In the form of the attributes.
+            Further wrenches and their poses, in the components and units of the attributes.
         limiting : sequence of (Row or None), length k
             Row of the limit that is reached first at each pose.
         """
@@ -144,6 +144,7 @@ def limit(points: Array, measure: Measure) -> Limit:
     points : ndarray, shape (n, 3)
         Wrenches (F_x, F_z, M_y) in the paper's signs [N, N, N·m].
     measure : {'shear', 'normal', 'moment'}
+        Largest F_x in the loading plane, −F_z, or M_y; of wrenches with F_z ≤ 0 (`MEASURE_UNITS`).
 
     Raises
     ------
@@ -198,12 +199,14 @@ def sharpened(
     ----------
     grasp : Gripper
     points : HullPoints
+        Points of the hull to begin with, from `HullPoints.explored`.
     measure : {'shear', 'normal', 'moment'}
+        Force limit to raise, as in `limit`.
     cuts : int
         Largest number of points to add.
     starts : int
-        Largest number of starts of each search: if the first leads nowhere, at the farthest points
-        at which other phalanges fail.
+        Largest number of starts of each search: where the first start raises nothing, the search
+        starts again at the farthest points at which other phalanges fail.
 
     Returns
     -------
@@ -272,9 +275,9 @@ def rest_state(grasp: Gripper) -> State:
 
 
 def unloaded_pose(grasp: Gripper) -> Array | None:
-    """Return the pose at which a gripper exerts no wrench: the first along z from rest.
+    """Return the wrist pose nearest to rest along z at which a gripper exerts no wrench.
 
-    By symmetry only F_z is to vanish.
+    By symmetry F_x and M_y are zero along z; the pose is where F_z is zero as well.
 
     Returns
     -------

@@ -72,6 +72,7 @@ class Datum(NamedTuple):
     Attributes
     ----------
     label, unit : str
+        Text for the datum, and unit of its value.
     wanted, tolerance : float
         Value in the figure, and its tolerance, in the unit.
     first : bool
@@ -112,13 +113,14 @@ class GripperFit:
     Parameters
     ----------
     table : ParameterTable, optional
-        From `gripper_table`, with all other parameters.
+        All parameters of the gripper, of which some are fitted; `gripper_table` by default.
 
     Attributes
     ----------
     numbers : tuple of Axis, length n
-        The parameters, with the ends of their plausible ranges.
+        The fitted parameters, with the ends of their plausible ranges.
     names : list of str, length n
+        Name of each parameter without its section, such as ``pulley_radii[1]``.
     low, width : ndarray, shape (n,)
         Lower end and width of each range, in SI units.
     data : tuple of Datum, length k
@@ -167,7 +169,7 @@ class GripperFit:
             yield Datum(f"M_y : F_x best for {kind}", "m", arm, 0.4 * arm, False)
 
     def start(self) -> Array:
-        """Return the values in `table` as shares x, shape (n,), of their plausible ranges.
+        """Return the parameters' values in ``table`` as shares x, (n,), of their plausible ranges.
 
         Values outside a range are clipped to its ends, 0 and 1.
         """
@@ -209,7 +211,7 @@ class GripperFit:
         Returns
         -------
         ndarray, shape (k, 3)
-            [N, N, N·m]
+            Wrenches, with their mirror images [N, N, N·m].
         """
         if fine:
             return held_wrenches(gripper)
@@ -235,7 +237,7 @@ class GripperFit:
         Returns
         -------
         ndarray, shape (k,)
-            In the units of the data.
+            Model's value of each datum, in its unit.
 
         Raises
         ------

@@ -73,7 +73,7 @@ class PalmExperiment:
         return float(sharing.tile_stiffness.sum() / sharing.tile_travel[softest].max())
 
     def gain(self, sequence: Sequence[int]) -> float:
-        """Return the relative gain of the palm's load by friction: fixed rods in place of bearings.
+        """Return by what share friction raises the palm's load: rods in place of bearings.
 
         Parameters
         ----------
@@ -83,6 +83,6 @@ class PalmExperiment:
         Returns
         -------
         float
-            0.1 for a load that is 10 % larger with rods at the tiles' pulleys.
+            Relative gain: 0.1 if the load is 10 % larger with fixed rods as the tiles' pulleys.
         """
         return self.load(sequence, self.friction) / self.load(sequence, 0.0) - 1.0

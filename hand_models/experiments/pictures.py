@@ -49,6 +49,7 @@ def panels(
     Parameters
     ----------
     rows, columns : int
+        Numbers of rows and columns of axes.
     size : tuple of float
         Width and height of the figure [inches].
     grid : {'x', 'y', 'both', 'none'}

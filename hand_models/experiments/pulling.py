@@ -58,7 +58,7 @@ PULLING_SETTINGS: Final = PullingSettings()
 
 @dataclass(frozen=True, eq=False)
 class Pulled:
-    """The last wrenches and poses along m directions before a gripper exceeds a limit.
+    """Result of `pull`: last wrench and pose along m directions before a gripper exceeds a limit.
 
     Attributes
     ----------
@@ -89,11 +89,14 @@ def explored(gripper: Gripper, count: int, progress: Progress) -> tuple[WristSea
     count : int
         Approximate number of directions.
     progress : Progress
+        Called with (steps done, steps in all).
 
     Returns
     -------
     search : WristSearch
+        Result of the search over poses.
     pulled : Pulled
+        Result of the pulls.
     wrenches : ndarray, shape (n, 3)
         Outermost wrenches of the search, and those of the pulls [N, N, N·m].
 
@@ -130,17 +133,17 @@ def wrist_poses(gripper: Gripper, wrenches: Array, start: Array) -> tuple[Array,
     ----------
     gripper : Gripper
     wrenches : ndarray, shape (m, 3)
-        [N, N, N·m]
+        (F_x, F_z, M_y) in the paper's signs [N, N, N·m].
     start : ndarray, shape (m, 3)
         Poses (x, z, ω_y) to begin at, near the solutions [m, m, rad].
 
     Returns
     -------
     poses : ndarray, shape (m, 3)
-        [m, m, rad]
+        Poses (x, z, ω_y) [m, m, rad].
     residual : ndarray, shape (m,)
-        Largest component of each wrench that is not balanced, its moment over 0.1 m; NaN where a
-        phalanx lost its rock [N].
+        Largest component of the difference between given and exerted wrench, the moment divided by
+        0.1 m; NaN where a phalanx lost its rock [N].
     """
     poses, m = start.copy(), len(start)
     steps = 1j * COMPLEX_STEP * np.eye(3)
@@ -210,14 +213,15 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     ----------
     gripper : Gripper
     directions : ndarray, shape (m, 3)
-        In (F_x, F_z, M_y), of any length.
+        Directions in (F_x, F_z, M_y), of any length.
     progress : callable, optional
         Called with (directions done, directions in all) after each increment.
 
     Returns
     -------
     Pulled
-        Of each direction the last wrench and pose that hold, and the limit that follows.
+        For each direction the last wrench and pose within every limit, and the limit that the next
+        increment exceeds.
 
     Raises
     ------
@@ -264,21 +268,22 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
 
 
 def even_pulls(count: int, size: Array) -> Array:
-    """Return directions of wrenches with F_z < 0, evenly spread in units of ``size``.
+    """Return directions of wrenches with F_z < 0, evenly spread when divided by ``size``.
 
-    They lie on a spiral over half of a half sphere, and mirrored: (F_x, M_y) → (−F_x, −M_y).
+    Half of them lie on a spiral over a quarter of a sphere; the others are their mirror images,
+    (F_x, M_y) → (−F_x, −M_y).
 
     Parameters
     ----------
     count : int
         Approximate number of directions.
     size : ndarray, shape (3,)
-        Units of F_x, F_z and M_y.
+        Scale of F_x, F_z and M_y [N, N, N·m].
 
     Returns
     -------
     ndarray, shape (m, 3)
-        [N, N, N·m]
+        Directions (F_x, F_z, M_y) in the paper's signs [N, N, N·m].
     """
     k = np.arange(count)
     height = (k + 0.5) / count

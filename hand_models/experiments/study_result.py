@@ -25,7 +25,7 @@ class Claim:
     Attributes
     ----------
     claim : str
-        In the paper's words, or close to them, with the place.
+        Text of the claim in the paper's words, or close to them, with its place in the paper.
     claimed, got : str or float
         The paper's value and the model's.
     holds : bool
@@ -55,7 +55,7 @@ class StudyResult:
         further remarks for a reader.
     claims : tuple of Claim
     hand : dict
-        By section and name, the hand's entries that differ from the bundled hand; filled in by
+        Entries of the hand that differ from the bundled hand, by section and name; filled in by
         `run_study`.
     """
 
@@ -108,7 +108,7 @@ class StudyText:
         claimed : float, optional
             The paper's value, in place of the file's.
         role : {'test', 'calibration'}, optional
-            In place of the file's, which is ``test`` by default.
+            Role of the claim in place of the file's, which is ``test`` by default.
         **values
             Values of the placeholders in the text.
         """
@@ -167,6 +167,11 @@ def part(progress: Progress, start: int, end: int, total: int) -> Progress:
     progress : Progress
         Callback of the whole work, called with (steps done, ``total``).
     start, end, total : int
-        The part begins and ends at these steps of the total.
+        Steps of the whole work at which the part begins and ends, and their number in all.
+
+    Returns
+    -------
+    Progress
+        Called with (steps done, steps in all) of the part; calls ``progress`` in proportion.
     """
     return lambda done, of: progress(start + (end - start) * done // of, total)

@@ -146,7 +146,7 @@ def radius_axes(table: ParameterTable, points: int = 15) -> tuple[Axis, Axis]:
     Returns
     -------
     tuple of (Axis, Axis)
-        For the middle and for the distal joint.
+        Axis for the middle joint, and for the distal joint.
     """
     low, high = experiment_table().vector("fig16", "radii")
     values = tuple(np.linspace(low, high, points).tolist())
@@ -175,7 +175,7 @@ class GripperSweep:
     measures: tuple[Measure, ...] = ("shear", "normal")
 
     def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
-        """Compute the map for a hand's table.
+        """Compute the map of force limits, with the parameters of a hand.
 
         Raises
         ------

@@ -87,11 +87,13 @@ class Axis:
     Attributes
     ----------
     section, name : str
+        Section and name of the entry.
     index : int or None
         Index of the number, for an entry that is a list.
     values : tuple of float
-        Ascending, in SI units.
+        Values of the entry in the sweep, ascending, in SI units.
     unit : str
+        SI unit of the values.
     """
 
     section: str

@@ -90,7 +90,7 @@ def with_mirrored(points: Array) -> Array:
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        F_x, F_z, M_y.
+        Wrenches F_x, F_z, M_y [N, N, N·m].
 
     Returns
     -------
@@ -101,12 +101,12 @@ def with_mirrored(points: Array) -> Array:
 
 
 def edge(points: Array, at: Array) -> Array:
-    """Return the upper edge of a plane hull: the largest second coordinate at given first ones.
+    """Return the largest second coordinate of a hull in the plane, at given first coordinates.
 
     Parameters
     ----------
     points : ndarray, shape (n, 2)
-        Points whose hull it is.
+        Points whose convex hull is taken.
     at : ndarray, shape (m,)
         First coordinates.
 
@@ -156,7 +156,7 @@ def clipped_vertices(points: Array) -> Array:
     Returns
     -------
     ndarray, shape (k, 3)
-        Empty, (0, 3), if no vertex of the hull has F_z < 0.
+        Vertices [N, N, N·m]; empty, (0, 3), if no vertex of the hull has F_z < 0.
     """
     height, slack = points[:, 1], _slack(points)
     if not (height < -slack).any():
@@ -176,12 +176,13 @@ def section(points: Array, normal: ArrayLike) -> Array:
     points : ndarray, shape (n, 3)
         Wrenches [N, N, N·m].
     normal : array_like, shape (3,)
+        Normal of the plane through the origin, of any length.
 
     Returns
     -------
     ndarray, shape (k, 3)
-        Corners; a face, an edge's two ends or one vertex where the plane only touches the hull;
-        empty, (0, 3), if the plane misses the hull.
+        Corners of the polygon. Where the plane only touches the hull: the corners of a face, the
+        two ends of an edge, or one vertex. Empty, (0, 3), if the plane misses the hull.
     """
     way = np.asarray(normal, dtype=float) / PLANAR_SCALE
     slack = _slack(points)
@@ -204,14 +205,14 @@ def distance_along(points: Array, directions: Array, start: ArrayLike = 0.0) -> 
     points : ndarray, shape (n, 3)
         Wrenches [N, N, N·m].
     directions : ndarray, shape (m, 3)
-        In the wrenches' units, of any length.
+        Directions in the wrenches' units, of any length.
     start : array_like, shape (3,) or (m, 3), optional
         Wrench at which the line starts; zero by default [N, N, N·m].
 
     Returns
     -------
     ndarray, shape (m,)
-        NaN where the line misses the hull, or meets it only for s < 0.
+        Largest s of each direction; NaN where the line misses the hull, or meets it only for s < 0.
     """
     normals, offsets = hull_facets(points * PLANAR_SCALE)
     slack = _slack(points)

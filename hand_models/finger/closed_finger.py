@@ -62,7 +62,7 @@ class Refused(NamedTuple):
 
 
 def cling(model: FingerModel, section: Section | None) -> ClosedFinger | Refused:
-    """Return a straight, unloaded finger that is to cling with its nail; refuse rock inside it.
+    """Return a straight, unloaded finger that is to cling with its nail, if no rock is inside it.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ def around_rock(rock: Outlines, shape: PhalanxShape, drive: Records, q: Array) -
     Returns
     -------
     ndarray, shape (n,)
-        Records of `AROUND_FIELDS`.
+        Records of `AROUND_FIELDS`, with derivatives by the joint angles.
     """
     found, bar = np.zeros(len(q), AROUND_FIELDS), shape.record
     for i, own in enumerate(zip(*rock, strict=True)):
@@ -91,8 +91,9 @@ def follow(
     rock : Outlines
         Rock in the plane of each finger.
     shape : PhalanxShape
+        Dimensions of the phalanges, the same for all fingers.
     drive : ndarray, shape (n,)
-        Records of `DRIVE_FIELDS`.
+        Tendons and springs, records of `DRIVE_FIELDS` (see `drives`).
     q : ndarray, shape (n, 3)
         Joint angles at the start [rad].
 

@@ -17,7 +17,7 @@ __all__ = ["settle_finger"]
 
 
 def settle_finger(model: FingerModel, section: Section | None, joint: Vector2) -> SettledFinger:
-    """Close a finger on a section of rock, phalanx by phalanx from the base.
+    """Return a finger closed on a section of rock, phalanx by phalanx from the base.
 
     Each phalanx turns until its face meets the rock. Where the face meets rock beyond the tile, the
     spines at the tile's far edge reach across the gap, if it is within their travel; otherwise the

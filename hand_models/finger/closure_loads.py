@@ -26,7 +26,7 @@ Loads = tuple[list[complex], list[complex]]
 def tendon_loads(
     model: FingerModel, laid: Sequence[ClosedPhalanx], closing: float, base_tile: bool
 ) -> Loads | None:
-    """Return shear and normal load of each phalanx; None if a contact is not beyond its joint.
+    """Return shear and normal load of each phalanx of a finger that rests on all three.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def tendon_loads(
     -------
     tuple of list of complex, or None
         Shears, then normal loads, proximal first: a + i b with a the load at zero tension [N] and
-        b the load per newton of tension. None unless every contact is beyond its joint.
+        b the load per newton of tension. None if a contact is at or behind its joint.
     """
     if not all(each.along > 0.0 for each in laid):
         return None
@@ -70,7 +70,7 @@ def tendon_loads(
 
 
 def stays(loads: Loads, surface: Surface, tension: float) -> bool:
-    """Return True if no contact of a finger breaks at a tension.
+    """Return True if no contact of a finger that rests on all phalanges breaks at a tension.
 
     A contact that is pulled off the rock breaks if its drag is less than μ times the pull, or if
     its load is beyond the tile's strength at that angle. A tile that slips, its shear above the
@@ -79,7 +79,7 @@ def stays(loads: Loads, surface: Surface, tension: float) -> bool:
     Parameters
     ----------
     loads : tuple of list of complex
-        From `tendon_loads`.
+        Result of `tendon_loads`.
     surface : Surface
     tension : float
         Tension of the tendon [N].

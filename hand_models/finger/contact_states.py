@@ -113,9 +113,9 @@ def _write_forces(
 def put_forces(
     settings: Record, code: Record, drive: Record, state: Record, around: Record, found: Record
 ) -> None:
-    """Write torque, slope, stiffness and shears of a finger in its contact state.
+    """Write the linearised torques and shears of a finger in a given contact state to ``found``.
 
-    Arguments are arrays of one record: as of `contact_states`.
+    Arguments are those of `contact_states`, each an array of one record.
     """
     _write_forces(settings[0], code[0], drive[0], state[0], around[0], found[0])
 
@@ -354,7 +354,7 @@ def contact_states(
     least : ndarray, shape (3,)
         Gaps that spines keep from growing, infinite for tiles without caught spines [m].
     found : record of `LINEARISED_FIELDS`
-        What is written.
+        Result, written over: the linearised solution.
     """
     settings, code, shape, drive = settings[0], code[0], shape[0], drive[0]
     state, around, found = state[0], around[0], found[0]

@@ -38,7 +38,7 @@ __all__ = ["Cling", "Fingernail", "Hook"]
 
 
 class Hook(NamedTuple):
-    """Contact of a nail with the rock, in the coordinates (x, z) of F.
+    """Contact of a nail with the rock, in the coordinates (x, z) of the finger frame F.
 
     Attributes
     ----------

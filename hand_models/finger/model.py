@@ -73,7 +73,7 @@ class FingerModel:
 
     @classmethod
     def from_table(cls, table: ParameterTable) -> FingerModel:
-        """Build the model from ``hand.toml``.
+        """Read the finger's numbers from a table of ``hand.toml``.
 
         Raises
         ------

@@ -142,13 +142,18 @@ class OpenFinger(NamedTuple):
 
 
 def drives(model: FingerModel, closings: Sequence[OpenFinger]) -> Records:
-    """Return the drives of n fingers of one model, records of `DRIVE_FIELDS`.
+    """Return the tendons and springs of n fingers of one model, records of `DRIVE_FIELDS`.
 
     Parameters
     ----------
     model : FingerModel
     closings : sequence of OpenFinger, length n
         The fingers' surfaces and closing tensions.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Records of `DRIVE_FIELDS`.
     """
     found = np.zeros(len(closings), DRIVE_FIELDS)
     losses = np.array([model.losses(closing.base_tile) for closing in closings])
@@ -167,7 +172,7 @@ def drives(model: FingerModel, closings: Sequence[OpenFinger]) -> Records:
 
 
 def open_states(q: Array) -> Records:
-    """Return the start of closing: no tension, no contact, all spines ready to catch.
+    """Return the states in which fingers begin to close: no tension, no contact, all spines ready.
 
     Parameters
     ----------
@@ -189,6 +194,7 @@ def open_states(q: Array) -> Records:
 def held_share(states: Records, around: Records) -> Array:
     """Return the share of each tile's spines that grip the rock, φ − ψ, shape (n, 3).
 
-    φ: share on the rock (`AROUND_FIELDS`); ψ: share that was pulled off (`STATE_FIELDS`).
+    ``around``: records of `AROUND_FIELDS` with φ, the share on the rock; ``states``: records of
+    `STATE_FIELDS` with ψ, the share that was pulled off.
     """
     return engaged_share(1.0 - around["share"] + states["off"], 1.0)

@@ -125,7 +125,7 @@ def phalanx_beside(
     bare : ndarray of bool, shape (p,)
         True for rock that the bare frame meets, beside the tiles.
     settings, shape : record
-        As of `put_around`.
+        `FingerSettings` and `PhalanxShape`.
     joint, u : complex
         x + i z of the phalanx's joint [m], and the unit vector along the phalanx.
     depth : float
@@ -179,16 +179,16 @@ def near_points(
     u: complex,
     within: float,
 ) -> Indices:
-    """Return the points of rock on which a phalanx's gap and contact depend.
+    """Return the indices of the points of rock on which a phalanx's gap and contact depend.
 
     Parameters
     ----------
     points, lengths, bare, centres, radii, longest : ndarray
         Rock in the finger's plane, a row of `Outlines`.
     shape : record
-        As of `put_around`.
+        `PhalanxShape`.
     joint, u : complex
-        As of `phalanx_beside`.
+        Joint and direction of the phalanx, as of `phalanx_beside`.
     within : float
         Margin: the tile's depth and the largest further motion [m].
     """
@@ -241,7 +241,8 @@ def rock_distances(
     points, centres, radii : ndarray
         Rock in the finger's plane, a row of `Outlines`.
     each_place : int
-        0 if only the least of all distances is needed, which is much faster.
+        1 for the distance of each place; 0, much faster, for a result whose last number is the
+        least distance of all places.
     """
     found = np.full(len(places), math.inf)
     each = len(points) // len(centres)
@@ -309,8 +310,7 @@ def _on_rock(
                 farther[k] = min(farther[k], away[i] + behind[near[i], k])
     total, middle = 0.0, 0.0
     for k in range(strips):
-        away_there = tile_gap + (farther[k] - least)
-        part = _engaged(settings, away_there, shape.travel, shape.exponent)
+        part = _engaged(settings, tile_gap + (farther[k] - least), shape.travel, shape.exponent)
         total += part
         middle += part * across[k]
     return total / strips, middle / max(total, settings.sum_rounding)
@@ -347,7 +347,7 @@ def put_around(
     q : ndarray, shape (3,)
         Joint angles [rad].
     found : record of `AROUND_FIELDS`
-        What is written.
+        Result, written over.
     points, lengths, centres, radii, longest, bare, places, behind, across : ndarray
         Rock in the finger's plane, a row of `Outlines`.
     """

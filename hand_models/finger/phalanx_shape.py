@@ -84,7 +84,7 @@ class PhalanxShape(NamedTuple):
 
     @property
     def record(self) -> NDArray[np.void]:
-        """Dimensions and lengths that go with them, an array of one record."""
+        """Dimensions and the lengths derived from them, an array of one record [m]."""
         more = {"length": self.length, "fine": self.fine, "closes": self.closes}
         return record_of({**self._asdict(), **more})
 

@@ -67,11 +67,12 @@ class ClosedPhalanx(NamedTuple):
 
 
 class SequentialClosure:
-    """Solver that lays fingers of one model on smooth rock.
+    """Solver that lays fingers of one model on smooth rock, phalanx by phalanx.
 
     Parameters
     ----------
     model : FingerModel
+        Numbers of the fingers.
     """
 
     def __init__(self, model: FingerModel) -> None:
@@ -97,7 +98,7 @@ class SequentialClosure:
         -------
         list of ClosedPhalanx
             Phalanges from the base outward, up to the first that does not rest on its tile's face:
-            three for a finger that is laid, none where the section is ``skew``.
+            three for a finger that is laid, none where the section is `SmoothSection.skew`.
         """
         laid: list[ClosedPhalanx] = []
         joint, angle, u = 0j, 0.0, 1.0 + 0j

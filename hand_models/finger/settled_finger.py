@@ -75,7 +75,7 @@ class Contact:
     across: float = 0.0
 
     def point(self, height: float) -> tuple[float, float]:
-        """Return the contact's place (x, z) in F [m]; ``height``: of the tile's face [m]."""
+        """Return the contact's place (x, z) in F [m]; ``height``: as `FingerModel.tile_height`."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         height += self.rise
         return (
@@ -84,7 +84,7 @@ class Contact:
         )
 
     def end(self, spacing: float) -> tuple[float, float]:
-        """Return the place (x, z) of the next joint in F [m]; ``spacing``: of the joints [m]."""
+        """Return the place (x, z) of the next joint in F, ``spacing`` from this joint [m]."""
         return (
             self.joint[0] + spacing * math.cos(self.angle),
             self.joint[1] + spacing * math.sin(self.angle),
@@ -123,7 +123,7 @@ class SettledFinger:
 
     @cached_property
     def free(self) -> tuple[int, ...]:
-        """Indices of the joints that contacts support; as many as `bearing`, if that is not ()."""
+        """Indices of the joints that contacts support; with a contact, as many as in `bearing`."""
         return tuple(i for i, contact in enumerate(self.contacts) if contact.stop is None)
 
     @cached_property
@@ -182,7 +182,7 @@ class SettledFinger:
         Parameters
         ----------
         shears : ndarray, shape (3, 2)
-            From `shears`.
+            Result of the method `shears`.
         base_tile : bool, optional
             Whether a base tile comes first on the tendon.
 
@@ -204,20 +204,21 @@ class SettledFinger:
         return normals
 
     def stop_torques(self, shears: Array, normals: Array, base_tile: bool = False) -> Array:
-        """Return the torque that each joint's end stop carries, affine in tension.
+        """Return the torque on each joint's end stop as an affine function of the tension.
 
         Parameters
         ----------
         shears, normals : ndarray, shape (3, 2)
-            From `shears` and `normals`.
+            Results of the methods `shears` and `normals`.
         base_tile : bool, optional
             Whether a base tile comes first on the tendon.
 
         Returns
         -------
         ndarray, shape (3, 2)
-            At zero tension [N·m], and per newton [m]. Positive toward closing: not negative at an
-            upper stop, not positive at a lower one, zero at a joint that contacts support.
+            Columns: torque at zero tension [N·m], and per newton [m]. Positive toward closing: not
+            negative at an upper stop, not positive at a lower one, zero at a joint that contacts
+            support.
         """
         if len(self.free) == len(self.contacts):
             return np.zeros_like(shears)

@@ -49,7 +49,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class ContactSettings:
-    """Settings of the search for a hand's rest. A way of 1 mm counts as a turn of 10 mrad."""
+    """Settings of the search for a hand's rest. A motion of 1 mm counts as a turn of 10 mrad."""
 
     force: float = 0.01
     """Largest net force at rest, and net moment over 0.1 m [N]: by some 40 N/mm along z it is a
@@ -126,13 +126,13 @@ def placed_by_contact(
     settled : sequence of SettledHand, length n
         Hands where they start: their x, y and turn about z stay.
     offsets : sequence of Pose, length n, optional
-        H in the frame of its rest; by default the hands stay at rest.
+        Wanted pose of each H in the frame of its rest; by default the hands stay at rest.
 
     Returns
     -------
     list of SettledHand or InvalidInputError
-        In order, with the seating rule ``contact``; an error, with the field ``placing``, for a
-        hand that has no stable rest within `ContactSettings.ways` and ``seat_tilt`` of its start,
+        The hands in order, of seating rule ``contact``; an error, of field ``placing``, for a hand
+        that has no stable rest within `ContactSettings.ways` and ``seat_tilt`` of its start,
         or that cannot close at its offset.
     """
     offsets = [Pose.identity()] * len(settled) if offsets is None else offsets
@@ -173,13 +173,13 @@ def contact_slopes(hand: SpinyHand, placement: Placement) -> Array:
     ----------
     hand : SpinyHand
     placement : Placement
-        With the pose of the hold.
+        Where the hand is, with ``hold_in_hand`` given.
 
     Returns
     -------
     ndarray, shape (3, 3)
-        Derivative of (f_z, m_x, m_y) by (z, α, β), fingers closed anew; turns and moments counted
-        over 0.1 m.
+        Derivative of f_z, m_x, m_y (`closed_wrench`) by the hand's motion along z of H and its
+        turns about x and y, fingers closed anew; turns times 0.1 m, moments over 0.1 m.
     """
     search = _Search(hand, [placement])
     slopes = search.slopes(np.zeros((1, 3)), np.zeros(1, dtype=int))[0]
@@ -196,14 +196,14 @@ def rests_on_rock(
     hand : SpinyHand
         Model of all hands.
     starts : sequence of Placement, length n
-        With poses of the holds.
+        Where the hands start, with ``hold_in_hand`` given.
     slopes : ndarray, shape (3, 3), optional
-        Stiffness to begin with, of a hand nearby (`contact_slopes`) [N/m]; computed by default.
+        First stiffness, that of a hand nearby (`contact_slopes`) [N/m]; computed by default.
 
     Returns
     -------
     list of Pose or InvalidInputError, length n
-        In the order of ``starts``: H at rest in H at the start; an error, not raised, if none is.
+        In the order of ``starts``: H at rest in H at its start; an error, not raised, without rest.
     """
     search, found = _Search(hand, starts), dict[int, Pose]()
 

@@ -148,7 +148,7 @@ def grid_of_trials(
     Returns
     -------
     list of HoldTrial
-        For each point on rock, every angle with every rotation.
+        Places at each point on rock, one for every angle with every rotation.
 
     Raises
     ------
@@ -247,14 +247,14 @@ def try_holds(
         Number of places about each one at which the hand is tried, too; none by default. A hand
         with the seat 'rest' is seated anew at each (`closed_about`).
     force : float, optional
-        Force that a hand is to hold at these, for their share that does [N].
+        Pure force that counts as held, for `Robustness.share` [N].
 
     Returns
     -------
     list of FoundHold or InvalidInputError
-        In the order of the trials; an error where a hand cannot be, with the reason. A place where
-        the scan ends within a finger's reach is an error, too: the finger would take the scan's
-        border for an edge.
+        Hands in the order of the trials; an error, with the reason, where one cannot be. A place
+        where the scan ends within a finger's reach is an error, too: the finger would take the
+        scan's border for an edge.
     """
     placements = [
         Placement(
@@ -316,10 +316,10 @@ def ranked_holds(
     found : sequence of FoundHold or InvalidInputError
         Results of `try_holds`.
     by : {'robust', 'share', 'pure', 'support'}, optional
-        The pure force that nine in ten samples have, the share of the samples that hold the wanted
-        force, or the largest force without a scatter: pure, or whatever the other components. Ties
-        are broken by the others, in this order. A pure force below zero, or none, counts as zero. A
-        place without samples comes after those with.
+        Figure by which places are ranked: ``robust``, the pure force that nine in ten samples have;
+        ``share``, the share of samples that hold the wanted force; ``pure`` and ``support``, as in
+        `FoundHold`. Ties are broken by the others, in this order. A pure force below zero, or none,
+        counts as zero. A place without samples comes after those with.
     way : str, optional
         Direction of the force: one of `TRIAL_WAYS`.
     """

@@ -68,7 +68,7 @@ def write_hands(closed: Sequence[ClosedPlacement], path: Path) -> None:
     Parameters
     ----------
     closed : sequence of ClosedPlacement
-        At least one. All on the same `Mesh`, with the same surface and hand.
+        Hands, at least one, all on the same `Mesh`, with the same surface and hand model.
     path : Path
 
     Raises
@@ -127,9 +127,10 @@ def write_hands(closed: Sequence[ClosedPlacement], path: Path) -> None:
 
 
 def read_hands(path: Path, rock: Mesh, surface: Surface, hand: SpinyHand) -> list[ClosedPlacement]:
-    """Read closed hands, and have their kind of hand know them: they are not closed again.
+    """Read closed hands from a file, and put them into the cache of ``hand``.
 
-    A stance whose hand has the same placement, on this very rock, takes the hand that was read.
+    A stance with a hand of the same placement, on this very ``rock`` object, then takes the hand
+    that was read, and does not close it again.
 
     Parameters
     ----------
@@ -143,7 +144,8 @@ def read_hands(path: Path, rock: Mesh, surface: Surface, hand: SpinyHand) -> lis
     Raises
     ------
     InvalidInputError
-        If the file is no such file, or rock, surface or hand differ; the field is ``file``.
+        If `write_hands` has not written the file, or rock, surface or hand differ; the field is
+        ``file``.
     """
     with reading_file(path), np.load(path, allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}

@@ -94,7 +94,7 @@ def place(
     ----------
     rock : Hold
     point : array_like, shape (3,)
-        On the rock, in its frame [m].
+        Place on the rock, in its frame [m].
     approach : array_like, shape (3,)
         Direction into the rock, of any length, in the rock's frame.
     wrist_angle : float, optional

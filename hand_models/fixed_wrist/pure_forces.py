@@ -25,7 +25,7 @@ undecided, and far below any load of a hand."""
 
 
 def force_directions(ways: Sequence[str] = tuple(TRIAL_WAYS)) -> Array:
-    """Return the directions of forces, shape (k, 6), by sign and axis such as ``-fz``."""
+    """Return unit wrenches, shape (k, 6), along forces named by sign and axis, such as ``-fz``."""
     axes = np.eye(6)[["xyz".index(way[-1]) for way in ways]]
     return np.asarray(axes * [[1.0 if way[0] == "+" else -1.0] for way in ways] + 0.0)
 
@@ -42,8 +42,8 @@ def pure_reaches(space: WrenchSpace, directions: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (k,)
-        [N] along unit forces. Negative where every such wrench is at least so much against d; NaN
-        where the set has none.
+        Largest t of each direction; for a d that is a unit force, in newtons. Negative if the set
+        has multiples of d with negative t only; NaN if it has none at all.
 
     Raises
     ------
@@ -78,8 +78,8 @@ def impossible_forces(
     Returns
     -------
     dict of str to str
-        By direction; without those along which the hand can pull or shear with at least
-        `FORCE_TOLERANCE`.
+        Sentences by direction, such as ``-fz``; none for a direction along which the hand can pull
+        or shear with at least `FORCE_TOLERANCE`.
     """
     found = {}
     for way in TRIAL_WAYS:

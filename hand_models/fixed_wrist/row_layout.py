@@ -108,8 +108,8 @@ class RowLayout:
         Returns
         -------
         ndarray, shape (n, k, 4)
-            Coefficients of a tile's shear, normal and lateral load, the last with the row's sign,
-            and the capacity of a whole tile [N].
+            Coefficients of a tile's shear, normal and lateral load, the last times the row's sign;
+            then the capacity of a tile with all its spines on the rock [N].
         """
         signs = np.ones((len(self.plane_signs), 4))
         signs[:, 2] = self.plane_signs
@@ -257,7 +257,7 @@ def named_row(
     kind: Literal["limit", "hard"],
     more: str = "",
 ) -> Row:
-    """Return a row whose label is its names joined by ``/``, then ``more``.
+    """Return a `Row` whose label is its names joined by ``/``, then ``more``.
 
     Parameters
     ----------

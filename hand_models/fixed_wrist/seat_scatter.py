@@ -88,7 +88,7 @@ class Robustness(NamedTuple):
     share : ndarray, shape (j,)
         Share of the places whose largest pure force is at least ``force`` [1].
     force : float
-        [N]
+        Pure force that counts as held, for ``share`` [N].
     """
 
     draws: int
@@ -117,7 +117,7 @@ def robustness(
     pure: ArrayLike | None = None,
     force: float = FORCE_TOLERANCE,
 ) -> Robustness:
-    """Close a hand again at places near its place, and return quantiles of what it reaches there.
+    """Return quantiles of the largest wrenches of a hand that is closed again at places nearby.
 
     Parameters
     ----------
@@ -131,13 +131,13 @@ def robustness(
     seed : int, optional
     scatter : tuple of float, optional
         Half width of a uniform scatter along each axis of H [m], and about each axis through the
-        middle of the palm [rad]. As in the hand's parameters by default.
+        middle of the palm [rad]; by default that of the hand's parameters.
     at : Pose, optional
         Frame on the hold on which the hand was seated, to seat it anew at each place
         (`closed_about`).
     pure : array_like, shape (j, 6), optional
-        Directions of forces on the rock, in H, for pure forces; none by default, as a place takes
-        two linear programs for each line.
+        Directions of forces on the rock, in H, for pure forces; none by default, as each place
+        takes two linear programs for a direction and its opposite.
     force : float, optional
         Pure force that counts as held, above zero [N].
 
@@ -193,7 +193,7 @@ def robustness(
 
 
 def scattered_places(name: str, count: int, seed: int) -> Array:
-    """Return a hand's places, from −1 to 1 along and about each axis of H (scrambled Sobol).
+    """Return samples of a hand's displacement from its place, each from −1 to 1 (scrambled Sobol).
 
     Parameters
     ----------
@@ -202,10 +202,12 @@ def scattered_places(name: str, count: int, seed: int) -> Array:
     count : int
         Number of places.
     seed : int
+        Seed of the scrambling, beside the name.
 
     Returns
     -------
     ndarray, shape (count, 6)
+        Displacements along x, y, z of H and turns about them, as shares of the half widths.
     """
     from scipy.stats import qmc
 
@@ -230,15 +232,17 @@ def closed_about(
         Model of the settled hand.
     settled : SettledHand
     places : ndarray, shape (n, 6)
-        Along and about each axis of H, in units of ``scatter``; of a hand that was placed by
-        contact or is seated anew, those along z and about x and y in units of ``contact_scatter``.
+        Displacement along, and turn about, each axis of H, in units of ``scatter``; for a hand that
+        was placed by contact or is seated anew, those along z and about x and y in units of
+        ``contact_scatter``.
     scatter : tuple of float
         Unit along an axis [m], and about an axis [rad].
     contact_scatter : tuple of float, optional
-        The same of what contact leaves; that of the hand's parameters by default.
+        Units of the displacement along z [m] and of the turns about x and y [rad] that remain
+        after contact; by default those of the hand's parameters.
     at : Pose, optional
-        Frame on the hold on which a hand was seated (`Placement`): at each place along x and y and
-        turned about z the hand is seated anew, and then moved by what contact leaves.
+        Frame on the hold on which a hand was seated (`Placement`). At each place the hand is then
+        seated anew, at its x, y and turn about z, and moved by the rest of its displacement.
 
     Yields
     ------

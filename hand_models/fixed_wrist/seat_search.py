@@ -66,7 +66,7 @@ def _about(move: _Move) -> list[_Move]:
 def best_seats(
     hand: SpinyHand, placements: Sequence[Placement], direction: ArrayLike = PULL_OFF
 ) -> list[SettledHand | InvalidInputError]:
-    """Seat hands near their places where they can hold the largest wrench in a direction.
+    """Seat hands near their usual seats, where they can hold the largest wrench in a direction.
 
     A cache of the hand's model keeps seats that were found before.
 
@@ -75,15 +75,15 @@ def best_seats(
     hand : SpinyHand
         Model of all hands.
     placements : sequence of Placement
-        Without poses.
+        Hands on their holds, with ``hold_in_hand`` None.
     direction : array_like, shape (6,), optional
         Direction of the wrench on the rock, in H; the pull-off by default.
 
     Returns
     -------
     list of SettledHand or InvalidInputError
-        In order, with the seating rule ``best``; where a hand can be at none of the places, the
-        error of the first.
+        Hands in the order of ``placements``, with the seating rule ``best``; for a hand that can
+        close at none of the places tried, the error at the first of them.
 
     Raises
     ------

@@ -114,7 +114,7 @@ def limit_rows(
     most: Array,
     wrenches: tuple[Array, Array],
 ) -> tuple[Array, Array, Array]:
-    """Return the limits of hands: loads L y + l0 against capacities s.
+    """Return the limits L y + l0 ≤ u s of hands: y are a hand's loads [N], u its utilisation.
 
     Parameters
     ----------
@@ -130,7 +130,8 @@ def limit_rows(
     Returns
     -------
     L, l0, s : ndarray, shapes (h, nl, m), (h, nl), (h, nl)
-        In the order of ``layout.limits``: tiles, tendons and motors, fingers, nails, palm, hand.
+        Load of each limit per unit of each column, at zero load, and its capacity; in the order of
+        ``layout.limits``: tiles, tendons and motors, fingers, nails, palm, hand.
     """
     (at_zero, V), finger_of = wrenches, layout.finger_of
     loads, structure = _of_tiles(hands, "loads"), model.structure
@@ -186,7 +187,7 @@ def limit_rows(
 
 
 def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, Array]:
-    """Return the conditions H y ≤ h of hands that no strength can change.
+    """Return the hard rows H y ≤ h of hands: conditions on the loads y that hold at any strength.
 
     Parameters
     ----------
@@ -197,7 +198,8 @@ def hard_rows(layout: RowLayout, hands: Sequence[SettledHand]) -> tuple[Array, A
     Returns
     -------
     H, h : ndarray, shapes (n, nh, m), (n, nh)
-        In the order of ``layout.hard``: tensions, tiles, joint stops, nails, tendon friction, palm.
+        Coefficients and right-hand sides, in the order of ``layout.hard``: tensions, tiles, joint
+        stops, nails, tendon friction, palm.
     """
     loads, shape = _of_tiles(hands, "loads"), (len(hands), len(layout.hard))
     friction = np.array([hand.surface.friction for hand in hands])[:, None, None]

@@ -60,8 +60,8 @@ class ClosedFingers:
     alone : dict of int to ClosedFinger
         Fingers that were closed along their paths, by their index in ``row_of``.
     lifts : dict of int to float
-        By the index of each hand with rock inside an open finger: distance along −z of the hand
-        frame H that would clear it [m].
+        For each hand with rock inside an open finger, by its index: distance along −z of the hand
+        frame H by which the hand would have to back off [m].
 
     Attributes
     ----------
@@ -145,8 +145,8 @@ def close_fingers(
     ----------
     placed : PlacedHands
     laid : sequence of sequence of list of ClosedPhalanx, lengths n and 4
-        Phalanges of each finger that rest on smooth rock one after the other; the same list for
-        identical fingers.
+        For each finger its phalanges that rest on smooth rock (`SequentialClosure.lay`); the same
+        list for identical fingers.
     tensions : sequence of float, length n
         Closing tension of each hand [N].
     errors : dict of int to InvalidInputError

@@ -31,7 +31,7 @@ class StackRows(NamedTuple):
     Attributes
     ----------
     tiles : slice
-        Places of the tiles that do not turn toward the rock: base tiles, then palm tiles.
+        Places of the tiles that do not turn toward the rock: the base tiles, then the palm's.
     base_count : int
         Number of base tiles among them.
     joints, alongs : slice
@@ -98,8 +98,9 @@ class FingerFrame:
         Parameters
         ----------
         hold : Hold
+            The rock.
         hand_in_hold : Pose
-            H in the hold's frame.
+            The hand frame H in the hold's frame.
         raw : bool, optional
             Whether to use `Hold.raw_section`, with steps and edges smaller than a tile.
         """
@@ -107,7 +108,7 @@ class FingerFrame:
         return hold.raw_section(*plane) if raw else hold.finger_rock(*plane).tile
 
     def rock(self, hold: Hold, hand_in_hold: Pose) -> FingerRock:
-        """Return the rock that the finger meets with its whole width, in its coordinates F."""
+        """Return the rock under the finger's whole width, in its frame F; arguments as of `cut`."""
         return hold.finger_rock(*self._plane(hand_in_hold))
 
     def _plane(self, hand_in_hold: Pose) -> tuple[Array, Array, Array]:

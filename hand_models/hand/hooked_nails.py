@@ -18,7 +18,7 @@ __all__ = ["Nails", "hook_nails"]
 
 
 class Nails(NamedTuple):
-    """Nails of one hand.
+    """Fingernails of one hand: whether and where each hooks on the rock.
 
     Attributes
     ----------

@@ -35,7 +35,9 @@ __all__ = ["HandModel"]
 class HandModel:
     """Geometry, mechanics and limits of a hand, independent of any hold.
 
-    Models of equal parameter tables are equal and have the same hash.
+    Attributes are the numbers of the table, most with the names of their entries, in SI units;
+    ``finger``, ``drive``, ``structure`` and ``nail`` hold those of one finger. Models of equal
+    parameter tables are equal and have the same hash.
 
     Parameters
     ----------
@@ -158,9 +160,9 @@ class HandModel:
         return self.frame_stack((outer_rotation,)).hands[0]
 
     def frame_stack(self, outer_rotations: tuple[float, ...]) -> FrameStack:
-        """Return the finger frames of n hands with these rotations of their outer fingers [rad].
+        """Return the finger frames of n hands, whose outer fingers have n rotations [rad].
 
-        The last 64 results are kept in an LRU cache.
+        ``outer_rotations``: from 0 to π each. The last 64 results are kept in an LRU cache.
         """
         return self._frames.get(outer_rotations, partial(self._frame_stack, outer_rotations))
 

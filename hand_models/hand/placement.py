@@ -44,7 +44,7 @@ class Placement(NamedTuple):
 
 
 class PlacementKey:
-    """Hashable cache key of a placement: equal keys are hands that close alike.
+    """Hashable cache key of a placement: hands of equal keys close alike.
 
     Poses are compared by their bytes. The hash is computed once.
     """
@@ -157,7 +157,7 @@ class PlacedHands:
         return hold.entries(places, into)
 
     def rock(self, index: int, finger: int) -> FingerRock:
-        """Return the rock that a finger of a hand meets with its whole width, by their indices."""
+        """Return the rock under the whole width of a finger; arguments as of `section`."""
         hand_in_hold = self.seatings[index].pose.inverse()
         return self.frames.hands[index][finger].rock(self.placements[index].hold, hand_in_hold)
 
@@ -174,7 +174,8 @@ class PlacedHands:
         Returns
         -------
         Section or None
-            `Hold.raw_section` in a fingernail grasp, else what stands out across the tiles.
+            `Hold.raw_section` in a fingernail grasp, else the envelope of the rock across the
+            width of the tiles.
         """
         hold, grasp = self.placements[index].hold, self.placements[index].grasp
         hand_in_hold = self.seatings[index].pose.inverse()

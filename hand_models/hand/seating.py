@@ -54,7 +54,7 @@ class Seating:
         Distance along −z of H by which the hand then backed off, so that its open fingers are
         clear of the rock [m].
     offset : Pose, optional
-        With the rule 'contact', H in the frame where it has come to rest.
+        Pose of H in the frame of its rest, for the rule 'contact'.
     """
 
     pose: Pose
@@ -243,7 +243,7 @@ class RockUnder:
         return PolylineSection(pieces) if pieces else None
 
     def top(self, x: Array) -> Array:
-        """Return z of the highest rock under the palm, for places of the frame along x of the hand.
+        """Return z of the highest rock under the palm, for places of the frame ``at`` along x.
 
         Parameters
         ----------

@@ -57,7 +57,7 @@ class HandPostures(NamedTuple):
     across: Array
 
     def fingers(self, model: FingerModel) -> tuple[SettledFinger, ...]:
-        """Return the posture of each finger, of one model, in the order of `FINGERS`."""
+        """Return the four fingers in the order of `FINGERS`; ``model``: numbers of a finger."""
         return tuple(
             SettledFinger(
                 model,
@@ -194,7 +194,7 @@ class SettledHand:
         joint, and the torque against its stop at zero tension [N·m] and per newton [m].
     palm : SettledPalm
     sets : BoundedStore of float to WrenchSpace
-        Cache of `fixed_wrist.wrench_spaces` by the largest tension [N], the last few.
+        Cache of the hand's last wrench spaces (`fixed_wrist`), by the largest tension [N].
     """
 
     hand: HandModel
@@ -358,7 +358,8 @@ class SettledHand:
         Returns
         -------
         tuple of HalfPlane
-            ``nail_shear`` with the capacity ``finger_shear``, and ``fingertip_force`` [N].
+            Limits ``nail_shear``, with capacity `Structure.finger_shear`, and
+            ``fingertip_force`` [N].
         """
         structure = self.hand.structure
         base = -self.hand.frames(self.grasp.outer_rotation)[self.finger_of[tile]].along

@@ -74,7 +74,7 @@ def settle_hands(
 
 
 def seated(hand: HandModel, placements: Sequence[Placement]) -> Sequence[Seating]:
-    """Return the seating of each hand: the pose of its hold in it, found where none is given.
+    """Return the seating of each hand: the pose of its hold in H, as given, or else found.
 
     Parameters
     ----------

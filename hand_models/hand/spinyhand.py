@@ -150,7 +150,7 @@ class SpinyHand(HandModel):
         return [next(rough if scan else smooth) for scan in scanned]
 
     def keep(self, closed: Iterable[tuple[Placement, SettledHand]]) -> None:
-        """Keep hands that were closed before, for `settle_each` to find by their placements."""
+        """Add closed hands, each with its placement, to the caches that `settle_each` searches."""
         for placement, settled in closed:
             store = self.settled_scans if placement.hold.scanned else self.settled
             store.keep([(PlacementKey(placement), settled)])

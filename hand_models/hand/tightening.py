@@ -66,7 +66,7 @@ class ClosingSequence(NamedTuple):
 
 
 def resting_tensions(model: FingerModel, turns: Array, losses: Array) -> Array:
-    """Return the tendon tensions that balance the joints' springs at angles q: (p + K q) / (M r).
+    """Return the tensions (p + K q) / (M r) that balance the springs of joints at angles q.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def closing_sequence(settled: SettledHand) -> tuple[ClosingSequence, ...]:
     Returns
     -------
     tuple of ClosingSequence, length 4
-        In the order of `FINGERS`.
+        Sequence of each finger, in the order of `FINGERS`.
     """
     hand = settled.hand
     nail = hand.nail

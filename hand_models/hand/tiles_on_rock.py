@@ -75,7 +75,7 @@ class HandTiles(NamedTuple):
 
 
 def tiles_on_rock(placed: PlacedHands, closed: ClosedFingers, tensions: Sequence[float]) -> Array:
-    """Return the numbers of all finger tiles of n closed hands.
+    """Return places, axes and loads of all finger tiles of n closed hands, as one array.
 
     Parameters
     ----------

@@ -157,7 +157,7 @@ def draws_of(
     Parameters
     ----------
     sets : ParameterTable
-        In the form of ``draws.toml``.
+        Fitted sets and ranges, in the form of ``draws.toml``.
     hand : ParameterTable, optional
         All parameters of the hand; the bundled ones by default. Entries that differ from the
         bundled hand are taken as known: no sample changes them.

@@ -48,7 +48,7 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes
     ----------
     value : float or list of float
-        In SI units.
+        The number or numbers, in ``unit``.
     unit : str
         The SI unit, ``1`` for a ratio.
     source : {'paper', 'measured', 'calibrated', 'assumed'}
@@ -85,7 +85,7 @@ class ParameterTable:
     Parameters
     ----------
     sections : mapping of str to mapping of str to Quantity
-        Not to be changed afterwards.
+        Quantities by section, then by name; not to be changed afterwards.
     """
 
     def __init__(self, sections: Mapping[str, Mapping[str, Quantity]]) -> None:
@@ -118,7 +118,7 @@ class ParameterTable:
         Parameters
         ----------
         raw : mapping of str to object
-            By section, then by name: dictionaries with the fields of `Quantity`.
+            Dictionaries with the fields of `Quantity`, by section, then by name.
         units : mapping of str to mapping of str to str, optional
             Units by section and name. With units given, an entry may be a bare number, or a list of
             numbers: in the entry's unit (``1`` where the mapping has none), with the source
@@ -133,8 +133,8 @@ class ParameterTable:
         for section, entries in raw.items():
             if not isinstance(entries, Mapping):
                 raise InvalidInputError(
-                    f"a section of entries is needed, got {type(entries).__name__}; an entry is in "
-                    "a section",
+                    f"a section of entries is needed, got {type(entries).__name__}; put an entry "
+                    "into a section",
                     field=section,
                 )
             sections[section] = {

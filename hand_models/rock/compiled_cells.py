@@ -23,7 +23,10 @@ LEAF_SIZE: Final = 8
 
 @compiled("f2", "i2")
 def curve_places(vertices: Array, faces: Indices) -> Indices:
-    """Return the place of each triangle's middle on Morton's curve through all of space."""
+    """Return the Morton code of each triangle's middle, (m,): its place on a curve through space.
+
+    The mesh has ``vertices`` (n, 3) [m] and ``faces`` (m, 3).
+    """
     low, high = np.full(3, math.inf), np.full(3, -math.inf)
     for vertex in vertices:
         for k in range(3):
@@ -42,7 +45,10 @@ def curve_places(vertices: Array, faces: Indices) -> Indices:
 
 @compiled("f2", "i2", "f0")
 def solid_triangles(vertices: Array, faces: Indices, least: float) -> NDArray[np.bool_]:
-    """Return True for each triangle that is higher over its longest edge than ``least`` [m]."""
+    """Return True for each triangle, (m,), that is higher over its longest edge than ``least`` [m].
+
+    The mesh has ``vertices`` (n, 3) [m] and ``faces`` (m, 3).
+    """
     solid = np.empty(len(faces), dtype=np.bool_)
     edges, square = np.empty((3, 3)), np.empty(3)
     for i in range(len(faces)):
@@ -62,7 +68,11 @@ def solid_triangles(vertices: Array, faces: Indices, least: float) -> NDArray[np
 
 @compiled("f2", "i2", "i1")
 def leaf_boxes(vertices: Array, faces: Indices, order: Indices) -> Array:
-    """Return opposite corners of the box about each leaf of triangles in order, (n, 2, 3)."""
+    """Return opposite corners of the box about each leaf of triangles, (n, 2, 3) [m].
+
+    ``order``: indices of the triangles, `LEAF_SIZE` for each leaf, of the mesh of ``vertices`` and
+    ``faces``.
+    """
     boxes = np.empty(((len(order) + LEAF_SIZE - 1) // LEAF_SIZE, 2, 3))
     boxes[:, 0], boxes[:, 1] = math.inf, -math.inf
     for i in range(len(order)):
@@ -118,18 +128,18 @@ def _leaves(boxes: Array, levels: Indices, axes: Array, low: Array, high: Array)
 def triangles_in_box(
     order: Indices, boxes: Array, levels: Indices, axes: Array, low: Array, high: Array
 ) -> Indices:
-    """Return the triangles of all leaves that a box meets, leaf by leaf.
+    """Return the indices of the triangles of all leaves that a box meets, leaf by leaf.
 
     Parameters
     ----------
     order : ndarray of int, shape (m,)
-        Triangles, leaf by leaf.
+        Indices of the triangles, leaf by leaf.
     boxes : ndarray, shape (n, 2, 3)
         Opposite corners of the boxes, the leaves first, then those of each level above [m].
     levels : ndarray of int, shape (k + 1,)
         Index of the first box of each level, and their number.
     axes, low, high : ndarray
-        As of `TriangleCells.within`.
+        The box that is searched, as of `TriangleCells.within`.
     """
     leaves = _leaves(boxes, levels, axes, low, high)
     found = np.empty(len(leaves) * LEAF_SIZE, dtype=np.intp)

@@ -84,9 +84,25 @@ def _followed(after: Indices) -> tuple[Indices, Indices]:
 def plane_cut(
     vertices: Array, faces: Indices, some: Indices, plane: Array, reach: float
 ) -> tuple[Array, Indices]:
-    """Return the polylines in which a plane cuts some triangles; see `rock.triangles.cut`.
+    """Return the polylines in which a plane cuts triangles of a mesh; see `rock.triangles.cut`.
 
-    ``plane``: its origin [m] and both axes, shape (3, 3).
+    Parameters
+    ----------
+    vertices, faces : ndarray, shapes (n, 3) and (m, 3)
+        The mesh [m].
+    some : ndarray of int, shape (k,)
+        Indices of the triangles to cut.
+    plane : ndarray, shape (3, 3)
+        Origin of the plane's coordinates (s, t) [m], then their axes.
+    reach : float
+        Triangles outside the square |s|, |t| ≤ reach are left out [m].
+
+    Returns
+    -------
+    points : ndarray, shape (p, 2)
+        Points (s, t) of the polylines, one polyline after another, rock on their left [m].
+    stops : ndarray of int
+        Index in ``points`` at which each polyline ends.
     """
     origin, s_axis, t_axis = plane
     normal, level = np.empty(3), 0.0
@@ -159,7 +175,11 @@ def _length(points: Array) -> float:
 
 @compiled("f2", "i1", "f0")
 def bridged(points: Array, stops: Indices, gap: float) -> tuple[Array, Indices]:
-    """Return open polylines joined across gaps; see `hand_models.rock.triangles.bridge`."""
+    """Return open polylines joined across gaps; see `hand_models.rock.triangles.bridge`.
+
+    Polylines, given and returned, are ``points`` (p, 2) [m] and ``stops``, the index at which each
+    ends; ``gap``: largest distance that is bridged [m].
+    """
     starts = np.empty(len(stops), dtype=np.intp)
     starts[0], starts[1:] = 0, stops[:-1]
     near, pairs = np.empty(16), np.empty((16, 2), dtype=np.intp)

@@ -23,7 +23,7 @@ def _distance(a: Array, b: Array) -> float:
 
 @compiled("f2")
 def without_repeats(points: Array) -> Array:
-    """Return a polyline without points that are as the one before."""
+    """Return a polyline, (n, 2), without points that equal the point before them."""
     kept = np.empty_like(points)
     count = 0
     for point in points:
@@ -35,12 +35,12 @@ def without_repeats(points: Array) -> Array:
 
 @compiled("f2")
 def corners(points: Array) -> tuple[Array, Array]:
-    """Return a polyline without points at which it goes straight on, in however many parts.
+    """Return a polyline, (n, 2), without the points at which its direction does not change.
 
     Returns
     -------
     points : ndarray, shape (n, 2)
-        Each different from the one before [m].
+        Points that are left, each different from the one before [m].
     lengths : ndarray, shape (n,)
         Length of the polyline up to each point [m].
     """
@@ -85,7 +85,11 @@ def _parts_within(a: Array, b: Array, reach: float) -> tuple[float, float]:
 
 @compiled("f2", "i1", "f0")
 def reached(points: Array, stops: Indices, reach: float) -> tuple[Array, Indices, float]:
-    """Return the parts of polylines within the square |s|, |t| ≤ reach, and their whole length."""
+    """Return the parts of polylines within a square, and the sum of their lengths [m].
+
+    Polylines, given and returned, are points (s, t), shape (p, 2) [m], and the index at which each
+    ends; the square is |s|, |t| ≤ ``reach`` [m].
+    """
     found, ends = np.empty((3 * len(points), 2)), np.empty(len(points) + len(stops), dtype=np.intp)
     total = runs = start = 0
     for stop in stops:
@@ -320,17 +324,18 @@ def smoothed(
     Parameters
     ----------
     points, lengths : ndarray
-        As of `corners`.
+        Raw polyline, the result of `corners`.
     step : float
         Distance of neighbouring points along the polyline [m].
     count : int
-        Number of points.
+        Number of points at equal steps.
     rest : float
-        By how many steps the last one goes on straight.
+        Length from the last of them to the polyline's end, in steps: the curve goes on straight
+        by as much; 0 for none.
     closed : int
         1 if the polyline is a ring, else 0.
     wide, narrow : ndarray
-        Weights of the first and the second parabolas, as of `_fitted`.
+        Weights of neighbouring points in the first and the second fit of parabolas (odd lengths).
     """
     half = len(wide) // 2
     over = 2 * half if closed else 0

@@ -63,7 +63,7 @@ class Hold(ABC):
 
     @property
     def swept(self) -> Swept | None:
-        """A smooth hold as a ball that is swept along two faces; None for other holds."""
+        """A smooth hold as numbers: a ball swept along two faces; None for other holds."""
         return None
 
     @abstractmethod
@@ -88,6 +88,8 @@ class Hold(ABC):
     ) -> Section | None:
         """Cut the hold as `section` does, but keep steps and edges smaller than a finger's tile.
 
+        Arguments are those of `section`.
+
         Returns
         -------
         Section or None
@@ -98,7 +100,8 @@ class Hold(ABC):
     def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
         """Return the rock that a finger meets with its whole width, in its plane.
 
-        A smooth shape is taken as alike across the finger: as it is in the finger's plane.
+        Arguments are those of `section`. In this base class the rock is taken to be the same
+        across the finger as in its plane.
         """
         return FingerRock(self.section(origin, s_axis, t_axis))
 
@@ -119,7 +122,7 @@ class Hold(ABC):
         """
 
     def entries(self, points: ArrayLike, direction: ArrayLike) -> list[float]:
-        """Return the distance of `entry` for each of several points, shape (n, 3) [m]."""
+        """Return the distance of `entry` for each of n points, shape (n, 3), as a list [m]."""
         return [self.entry(point, direction) for point in np.asarray(points, dtype=float)]
 
     def surface(self, low: Array, high: Array) -> Triangles:
@@ -148,7 +151,7 @@ class Hold(ABC):
         )
 
     def check_place(self, at: Pose | None = None) -> None:
-        """Check that rock lies at the origin of the frame that a palm is to take.
+        """Check that rock lies at the origin of the frame in which a palm is to be placed.
 
         Nothing is checked where no frame is given.
 

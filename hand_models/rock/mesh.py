@@ -40,9 +40,9 @@ class Mesh(OutlinedHold):
     Parameters
     ----------
     vertices : array_like, shape (n, 3)
-        In the hold's frame [m].
+        Corners of the triangles, in the hold's frame [m].
     faces : array_like of int, shape (m, 3)
-        Vertices of each triangle, counterclockwise from outside the rock.
+        Indices of each triangle's vertices, counterclockwise from outside the rock.
     hand : ParameterTable, optional
         All parameters of the hand that is to grip the hold, for the scale of smoothing.
     anywhere : bool, optional
@@ -116,7 +116,7 @@ class Mesh(OutlinedHold):
         return self.triangles
 
     def check_place(self, at: Pose | None = None) -> None:
-        """Check that rock lies at the origin of the frame that a palm is to take, and faces it.
+        """Check that rock lies at the origin of a palm's frame, and faces the palm.
 
         Parameters
         ----------

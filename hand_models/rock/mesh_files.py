@@ -22,13 +22,14 @@ MESH_ENDINGS: Final = (".stl", ".ply", ".obj", ".off")
 
 
 def read_mesh(path: Path) -> tuple[Array, Indices]:
-    """Read vertices and triangles of an STL, PLY, OBJ or OFF file, whose unit is to be metres.
+    """Read vertices and triangles of an STL, PLY, OBJ or OFF file, which must be in metres.
 
     Returns
     -------
     vertices : ndarray, shape (n, 3)
-        [m]
+        Corners of the triangles [m].
     faces : ndarray of int, shape (m, 3)
+        Indices of each triangle's vertices.
 
     Raises
     ------
@@ -51,9 +52,9 @@ def read_vertices(path: Path) -> tuple[Array, Indices]:
     Returns
     -------
     vertices : ndarray, shape (n, 3)
-        In the file's unit.
+        Points in the file's unit.
     faces : ndarray of int, shape (m, 3)
-        Empty, (0, 3), for a point cloud.
+        Indices of each triangle's vertices; empty, (0, 3), for a point cloud.
 
     Raises
     ------

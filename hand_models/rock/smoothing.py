@@ -114,13 +114,13 @@ class Scale:
 
     @property
     def lines(self) -> Array:
-        """Middles of equal strips across a tile, an odd number of them [m]."""
+        """Distance of the middle of each strip across a tile from the tile's middle, (k,) [m]."""
         half = math.ceil(0.5 * self.tile_width / self.strip - 0.5)
         return np.asarray(self.tile_width / (2 * half + 1) * np.arange(-half, half + 1))
 
     @property
     def places(self) -> Array:
-        """Places along a finger at which heights of rock are taken [m]."""
+        """Places s along a finger at which heights of rock are taken, (g,), ascending [m]."""
         count = math.ceil(self.reach / self.height_spacing)
         return np.asarray(self.reach / count * np.arange(-count, count + 1))
 
@@ -130,7 +130,7 @@ def load_compiled() -> None:
 
     The first process of a machine compiles, in some 20 s; others load in 0.5 s.
     """
-    for part in ("cells", "cuts", "heights", "smoothing"):
+    for part in ("cells", "cuts", "heights", "outlines", "smoothing"):
         import_module(f"hand_models.rock.compiled_{part}")
     for part in ("polylines", "contacts"):
         import_module(f"hand_models.sections.compiled_{part}")
@@ -202,7 +202,7 @@ NO_OUTLINES: Final = np.zeros((0, 2)), np.zeros(0, dtype=np.intp), 0.0
 
 
 class Heights(NamedTuple):
-    """Heights t at which rock begins over places s in equal steps, across a finger.
+    """Heights t at which rock begins at g places s along a finger (`Scale.places`).
 
     Attributes
     ----------
@@ -211,7 +211,8 @@ class Heights(NamedTuple):
     lines : ndarray, shape (k, g)
         t in the middle of each strip across the tiles [m].
     tile_ends, frame_ends : ndarray, shape (2, g, 2)
-        Where the rock ends beside places, across the tiles and across the frames (`rock_ends`).
+        Ends (s, t) of the rock before and after each place, across the tiles and across the
+        frames, from `rock_ends`; NaN where the rock does not end there [m].
     """
 
     tile: Array
@@ -255,23 +256,23 @@ class OutlinedHold(Hold):
         self._scale = Scale.of(hand)
 
     def finger_rock(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> FingerRock:
-        """Cut the hold with a plane, raise the cut to what stands out beside it, and smooth it.
+        """Return the envelope of the rock across a finger's width, in the finger's plane, smoothed.
 
-        Seen along t, what stands out first anywhere across the tiles, and across the frames, is the
-        envelope that they meet. Where rock reaches back under an overhang in the finger's plane by
-        more than a bridged gap, the finger is met in this plane alone.
+        The envelope is the least t of the rock across the tiles, and across the phalanges' frames.
+        Where rock reaches back under an overhang in the finger's plane by more than a bridged gap,
+        only the cut in this plane is used. Arguments are those of `Hold.section`.
 
         Returns
         -------
         FingerRock
-            Only rock within a finger's reach of the plane's origin.
+            Rock within a finger's reach of the plane's origin.
 
         Raises
         ------
         InvalidInputError
             If an outline is too long to be a surface of rock; the field is ``hold``.
         """
-        from hand_models.rock.compiled_heights import (
+        from hand_models.rock.compiled_outlines import (
             least_heights,
             raised_outlines,
             seen_corners,
@@ -313,19 +314,16 @@ class OutlinedHold(Hold):
 
     def _heights_of(self, triangles: Triangles, some: Indices, plane: Array) -> Heights:
         """Return heights of some triangles across a finger."""
-        from hand_models.rock.compiled_heights import heights_across, rock_ends
+        from hand_models.rock.compiled_heights import facing_triangles, heights_across, rock_ends
 
         scale, s = self._scale, self._scale.places
         halves = 0.5 * np.array([scale.tile_width, scale.frame_width])
-        least = heights_across(
-            *triangles, some, plane, s, halves, scale.lines, BASE_TOLERANCES.length
-        )
+        seen = facing_triangles(*triangles, some, plane, float(halves.max()), scale.reach)
+        least = heights_across(seen, s, halves, scale.lines, BASE_TOLERANCES.length)
         ends = np.full((2, 2, len(s), 2), np.nan)
         for row, half in enumerate(halves.tolist()):
             if not np.isfinite(least[row]).all():
-                ends[row] = rock_ends(
-                    *triangles, some, plane, s, half, least[row], scale.bridged_gap
-                )
+                ends[row] = rock_ends(seen, s, half, least[row], scale.bridged_gap)
         return Heights(least[0], least[1], least[2:], ends[0], ends[1])
 
     @abstractmethod
@@ -334,6 +332,8 @@ class OutlinedHold(Hold):
 
     def section(self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike) -> Section | None:
         """Cut the hold with a finger's plane, and smooth the cut to the scale of a tile.
+
+        Arguments are those of `Hold.section`.
 
         Returns
         -------
@@ -351,6 +351,8 @@ class OutlinedHold(Hold):
         self, origin: ArrayLike, s_axis: ArrayLike, t_axis: ArrayLike
     ) -> Section | None:
         """Cut the hold with a finger's plane without smoothing, for a nail.
+
+        Arguments are those of `Hold.section`.
 
         Returns
         -------

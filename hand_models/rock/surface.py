@@ -56,6 +56,6 @@ def drawn_out(outline: Array, low: float, high: float) -> Triangles:
     outline : ndarray, shape (n, 2)
         Points (x, z) in order, with the rock on their left seen along y [m].
     low, high : float
-        Ends of the extrusion along y [m].
+        Least and largest y of the extrusion [m].
     """
     return grid(np.stack([np.insert(outline, 1, y, axis=1) for y in (low, high)]))

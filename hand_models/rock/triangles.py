@@ -34,7 +34,7 @@ __all__ = [
 
 
 def edges_of(faces: Indices) -> Indices:
-    """Return the three directed edges of each triangle (m, 3), as pairs of vertex indices.
+    """Return the three directed edges of each of ``faces`` (m, 3), as pairs of vertex indices.
 
     Returns
     -------
@@ -54,10 +54,10 @@ def connected(pairs: Indices, count: int) -> Indices:
 
 
 def grouped(some: Indices, parts: Indices) -> list[Indices]:
-    """Return items grouped by the part that each belongs to, parts ascending, as a list of arrays.
+    """Return items grouped by the part that each belongs to: one array for each part, ascending.
 
-    Items ``some`` (n,) index ``parts``, which has each one's part as `connected` returns it; the
-    items of a part stay in the order given.
+    ``some`` (n,) are the items, which are indices into ``parts``: the part of every item, as
+    `connected` returns it. The items of a part stay in the order given.
     """
     order = some[np.argsort(parts[some], kind="stable")]
     return np.split(order, np.flatnonzero(np.diff(parts[order])) + 1) if len(order) else []
@@ -267,7 +267,7 @@ def cut(
 
 
 def unstrung(points: Array, ends: Indices) -> list[Array]:
-    """Return each of the polylines that `strung` has put one after another."""
+    """Split the points (n, 2) of polylines at the indices where each ends, as `strung` has them."""
     return [points[i:j] for i, j in pairwise([0, *ends.tolist()])]
 
 
@@ -301,7 +301,8 @@ def bridge(pieces: list[Array], gap: float) -> list[Array]:
 class TriangleCells:
     """Spatial index of a mesh: finds the triangles in a box through a tree of cells.
 
-    What a search takes grows with what it finds, and with the logarithm of the mesh's size.
+    The time of a search grows with the number of triangles that it finds, and with the logarithm
+    of the mesh's size.
 
     Parameters
     ----------

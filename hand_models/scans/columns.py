@@ -48,7 +48,7 @@ def read_columns(path: Path) -> RawScan:
     first = _cells(lines[0], style)
     names = None
     # a line of numbers whose decimals have the other mark is no names, and refused below
-    if not any(_numbers(first, style._replace(decimal=mark)) for mark in ".,"):
+    if not any(_numbers(first, style._replace(decimal=mark), finite=0) for mark in ".,"):
         names = _names(first, style)
         del lines[0]
     width = len(_cells(lines[0], style)) if lines else len(names or ())
@@ -108,13 +108,13 @@ def _cells(line: str, style: _Style) -> list[str]:
     return [cell.strip().strip("\"'") for cell in line.strip("\r\n").split(style.mark)]
 
 
-def _numbers(cells: Sequence[str], style: _Style) -> bool:
-    """Return whether the first cells are numbers, and at least three are."""
+def _numbers(cells: Sequence[str], style: _Style, finite: int = 1) -> bool:
+    """Return whether the first three cells are numbers, at least ``finite`` of them finite."""
     try:
         found = [_number(cell, style) for cell in cells[: len(AXIS_NAMES)]]
     except ValueError:
         return False
-    return len(found) == len(AXIS_NAMES) and any(map(np.isfinite, found))
+    return len(found) == len(AXIS_NAMES) and sum(map(np.isfinite, found)) >= finite
 
 
 def _number(cell: str, style: _Style) -> float:

@@ -18,18 +18,20 @@ def _area(a: Array, b: Array, row: float, column: float) -> float:
 
 @compiled("f3", "i0", "i0")
 def seen_triangles(triangles: Array, rows: int, columns: int) -> Indices:
-    """Return the first triangle along z that covers each pixel's middle, −1 where none does.
+    """Return the triangle of least z at each pixel's middle.
 
     Parameters
     ----------
     triangles : ndarray, shape (m, 3, 3)
-        Corners; x and y are in pixels, whole numbers in their middles.
+        Corners (x, y, z) of each triangle; x counts rows and y columns of pixels, from the middle
+        of the first.
     rows, columns : int
-        Size of the picture along x and y.
+        Number of pixels along x and y.
 
     Returns
     -------
     ndarray of int, shape (rows, columns)
+        Index of the triangle; −1 where none covers the pixel's middle.
     """
     seen, depth = np.full((rows, columns), -1), np.full((rows, columns), math.inf)
     for i in range(len(triangles)):

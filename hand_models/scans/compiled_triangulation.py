@@ -93,16 +93,17 @@ def delaunay_triangles(points: Indices, centre: Indices) -> tuple[Indices, Indic
     Parameters
     ----------
     points : ndarray of int, shape (n, 2)
-        Coordinates from 0 to 2^30, not all on a line, in the order of their distance from the
-        centre. Of equal ones one is taken.
+        Coordinates from 0 to 2^30, not all on a line, in the order of their distance from
+        ``centre``. Of equal points one is used.
     centre : ndarray of int, shape (2,)
+        Point from which the triangulation grows.
 
     Returns
     -------
     corners : ndarray of int, shape (m, 3)
-        Points of each triangle, counterclockwise.
+        Indices of each triangle's points, counterclockwise.
     beside : ndarray of int, shape (m, 3)
-        Neighbour across the edge from each corner to the next, −1 for none.
+        Index of the neighbour across the edge from each corner to the next, −1 for none.
     """
     size = len(points)
     corners, beyond = np.empty(6 * size, dtype=np.int32), np.full(6 * size, -1, dtype=np.int32)
@@ -169,7 +170,10 @@ def delaunay_triangles(points: Indices, centre: Indices) -> tuple[Indices, Indic
 
 @compiled("f2", "i2", "i2")
 def bridged_widths(points: Array, corners: Indices, beside: Indices) -> tuple[Array, Array]:
-    """Return the width that each triangle bridges, and its area across z; as in `Gaps`."""
+    """Return the width that each triangle bridges [m], and its area across z [m²], both (m,).
+
+    Arguments and results are the attributes of `Gaps`.
+    """
     width, area = np.empty(len(corners)), np.empty(len(corners))
     for i in range(len(corners)):
         a, b, c = points[corners[i, 0]], points[corners[i, 1]], points[corners[i, 2]]

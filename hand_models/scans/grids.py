@@ -35,7 +35,7 @@ class GeoTag(IntEnum):
 
 
 def read_numpy(path: Path, cell: float | None) -> RawScan:
-    """Read a grid of heights from an ``.npy`` or ``.npz`` file; the latter may give ``dx``, ``dy``.
+    """Read a grid of heights from an ``.npy`` file, or an ``.npz`` file, which may give dx and dy.
 
     Parameters
     ----------

@@ -58,15 +58,15 @@ class Gaps:
     Attributes
     ----------
     points : ndarray, shape (n, 3)
-        [m]
+        The points, z along the view [m].
     corners : ndarray of int, shape (m, 3)
-        Points of each triangle.
+        Indices of each triangle's points.
     beside : ndarray of int, shape (m, 3)
-        Neighbours of each triangle, −1 for none.
+        Indices of each triangle's neighbours, −1 for none.
     bridged : ndarray, shape (m,)
         Width that each triangle bridges [m]; infinite for slivers of the outline.
     area : ndarray, shape (m,)
-        Area across z [m²].
+        Area of each triangle across z [m²].
     """
 
     points: Array
@@ -77,7 +77,7 @@ class Gaps:
 
     @classmethod
     def between(cls, points: Array, corners: Indices, beside: Indices) -> Gaps:
-        """Compute the width that each triangle bridges, and its area; parameters as attributes."""
+        """Return the gaps of triangles; the arguments are the attributes of the same names."""
         from hand_models.scans.compiled_triangulation import bridged_widths
 
         return cls(points, corners, beside, *bridged_widths(points, corners, beside))
@@ -99,7 +99,7 @@ class Gaps:
         Parameters
         ----------
         hole : float
-            Largest width, and largest height, that is bridged [m].
+            Largest width of a hole, and largest height of a step, that is bridged [m].
 
         Returns
         -------
@@ -144,7 +144,7 @@ def empty_circles(triangles: Array) -> Array:
     Returns
     -------
     ndarray, shape (m,)
-        [m]
+        Diameters [m].
     """
     edges = triangles[:, [1, 2, 0], :2] - triangles[:, :, :2]
     a, b, c = np.sort(np.linalg.norm(edges, axis=2), axis=1).T

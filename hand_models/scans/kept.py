@@ -23,7 +23,7 @@ def keep_triangles(scan: Scan, hole: float) -> ScannedRock:
     Parameters
     ----------
     scan : Scan
-        With triangles.
+        Scan with triangles.
     hole : float
         Width above which a hole is reported [m].
 

@@ -113,13 +113,13 @@ class Triangulated(NamedTuple):
     points : ndarray, shape (n, 3)
         Coordinates from ``middle`` along ``axes`` [m].
     corners : ndarray of int, shape (m, 3)
-        Points of each triangle, counterclockwise over x and y.
+        Indices of each triangle's points, counterclockwise over x and y.
     gaps : Gaps
         The width that each triangle bridges.
     middle : ndarray, shape (3,)
-        In the scan's axes [m].
+        Origin of the points' coordinates, in the scan's axes [m].
     axes : ndarray, shape (3, 3)
-        Columns, in the scan's axes; z along the view.
+        Columns: axes of the points' coordinates, in the scan's axes; z along the view.
     """
 
     points: Array
@@ -146,8 +146,10 @@ def triangulated(
     Raises
     ------
     InvalidInputError
-        If the spacing is not above zero, or points are on a line.
+        If the spacing is not above zero, points are on a line, or points are farther than
+        ``farthest`` of ``scan.toml`` from the median point.
     """
+    _check_strays(scan.points)
     axes = axes_along(scan.direction())
     middle = 0.5 * (scan.points.min(axis=0) + scan.points.max(axis=0))
     # along the axes, but from the scan's origin: a crop of the scan has the same squares
@@ -256,6 +258,19 @@ def _length(value: float, field: str) -> float:
     if not (math.isfinite(value) and value > 0.0):
         raise InvalidInputError(f"must be finite and above zero, got {value:g} m", field=field)
     return value
+
+
+def _check_strays(points: Array) -> None:
+    """Refuse points that are so far from the others that no triangulation resolves both."""
+    farthest = scan_table().scalar("scan", "farthest")
+    distances = np.abs(points - np.median(points, axis=0)).max(axis=1)
+    strays = int(np.count_nonzero(distances > farthest))
+    if strays:
+        raise InvalidInputError(
+            f"{strays} of {len(points)} points are more than {farthest:g} m from the median point, "
+            f"the farthest {distances.max():.3g} m: remove them, or cut the scan to the rock",
+            field="file",
+        )
 
 
 def _check_spread(points: Array, spacing: float | None = None) -> None:

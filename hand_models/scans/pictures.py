@@ -79,18 +79,19 @@ def plot_holds(
     Parameters
     ----------
     rock : Triangles
-        In the rock's frame [m].
+        Surface of the rock, in the rock's frame [m].
     points : ndarray, shape (n, 3)
         Points with a hand, in the rock's frame [m].
     values : ndarray, shape (n,)
-        What the best hand at each point holds.
+        What the best hand at each point holds, in the unit that ``label`` names.
     refused : mapping of str to ndarray, shape (m, 3)
         Points without a hold [m], by the kind of reason; each kind has a marker of its own.
     best : sequence of Pose
-        H of the best hands in the rock's frame, the best first.
+        Hand frames H of the best hands in the rock's frame, the best first.
     path : Path
         File of the picture; its ending chooses the format.
     title : str
+        Title of the picture.
     label : str
         Meaning of the values, with their unit.
     """

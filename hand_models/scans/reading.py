@@ -81,7 +81,7 @@ def read_scan(
     cell : float, optional
         Distance between neighbours of a grid, in the file's unit, in place of the file's.
     width : float, optional
-        In place of a unit: all lengths are scaled so that this is the longest side [m].
+        Length of the longest side, to which all lengths are scaled, in place of a unit [m].
 
     Raises
     ------

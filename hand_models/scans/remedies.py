@@ -29,6 +29,7 @@ class Remedy(NamedTuple):
     Attributes
     ----------
     option : {'std_ratio', 'hole'}
+        Option that is advised: of `drop_outliers`, or of `mesh_scan`.
     value : float
         Value of the option: standard deviations, or a width [m].
     left : int

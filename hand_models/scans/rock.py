@@ -25,9 +25,9 @@ class ScannedRock:
     Attributes
     ----------
     vertices : ndarray, shape (n, 3)
-        In the rock's frame [m].
+        Corners of the triangles, in the rock's frame [m].
     faces : ndarray of int, shape (m, 3)
-        Counterclockwise seen from outside.
+        Indices of each triangle's vertices, counterclockwise seen from outside.
     pose : Pose
         The rock's frame in the scan's, which has z up.
     holes : tuple of Hole
@@ -49,8 +49,8 @@ class ScannedRock:
         True if the triangles are the file's; True if these were turned over because they faced
         away from the given view.
     gaps : Gaps or None
-        What all triangles between the points bridge, also those that were left out; None for a
-        file's triangles.
+        All triangles between the points, also those that were left out, with the width that each
+        bridges; None for a file's triangles.
     """
 
     vertices: Array

@@ -67,14 +67,14 @@ def areas_of(points: Array, faces: Indices) -> Array:
     Parameters
     ----------
     points : ndarray, shape (n, 3)
-        [m]
+        Corners of the triangles [m].
     faces : ndarray of int, shape (m, 3)
-        Counterclockwise seen from outside.
+        Indices of each triangle's corners, counterclockwise seen from outside.
 
     Returns
     -------
     ndarray, shape (m, 3)
-        [m²]
+        Area vectors [m²].
     """
     a, b, c = (points[faces[:, i]] for i in range(3))
     return np.asarray(0.5 * np.cross(b - a, c - a))
@@ -86,7 +86,7 @@ class RawScan(NamedTuple):
     Attributes
     ----------
     points : ndarray, shape (n, 3)
-        In the file's axes and unit; not finite where nothing was measured.
+        Points in the file's axes and unit; not finite where nothing was measured.
     scanner : Pose or None
         Pose of the scanner, if the file has one; if the pose is turned, the points are in the
         scanner's frame.
@@ -109,7 +109,7 @@ class Scan:
     Attributes
     ----------
     points : ndarray, shape (n, 3)
-        Finite, z up [m].
+        The finite points, z up [m].
     read : int
         Number of points in the file, including those that were left out.
     view : ndarray, shape (3,), or None
@@ -241,16 +241,16 @@ def in_scan(cells: FilledCells, middle: Array, axes: Array) -> FilledCells:
     Parameters
     ----------
     cells : FilledCells
-        In coordinates from ``middle`` along ``axes``.
+        Filled cells, in coordinates from ``middle`` along ``axes``.
     middle : ndarray, shape (3,)
-        In the scan's axes [m].
+        Origin of these coordinates, in the scan's axes [m].
     axes : ndarray, shape (3, 3)
-        Columns, in the scan's axes.
+        Columns: axes of these coordinates, in the scan's axes.
 
     Returns
     -------
     FilledCells
-        With the scan's axis that is nearest to theirs.
+        Its axis is the scan's axis nearest to that of ``cells``.
     """
     axis = int(np.abs(axes[:, cells.axis]).argmax())
     value = float(middle[axis] + axes[axis, cells.axis] * cells.value)
@@ -268,14 +268,14 @@ def start_on(points: Array, scan: Scan, middle: Array, axes: Array) -> Array:
         Coordinates from ``middle`` along ``axes`` [m].
     scan : Scan
     middle : ndarray, shape (3,)
-        In the scan's axes [m].
+        Origin of the points' coordinates, in the scan's axes [m].
     axes : ndarray, shape (3, 3)
-        Columns, in the scan's axes; z along the view.
+        Columns: axes of the points' coordinates, in the scan's axes; z along the view.
 
     Returns
     -------
     ndarray, shape (3,)
-        One of the points [m].
+        One of ``points`` [m].
 
     Raises
     ------

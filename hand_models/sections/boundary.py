@@ -53,22 +53,23 @@ class Boundary:
 
     @cached_property
     def runs(self) -> tuple[Array, Indices, Indices]:
-        """Vertices (n, 2), and for each the first and the last of its polyline, (n,) [m]."""
+        """Vertices (n, 2) [m], and indices (n,) of the first and last of each one's polyline."""
         lengths = np.diff(self._ends, prepend=0)
         bounds = self._ends - lengths, self._ends - 1
         first, last = np.repeat(bounds, lengths, axis=1)
         return self._places, first, last
 
     def nearest(self, points: Complexes) -> tuple[Indices, Array, Complexes]:
-        """Return the nearest segment to each of n points.
+        """Return the nearest segment to each of n points s + i t [m].
 
         Returns
         -------
         segment : ndarray of int, shape (n,)
+            Index of the segment, counted through all polylines.
         part : ndarray, shape (n,)
             Place nearest to the point as a share of the segment's length, in [0, 1].
         away : ndarray of complex, shape (n,)
-            Vector from that place to the point [m].
+            Vector s + i t from that place to the point [m].
         """
         from hand_models.sections.compiled_polylines import nearest_segments
 
@@ -94,22 +95,24 @@ class Boundary:
 
 
 def strung(pieces: Sequence[Array]) -> tuple[Array, Indices]:
-    """Return the points of polylines one after another, and the index at which each ends."""
+    """Join the points of polylines to one array, (n, 2), with the index at which each ends."""
     return np.ascontiguousarray(np.concatenate(pieces)), np.cumsum([len(each) for each in pieces])
 
 
 def stretch_minima(values: Array, first: Indices) -> Indices:
-    """Return the index of the least value in each of several stretches of an array.
+    """Return the index of the least value in each of several runs of an array.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
+        k runs of values, one after another.
     first : ndarray of int, shape (k,)
-        Index at which each stretch begins; the first is 0.
+        Index at which each run begins; the first is 0.
 
     Returns
     -------
     ndarray of int, shape (k,)
+        Indices into ``values``.
     """
     least = np.minimum.reduceat(values, first)
     lengths = np.diff(first, append=len(values))

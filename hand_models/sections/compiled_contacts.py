@@ -208,20 +208,26 @@ def first_contacts(
 
     Parameters
     ----------
-    vertices, firsts, lasts : ndarray
-        Shapes (n, 2) and (n,) [m].
+    vertices, firsts, lasts : ndarray, shapes (n, 2), (n,) and (n,)
+        Vertices (s, t) [m], and the index of the first and of the last vertex of each one's
+        polyline (`Boundary.runs`).
     joints : ndarray, shape (m, 2)
-        [m]
+        Joints (s, t) about which the phalanges turn [m].
     face : ndarray, shape (3,)
         Where the face begins and ends along the phalanx, and its height [m].
     low, high : float
         Angles between which the phalanges turn [rad].
     fitted : float
-        Length on both sides that a parabola is fitted to [m].
+        Length of rock on each side of a contact to which a parabola is fitted [m].
     faceted : int
         1 if vertices are corners of the rock, 0 if they are places on a smooth curve.
     rounding : float
-        Angle by which one may fall short of a bound by rounding [rad].
+        Angle by which an angle may fall short of a bound by rounding [rad].
+
+    Returns
+    -------
+    tuple of (ndarray, ndarray, ndarray of bool), shape (m,) each
+        Angles [rad], distances [m] and flags of faces that lie flat, as `TurningFaces.contacts`.
     """
     start, end, height = face
     longest = 0.0
@@ -259,7 +265,10 @@ def first_contacts(
 def pierced_faces(
     vertices: Array, lasts: Indices, joints: Array, face: Array, angle: float
 ) -> Flags:
-    """Return whether the boundary passes through each face at an angle; as of `first_contacts`."""
+    """Return whether the rock's boundary crosses each face, (m,), with the phalanges at an angle.
+
+    ``angle``: of the phalanges [rad]; the other arguments are those of `first_contacts`.
+    """
     start, end, height = face
     found = np.zeros(len(joints), dtype=np.bool_)
     for i in range(len(joints)):

@@ -16,17 +16,21 @@ __all__ = ["highest_rock", "nearest_segments"]
 
 
 @compiled()
-def _from_segment(begin: Array, end: Array, point: Array) -> tuple[float, float, float]:
-    """Return the part of a segment nearest to a point, and the vector from there to the point."""
-    x, y = point[0] - begin[0], point[1] - begin[1]
-    u, v = end[0] - begin[0], end[1] - begin[1]
+def _from_segment(vertices: Array, at: int, s: float, t: float) -> tuple[float, float, float]:
+    """Return the part of segment ``at`` nearest to (s, t), and the vector from there to (s, t)."""
+    x, y = s - vertices[at, 0], t - vertices[at, 1]
+    u, v = vertices[at + 1, 0] - vertices[at, 0], vertices[at + 1, 1] - vertices[at, 1]
     part = min(max((x * u + y * v) / (u * u + v * v), 0.0), 1.0)
     return part, x - part * u, y - part * v
 
 
 @compiled("f2", "i1", "f2")
 def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Indices, Array, Array]:
-    """Return the nearest segment to each point; see `Boundary.nearest`."""
+    """Return the nearest segment to each of n points (n, 2) [m]; see `Boundary.nearest`.
+
+    ``vertices`` (p, 2) and ``ends``: points of the polylines [m], and the index at which each ends.
+    The vectors to the points are returned as (s, t), shape (n, 2).
+    """
     longest, begin = 1e-9, 0  # [m] or else the longest segment
     for end in ends:
         for i in range(begin, end - 1):
@@ -37,21 +41,21 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
     away = np.empty((len(points), 2))
     nearest = 0
     for i in range(len(points)):
-        point = points[i]
+        s, t = points[i]
         # the segment nearest to the point before is near to this one
-        _, x, y = _from_segment(vertices[nearest], vertices[nearest + 1], point)
+        _, x, y = _from_segment(vertices, nearest, s, t)
         least = math.sqrt(x * x + y * y) * (1.0 + 1e-12) + 1e-15  # [m] it is found once more
         square, begin = math.inf, 0
         for piece in range(len(ends)):
             at, begin = begin, ends[piece]
             while at < begin - 1:
-                x, y = point[0] - vertices[at, 0], point[1] - vertices[at, 1]
+                x, y = s - vertices[at, 0], t - vertices[at, 1]
                 # what is within so many segments of a vertex that is farther is farther, too
                 beyond = math.sqrt(x * x + y * y) - least
                 if beyond > longest:
                     at += int(beyond / longest)
                     continue
-                part, x, y = _from_segment(vertices[at], vertices[at + 1], point)
+                part, x, y = _from_segment(vertices, at, s, t)
                 if x * x + y * y < square:
                     square = x * x + y * y
                     least = min(least, math.sqrt(square))
@@ -63,7 +67,11 @@ def nearest_segments(vertices: Array, ends: Indices, points: Array) -> tuple[Ind
 
 @compiled("f2", "i1", "f1", "f1")
 def highest_rock(vertices: Array, ends: Indices, low: Array, high: Array) -> Array:
-    """Return the least t of polylines in each window low ≤ s ≤ high, or infinity."""
+    """Return the least t of polylines in each of n windows of s, (n,) [m]; infinite without rock.
+
+    ``vertices`` (p, 2) and ``ends``: points of the polylines [m], and the index at which each ends;
+    ``low`` and ``high``, (n,): the windows low ≤ s ≤ high [m].
+    """
     least = np.full(len(low), math.inf)
     for i in range(len(low)):
         begin = 0

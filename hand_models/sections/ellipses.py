@@ -54,18 +54,18 @@ class _Nearest(NamedTuple):
 
 
 class Ellipse(SmoothSection):
-    """An ellipse of rock, ``|A v + B v̄| ≤ ρ`` with v = q − c for points q.
+    """An ellipse of rock: points q = s + i t with ``|A v + B v̄| ≤ ρ``, where v = q − c.
 
     Parameters
     ----------
     centre : complex
         c [m].
     linear : tuple of complex
-        A and B.
+        A and B, which map the ellipse to a disc.
     rho : float
-        ρ, radius of the disc that A and B map the ellipse to.
+        ρ, radius of that disc.
     size : float
-        Factor from distances to that disc to approximate distances to the ellipse [m].
+        Factor by which a distance from that disc becomes an approximate one from the ellipse.
     """
 
     def __init__(
@@ -219,15 +219,20 @@ def arc(
     Parameters
     ----------
     centre : complex
-        [m]
+        Centre s + i t [m].
     axes : tuple of complex
-        e₁ and e₂ [m].
+        Half-diameters e₁ and e₂ [m].
     most : float
         φ goes from −most to most [rad].
     reach : float
         Distance from the origin within which points are dense [m].
     spacing : float
         Approximate distance of neighbouring points there [m].
+
+    Returns
+    -------
+    ndarray of complex
+        Points s + i t, φ ascending [m].
     """
 
     def places(turns: Array) -> Complexes:
@@ -249,14 +254,14 @@ def radii(linear: tuple[complex, complex], rho: float) -> tuple[complex, complex
     Parameters
     ----------
     linear : tuple of complex
-        A and B.
+        A and B of the ellipse (see `Ellipse`).
     rho : float
-        ρ.
+        ρ of the ellipse.
 
     Returns
     -------
     tuple of complex
-        The vectors v for which A v + B v̄ is ρ and iρ [m].
+        Vectors v from the centre for which A v + B v̄ is ρ, and iρ [m].
     """
     A, B = linear
     part = rho / (abs(A) ** 2 - abs(B) ** 2)
@@ -271,7 +276,7 @@ def rock_left(places: Complexes, axes: tuple[complex, complex]) -> Complexes:
     places : ndarray of complex
         Result of `arc`.
     axes : tuple of complex
-        Half-diameters e₁ and e₂ of the arc.
+        Half-diameters e₁ and e₂ that the arc was made with.
     """
     return places if (axes[0].conjugate() * axes[1]).imag > 0.0 else places[::-1]
 

@@ -36,17 +36,17 @@ NO_STRIPS = RockStrips(np.zeros(1), np.zeros(0, dtype=complex), np.zeros((0, 1))
 
 
 class FingerRock(NamedTuple):
-    """Rock under a finger.
+    """Rock under a finger, as its envelope: the least t anywhere across the finger's width.
 
     Attributes
     ----------
     tile : Section or None
-        What stands out first anywhere across the tiles; None if there is no rock.
+        Envelope across the tiles; None if there is no rock.
     frame : Section or None
-        What stands out first anywhere across the phalanges' frames, which are wider than their
-        tiles; None where it is the same.
+        Envelope across the phalanges' frames, which are wider than their tiles; None where it is
+        the same.
     strips : RockStrips
-        The rock across the tiles.
+        Depth of the rock behind the envelope in strips across the tiles.
     """
 
     tile: Section | None
@@ -55,5 +55,5 @@ class FingerRock(NamedTuple):
 
     @property
     def sections(self) -> tuple[Section, ...]:
-        """The sections that have rock."""
+        """Sections of ``tile`` and ``frame`` that are not None."""
         return tuple([each for each in (self.tile, self.frame) if each is not None])

@@ -35,8 +35,9 @@ class TurningFaces:
     ----------
     boundary : Boundary
     joint : ndarray of complex, shape (n,)
-        Joints about which the faces turn [m].
+        Joints s + i t about which the faces turn [m].
     face : Face
+        Face of each phalanx.
     low : float
         Angle of the phalanges at the start [rad].
     """

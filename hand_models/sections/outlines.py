@@ -17,12 +17,14 @@ __all__ = ["Outlines"]
 
 
 class Outlines(NamedTuple):
-    """Points on the rock in the planes of n fingers: p for each, in blocks of 16.
+    """Points on the rock in the planes of n fingers: p points for each, in blocks of 16.
+
+    Fingers with fewer points are filled up with points 1 km away.
 
     Attributes
     ----------
     points : ndarray of complex, shape (n, p)
-        s + i t of places on the rock, chain by chain; a filler is 1 km away [m].
+        s + i t of places on the rock, one boundary curve after another [m].
     lengths : ndarray, shape (n, p)
         Length of the rock's boundary that each point represents [m].
     centres : ndarray of complex, shape (n, p / 16)
@@ -34,7 +36,7 @@ class Outlines(NamedTuple):
     bare : ndarray of bool, shape (n, p)
         True for rock that the bare frame meets, beside the tiles.
     places, behind, across : ndarray, shapes (n, c), (n, c, k) and (n, k)
-        Rock in the strips across each finger's tiles, as in `RockStrips`; a filler is 1 km away.
+        Rock in the strips across each finger's tiles, as in `RockStrips`.
     """
 
     points: Complexes

@@ -62,7 +62,7 @@ class PolylineSection(Section):
 
     @cached_property
     def boundary(self) -> Boundary:
-        """Search structure of the polylines, made when first used; `highest` does not need it."""
+        """The polylines, prepared for searches when first used; `highest` does not need it."""
         return Boundary(self.pieces)
 
     @cached_property
@@ -82,7 +82,7 @@ class PolylineSection(Section):
         Parameters
         ----------
         joints : ndarray of complex, shape (n,)
-            [m]
+            Joints s + i t [m].
         face : Face
         low, high : float
             Angle of the phalanges from which they turn, and up to which [rad].
@@ -122,7 +122,7 @@ class PolylineSection(Section):
         Returns
         -------
         ndarray, shape (n,)
-            Infinite for a window without rock [m].
+            Least t in each window; infinite without rock [m].
         """
         from hand_models.sections.compiled_polylines import highest_rock
 

@@ -71,7 +71,7 @@ class Rest(NamedTuple):
 
 
 class Section(ABC):
-    """The rock in a plane with coordinates (s, t); t grows into the rock."""
+    """The rock in a finger's plane: s along the finger, t into the rock; base class of sections."""
 
     @abstractmethod
     def outline(self, reach: float, spacing: float) -> Sequence[Complexes]:
@@ -126,7 +126,7 @@ class Section(ABC):
         Returns
         -------
         ndarray
-            Of the places' shape; approximate, as `distance` [m].
+            Distances, in the shape of ``places``; approximate, as `distance` [m].
         """
         return np.array(list(map(self.distance, places.ravel().tolist()))).reshape(places.shape)
 

@@ -52,7 +52,7 @@ class SmoothSection(Section):
 
     @abstractmethod
     def tangent(self, joint: complex, height: float) -> Tangent | None:
-        """Return the tangent to the curved rock of the face's line as the phalanx turns.
+        """Return the direction of a phalanx in which its face's line touches the curved rock.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class SmoothSection(Section):
         Parameters
         ----------
         joint : complex
-            s + i t [m].
+            Joint, s + i t [m].
         arm : float
             Distance of the point from the joint [m].
 
@@ -85,7 +85,7 @@ class SmoothSection(Section):
         """
 
     def partings(self, joint: complex, u: complex, face: Face) -> Iterator[complex]:
-        """Yield separating lines between the rock and the face of a phalanx, by their normals.
+        """Yield normals of lines that may separate the rock from the face of a phalanx.
 
         Only lines that are known without search are tried.
 
@@ -192,9 +192,9 @@ class Disc(SmoothSection):
     Parameters
     ----------
     centre : complex
-        [m]
+        Centre s + i t [m].
     radius : float
-        [m]
+        Radius [m].
     """
 
     def __init__(self, centre: complex, radius: float) -> None:
@@ -327,7 +327,7 @@ def into_circle(away: complex, radius: float, arm: float) -> complex | None:
 
 
 def to_face(away: complex, u: complex, face: Face) -> complex:
-    """Return the vector to a centre from the place of a face nearest to it.
+    """Return the vector to a circle's centre from the place of a face that is nearest to it.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ def to_face(away: complex, u: complex, face: Face) -> complex:
     Returns
     -------
     complex
-        In the phalanx's axes: along it, and i times the component across it [m].
+        The vector in the phalanx's axes: real part along it, imaginary part across it [m].
     """
     place = u.conjugate() * away
     along = place.real

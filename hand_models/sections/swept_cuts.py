@@ -51,7 +51,7 @@ class Swept(NamedTuple):
     sine, cosine : float
         Sine and cosine of half the angle between the faces; both 0 for a hold without faces.
     grazing : float
-        Slope up to which a line counts as parallel to a face.
+        Slope up to which a line counts as parallel to a face, and so does not meet it.
     """
 
     scale_x: float
@@ -70,15 +70,18 @@ def entry_distances(shape: Swept, points: Sequence[Vector3], direction: Vector3)
     Parameters
     ----------
     shape : Swept
+        The hold.
     points : sequence of (float, float, float)
-        From the centre of the hold's ball, multiplied by the scales.
+        x, y, z from the ball's centre (0, 0, ``shape.depth``) in the hold's frame [m], each times
+        the scale of its axis (``shape.scale_x``, …).
     direction : (float, float, float)
-        A unit vector, multiplied by the scales.
+        x, y, z of a unit vector in the hold's frame, scaled likewise.
 
     Returns
     -------
     list of float
-        Negative where a point is inside; infinite where a line misses the rock [m].
+        Distance from each point, in metres of the hold's frame. Negative if the rock begins behind
+        the point, as for a point inside the rock; infinite if the ray's line misses the rock.
     """
     dx, dy, dz = direction
     a = dx * dx + dy * dy + dz * dz
@@ -120,7 +123,7 @@ def cut_of(shape: Swept, plane: FingerPlane) -> SmoothSection | None:
     ----------
     shape : Swept
     plane : tuple of float, length 9
-        See `FingerPlane`.
+        Axes s and t of the plane and its origin, scaled as `FingerPlane` says.
 
     Returns
     -------

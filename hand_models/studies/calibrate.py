@@ -85,11 +85,11 @@ def global_search(
     seed : int
         Seed of the random numbers, above 0.
     tick : callable
-        Called for each set tried.
+        Called without arguments for each set tried.
     closer : ndarray, shape (k,), optional
-        For each of the k data, the share of its tolerance that counts as one; 1 by default.
-    held : dict, optional
-        Shares of parameters that are held fixed, by their index.
+        Factor on the tolerance of each of the k data, to require some more closely; 1 by default.
+    held : dict of int to float, optional
+        Parameters that are held fixed: their values as shares, by their indices.
     """
     # a second's work to load, which only this study needs
     import cma
@@ -133,7 +133,7 @@ def global_search(
 
 
 def farthest_apart(sets: Array, count: int) -> list[int]:
-    """Return indices of sets far apart: the first set, then each farthest from those before.
+    """Return the indices of sets far apart: the first set, then each farthest from those before.
 
     Parameters
     ----------

@@ -108,7 +108,8 @@ def loading_planes(points: Array) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``arm``: values of a [m]; ``force`` [N] and ``moment`` [N·m]: the greatest in each plane;
+        ``arm``: values of a, one for each plane [m]; ``force`` [N] and ``moment`` [N·m]: the
+        greatest in each plane;
         ``best_for_force`` and ``best_for_moment``: the best over all planes, with
         ``arms_as_good``, the range of arms within 1 % of the best.
     """

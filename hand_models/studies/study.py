@@ -49,7 +49,10 @@ class Study(Protocol):
     """Interface of a study's module."""
 
     def run(self, progress: Progress, hand: ParameterTable) -> StudyResult:
-        """Compute the study's data and check its claims, for a hand's table."""
+        """Compute the study's data and check its claims, with the parameters of a hand.
+
+        ``progress``: called with (steps done, steps in all); ``hand``: all parameters of the hand.
+        """
 
     def plot(self, result: StudyResult) -> dict[str, Figure]:
         """Draw the study's pictures from its result.
@@ -57,7 +60,7 @@ class Study(Protocol):
         Returns
         -------
         dict of str to Figure
-            By the names of the files, without ending.
+            Pictures by the names of their files, without ending.
         """
 
 
@@ -104,7 +107,7 @@ def run_study(
     Returns
     -------
     result : StudyResult
-        With the data as ``result.json`` has them.
+        Result of the study, its data as in ``result.json``.
     files : list of Path
         Files written, ``result.json`` first.
 

@@ -110,9 +110,10 @@ def _ratio_test(tableau: Array, basis: list[int], entering: int) -> int | None:
 
 
 def stick_slip(travel: tuple[Array, Array], before: tuple[Array, Array]) -> Array:
-    """Return a of each pulley, which says whether the tendon slips there, and which way.
+    """Return the unknown a of each pulley, which says whether the tendon slips there and which way.
 
-    The tension after a pulley is λ s + ω a, with s the tension before it (see the module).
+    The tension after a pulley is λ s + ω a, with s the tension before it, λ and λ + ω the ratios of
+    the two tensions as the tendon slips toward its first and toward its last strand.
 
     Parameters
     ----------

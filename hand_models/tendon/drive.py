@@ -147,7 +147,7 @@ class TendonDrive:
         tensions : ndarray, shape (F,)
             Tension of each tendon [N].
         wound : tuple of ndarray
-            The five arguments of `winch_angle`.
+            The five arguments of `winch_angle`, each of shape (F,).
         """
         return np.array([self.torque(tensions), self.current(tensions), self.winch_angle(*wound)])
 

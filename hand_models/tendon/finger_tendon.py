@@ -183,7 +183,7 @@ class FingerTendon:
         Parameters
         ----------
         state : TendonState
-            At rest, not slack.
+            Tendon and tiles at rest, the tendon not slack.
         shift, turn : sequence of float, length n, optional
             δx_i, displacement of each phalanx along the rock toward the finger's base [m]; δq_i,
             turn of each joint, closing [rad]. Zero by default.
@@ -211,7 +211,7 @@ class FingerTendon:
         Parameters
         ----------
         state : TendonState
-            At rest.
+            Tendon and tiles at rest.
         shift, turn : sequence of float, length n, optional
             δx_i, displacement of each phalanx along the rock toward the finger's base [m]; δq_i,
             turn of each joint, closing [rad]. Zero by default.

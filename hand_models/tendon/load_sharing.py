@@ -103,11 +103,11 @@ def share_load(
 ) -> PalmSharing:
     """Return how N palm tiles on one tendon share a load from rest.
 
-    Solved as a linear complementarity problem. Tensions are in units of the mean contact stiffness
-    (so they are lengths), the palm's travel is one. The unknowns are the a of `complementarity`,
-    one for each pulley with friction, s′ = ρ s + ω a with ω = 1/ρ − ρ. They give all the strands s
-    = G a + g s_0, with s_0 by the tendon's length, and from these the slips δ = (k x − A − B)/(k +
-    k_p) and the travels V δ.
+    Solved as a linear complementarity problem (`stick_slip`), with the symbols of this module.
+    Tensions are in units of the mean contact stiffness (so they are lengths), the palm's travel is
+    one. Of each pulley with friction the unknown is a in s′ = ρ s + ω a, ω = 1/ρ − ρ. All strands
+    are affine in a, with the first tension from the tendon's length, and so are the slips
+    δ = (k x − A − B)/(k + k_p) and the tendon's travels past the pulleys.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class TendonResponse(NamedTuple):
     shears : ndarray, shape (F, n, m)
         T_i, shear of each tile on the rock [N].
     regime : ndarray of int, shape (F, m)
-        Index of the regime of stick and slip.
+        Index of the regime (which boundaries stick, and which way the others slip), among all 3ⁿ.
     """
 
     tensions: NDArray[Any]
@@ -72,7 +72,7 @@ class TendonRegimes:
     ----------
     tendons : sequence of FingerTendon, length F
     losses : ndarray, shape (F, n)
-        Tension at each tile at rest, over the motor's tension.
+        Tension at each tile at rest, as a share of the motor's tension.
     scheme : {'held', 'tension'}
         Whether motors stand still or keep their tension.
     """
@@ -147,7 +147,7 @@ class TendonRegimes:
         tension: NDArray[Any],
         at_rest: NDArray[Any],
     ) -> TendonResponse:
-        """Return tensions and shears after changes of load, each from the state of rest.
+        """Return tensions and shears after m changes of load, each change begun at rest.
 
         Parameters
         ----------

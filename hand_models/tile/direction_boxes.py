@@ -73,7 +73,7 @@ class DirectionBoxes(NamedTuple):
         return _steepness(self.last, self.near)
 
     def line(self, a: float, b: float) -> tuple[Array, Array]:
-        """Return bounds of ``a cos ω + b sin ω`` in each box, where it is positive.
+        """Return bounds of ``a cos ω + b sin ω`` in each box, valid where this is positive.
 
         Parameters
         ----------
@@ -131,10 +131,12 @@ def bounded(bound: Callable[[DirectionBoxes], Array], boxes: DirectionBoxes, mos
     Parameters
     ----------
     bound : callable
-        Returns for each box a number that no value in it exceeds, the closer the smaller the box.
+        Returns for each box a number that the function does not exceed in it; the smaller the box,
+        the closer the number is.
     boxes : DirectionBoxes
     most : float
-        Proposed bound, a little above the values: boxes above it are divided.
+        Proposed bound, a little above the function's values: boxes whose number exceeds it are
+        divided.
 
     Returns
     -------

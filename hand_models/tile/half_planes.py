@@ -202,7 +202,7 @@ def directional_strength(pieces: Sequence[HalfPlane], directions: Array) -> Arra
     Returns
     -------
     ndarray, shape (n,)
-        [N]; infinite where no half-plane bounds the load.
+        Largest load in each direction [N]; infinite where no half-plane bounds it.
     """
     found = np.full(len(directions), np.inf)
     for piece in pieces:

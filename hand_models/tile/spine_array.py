@@ -50,9 +50,9 @@ class Statistics(NamedTuple):
 
     Attributes
     ----------
-    mean, deviation : ndarray
-        Mean and standard deviation [N].
-    quantiles : ndarray, first axis of length 3
+    mean, deviation : ndarray, shape (...)
+        Mean and standard deviation for each direction of load [N].
+    quantiles : ndarray, shape (3, ...)
         5, 50 and 95 % quantiles [N].
     """
 
@@ -62,7 +62,7 @@ class Statistics(NamedTuple):
 
 
 def statistics(strengths: Array) -> Statistics:
-    """Return mean, standard deviation and quantiles of strengths [N] over their first axis."""
+    """Return mean, standard deviation and quantiles of strengths (trials, ...) over trials [N]."""
     return Statistics(
         strengths.mean(axis=0),
         strengths.std(axis=0, ddof=1),
@@ -71,7 +71,7 @@ def statistics(strengths: Array) -> Statistics:
 
 
 def spine_forces(limits: Array, play: Array, stiffness: float) -> Array:
-    """Return the force of every spine at the moment when the first of its tile reaches its limit.
+    """Return the force of every spine of a tile when the first of them reaches its limit.
 
     Parameters
     ----------
@@ -236,7 +236,8 @@ class SpineArray:
         Returns
         -------
         ndarray, shape (trials, ...)
-            Largest force [N]; infinite where the friction of pressing alone carries any load.
+            Strength F of each trial in each direction [N]; infinite where the friction of pressing
+            alone carries any load.
         """
         phi, theta = np.broadcast_arrays(np.asarray(angle, float), np.asarray(azimuth, float))
         size = (trials, self.spines)
@@ -260,7 +261,7 @@ class SpineArray:
         Returns
         -------
         ndarray, shape (trials,)
-            [N]
+            Strength of each trial [N].
         """
         return np.asarray(self._drag_forces(rng, (trials, self.spines)).sum(axis=1))
 

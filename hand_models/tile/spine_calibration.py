@@ -124,7 +124,7 @@ def measured_tile_shear(concrete: str) -> tuple[TileShear, ...]:
 
 
 def within_law(angles: Array, pull_off_angle: float) -> Array:
-    """Return which loading angles are in [0, φ_max], the range for which Eq. 21 is published.
+    """Return True for loading angles in [0, φ_max], the range for which Eq. 21 is published.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def within_law(angles: Array, pull_off_angle: float) -> Array:
     Returns
     -------
     ndarray of bool
-        The shape of ``angles``.
+        Flags in the shape of ``angles``.
     """
     return np.asarray((angles >= 0.0) & (angles <= pull_off_angle + BASE_TOLERANCES.angle))
 

@@ -243,10 +243,9 @@ class Surface:
         return np.where(phi >= 0.0, pulling, pressing)
 
     def straight_strength(self, angle: ArrayLike) -> Array:
-        """Return f_s(φ), strength in the finger's plane [N].
+        """Return f_s(φ), the strength in the finger's plane, of the shape of ``angle`` [N].
 
-        ``angle``: φ from shear toward pull-off [rad]; f_s never rises with φ, and is f_max if φ ≤
-        0.
+        ``angle``: φ from shear toward pull-off [rad]. f_s never rises with φ; f_max for φ ≤ 0.
         """
         return pull_strength(*self.straight_law, angle)
 
@@ -256,16 +255,18 @@ class Surface:
         return self.shear_limit, self.pull_off_limit, self.pull_off_angle, self.pull_off_exponent
 
     def sideways_share(self, angle: ArrayLike) -> Array:
-        """Return λ(φ), strength straight sideways over strength along the drag.
+        """Return λ(φ), strength straight sideways over that along the drag, shape of ``angle``.
 
-        ``angle``: φ from shear toward pull-off [rad]; λ never rises with φ.
+        ``angle``: φ from shear toward pull-off [rad]. λ never rises with φ.
         """
         ratio = np.clip(np.asarray(angle) / self.pull_off_angle, 0.0, 1.0)
         kept = 1.0 - (1.0 - self.lateral_pull_off_ratio) * ratio
         return np.asarray(self.lateral_limit / self.shear_limit * kept)
 
     def excess(self, shear: ArrayLike, normal: ArrayLike, lateral: ArrayLike = 0.0) -> Array:
-        """Return the excess of a whole tile's load over the limit surface [N]; negative inside.
+        """Return the excess of a tile's load over the limit surface [N]; negative inside.
+
+        The tile has all its spines on the rock.
 
         Parameters
         ----------
@@ -281,7 +282,7 @@ class Surface:
     def inner(self, count: int | None = None) -> tuple[HalfPlane, ...]:
         """Return half-planes inside the limit surface; see `inner_half_planes`.
 
-        ``count``: straight pieces from pure shear to φ_max; ``half_planes`` by default.
+        ``count``: number of straight pieces from pure shear to φ_max; ``half_planes`` by default.
         """
         return inner_half_planes(self if count is None else replace(self, half_planes=count))
 
@@ -331,7 +332,7 @@ def engaged_share(gap: ArrayLike, travel: float, exponent: float = 1.0) -> Array
     Returns
     -------
     ndarray
-        The shape of ``gap``.
+        φ, in the shape of ``gap``.
     """
     off = np.asarray(gap, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):

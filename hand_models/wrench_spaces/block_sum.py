@@ -35,6 +35,7 @@ class Block(NamedTuple):
     columns : ndarray of int, shape (d,)
         Indices of the columns in the wrench space.
     vertices : ndarray, shape (n, d)
+        Vertices of the polytope, as loads of these columns.
     A, b : ndarray, shapes (k, d), (k,)
         Rows that are enough to describe the polytope; in more than two columns its facets.
     """
@@ -83,6 +84,8 @@ class Sizes(NamedTuple):
 
 class BlockSum:
     """Minkowski sum of the polytopes of blocks, each mapped to wrenches by V.
+
+    *Scaled* wrenches have their moments divided by 0.1 m (`WRENCH_SCALE`): all components in N.
 
     Parameters
     ----------
@@ -181,7 +184,7 @@ class BlockSum:
         Parameters
         ----------
         slopes : ndarray, shape (m,)
-            Value of a unit of each load.
+            Coefficient of each load.
 
         Returns
         -------

@@ -25,6 +25,7 @@ def clipped(
     Parameters
     ----------
     vertices : ndarray, shape (n, r)
+        All vertices of the polytope.
     faces : Facets
         All facets of the polytope.
     cuts : Facets

@@ -26,6 +26,7 @@ class Facets(NamedTuple):
     normals : ndarray, shape (k, r)
         Unit outward normals.
     offsets : ndarray, shape (k,)
+        Largest product of each normal with the polytope's points.
     """
 
     normals: Array
@@ -35,14 +36,15 @@ class Facets(NamedTuple):
 class HalfSpaces(NamedTuple):
     """``normals @ w ≤ offsets`` and, for a flat set, ``equation_normals @ w = equation_offsets``.
 
-    Normals of a `WrenchSpace` have unit length as functions of the scaled wrench, so that a
-    violation is a distance [N].
+    For a `WrenchSpace`, a normal has length one as a function of the scaled wrench (moments divided
+    by 0.1 m), so that a violation is a distance [N].
 
     Attributes
     ----------
     normals, offsets : ndarray, shapes (k, d), (k,)
+        Inequalities.
     equation_normals, equation_offsets : ndarray, shapes (e, d), (e,)
-        e = 0 for a set that is not flat.
+        Equations; e = 0 for a set that is not flat.
     """
 
     normals: Array
@@ -60,10 +62,12 @@ def affine_hull(edges: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     edges : ndarray, shape (n, d)
+        Vectors.
 
     Returns
     -------
     directions : ndarray, shape (r, d)
+        Directions, one in a row.
     reach : ndarray, shape (r,)
         Singular value along each direction, descending.
     """
@@ -81,7 +85,7 @@ def lifted(faces: Facets, directions: Array, reach: Array, base: Array) -> HalfS
     Parameters
     ----------
     faces : Facets
-        In r dimensions, in coordinates divided by the reach, about ``base``.
+        Facets in r dimensions, in coordinates divided by the reach, about ``base``.
     directions, reach : ndarray, shapes (r, d), (r,)
         Result of `affine_hull`.
     base : ndarray, shape (d,)
@@ -90,7 +94,7 @@ def lifted(faces: Facets, directions: Array, reach: Array, base: Array) -> HalfS
     Returns
     -------
     HalfSpaces
-        In d dimensions, with d − r equations.
+        The same set in d dimensions, with d − r equations.
     """
     normals = (faces.normals / reach) @ directions
     lengths = np.linalg.norm(normals, axis=1)

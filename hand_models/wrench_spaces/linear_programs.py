@@ -22,7 +22,9 @@ def linear_program(
     Parameters
     ----------
     cost : ndarray, shape (n,)
+        Coefficients of the objective.
     A, b : ndarray, shapes (k, n), (k,)
+        Constraints.
     what : str
         Name of the program, for error messages.
     tolerance : float, optional
@@ -75,15 +77,16 @@ def ends_along(
     Parameters
     ----------
     direction, origin : ndarray, shape (n,)
-        d and o.
+        Direction d and point o.
     generators : ndarray, shape (n, m)
-        V.
+        V, change of the point per unit of each y.
     A, b : ndarray, shapes (k, m), (k,)
+        Constraints on y.
 
     Returns
     -------
     tuple of (float, float), or None
-        None if no t is feasible.
+        Least and largest t; None if no t is feasible.
 
     Raises
     ------

@@ -44,7 +44,7 @@ def extreme_points(image: Array, columns: int) -> Summand:
     Parameters
     ----------
     image : ndarray, shape (n, 6)
-        Images of the vertices.
+        Images of the vertices, such as wrenches.
     columns : int
         Number of the block's columns. Where the map is one to one on more than two columns, all
         images are extreme, and no hull is computed: it might merge facets and lose some of them.
@@ -99,6 +99,7 @@ def facets(parts: Sequence[Summand], r: int, rounding: float) -> Facets:
     parts : sequence of Summand
         Segments and polygons with points in r dimensions.
     r : int
+        Dimension of the sum.
     rounding : float
         Distance that rounding may move points, in units of the points.
     """

@@ -21,10 +21,10 @@ class Polytope(NamedTuple):
     Attributes
     ----------
     vertices : ndarray, shape (n, d)
-        None, n = 0, if the set is empty.
+        Vertices; n = 0 if the set is empty.
     facets : ndarray of int
-        Rows of A that are enough to describe the set: in more than two dimensions no redundant
-        row, in one or two every row that touches the set.
+        Indices of the rows of A that are enough to describe the set: in more than two dimensions
+        no redundant row, in one or two every row that touches the set.
     """
 
     vertices: Array

@@ -41,7 +41,7 @@ __all__ = ["Row", "WrenchSpace"]
 
 
 class Row(NamedTuple):
-    """The name of an inequality.
+    """Name of an inequality of a wrench space: the part and the load that it limits.
 
     Attributes
     ----------
@@ -348,9 +348,9 @@ class WrenchSpace:
         Parameters
         ----------
         wrench : array_like, shape (6,)
-            [N, N·m]
+            Wrench on the rock, in H [N, N·m].
         tolerance : float, optional
-            Distance in scaled wrenches [N].
+            Distance, with moments divided by 0.1 m (*scaled* wrenches) [N].
         """
         w = finite_vector(wrench, 6, "wrench")
         faces = self.half_spaces()

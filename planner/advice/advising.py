@@ -27,6 +27,7 @@ def advise(
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective.
     attempt : callable
         Plans a candidate stance; see `planner.advice.trials.Attempt`.
     plans : int, optional

@@ -3,14 +3,14 @@
 The hands stay in W. A shift d of the body, in the axes of B, moves its centre of mass: the hands
 then have to exert the same force f and, about the former origin of B, the moment
 
-    m(d) = m₀ + d × f.
+    m(d) = m₀ + d × f,    m₀ the moment without a shift.
 
 The least utilisation u is a convex function of the body wrench, hence of d. The multipliers ν of
-the balance give a subgradient: u(d') ≥ u(d) + (f × ν_m)·(d' − d). So each plan for a shift adds a
-cut (Kelley 1960), and a small linear program over all cuts gives the next shift to plan, and a
-lower bound on u. A tilt about the centre of mass changes neither force nor moment, only how far the
-limbs reach and the torques of their joints. Joint angles follow the body: the subgradient assumes
-the present angles, but a returned shift is planned with its own.
+the balance, ν_m for the moments, give a subgradient: u(d') ≥ u(d) + (f × ν_m)·(d' − d). So each
+plan for a shift adds a cut (Kelley 1960), and a small linear program over all cuts gives the next
+shift to plan, and a lower bound on u. A tilt about the centre of mass changes neither force nor
+moment, only how far the limbs reach and the torques of their joints. Joint angles follow the body:
+the subgradient assumes the present angles, but a returned shift is planned with its own.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def slope(trial: StanceTrial) -> Array:
     Returns
     -------
     ndarray, shape (3,)
-        In the axes of body frame B [1/m].
+        Gradient in the axes of body frame B [1/m].
     """
     lacking = direction(trial)
     assert lacking is not None
@@ -104,9 +104,10 @@ class BodySearch:
         self._allowed = -math.inf if now is None else min(now.distance, 0.0)
 
     def run(self) -> None:
-        """Plan the shifts with the least lower bound, until this equals the best utilisation.
+        """Plan one shift after another, until none can have a lower utilisation than the best.
 
-        The bound comes from the cutting planes. Stops, too, once the budget of plans is used up.
+        Each is the shift with the least lower bound on the utilisation, by the cutting planes so
+        far. The search stops, too, once the budget of plans is used up.
         """
         self._keep(np.zeros(3), self.trials.base)
         for _ in range(14):  # plans
@@ -119,7 +120,7 @@ class BodySearch:
             self._look(shift)
 
     def changes(self) -> list[Change]:
-        """Return the best shift found, and the smallest shift that should be feasible.
+        """Return the best shift found, and the smallest shift that the cuts predict to be feasible.
 
         Returns
         -------
@@ -145,8 +146,8 @@ class BodySearch:
         Returns
         -------
         list of Change
-            With known joints, one for each tilt. Otherwise the tilt whose reach gives the lowest
-            bound on the utilisation, if that bound is well below the best utilisation.
+            With known joints, a change for each tilt. Otherwise that for the tilt whose reach gives
+            the lowest bound on the utilisation, if the bound is well below the best utilisation.
         """
         if not self._known or self.range.tilt == 0.0:
             return []
@@ -179,7 +180,7 @@ class BodySearch:
         Returns
         -------
         ndarray, shape (s, 3)
-            In the axes of body frame B [m]; the first is zero.
+            Shifts in the axes of body frame B [m]; the first is zero.
         """
         steps = np.linspace(-self.range.shift, self.range.shift, 7)  # along each axis
         shifts = np.array([(x, y, z) for x in steps for y in steps for z in steps])
@@ -316,9 +317,9 @@ class BodySearch:
         Parameters
         ----------
         shift : ndarray, shape (3,)
-            In the axes of body frame B [m].
+            Shift in the axes of body frame B [m].
         tilt : _Tilt, optional
-            Rotation about the centre of mass.
+            Rotation of the body about its centre of mass; none by default.
         """
         stance = self.stance
         if np.linalg.norm(shift) < SETTINGS.least_shift:

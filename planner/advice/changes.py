@@ -74,7 +74,7 @@ class Change(NamedTuple):
     Attributes
     ----------
     kind : str
-        Such as ``body`` or ``grasp``.
+        Kind of the change, such as ``body`` or ``grasp``.
     limbs : tuple of str
         Limbs whose hands change.
     words : str
@@ -113,6 +113,7 @@ def combined(changes: Sequence[Change]) -> Change | None:
     Parameters
     ----------
     changes : sequence of Change
+        Changes to be made together.
 
     Returns
     -------
@@ -166,6 +167,7 @@ def changed(question: Question, changes: Mapping[str, Any]) -> Question:
     Parameters
     ----------
     question : Question
+        Question to be changed; it stays as it is.
     changes : mapping of str to object
         New values by path, as in `planner.result.Advice`.
 

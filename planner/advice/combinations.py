@@ -103,7 +103,8 @@ class CombinationSearch:
     gives : ndarray, shape (k, v)
         Largest wrench component along each direction that each variant can exert.
     needs : ndarray, shape (k, s)
-        Needed wrench component along each direction with each shift, minus 1.
+        Wrench component needed along each direction with each shift, minus 1. A choice is feasible
+        if its sum of ``gives``, minus ``needs``, is at least 1 along all directions.
     sizes : ndarray, shape (v,)
         Size of each variant's change, as in `planner.result.Advice`.
     shift_sizes : ndarray, shape (s,)

@@ -54,6 +54,7 @@ def grasps(prepared: PreparedStance, order: Sequence[int]) -> Iterator[Change]:
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     order : sequence of int
         Indices of the hands to change, in this order.
     """
@@ -87,6 +88,7 @@ def variants(prepared: PreparedStance, index: int) -> Iterator[Change]:
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     index : int
         Index of the hand.
     """
@@ -124,7 +126,7 @@ def closings(prepared: PreparedStance) -> Iterator[Change]:
 
 
 def fingers(turn: float) -> str:
-    """Return words for a rotation of the outer fingers.
+    """Return words for a rotation of the outer fingers: ``the outer fingers at 90°``.
 
     Parameters
     ----------
@@ -171,6 +173,7 @@ def placed(prepared: PreparedStance, index: int, motions: Sequence[_Motion]) -> 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     index : int
         Index of the hand.
     motions : sequence of (float, float, float)
@@ -221,7 +224,7 @@ def _moved(
 
 
 def way_motions() -> list[_Motion]:
-    """Return small shifts of a hand along its palm, as motions for `placed`."""
+    """Return shifts of a hand by 2 cm along ±x and ±y of H, as motions for `placed`."""
     return [(x, y, 0.0) for x, y in SETTINGS.palm_ways]
 
 
@@ -237,11 +240,12 @@ def turn_motions(turns: Sequence[float] = SETTINGS.palm_turns) -> list[_Motion]:
 
 
 def unseated(hand: HandOnHold, index: int) -> dict[str, Any]:
-    """Return the changes that remove a hand's automatic seat from a question.
+    """Return the changes of a question that leave out how a hand is seated, as it gets a pose.
 
     Parameters
     ----------
     hand : HandOnHold
+        The hand in the question.
     index : int
         Index of the hand in the question.
 
@@ -263,6 +267,7 @@ def rock_pose(prepared: PreparedStance, index: int) -> Pose:
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     index : int
         Index of the hand.
     """

@@ -52,6 +52,7 @@ class NewHold:
     trials : Trials
         Budget of plans.
     limb : str
+        Name of the limb that gets the hold.
 
     Attributes
     ----------
@@ -74,7 +75,7 @@ class NewHold:
 
     @property
     def likes(self) -> list[int]:
-        """Indices of the hands that the new hand may copy with their rock; none on shared rock."""
+        """Indices of the hands that the new hand may copy; hands that share a rock are left out."""
         limbs, shared = self.prepared.limbs, _sharing(self.prepared)
         likes = [i for i in range(len(limbs)) if i != self.index and i not in shared]
         return sorted(likes, key=limbs.__getitem__)
@@ -176,7 +177,9 @@ def every_hold(trials: Trials, limb: str) -> Iterator[Change]:
     Parameters
     ----------
     trials : Trials
+        Budget of plans; its unchanged stance is the start.
     limb : str
+        Name of the limb.
     """
     search = NewHold(trials, limb)
     turns = [math.radians(turn) for turn in range(-135, 181, 45)]  # [rad] all around
@@ -194,7 +197,7 @@ def try_new_holds(trials: Trials, most: int = 1) -> None:
     trials : Trials
         Budget of plans, which collects the results.
     most : int, optional
-        Number of limbs whose holds are refined after a first look.
+        Number of limbs whose best hold is refined, once each limb has had a plan.
     """
     limbs = trials.base.prepared.limbs
     searches = []

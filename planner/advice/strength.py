@@ -15,7 +15,7 @@ __all__ = ["lighter", "stronger"]
 
 
 def stronger(trials: Trials, order: Sequence[int], most: int) -> None:
-    """Find by how much the rock must be stronger: under all hands, then under single hands.
+    """Find the factors on the rock's strength, under all hands or one, for a feasible stance.
 
     Results are kept in ``trials``.
 

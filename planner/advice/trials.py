@@ -77,7 +77,7 @@ class Attempt(Protocol):
         Returns
         -------
         StanceTrial
-            Its utilisation is infinite if the stance has no plan.
+            Plan; its utilisation is infinite if the stance has none.
         """
 
 
@@ -87,9 +87,11 @@ class Tried(NamedTuple):
     Attributes
     ----------
     change : Change
+        Proposed change of the unchanged question.
     question : Question
         The changed question.
     trial : StanceTrial
+        Plan of the changed question's stance.
     """
 
     change: Change
@@ -143,7 +145,7 @@ class Trials:
         self._odd = _odd(self.base.prepared)
 
     def holds(self, utilisation: float) -> bool:
-        """Return whether a utilisation is feasible: within the question's cap on it."""
+        """Return whether a utilisation is feasible: within the cap that the question sets."""
         return utilisation <= self.question.limits.utilisation + CAP_SLACK
 
     @property
@@ -161,6 +163,7 @@ class Trials:
         Parameters
         ----------
         candidates : iterable of Change
+            Changes to try, each alone.
 
         Returns
         -------
@@ -180,8 +183,8 @@ class Trials:
         Returns
         -------
         StanceTrial or None
-            Its utilisation is infinite if the stance has no plan. None if the change is not
-            `possible`.
+            Plan of the change; its utilisation is infinite if there is none. None if the change is
+            not `possible`.
         """
         for each, question in self._asked([change]):
             return self._tried(each, question)
@@ -242,7 +245,7 @@ class Trials:
         Returns
         -------
         StanceTrial
-            Its utilisation is infinite if the stance has no plan.
+            Plan; its utilisation is infinite if the stance has none.
         """
         return self._try(prepare_stance(replace(question, objective=objective)))
 
@@ -277,11 +280,12 @@ def direction(trial: StanceTrial) -> Array | None:
     Parameters
     ----------
     trial : StanceTrial
+        Plan of the stance, or the failed attempt at one.
 
     Returns
     -------
     ndarray, shape (6,), or None
-        In body frame B [1/N, 1/(N·m)]; of any length. None if no program was solved.
+        Direction of any length, in body frame B [1/N, 1/(N·m)]. None if no program was solved.
     """
     outcome, data = trial.outcome, trial.data
     if outcome.solved and outcome.balance_dual is not None:

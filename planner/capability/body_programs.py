@@ -167,7 +167,7 @@ class BodyPrograms:
         Parameters
         ----------
         goal : ndarray, shape (n,)
-            Not zero.
+            Direction in the space of t; not zero.
         columns : ndarray, shape (6, n)
             Directions of body wrenches in body frame B, over `WRENCH_UNIT`; not zero.
         start : ndarray, shape (6,)
@@ -202,9 +202,9 @@ class BodyPrograms:
         Parameters
         ----------
         goal : ndarray, shape (n,)
-            Not zero.
+            Direction in the space of t; not zero.
         ways : ndarray, shape (k, n)
-            Directions of the k acceleration components of `Motion`, in world frame W.
+            Directions of acceleration, as columns of the k components of `Motion`, in frame W.
 
         Returns
         -------

@@ -177,6 +177,7 @@ class BodySpace(BodyPrograms):
         Returns
         -------
         BodySection
+            The plane, and the polygon of feasible body wrenches in it.
 
         Raises
         ------
@@ -303,7 +304,7 @@ class BodySpace(BodyPrograms):
         motion = self.motion
         if motion is None:
             raise InvalidInputError(
-                "does not determine the mass, which accelerations require; give load instead",
+                "gives no mass, and accelerations require one; give load instead of body_wrench",
                 field="body_wrench",
             )
         k = motion.wrench.shape[1]
@@ -336,7 +337,7 @@ def checked_axes(axes: Sequence[str]) -> tuple[str, str]:
     Parameters
     ----------
     axes : sequence of str
-        To be two of `WRENCH_COMPONENTS`.
+        Names to check; valid are two of `WRENCH_COMPONENTS`.
 
     Raises
     ------

@@ -55,8 +55,8 @@ def measured(draw: ParameterSample, hand: ParameterTable) -> dict[str, Array]:
     Returns
     -------
     dict of str to ndarray, shape (k,)
-        k numbers by measurement, in the units of ``[measurements]`` of the experiments' parameter
-        file; a pull is zero where the gripper cannot grip.
+        k numbers for each measurement, by its name, in the units of ``[measurements]`` of the
+        experiments' parameter file; a pull is zero where the gripper cannot grip.
     """
     numbers, surfaces = own_hand(draw.hand, hand), own_surfaces(draw.surfaces)
     tile, rock = (Surface.named(name, surfaces) for name in ("sandpaper-36", "rock"))
@@ -217,7 +217,7 @@ class MeasurementStudy:
         Returns
         -------
         dict of str to Figure
-            With the key ``measure``.
+            The figure, with the key ``measure``.
         """
         rows = result.data["measurements"][::-1]
         places = np.arange(len(rows))

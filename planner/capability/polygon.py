@@ -3,8 +3,8 @@
 Each queried direction gives a support point of the set and a half-plane that contains the set. The
 convex hull of the points lies within the set, the intersection of the half-planes around it. Where
 these polygons are farthest apart, the normal of the inner edge is queried next (Bretl and Lall,
-Testing static equilibrium for legged robots, IEEE Transactions on Robotics 24, 2008). Polygons are
-found exactly once each edge has been queried, and so are segments and points.
+Testing static equilibrium for legged robots, IEEE Transactions on Robotics 24, 2008). Once each
+edge has been queried, the result is exact, be it a polygon, a segment or a point.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class SupportPoint(NamedTuple):
     normal : ndarray, shape (2,)
         Unit vector of the direction.
     point : ndarray, shape (2,)
-        In the unit of the set.
+        The point, in the unit of the set.
     limiting : LimitName or None
         Limit that bounds the set there.
     """

@@ -47,6 +47,7 @@ def survey(
     Parameters
     ----------
     wrist : FloatingWrist
+        Model of the wrist, with its hand closed on its hold.
     per_axis : int
         Number of grid poses along each of six axes.
     progress : callable, optional
@@ -55,6 +56,7 @@ def survey(
     Returns
     -------
     Survey
+        Feasible poses and wrenches, and the limit reached along each axis.
 
     Raises
     ------

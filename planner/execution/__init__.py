@@ -1,4 +1,4 @@
-"""Execution of a plan as it is: equilibria of the body on its limbs and hands."""
+"""Execution of a plan as it is: reactions to its tensions, equilibria on limbs and hands."""
 
 import lazy_loader
 import numpy.typing  # noqa: F401 - whole, before threads load modules that ask for parts of it

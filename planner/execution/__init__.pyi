@@ -1,2 +1,8 @@
 from .equilibrium import Equilibria as Equilibria, LimbPull as LimbPull, equilibria as equilibria
-from .open_loop import execute as execute, find_open_loop as find_open_loop
+from .open_loop import (
+    Passes as Passes,
+    execute as execute,
+    execute_closed as execute_closed,
+    find_open_loop as find_open_loop,
+)
+from .set_points import sent_plans as sent_plans, without_margins as without_margins

@@ -31,7 +31,7 @@ from planner.programs import CAP_SLACK
 from planner.question import OpenLoopSettings
 from planner.result import HandPlan, OpenLoop, OpenLoopSample, recover_floating_hand
 
-__all__ = ["Passes", "execute", "find_open_loop"]
+__all__ = ["Passes", "execute", "execute_closed", "find_open_loop"]
 
 Passes = Callable[[Sequence[SettledHand], Sequence[HandPlan], OpenLoopSample], bool]
 """Returns whether closed hands, with their loads and wrists in equilibrium, pass the checks."""
@@ -146,13 +146,41 @@ def execute(
         there = [each for each in outcomes if isinstance(each, SettledHand)]
         if len(there) == len(outcomes):
             whole.append((k, there))
-    for first in range(0, len(whole), EXECUTION_SETTINGS.at_once):
-        part = whole[first : first + EXECUTION_SETTINGS.at_once]
-        found = _settled_on(prepared, hands, [there for _, there in part], idle)
-        for (k, there), (sample, loads) in zip(part, found, strict=True):
-            if sample.found and passes(there, loads, sample):
-                samples[k] = sample
+    found = execute_closed(prepared, hands, [there for _, there in whole], idle, passes)
+    for (k, _), sample in zip(whole, found, strict=True):
+        samples[k] = sample
     return samples, refused, reasons
+
+
+def execute_closed(
+    prepared: PreparedStance,
+    hands: Sequence[HandPlan],
+    closed: Sequence[Sequence[SettledHand]],
+    idle: float = 0.0,
+    passes: Passes = lambda *_: True,
+) -> list[OpenLoopSample]:
+    """Execute a plan as it is on hands that have closed otherwise than planned.
+
+    Parameters
+    ----------
+    prepared, hands, idle, passes
+        As of `execute`.
+    closed : sequence of sequence of SettledHand, shape (s, n)
+        Closed hands of each sample.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes before all samples are in equilibrium.
+    """
+    samples: list[OpenLoopSample] = []
+    for first in range(0, len(closed), EXECUTION_SETTINGS.at_once):
+        part = closed[first : first + EXECUTION_SETTINGS.at_once]
+        found = _settled_on(prepared, hands, part, idle)
+        for there, (sample, loads) in zip(part, found, strict=True):
+            passed = sample.found and passes(there, loads, sample)
+            samples.append(sample if passed else OpenLoopSample(False))
+    return samples
 
 
 def _settled_on(

@@ -76,6 +76,7 @@ def limit_name(limb: str, row: Row) -> LimitName:
     limb : str
         Limb of the hand that has the wrench space.
     row : Row
+        Row of that wrench space.
     """
     return LimitName(limb, row.finger, row.phalanx, row.limit, row.joint)
 
@@ -86,6 +87,7 @@ def joint_name(limb: str, joint: str, slides: bool) -> LimitName:
     Parameters
     ----------
     limb, joint : str
+        Names of the limb and of its joint.
     slides : bool
         Whether the joint is prismatic, so that its load is a force.
     """
@@ -98,10 +100,11 @@ class LimitUse(NamedTuple):
     Attributes
     ----------
     name : LimitName
+        Name of the limit.
     load : float
-        [N], [N·m] or [A]
+        Load on the limit [N], [N·m] or [A].
     capacity : float
-        In the unit of the load.
+        Load at utilisation 1, in the same unit.
     """
 
     name: LimitName

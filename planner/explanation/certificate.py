@@ -66,6 +66,7 @@ def certify(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     sets : Sets
         Wrench spaces of the hands, and their scaled rows.
     known : Outcome

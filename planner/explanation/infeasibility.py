@@ -76,7 +76,8 @@ class FarkasProgram:
     """Linear program whose solution is a Farkas certificate; not thread-safe.
 
     Columns are d⁺ and d⁻ (nb each; d is a start plus d⁺ − d⁻), λ (n), and the positive and negative
-    parts of Gᵀd − Hᵀλ (M each). Rows define these parts (M); the last row sums d⁺, d⁻, λ.
+    parts of Gᵀd − Hᵀλ (M each). Rows define these parts (M); the last row sums d⁺, d⁻, λ. X is
+    `LOAD_BOX`, the largest size of a load.
 
     Parameters
     ----------
@@ -350,6 +351,7 @@ class HardRowSystem:
         Parameters
         ----------
         constraints : iterable of LimitName
+            Names of the selected constraints.
         balance : bool, optional
             Whether the body's balance takes part.
 

@@ -42,6 +42,7 @@ def irreducible_set(
     Parameters
     ----------
     system : HardRowSystem
+        Named constraints of the stance.
     suspects : collection of LimitName
         Constraints among which the subset is sought; all constraints if these are feasible.
 
@@ -88,6 +89,7 @@ def blocks_up_to(system: HardRowSystem, names: Collection[LimitName]) -> float:
     Parameters
     ----------
     system : HardRowSystem
+        Named constraints of the stance.
     names : collection of LimitName
         Infeasible constraints.
 
@@ -111,7 +113,7 @@ def sufficient_alone(
     Parameters
     ----------
     system : HardRowSystem
-        Infeasible with all its constraints.
+        Named constraints of the stance, infeasible together.
     irreducible : tuple of LimitName or None
         An irreducible infeasible subset: only its members can suffice. Each proof that turns up
         narrows them further. They are tried together, then by halves.
@@ -119,8 +121,8 @@ def sufficient_alone(
     Returns
     -------
     tuple of LimitName or None
-        In the order of ``irreducible``. None if that is None, if rounding or a deadline leaves the
-        answer undecided, or if more than 24 members would have to be tried one by one.
+        Constraints in the order of ``irreducible``. None if that is None, if rounding or a deadline
+        leaves the answer undecided, or if more than 24 members would have to be tried one by one.
     """
     if not irreducible:
         return irreducible

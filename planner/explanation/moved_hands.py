@@ -22,11 +22,12 @@ __all__ = ["changed_contacts"]
 
 
 def changed_contacts(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[str]:
-    """Yield a sentence for each compliant hand that would close otherwise where its wrist goes.
+    """Yield a sentence for each compliant hand that would close differently at its planned pose.
 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     hands : sequence of HandPlan
         A plan's hands, in the order of the stance.
     """

@@ -50,6 +50,7 @@ def tension_path(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     sets : Sets
         Wrench spaces of the hands, and their scaled rows; linearised about the plan.
     loads : sequence of ndarray

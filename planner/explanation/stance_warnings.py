@@ -30,6 +30,7 @@ def oddities(prepared: PreparedStance) -> tuple[tuple[Finding, ...], tuple[str, 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
 
     Returns
     -------
@@ -63,6 +64,7 @@ def warnings(stance: Stance, batch: HandBatch) -> tuple[str, ...]:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     batch : HandBatch
         Settled hands of the stance, in its order.
     """
@@ -272,7 +274,7 @@ def strained_preloads(prepared: PreparedStance) -> Iterator[str]:
 
 
 def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
-    """Yield warnings about a plan's floating wrists: moved or turned too far, or unstable.
+    """Yield warnings about a plan's floating wrists that move or turn too far, or are unstable.
 
     Beyond 5 mm or 50 mrad the linear step from rest is uncertain; unstable is a wrist whose least
     stiffness is not above zero.
@@ -280,6 +282,7 @@ def far_wrists(hands: Sequence[HandPlan]) -> Iterator[str]:
     Parameters
     ----------
     hands : sequence of HandPlan
+        Hands of the plan, in the order of the stance.
     """
     for hand in hands:
         if hand.wrist is None:

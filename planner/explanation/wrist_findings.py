@@ -24,14 +24,15 @@ ONE_OF_A_PLAN: Final = (PALM_WITHOUT_TRAVEL, TILE_STRETCHED_FAR)
 
 
 def palm_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Iterator[Finding]:
-    """Yield at most one finding: the fixed hand whose palm lacks most travel for its loads.
+    """Yield at most one finding: the fixed hand whose palm would have to travel most for its loads.
 
-    A palm shears by its springs and presses past the gap of its nearest tile. A fixed wrist moves
-    by neither, and its plan takes the palm's loads as free reactions.
+    A palm carries shear as its springs give, and pressing only once it has crossed the gap of its
+    nearest tile. A fixed wrist does not travel, and its plan takes both loads as free reactions.
 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     hands : sequence of HandPlan
         A plan's hands, in the order of the stance.
     """
@@ -75,6 +76,7 @@ def stretch_findings(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Ite
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     hands : sequence of HandPlan
         A plan's hands, in the order of the stance.
     """

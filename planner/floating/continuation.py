@@ -61,6 +61,7 @@ def least_use(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     budget : Budget
         Largest number of conic programs.
     near : WristSolution, optional
@@ -113,6 +114,7 @@ def most_load(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     plan : WristSolution
         Result of `least_use` for the whole body wrench.
     known : LargestFactor or None

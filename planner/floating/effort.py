@@ -122,7 +122,7 @@ class LeastEffort(Goal):
 
 
 def with_room(cap: float, used: float) -> float:
-    """Return a cap that leaves a plan at the cap some room for rounding.
+    """Return the cap on the utilisation, raised a little if the plan uses all of it, for rounding.
 
     Parameters
     ----------
@@ -154,6 +154,7 @@ def best_within(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     plan : WristSolution
         Start plan, within the cap.
     cap : float

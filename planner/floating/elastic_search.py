@@ -40,14 +40,15 @@ __all__ = ["find_wrists", "firm_rows", "first_plan", "pressing", "without_hindra
 
 
 def first_plan(hands: HandSets, factor: float, budget: Budget) -> WristSolution:
-    """Return a plan found from one starting point after another, or the nearest failure.
+    """Search for a plan of least utilisation from one starting point after another.
 
-    It is the first plan found, or the best one if palms of compliant hands carry load in it: their
-    springs begin at a gap, and the search is local.
+    The first plan found is returned, unless palms of compliant hands carry load in it: then the
+    best of all, because the search is local, and a palm's springs carry nothing before a gap.
 
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     factor : float
         Multiple of the body wrench to be balanced.
     budget : Budget
@@ -80,7 +81,10 @@ def _palms_carry(hands: HandSets, point: LinearisationPoint) -> bool:
 
 
 def pressing(hands: HandSets, factor: float) -> LinearisationPoint:
-    """Return the point at which the palms of all wrists that move just meet the rock."""
+    """Return the point at which all compliant and floating wrists have brought palms to rock.
+
+    ``factor`` is the multiple of the body wrench that is to be balanced from there on.
+    """
     point = hands.at_rest()
     loads = [
         y if wrist is None else wrist.pressing
@@ -114,14 +118,17 @@ def find_wrists(
     most: int = SETTINGS.rounds,
     goal: Goal = LEAST_USE,
 ) -> WristSolution:
-    """Search for the best wrist poses for a goal: relaxed for compliant hands, else `solve_wrists`.
+    """Search for the loads and wrist poses that are best for a goal.
 
-    The relaxed search is used where a hand is compliant and the goal is the least utilisation.
+    Where a hand is compliant and the goal is the least utilisation, the search is that of this
+    module, with relaxed programs; otherwise it is `solve_wrists`.
 
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     start : LinearisationPoint
+        Point at which the search begins.
     budget : Budget
         Largest number of conic programs.
     most : int, optional
@@ -132,6 +139,7 @@ def find_wrists(
     Returns
     -------
     WristSolution
+        The best plan found, or the failed search.
     """
     if hands.together is None or goal is not LEAST_USE:
         return solve_wrists(hands, start, budget, most, goal)
@@ -139,15 +147,17 @@ def find_wrists(
 
 
 def without_hindrance(hands: HandSets, found: WristSolution, budget: Budget) -> WristSolution:
-    """Return a better plan where palms of compliant hands hold wrists back at a poor one.
+    """Look for a better plan than one in which palms of compliant hands keep their wrists back.
 
-    A search without palms begins at the plan. If it ends lower, a search with palms begins there.
+    A search without palms begins at the plan found. If it ends at a lower utilisation, a search
+    with palms begins there. Returns the given plan if neither helps.
 
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     found : WristSolution
-        Where a search has ended.
+        Result of a search, with or without a plan.
     budget : Budget
         Largest number of conic programs.
     """
@@ -250,12 +260,14 @@ def _merit(state: WristSolution, price: float) -> float:
 
 
 def firm_rows(sets: Sets) -> NDArray[np.bool_]:
-    """Return which hard rows of all hands only say how far a round goes, shape (Σ nh,).
+    """Return a mask of the hard rows that bound the trust region, shape (Σ nh,), bool.
+
+    `programs.elastic` must keep these rows; it may exceed the hands' nh other hard rows.
 
     Parameters
     ----------
     sets : Sets
-        Sets linearised within a range.
+        Sets linearised within a trust region.
     """
     return np.array(
         [row.limit == WRIST_RANGE for space in sets.spaces for row in space.rows[len(space.s) :]]

@@ -103,15 +103,15 @@ class Goal(ABC):
         """
 
     def excess(self, measure: ExactMeasure) -> float:
-        """Return by how much a point exceeds a bound of the goal, such as a cap; 0 by default."""
+        """Return by how much a measured point exceeds a cap of the goal; 0 by default."""
         return 0.0
 
     def exact(self, measure: ExactMeasure, hands: HandSets) -> bool:
-        """Return whether a point is a plan: balanced, within hard rows and the goal's bounds."""
+        """Return whether a measured point is a plan: balanced, within hard rows and caps."""
         return measure.exact(hands)
 
     def wrong(self, measure: ExactMeasure) -> float:
-        """Return the sum of all violations at a point: missing wrench, hard row, excess."""
+        """Return the sum of a measured point's violations: missing wrench, hard row, excess."""
         return measure.missing + measure.broken + self.excess(measure)
 
     def merit(self, measure: ExactMeasure, penalty: float) -> float:
@@ -127,7 +127,7 @@ class Goal(ABC):
         return self.value(measure) + penalty * self.wrong(measure)
 
     def constraints(self, data: StanceData) -> StanceData:
-        """Return the stance with the goal's constraints as hard rows; by default unchanged."""
+        """Return a stance's rows with the goal's constraints as hard rows; unchanged by default."""
         return data
 
     @abstractmethod
@@ -147,7 +147,7 @@ class Goal(ABC):
 
     @abstractmethod
     def dearest(self, outcome: Outcome) -> float:
-        """Return the largest dual value of an outcome; the penalty must exceed it to be exact."""
+        """Return the largest dual value of an outcome, which an exact penalty must exceed."""
 
     @abstractmethod
     def first_step(self, data: StanceData, outcome: Outcome, near: Sequence[Array]) -> Outcome:
@@ -160,7 +160,7 @@ class Goal(ABC):
         outcome : Outcome
             Result of `solve` on the sets.
         near : sequence of ndarray, shape (m,)
-            Loads of each hand [N], or wrist pose [m, rad], at the current point.
+            Loads y of each hand at the current point, as in `LinearisationPoint`.
         """
 
     @abstractmethod
@@ -177,6 +177,7 @@ class Goal(ABC):
         Parameters
         ----------
         hands : HandSets
+            Hands of the stance, with their sets at any pose of their wrists.
         point : LinearisationPoint
             Current point.
         sets : Sets
@@ -203,7 +204,7 @@ class Goal(ABC):
         root : ndarray, shape (M, M)
             R, in the scaled loads of all hands.
         near : sequence of ndarray, shape (m,)
-            Loads of each hand [N], or wrist pose [m, rad], at the current point.
+            Loads y of each hand at the current point, as in `LinearisationPoint`.
         """
 
     @abstractmethod
@@ -212,13 +213,13 @@ class Goal(ABC):
 
 
 class LeastUse(Goal):
-    """Goal of least utilisation; among points of equal utilisation, about least effort."""
+    """Goal of least utilisation; of points of equal utilisation, one of about the least effort."""
 
     least_penalty = 10.0
     promised = None
 
     def value(self, measure: ExactMeasure) -> float:
-        """Return the utilisation of a point."""
+        """Return the utilisation of a measured point."""
         return measure.utilisation
 
     def solve(self, data: StanceData) -> Outcome:

@@ -38,9 +38,9 @@ def next_plan(hands: HandSets, near: WristSolution, budget: Budget) -> WristSolu
     Returns
     -------
     WristSolution or None
-        A plan whose utilisation is at most the fraction `FloatingSettings.next_gap` above that of
-        the sets linearised there; ``unproven`` unless it is the least of these. None if there is no
-        such plan close by.
+        A plan whose utilisation is at most the fraction `FloatingSettings.next_gap` above the least
+        in the sets linearised there; ``unproven`` unless it is that least. None if there is no such
+        plan close by.
     """
     goal, within = LEAST_USE, SETTINGS.first_range
     turned = Sets(near.sets.spaces, near.sets.data.turned(hands.wrench))

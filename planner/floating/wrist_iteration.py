@@ -65,7 +65,7 @@ class WristSolution:
     sets : Sets
         Sets linearised at the point.
     outcome : Outcome
-        Of the goal's program on these sets; not solved if ``nothing`` was found.
+        Result of the goal's program on these sets; not solved if ``nothing`` was found.
     rounds : int
         Number of linearisations.
     error : float
@@ -100,13 +100,16 @@ def searching(
     before: Sets | None = None,
     error: float = 0.0,
 ) -> WristSolution:
-    """Return a point with the sets linearised there, and no program solved on them yet.
+    """Return the state of a search at a point: the sets linearised there, and nothing solved yet.
 
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     goal : Goal
+        Objective of the search.
     point : LinearisationPoint
+        Wrist poses and loads at which the sets are linearised.
     within : float
         Half width of the trust region, in `TWIST_UNIT`.
     before : Sets, optional
@@ -127,7 +130,7 @@ def solve_wrists(
     most: int = SETTINGS.rounds,
     goal: Goal = LEAST_USE,
 ) -> WristSolution:
-    """Search for the best wrist poses for a goal.
+    """Search for the loads and wrist poses that are best for a goal, within a trust region.
 
     If the search ends without proof, or its budget is spent, violations at the last point are
     corrected (`made_exact`). At a deadline the latest plan found on the way is returned.
@@ -135,7 +138,9 @@ def solve_wrists(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     start : LinearisationPoint
+        Point at which the search begins.
     budget : Budget
         Largest number of conic programs.
     most : int, optional
@@ -146,6 +151,7 @@ def solve_wrists(
     Returns
     -------
     WristSolution
+        The best plan found, or the point at which the search failed.
     """
     now = searching(hands, goal, start, SETTINGS.first_range)
     passed: WristSolution | None = None
@@ -215,7 +221,9 @@ def repaired(hands: HandSets, goal: Goal, state: WristSolution, within: float) -
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     goal : Goal
+        Objective of the search.
     state : WristSolution
         Point to be corrected.
     within : float
@@ -254,7 +262,9 @@ def made_exact(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     goal : Goal
+        Objective of the search.
     start : WristSolution
         Point at which the search ended.
     rounds : int
@@ -293,6 +303,7 @@ def gap(goal: Goal, state: WristSolution, outcome: Outcome) -> float:
     Parameters
     ----------
     goal : Goal
+        Objective of the search.
     state : WristSolution
         The point, with its exact measure.
     outcome : Outcome
@@ -318,6 +329,7 @@ def disagreements(
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     spaces : sequence of WrenchSpace
         Sets whose error is wanted.
     there : sequence of WrenchSpace

@@ -49,11 +49,13 @@ def plot_body_space(space: BodySpace, section: BodySection, path: Path, title: s
     Parameters
     ----------
     space : BodySpace
+        Body space of the stance.
     section : BodySection
         Section of that body space, from `BodySpace.section`.
     path : Path
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
+        Title of the picture.
     """
     views = ACCELERATION_VIEWS if space.accelerates else ()
     outlines = [_accelerations(space, view) for view in views]

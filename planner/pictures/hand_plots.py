@@ -56,11 +56,13 @@ def plot_wrench_space(
     Parameters
     ----------
     settled : SettledHand
+        The hand, closed on its hold.
     space : WrenchSpace or None
         Wrench space, not empty at utilisation 1; None draws the hand only.
     path : Path
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
+        Title of the picture.
     preload : ndarray, shape (4,), optional
         For a floating hand, the tendon tensions at which its motors are held [N]; ``space`` is then
         its wrench space linearised at rest.
@@ -86,9 +88,11 @@ def draw_wrench_space(
     Parameters
     ----------
     settled : SettledHand
+        The hand, closed on its hold.
     space : WrenchSpace or None
         Wrench space, not empty at utilisation 1; None draws the hand only.
     title : str
+        Title of the picture.
     preload : ndarray, shape (4,), optional
         Preload of a floating hand's tendons [N]; tile forces are then those at this preload, not at
         the closing tension.
@@ -134,6 +138,7 @@ def draw_fingers(panels: list[Axes], settled: SettledHand, tensions: Array) -> N
     panels : list of Axes
         For inner_left, outer_left, inner_right and outer_right.
     settled : SettledHand
+        The hand, closed on its hold.
     tensions : ndarray, shape (4,)
         Tendon tensions that load the tiles, in the order of `FINGERS` [N].
     """

@@ -28,7 +28,13 @@ from planner.pictures.plan_scene import (
     joint_utilisations,
     view_directions,
 )
-from planner.pictures.plan_tables import draw_joints, draw_shortfall, draw_spread, draw_tiles
+from planner.pictures.plan_tables import (
+    draw_answers,
+    draw_joints,
+    draw_shortfall,
+    draw_spread,
+    draw_tiles,
+)
 from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM, View, draw_scene
 from planner.question import Question
 from planner.result import Plan
@@ -74,7 +80,8 @@ def draw_plan(plan: Plan, question: Question) -> Figure:
     places = {"bottom": bottom, "top": top}
     under = 0.0
     if plan.spread is not None and plan.spread.load_factor is not None:
-        draw_spread(figure.add_axes((0.045, bottom, 0.33, 0.11)), plan.spread, plan.load_factor)
+        draw_spread(figure.add_axes((0.045, bottom, 0.165, 0.11)), plan.spread, plan.load_factor)
+        draw_answers(figure.add_axes((0.275, bottom, 0.11, 0.11)), plan.spread)
         under = 0.3
     space = figure.add_gridspec(1, 1, left=0.02, right=0.4, bottom=under, top=top)
     _draw_space(figure, space[0], scene, seen)

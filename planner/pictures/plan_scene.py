@@ -48,7 +48,7 @@ class DrawnSurface(NamedTuple):
     name : str
         Limb whose rock or palm is drawn; empty for the body and links.
     vertices : ndarray, shape (n, 3)
-        [m]
+        Corners, in W [m].
     faces : ndarray of int, shape (m, 3)
         Vertex indices of each triangle.
     """
@@ -70,6 +70,7 @@ class Line(NamedTuple):
     Attributes
     ----------
     kind : {'finger', 'limb'}
+        What the line is: the joints of a finger, or those of a limb.
     points : ndarray, shape (n, 3)
         [m]
     """
@@ -84,8 +85,9 @@ class Dots(NamedTuple):
     Attributes
     ----------
     kind : {'contact', 'joint', 'load', 'origin'}
+        Contacts of tiles, joints of a limb, the point where the load acts, or the origin of B.
     points : ndarray, shape (n, 3)
-        [m]
+        Marked points, in W [m].
     utilisations : ndarray, shape (n,), or None
         Utilisation of each joint; None for other kinds, and for joints without known torques.
     """
@@ -103,10 +105,11 @@ class Arrow(NamedTuple):
     kind : {'force', 'load'}
         ``force``: of the rock on a hand; ``load``: weight or other load that the hands hold.
     start : ndarray, shape (3,)
-        In world frame W [m].
+        Start of the arrow, in world frame W [m].
     force : ndarray, shape (3,)
-        In W [N].
+        The force, in W [N].
     text : str
+        Text at the tip, such as the size of the force.
     utilisation : float or None
         Utilisation of the hand; None for the load.
     """
@@ -124,9 +127,11 @@ class Label(NamedTuple):
     Attributes
     ----------
     kind : {'limb', 'origin'}
+        Name of a limb at its hand, or of the body frame at its origin.
     place : ndarray, shape (3,)
-        [m]
+        The point, in W [m].
     text : str
+        Text at the point.
     """
 
     kind: str
@@ -143,11 +148,15 @@ class DrawnScene:
     origin : ndarray, shape (3,)
         Origin of body frame B in world frame W [m].
     surfaces : tuple of DrawnSurface
+        Rock, palms, body and links.
     lines : tuple of Line
+        Fingers and limbs.
     dots : tuple of Dots
+        Contacts, joints, and the points of load and origin.
     arrows : tuple of Arrow
         Those of the hands in their order, then that of the load.
     labels : tuple of Label
+        Names of the limbs and of the origin.
     """
 
     origin: Array
@@ -279,6 +288,7 @@ def joint_utilisations(plan: Plan, stance: Stance) -> dict[str, Array]:
     Parameters
     ----------
     plan : Plan
+        Plan with or without joint torques.
     stance : Stance
         Stance of the plan.
 

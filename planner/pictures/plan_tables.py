@@ -16,7 +16,7 @@ from planner.pictures.plan_views import UTILISATION_COLOURS, UTILISATION_NORM
 from planner.question import Question
 from planner.result import SPREAD_SETTINGS, Certificate, LimitName, Plan, Spread
 
-__all__ = ["draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
+__all__ = ["draw_answers", "draw_joints", "draw_shortfall", "draw_spread", "draw_tiles"]
 
 
 def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
@@ -28,8 +28,9 @@ def draw_tiles(axes: Any, plan: Plan, question: Question) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     plan : Plan
-        With loads.
+        A plan that has loads.
     question : Question
         Question that the plan answers.
     """
@@ -78,6 +79,7 @@ def draw_joints(axes: Any, used: Mapping[str, Array]) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     used : mapping of str to ndarray, shape (n,)
         Utilisation of the n joints of each limb, from the body outward.
     """
@@ -124,8 +126,9 @@ def draw_shortfall(axes: Any, plan: Plan) -> None:
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     plan : Plan
-        Without loads.
+        An infeasible plan, without loads.
     """
     axes.set_axis_off()
     proof = plan.certificate
@@ -196,14 +199,49 @@ def _lines(names: Sequence[LimitName]) -> list[str]:
     return lines
 
 
+def draw_answers(axes: Any, spread: Spread) -> None:
+    """Draw in how many samples a stance is feasible, planned anew or with the plan's set-points.
+
+    Parameters
+    ----------
+    axes : Axes
+    spread : Spread
+        Each of its answers is a bar: feasible, overloaded and without balance.
+    """
+    answers = {"planned anew": spread, "kept": spread.kept, "feedback": spread.feedback}
+    there = {words: each for words, each in answers.items() if each is not None}
+    holds = np.array([each.holds for each in there.values()])
+    without = np.array([each.without for each in there.values()])
+    parts = {
+        "feasible": (holds, "tab:green"),
+        "overloaded": (spread.draws - holds - without, "tab:orange"),
+        "no balance": (without, "0.3"),
+    }
+    left = np.zeros(len(there))
+    for words, (counts, colour) in parts.items():
+        bars = axes.barh(list(there), counts, left=left, color=colour, label=words, height=0.7)
+        axes.bar_label(bars, [str(n or "") for n in counts], label_type="center", fontsize=7)
+        left = left + counts
+    axes.set(xlim=(0.0, spread.draws), xlabel="samples", ylim=(len(there) - 0.5, -0.5))
+    axes.tick_params(labelsize=8)
+    _legend_above(axes)
+
+
+def _legend_above(axes: Any) -> None:
+    """Write the legend in a line above a small panel."""
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.03, 0.96), "ncols": 3}
+    axes.legend(fontsize=7, frameon=False, handlelength=1.0, columnspacing=0.8, **place)
+
+
 def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     """Draw a histogram of the load factors over the parameter samples.
 
     Parameters
     ----------
     axes : Axes
+        Matplotlib axes to draw into.
     spread : Spread
-        With load factors.
+        Spread that has load factors.
     nominal : float or None
         Load factor of the plan with nominal parameters.
     """
@@ -218,15 +256,15 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
     axes.axvline(1.0, color="tab:red", linestyle="--", label="needed")
     if nominal is not None:
         axes.axvline(nominal, color="black", label="nominal")
-    said = f"feasible in {spread.holds} of {spread.draws} samples"
+    said, limit = f"feasible in {spread.holds} of {spread.draws} samples", spread.threshold
+    if limit is not None and limit.shear_limit is not None:
+        said = f"feasible where a tile on {limit.surface} holds {limit.shear_limit:.2g} N or more"
+        said += f": {limit.share:.0%} of its range"
     if spread.cap < 1.0:
-        said += f" within {spread.cap:g}"
-    if spread.sensitive_to:
-        said += f"; most sensitive to {spread.sensitive_to[0].quantity}"
-    axes.set_title(said, fontsize=9)
+        said += f" (utilisation up to {spread.cap:g})"
+    axes.set_title(said, fontsize=9, loc="left", pad=18.0)
     axes.set(xlabel="load factor [1]", ylabel="samples")
     axes.margins(x=0.04)
-    axes.set_ylim(top=1.6 * axes.get_ylim()[1])
     axes.yaxis.get_major_locator().set_params(integer=True)
     axes.tick_params(labelsize=8)
-    axes.legend(fontsize=7, loc="upper center", ncols=3, facecolor="white", framealpha=0.9)
+    _legend_above(axes)

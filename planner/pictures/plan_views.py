@@ -67,6 +67,7 @@ class View:
     Attributes
     ----------
     axes : Axes or Axes3D
+        Matplotlib axes, two- or three-dimensional.
     place : callable
         Maps points in world frame W, shape (n, 3), to coordinates of the axes, shape (n, 2) or (n,
         3).
@@ -94,7 +95,7 @@ class View:
         Parameters
         ----------
         points : ndarray, shape (n, 3)
-            In world frame W [m].
+            The points, in world frame W [m].
         **style
             Line properties of matplotlib.
         """
@@ -107,7 +108,7 @@ class View:
         Parameters
         ----------
         points : ndarray, shape (n, 3)
-            In world frame W [m].
+            The points, in world frame W [m].
         **style
             Line properties of matplotlib.
         """
@@ -155,10 +156,11 @@ class View:
         Parameters
         ----------
         start : ndarray, shape (3,)
-            In world frame W [m].
+            Start of the arrow, in world frame W [m].
         step : ndarray, shape (3,)
-            From start to tip, in W [m].
+            Vector from start to tip, in W [m].
         colour : colour of matplotlib
+            Colour of the arrow.
 
         Returns
         -------
@@ -176,13 +178,14 @@ class View:
     def merged(
         self, spots: Iterable[Array], texts: Iterable[str], between: str, near: float
     ) -> list[tuple[Array, str]]:
-        """Return notes with their positions; in side views, near notes are joined at the first one.
+        """Return texts with their positions; in side views, texts close together become one note.
 
         Parameters
         ----------
         spots : iterable of ndarray, shape (2,)
             Projected position of each text.
         texts : iterable of str
+            Texts of the notes.
         between : str
             Separator of joined texts.
         near : float
@@ -209,6 +212,7 @@ class View:
         Parameters
         ----------
         text : str
+            Text to write.
         tip : ndarray, shape (2,)
             Projection of the tip.
         step : ndarray, shape (2,)
@@ -228,6 +232,7 @@ class View:
         Parameters
         ----------
         text : str
+            Text to write.
         spot : ndarray, shape (2,)
             Projection of the point.
         shift : (float, float)
@@ -317,7 +322,7 @@ def silhouette(vertices: Array, look: Array) -> Array:
     Parameters
     ----------
     vertices : ndarray, shape (n, 3)
-        [m]
+        Vertices of the surface [m].
     look : ndarray, shape (3,)
         Unit viewing direction.
 

@@ -24,6 +24,7 @@ def rock_patch(settled: SettledHand, beside: Array | None = None) -> Array:
     Parameters
     ----------
     settled : SettledHand
+        The hand, closed on its hold.
     beside : ndarray, shape (n, 3), optional
         Origins in hand frame H of all hands on this rock [m]; the box extends by
         `PictureSettings.rock_around` beyond all of them. By default this hand alone.

@@ -64,7 +64,7 @@ class TileIndex:
     bases, base_fingers : ndarray of int, shape (2 H,)
         Tiles on the rotating bases of outer fingers, and the fingers of these tiles.
     nails : ndarray of int
-        Indices of the tiles' entries that stand for nails, whether they hook or not.
+        Entries among the T that are fingernails, whether the nails hook or not.
     """
 
     hand: Indices
@@ -152,7 +152,7 @@ class ContactPattern(NamedTuple):
 
 
 def contact_pattern_of(hands: tuple[tuple[SettledTile, ...], ...]) -> ContactPattern:
-    """Return the contact states of all tiles.
+    """Return the contact states of all tiles, as arrays.
 
     Parameters
     ----------
@@ -182,8 +182,11 @@ class HandBatch:
     Attributes
     ----------
     hands : tuple of SettledHand
+        The hands, closed on their holds.
     places : TileIndex
+        Indices of the tiles by hand, finger and phalanx.
     touch : ContactPattern
+        Contact states of the tiles.
     points : ndarray, shape (T + H, 3)
         Positions of all tiles, then of all palms [m].
     axes : ndarray, shape (T, 3, 3)
@@ -193,7 +196,7 @@ class HandBatch:
     lateral_shares : ndarray, shape (T,)
         Share of the finger's lateral reaction that each tile carries, as in `SettledHand`.
     angles : ndarray, shape (F, 3)
-        Angle of each phalanx [rad].
+        Angle of each phalanx from x toward z of its finger frame F [rad].
     bends : ndarray, shape (F, 3)
         Angle of each joint, relative to the phalanx before it [rad].
     palm_limits : ndarray, shape (H, 2)

@@ -174,7 +174,10 @@ class HandSets:
         added: tuple[StanceConstraints, ...],
         known: tuple[ScaledRows, ...] | None = None,
     ) -> HandSets:
-        """Build the hands of a stance; ``known`` are their scaled rows, if already computed."""
+        """Build the hands of a stance from the attributes of the same names.
+
+        ``known`` are the hands' scaled rows, if already computed.
+        """
         scaled = tuple(map(ScaledRows.of, spaces)) if known is None else known
         data = StanceData.of(hands_data(scaled, transports, held), wrench)
         floating = any(wrist is not None for wrist in wrists)
@@ -193,7 +196,7 @@ class HandSets:
         return HandSets.of(spaces, own, self.transports, self.wrench, self.held, self.added)
 
     def turned(self, wrench: Array) -> HandSets:
-        """Return the same hands for another body wrench, shape (6,) [N, N·m]."""
+        """Return the same hands for another body wrench, shape (6,), in B [N, N·m]."""
         needed = np.concatenate([wrench / programs.WRENCH_UNIT, self.wrench[len(wrench) :]])
         return replace(self, wrench=needed, data=self.data.turned(needed))
 
@@ -224,6 +227,7 @@ class HandSets:
         Parameters
         ----------
         point : LinearisationPoint
+            Wrist poses and loads at which the sets are linearised.
         within : float, optional
             Half width of the trust region of wrists, in `TWIST_UNIT`; by default unbounded.
         farthest : sequence of ndarray, shape (m,), optional
@@ -306,7 +310,7 @@ class HandSets:
         return self.step(self.at_rest(), point.loads) <= 50.0
 
     def step(self, point: LinearisationPoint, loads: Sequence[Array]) -> float:
-        """Return the largest move of a wrist from a point to given loads, in `TWIST_UNIT`."""
+        """Return how far wrists move at most from a point to loads y, in units of `TWIST_UNIT`."""
         moved = [
             float(np.abs((y - at) / pose_units(wrist.columns)).max())
             for wrist, y, at in zip(self.wrists, loads, point.loads, strict=True)
@@ -324,10 +328,10 @@ def _near_rest(space: WrenchSpace, farthest: Array) -> WrenchSpace:
 
 
 def error_at_rest(wrist: FloatingWrist) -> float:
-    """Return the largest linearisation error of the set at rest [N].
+    """Return the largest error of a floating hand's set that is linearised at rest [N].
 
-    Measured where the set reaches farthest along ± each axis, if no phalanx in contact loses its
-    rock there.
+    The error is that of the wrench, moments over 0.1 m, where the set reaches farthest along ± each
+    axis; poses at which a phalanx in contact loses its rock are left out.
     """
     space, error = wrist.linearised(), 0.0
     for direction in np.vstack([np.eye(6), -np.eye(6)]):

@@ -34,8 +34,8 @@ class Posture:
     weights : Weights
         Body wrench from the robot's weight, centre of mass, and positions of payloads.
     off : mapping of str to tuple of float, float
-        Errors of inverse kinematics by limb, of hands whose pose is only nearly reached: distance
-        [m] and angle [rad].
+        Distance [m] and angle [rad] by which a hand misses its pose, by limb; only for hands whose
+        pose inverse kinematics reaches nearly.
     """
 
     angles: Mapping[str, Array]
@@ -55,7 +55,7 @@ def posture(question: Question) -> Posture | None:
     Returns
     -------
     Posture or None
-        With joint torques and weight; None if the question has no joints.
+        Joint angles with joint torques and weight; None if the question has no joints.
 
     Raises
     ------
@@ -91,6 +91,7 @@ def posture_at(question: Question, angles: Mapping[str, Array]) -> Posture:
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective.
     angles : mapping of str to ndarray, shape (n,)
         Joint angles by limb [rad], of prismatic joints [m]; limbs left out are at their rest
         angles.

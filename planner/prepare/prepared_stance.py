@@ -39,6 +39,7 @@ class PreparedStance:
     Attributes
     ----------
     question : Question
+        The question, as it was asked.
     where : Posture or None
         Joint angles and torques; None if the question has no joints.
     batch : HandBatch
@@ -148,6 +149,7 @@ def assemble(
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective.
     where : Posture or None
         Joint angles and torques; None if joints are not known.
     wrench : ndarray, shape (6,)
@@ -198,7 +200,7 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
     """Return what joints, caps and present tensions add to the set of each hand."""
     stance, limits = question.stance, question.limits
     change = limits.tension_change
-    margins = limits.hold_margin > 0.0 or limits.least_tension > 0.0
+    margins = max(limits.hold_margin, limits.least_tension, limits.palm_margin) > 0.0
     found = []
     for hand in stance.hands:
         cap, frame = limits.per_hand.get(hand.limb), None
@@ -221,6 +223,7 @@ def _added_rows(question: Question, where: Posture | None) -> tuple[StanceConstr
                 change=math.inf if change is None else change,
                 margin=limits.hold_margin,
                 least=limits.least_tension,
+                palm=limits.palm_margin,
             )
         )
     return tuple(found)

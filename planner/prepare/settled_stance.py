@@ -1,4 +1,4 @@
-"""Close the hands of a stance on their holds, let them come to rest there, and find one's set."""
+"""Close hands on their holds, let them come to rest there, and find the set of one hand."""
 
 from __future__ import annotations
 
@@ -46,14 +46,20 @@ def settle_stance(stance: Stance, which: Sequence[int] | None = None) -> list[Se
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     which : sequence of int, optional
         Indices of the hands; all by default.
+
+    Returns
+    -------
+    list of SettledHand
+        The closed hands, in the order of the indices.
 
     Raises
     ------
     InvalidInputError
-        If a hand cannot be closed on its hold; of the first such hand, its field relative to the
-        question.
+        If a hand cannot be closed on its hold; the field, relative to the question, is that of the
+        first such hand.
     """
     indices = range(len(stance.hands)) if which is None else which
     settled = []
@@ -75,11 +81,12 @@ def settle_each(
     kind : SpinyHand
         Model of all the hands.
     hands : sequence of HandOnHold
+        Hands with their holds and grasps.
 
     Returns
     -------
     list of SettledHand or InvalidInputError
-        In the order of ``hands``.
+        Closed hand, or error, for each of ``hands``, in their order.
     """
     placements = [
         Placement(hand.hold, hand.surface, hand.grasp, hand.placed_hold(), hand.at)
@@ -118,8 +125,8 @@ def come_to_rest(
 ) -> list[HandOnHold | InvalidInputError]:
     """Place hands by contact: where each, closed and unloaded, rests on its rock.
 
-    Only its z, and its turns about x and y, are found (`hand_models.fixed_wrist.contact_rest`).
-    Its rock stays where it is under the given hand.
+    Only a hand's position along z, and its rotations about x and y of H, change
+    (`hand_models.fixed_wrist.contact_rest`). The rock stays at its pose in W.
 
     Parameters
     ----------
@@ -128,7 +135,7 @@ def come_to_rest(
     hands : sequence of HandOnHold, length n
         Hands where they start.
     offsets : sequence of Pose, length n, optional
-        Final H in the frame where the hand rests; by default hands stay at rest.
+        Pose of each hand's final frame H in its frame H at rest; by default hands stay at rest.
 
     Returns
     -------
@@ -171,6 +178,7 @@ def hand_space(stance: Stance, limb: str) -> tuple[SettledHand, WrenchSpace]:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     limb : str
         Limb of the hand.
     """
@@ -184,6 +192,7 @@ class RestingHand(NamedTuple):
     Attributes
     ----------
     settled : SettledHand
+        The hand, closed on its hold.
     space : WrenchSpace
         All wrenches that the hand can exert on the rock. Of a floating hand, the set linearised at
         rest.
@@ -206,6 +215,7 @@ def resting_hand(stance: Stance, limb: str) -> RestingHand:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     limb : str
         Limb of the hand.
 
@@ -235,6 +245,7 @@ def floating_wrist(stance: Stance, limb: str) -> FloatingWrist:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     limb : str
         Limb of the hand.
 

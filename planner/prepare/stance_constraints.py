@@ -83,6 +83,7 @@ class JointLoads(NamedTuple):
     Attributes
     ----------
     names : tuple of str, length n
+        Names of the joints, from the body outward.
     sliding : ndarray of bool, shape (n,)
         True for prismatic joints.
     gravity : ndarray, shape (n,)
@@ -147,6 +148,8 @@ class StanceConstraints:
         press on the rock [N].
     least : float
         Least tension of every tendon [N].
+    palm : float
+        Force with which the palm must press on the rock [N].
     """
 
     joints: JointLoads | None = None
@@ -156,6 +159,7 @@ class StanceConstraints:
     change: float = np.inf
     margin: float = 0.0
     least: float = 0.0
+    palm: float = 0.0
 
     def on(self, space: WrenchSpace) -> WrenchSpace:
         """Return a hand's wrench space with the constraints added as rows.
@@ -163,7 +167,7 @@ class StanceConstraints:
         Limit rows are ``D w + d0 ≤ u s``, of the hand's wrench w, utilisation u and capacities s.
         Hard rows bound w or the tensions.
         """
-        if self.margin or self.least:
+        if self.margin or self.least or self.palm:
             space = self._tightened(space)
         D, d0, s = [np.zeros((0, 6))], [np.zeros(0)], [np.zeros(0)]
         H, h = [space.H], [space.h]
@@ -222,6 +226,7 @@ class StanceConstraints:
             "slack_tendon": self.least,
             "dragged_backwards": self.margin,
             "frame_pulled": self.margin,
+            "palm_pressing_reversed": self.palm,
         }
         room = [by.get(row.limit, 0.0) for row in space.rows[len(space.s) :]]
         return replace(space, h=space.h - np.array(room))

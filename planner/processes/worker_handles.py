@@ -157,7 +157,9 @@ class WorkerHandle(Generic[Input, Output]):
     Attributes
     ----------
     process : Process
+        The worker's process.
     lanes : tuple of PriorityLane
+        The worker's lanes, in the order of their numbers.
     """
 
     def __init__(

@@ -59,8 +59,8 @@ def cores() -> int:
 class Workers(Generic[Input, Output]):
     """Process pool that turns items into results; a context manager, for one thread.
 
-    An item goes to a ready worker with few items; of several items, the worker gets one of a
-    subject it has worked on before (an LRU cache keeps the last 256 subjects).
+    A ready worker with few items gets the next one, if possible of a subject that it has worked on
+    before (an LRU cache keeps the last 256 subjects).
 
     Parameters
     ----------
@@ -112,6 +112,7 @@ class Workers(Generic[Input, Output]):
         number : int
             Unique number of the item, by which `collect` identifies the result.
         item : object
+            Argument of the function that `make` has returned in the worker.
         about : hashable, optional
             Subject of the item: a worker that had an item of this subject before is preferred, if
             it has room.

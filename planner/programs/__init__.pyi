@@ -9,6 +9,12 @@ from .program import (
     Elastic as Elastic,
     tie_weight as tie_weight,
 )
+from .set_points import (
+    Kept as Kept,
+    LeastChange as LeastChange,
+    kept as kept,
+    least_change as least_change,
+)
 from .solvers import (
     CAP_SLACK as CAP_SLACK,
     TensionTrade as TensionTrade,

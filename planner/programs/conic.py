@@ -4,8 +4,8 @@
 
 The cone K is a product of zeros, then nonnegative numbers, then one second-order cone. A is passed
 sparse, because most entries of a stance's rows are zero: a dense A costs three times as much. A
-solver is set up for one sparsity pattern, is kept in `Solvers`, and takes over the numbers of later
-programs of that pattern. The solution of a program does not depend on the programs solved before.
+solver is set up for one sparsity pattern, kept in the cache `Solvers`, and given the numbers of
+later programs of that pattern. No solution depends on the programs that were solved before it.
 """
 
 from __future__ import annotations
@@ -369,8 +369,8 @@ class Outcome:
     value : float
         Objective; NaN if not solved.
     loads : tuple of ndarray, shape (m,)
-        Loads y of each hand [N], or pose of a compliant or floating wrist [m, rad]; empty if not
-        solved.
+        Loads y of each hand [N]; of a floating wrist its twist [m, rad], of a compliant one
+        tensions [N] and twist. Empty if not solved.
     limit_duals, hard_duals : tuple of ndarray, shapes (nl,), (nh,)
         Dual values of each hand's limit rows and hard rows. Of an infeasible program, its Farkas
         certificate. Empty if the solver returned no dual values.

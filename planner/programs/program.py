@@ -69,7 +69,7 @@ class Residuals(NamedTuple):
 
 
 class Best(StanceProgram):
-    """min u + Σ w z² + k ‖R z − c‖²: least utilisation, or least squares under a cap on it.
+    """Program min u + Σ w z² + k ‖R z − c‖²: least utilisation, or least squares under a cap.
 
     Here z, shape (M,), are the scaled loads of all hands, and u is the utilisation.
 
@@ -174,7 +174,7 @@ def tie_weight(hands: int) -> float:
 
 
 class Reach(StanceProgram):
-    """max c·t: how far the balance can go along the columns of B, within a cap on the utilisation.
+    """Program max c·t: farthest balance along the columns of B, within a cap on the utilisation.
 
     The balance is G z = offset + B t. The limit rows may depend on t, too, as those of joints
     depend on the body's acceleration: L z + l0 + K t ≤ cap.
@@ -261,7 +261,7 @@ class Reach(StanceProgram):
 
 
 class Nearest(StanceProgram):
-    """min ‖W − w‖ over all body wrenches w that the hands can give with loads up to `LOAD_BOX`.
+    """Program min ‖W − w‖ over the body wrenches w that hands can give with loads up to `LOAD_BOX`.
 
     Only hard rows count, no limits. ``value`` of the solved outcome is the distance, in
     `WRENCH_UNIT`.
@@ -311,7 +311,7 @@ class Nearest(StanceProgram):
 
 
 class Elastic(StanceProgram):
-    """min u + ρ (‖W − w‖₁ + 1ᵀv) + ½ ε ‖z − z₀‖²: balance and hard rows relaxed at a price ρ.
+    """Program min u + ρ (‖W − w‖₁ + 1ᵀv) + ½ ε ‖z − z₀‖²: rows may be exceeded at a price ρ.
 
     W is the body wrench asked for, w the one that the loads z give, u the utilisation. Hard rows
     may be exceeded by slacks v ≥ 0, except the firm rows. The program has a solution wherever the

@@ -1,7 +1,8 @@
 """One function for each conic program of a stance, and evaluations of given loads.
 
-The programs are defined in `planner.programs.program`. All loads y are in newtons, or of a
-floating wrist its twist [m, rad]; ``data`` holds the scaled rows of all hands.
+The programs are defined in `planner.programs.program`. Loads y are in newtons; those of a floating
+wrist are its twist [m, rad], those of a compliant wrist its tensions [N], then its twist. ``data``
+holds the scaled rows of all hands.
 """
 
 from __future__ import annotations
@@ -113,6 +114,7 @@ def margin(data: StanceData) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
 
     Returns
     -------
@@ -136,6 +138,7 @@ def unique(data: StanceData, share: float = 1.0) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     share : float, optional
         Factor on the weight of the tensions.
 
@@ -153,6 +156,7 @@ def less_tension(data: StanceData, trade: TensionTrade) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     trade : TensionTrade
         Weight of the tensions, and largest utilisation of the plan.
 
@@ -172,10 +176,11 @@ def curved(data: StanceData, root: Array, near: Sequence[Array]) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     root : ndarray, shape (M, M)
         Root R of the curvature RᵀR in the scaled loads z of all hands.
     near : sequence of ndarray, shape (m,)
-        Loads y₀ of each hand [N], or wrist pose [m, rad]; z₀ is y₀ over its units.
+        Loads y₀ of each hand [N], or twist of a wrist that moves [m, rad]; z₀ = y₀ / units.
     """
     centre = root @ (np.concatenate(near) / data.rows.unit)
     return Best(data, residuals=Residuals(root, centre, 0.5)).solve()
@@ -189,6 +194,7 @@ def tie_break(data: StanceData, cap: float) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     cap : float
         Largest utilisation.
     """
@@ -202,6 +208,7 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     utilisation : float
         Least utilisation. The cap is larger by 1e-9 (absolute below 1, relative above), in the
         second try by `CAP_SLACK`.
@@ -209,7 +216,7 @@ def least_tensions(data: StanceData, utilisation: float) -> Outcome:
     Returns
     -------
     Outcome
-        Of the last try; status `OUT_OF_TIME` or unsolved if both fail.
+        Outcome of the last try; status `OUT_OF_TIME` or unsolved if both fail.
     """
     outcome = Outcome(False, OUT_OF_TIME, 0, math.nan)
     for slack in (1e-9, CAP_SLACK):  # where the least has all its digits, or else near it
@@ -227,6 +234,7 @@ def effort(data: StanceData, cap: float) -> Outcome:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     cap : float
         Largest utilisation.
     """
@@ -248,10 +256,11 @@ def elastic(
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     penalty : float
         Price ρ of violations of the balance and of hard rows.
     near : sequence of ndarray, shape (m,)
-        Loads of each hand [N], or wrist pose [m, rad], near which the solution is kept.
+        Loads y of each hand near which the solution is kept [N]; twists of wrists [m, rad].
     firm : ndarray of bool, shape (Σ nh,)
         True for each hard row that must not be exceeded.
     nearness : float, optional
@@ -278,17 +287,7 @@ def reach(
 ) -> Reached:
     """Solve `Reach`: the farthest t along the columns of B, in direction ``goal``, within a cap.
 
-    Parameters
-    ----------
-    data : StanceData
-    goal : ndarray, shape (k,)
-        Direction in the space of t.
-    B : ndarray, shape (nb, k)
-        Directions of the balance's right-hand side, scaled as `StanceData.wrench`.
-    cap : float, optional
-        Largest utilisation.
-    K : sequence of ndarray, shape (nl, k), optional
-        Change of each hand's utilisations per unit of t; zero by default.
+    The parameters are those of `Reach`, with their shapes and units.
     """
     return Reach(data, goal, B, cap, K).farthest()
 
@@ -315,8 +314,9 @@ def loads_are_feasible(data: StanceData, loads: Sequence[Array], cap: float) -> 
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
     cap : float
         Largest utilisation.
     """
@@ -331,8 +331,9 @@ def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
 
     Returns
     -------
@@ -344,20 +345,21 @@ def body_wrench(data: StanceData, loads: Sequence[Array]) -> Array:
 
 
 def beyond(data: StanceData, loads: Sequence[Array], cap: float) -> float:
-    """Return the largest violation of limits at a cap, or of hard rows, by given loads.
+    """Return the largest excess of given loads over limits at a cap, or over hard rows.
 
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
     cap : float
         Largest utilisation.
 
     Returns
     -------
     float
-        Violation of a limit as utilisation, of a hard row in `LOAD_UNIT`; at least 0.
+        Utilisation minus cap of a limit, or excess of a hard row [`LOAD_UNIT`]; at least 0.
     """
     worst = 0.0
     for hand, y in zip(data.hands, loads, strict=True):
@@ -373,8 +375,9 @@ def used(data: StanceData, loads: Sequence[Array]) -> Array:
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     loads : sequence of ndarray, shape (m,)
-        Loads y of each hand [N], or wrist pose [m, rad].
+        Loads y of each hand [N]; for wrists that move, also or only the twist [m, rad].
 
     Returns
     -------

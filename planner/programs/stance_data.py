@@ -214,7 +214,7 @@ class HandData(NamedTuple):
     tie : ndarray, shape (m,)
         Weights of z² in the tie-break.
     rest : ndarray, shape (m,)
-        Weights of z² of loads other than tensions, beside the effort; zero for tensions.
+        Weights of z² that the effort adds for loads other than tensions; zero for tensions.
     unit : ndarray, shape (m,)
         Units of z: the loads are ``y = unit z`` [N], of a floating wrist its twist [m, rad].
     """
@@ -378,7 +378,7 @@ class StanceData:
     def by_rows(
         self, values: Array, *, limits: bool = True
     ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
-        """Split an array over all rows into (balance, limits of each hand, hard rows of each hand).
+        """Split an array over all rows into the balance, each hand's limits, each hand's hard rows.
 
         Without ``limits`` the array has no limit rows.
         """

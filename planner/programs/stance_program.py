@@ -2,7 +2,8 @@
 
 `StanceProgram.define` writes the program in CVXPY, as readable mathematics. `StanceProgram.conic`
 writes the same program in the solver's form, which takes a fraction of the time. `run` solves the
-second; if the solver returns neither a solution nor a certificate, CVXPY solves the first.
+second; if the solver returns neither a solution nor a certificate, a retry uses iterative
+refinement, and at last CVXPY solves the first.
 """
 
 from __future__ import annotations
@@ -68,6 +69,7 @@ class Definition(NamedTuple):
     Attributes
     ----------
     problem : Problem
+        CVXPY problem: objective and constraints.
     variables : tuple of Variable
         Variables that the caller reads, in order; the hands' loads z come last.
     rows : tuple of Constraint
@@ -88,10 +90,12 @@ class StanceProgram(ABC):
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
 
     Attributes
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     G : ndarray, shape (nb, M)
         Balance: body wrench per load.
     L, l0 : ndarray, shapes (Σ nl, M), (Σ nl,)

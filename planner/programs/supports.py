@@ -45,6 +45,7 @@ class SilentHighs(highspy.Highs):
         Parameters
         ----------
         A : ndarray, shape (rows, columns)
+            Matrix A of the rows.
         columns : tuple of ndarray, shape (columns,)
             Lower and upper bounds of x.
         rows : tuple of ndarray, shape (rows,)
@@ -98,7 +99,7 @@ class Support:
         Parameters
         ----------
         direction : ndarray, shape (6,)
-            In the hand frame H [1/N, 1/(N·m)].
+            Direction in the hand frame H [1/N, 1/(N·m)].
 
         Returns
         -------

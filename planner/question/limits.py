@@ -37,7 +37,7 @@ LEAST_LIMIT: Final = 1e-3
 """Least force or torque that is valid as a limit [N, N·m]; a smaller one is a rounding error."""
 
 MOST_MARGIN: Final = 1e3
-"""Largest hold margin or least tension that may be given [N]."""
+"""Largest margin or least tension that may be given [N]."""
 
 Torque = Annotated[float, Meta(ge=1e-3, le=1e6)]
 JointTorque = Annotated[float, Meta(ge=0.0, le=1e6)]
@@ -151,6 +151,9 @@ class Limits(Strict, frozen=True):
     hold_margin : float
         Force by which every tile on rock must stay short of being dragged backward, and every bare
         frame must press on the rock [N].
+    palm_margin : float
+        Force with which every palm of a hand with a fixed wrist must press on the rock, if it is
+        engaged [N].
     least_tension : float
         Least tension of every tendon [N]. It rules out fingers with slack tendons that grip only by
         the wrist's travel.
@@ -174,6 +177,10 @@ class Limits(Strict, frozen=True):
             description="by which tiles are short of being dragged backwards [N]",
         ),
     ] = 0.0
+    palm_margin: Annotated[
+        float,
+        Meta(ge=0.0, le=MOST_MARGIN, description="with which palms of fixed wrists press [N]"),
+    ] = 0.0
     least_tension: Annotated[
         float, Meta(ge=0.0, le=MOST_MARGIN, description="of every tendon [N]")
     ] = 0.0
@@ -187,7 +194,7 @@ class Limits(Strict, frozen=True):
             most = getattr(self, name)
             if most is not None:
                 check_positive(most, "N", name)
-        for name in ("hold_margin", "least_tension"):
+        for name in ("hold_margin", "palm_margin", "least_tension"):
             least = getattr(self, name)
             if not 0.0 <= least <= MOST_MARGIN:
                 raise InvalidFieldError(
@@ -315,14 +322,14 @@ class OpenLoopSettings(Strict, frozen=True, kw_only=True):
     def ranges(
         self, put: tuple[float, float], contact: tuple[float, float]
     ) -> tuple[float, float, float, float]:
-        """Return position, height, tilt and yaw, with a hand's parameters for those left out.
+        """Return the ranges of position, height [m], tilt and yaw [rad], with defaults of a hand.
 
         Parameters
         ----------
         put : tuple of float
-            The hand's ranges of position [m] and yaw [rad].
+            Default ranges of position [m] and yaw [rad], from the hand's parameters.
         contact : tuple of float
-            Its ranges of height [m] and tilt [rad].
+            Default ranges of height [m] and tilt [rad], likewise.
         """
         given = (self.position, self.height, self.tilt, self.yaw)
         usual = (put[0], *contact, put[1])

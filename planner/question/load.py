@@ -59,8 +59,8 @@ class Load(Strict, frozen=True):
         Centre of mass in the body frame B [m]; by default that of the posture if joints are known,
         else that of the robot's file.
     acceleration, angular_acceleration : tuple of float
-        Of the body, in the world frame W [m/s², rad/s²], with no angular velocity. An angular
-        acceleration requires joints, which give the inertia, and no ``com``.
+        Accelerations of the body in the world frame W [m/s², rad/s²]; its angular velocity is
+        zero. An angular acceleration requires joints, which give the inertia, and no ``com``.
     payloads : tuple of Payload
         Masses on links or in hands, in addition to ``mass``.
     """
@@ -95,7 +95,7 @@ class Load(Strict, frozen=True):
 
     @property
     def own(self) -> bool:
-        """True if no mass and no centre of mass is given, so that the robot's count."""
+        """True if neither mass nor centre of mass is given, so that those of the robot count."""
         return self.mass is None and self.com is None
 
     def body_wrench(self, stance: Stance, weights: Weights | None = None) -> Array:
@@ -107,6 +107,7 @@ class Load(Strict, frozen=True):
         Parameters
         ----------
         stance : Stance
+            Poses of the body and of the hands on their holds.
         weights : Weights, optional
             Weight of the robot, if joints are known.
 
@@ -146,7 +147,7 @@ class Load(Strict, frozen=True):
         Returns
         -------
         linear, angular : ndarray, shape (3,)
-            In the body frame B, of its origin [m/s², rad/s²].
+            Accelerations of the origin of body frame B, in B [m/s², rad/s²].
         """
         from hand_models.base import finite_vector
 

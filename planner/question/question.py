@@ -25,7 +25,7 @@ __all__ = ["MOST_DRAWS", "OwnObjective", "Question"]
 
 
 class OwnObjective(Protocol):
-    """Objective that the caller defines: an object as `planner.solving.Objective`."""
+    """Objective that the caller defines: an object like a `planner.solving.Objective`."""
 
     name: ClassVar[str]
 
@@ -41,6 +41,7 @@ class Question:
     Attributes
     ----------
     stance : Stance
+        Poses of body and hands, and the holds.
     body_wrench : ndarray, shape (6,), optional
         Wrench that the rock must exert on the robot, in the body frame B [N, N·m]; by default
         computed from ``load``.
@@ -48,6 +49,7 @@ class Question:
         Mass, payloads and acceleration. Acceleration and payloads count in the joint torques even
         if the body wrench is given.
     limits : Limits
+        Caps on the plan.
     want : frozenset of str
         Extras: 'load_factor', 'prices', 'model', 'robust', 'open_loop', 'spread', 'clearance' and
         'advice'.
@@ -211,9 +213,10 @@ class Question:
                 preload = float(hand.tendon_preload.min())
             if least > max(preload, 0.0):  # no preload is below zero
                 raise InvalidInputError(
-                    f"must be at most the tendon_preload of {hand.limb}, {preload:g} N, as motors "
-                    f"of floating hands stand still; got {least:g} N; lower it, give more "
-                    "tendon_preload, or let the wrist be 'compliant'",
+                    "must be at most the preload (tendon_preload, or else the closing tension) of "
+                    f"{hand.limb}, {preload:g} N, as motors of floating hands stand still; got "
+                    f"{least:g} N; lower it, give more tendon_preload, or let the wrist be "
+                    "'compliant'",
                     field="limits.least_tension",
                 )
 

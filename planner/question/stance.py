@@ -40,6 +40,7 @@ def known_limbs(named: Mapping[str, object], robot: Robot, field: str) -> None:
     named : mapping of str to object
         Mapping whose keys are checked.
     robot : Robot
+        Robot that has the limbs.
     field : str
         Field that the error names.
 
@@ -61,6 +62,7 @@ def known_choice(value: str, known: Sequence[str], field: str) -> None:
     Parameters
     ----------
     value : str
+        Value of the field.
     known : sequence of str
         Valid values.
     field : str
@@ -83,6 +85,7 @@ def checked_body_wrench(wrench: Array, field: str | None) -> Array:
     Parameters
     ----------
     wrench : ndarray, shape (6,)
+        Wrench to be checked [N, N·m].
     field : str or None
         Field that the error names.
 
@@ -164,8 +167,8 @@ class HandOnHold:
         Where on the hold the hand is seated: a frame in the hold's frame, used in place of that
         frame.
     contact_offset : Pose, optional
-        Of a hand that was placed by contact (`planner.come_to_rest`): H in the frame where the
-        unloaded hand rests. None for a hand that is where it was put or seated.
+        Pose of H in its frame at rest, where the unloaded hand rests, for a hand placed by contact
+        (`planner.come_to_rest`). None for a hand that is where it was put or seated.
     """
 
     limb: str
@@ -188,13 +191,13 @@ class HandOnHold:
         known_choice(self.wrist, get_args(WristMode), "wrist")
         if self.wrist_travel is not None and self.wrist != "compliant":
             raise InvalidInputError(
-                f"requires wrist 'compliant', got {self.wrist!r}; remove it for any other",
+                f"requires wrist 'compliant', got {self.wrist!r}: change wrist, or leave it out",
                 field="wrist_travel",
             )
         if self.tendon_preload is not None:
             if self.wrist != "floating":
                 raise InvalidInputError(
-                    f"requires wrist 'floating', got {self.wrist!r}; remove it for any other",
+                    f"requires wrist 'floating', got {self.wrist!r}: change wrist, or leave it out",
                     field="tendon_preload",
                 )
             preload = finite_vector(self.tendon_preload, len(FINGERS), "tendon_preload")
@@ -240,7 +243,7 @@ class HandOnHold:
         if self.seat_direction is not None:
             if self.seat != "best":
                 raise InvalidInputError(
-                    f"requires the seat 'best', got {self.seat!r}; remove it for any other",
+                    f"requires the seat 'best', got {self.seat!r}: change seat, or leave it out",
                     field="seat_direction",
                 )
             direction = finite_vector(self.seat_direction, 6, "seat_direction")
@@ -271,8 +274,9 @@ class Stance:
     body : Pose
         Pose of the body frame B in the world frame W.
     gravity : ndarray, shape (3,)
-        In W [m/s²].
+        Acceleration of gravity, in W [m/s²].
     robot : Robot
+        The robot; RoboSimian by default.
     joints : mapping of str to (ndarray or 'solve'), 'solve' or None
         Joint angles by limb [rad], of prismatic joints [m]; needed for every limb with a hand in
         the stance. 'solve', for one limb or for all: found by inverse kinematics. None: joints are

@@ -37,5 +37,8 @@ from .spread import (
     DrawnPlan as DrawnPlan,
     Influence as Influence,
     Quantiles as Quantiles,
+    SentPlan as SentPlan,
+    SentSpread as SentSpread,
     Spread as Spread,
+    StrengthThreshold as StrengthThreshold,
 )

@@ -30,7 +30,7 @@ class Advice(Struct, frozen=True):
     Attributes
     ----------
     kind : str
-        ``body``: shift and tilt it; ``place``: move or turn a hand on its rock, which stays;
+        ``body``: shift and tilt the body; ``place``: move or turn a hand on its rock, which stays;
         ``grasp``: close one or all hands with other angles of outer fingers or closing tensions;
         ``let_go``: remove a hand; ``free_hand``: add a hand, if rock is there; ``new_hold``: put a
         hand elsewhere, if rock is there; ``strength``: one or all holds stronger; ``mass``: a

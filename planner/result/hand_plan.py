@@ -49,8 +49,8 @@ class WristPlan:
         plus that of the limb, K; rotations over 0.1 m [N/m]. The wrist is stable only if it is
         positive.
     stretches : ndarray, shape (n,), or None
-        Stretch of each tile along the rock: its shear over its contact stiffness [m]. None in what
-        is no plan.
+        Stretch of each tile along the rock: its shear over its contact stiffness [m]. None for a
+        wrist pose that is no plan.
     """
 
     twist: Array
@@ -70,6 +70,7 @@ class HandPlan:
     Attributes
     ----------
     limb : str
+        Name of the limb that has the hand.
     wrench : ndarray, shape (6,)
         Wrench of the hand on the rock [N, N·m].
     tensions : ndarray, shape (4,)
@@ -87,11 +88,13 @@ class HandPlan:
     limit_shares : ndarray, shape (n,)
         Share of a whole tile's strength that limits each tile's load, as in `SettledHand`.
     tile_utilisations : ndarray, shape (n,)
+        Utilisation of each tile, over its half-planes.
     tiles : tuple of SettledTile
         Finger, phalanx and contact state of each tile.
     half_planes : tuple of HalfPlane
         Limits of a whole tile (for nails see ``nail_planes``).
     palm : Palm
+        Load of the palm.
     utilisation : float
         Largest utilisation of the hand's limits.
     seating : Seating
@@ -102,7 +105,8 @@ class HandPlan:
         Wrench space that the program used; of a compliant or floating hand, linearised at the
         planned wrist pose.
     laws : ndarray, shape (n, 2, 2), or None
-        [tile, shear or normal load, at zero tension [N] or per newton of tension]; None if the
+        Loads of each tile as functions of the tension f of its finger's tendon: ``laws[i, 0]`` are
+        a [N] and b [1] of the shear a + b f, ``laws[i, 1]`` those of the normal load. None if the
         wrist is compliant or floating.
     nail_planes : mapping of int to tuple of HalfPlane
         Limits of each nail that hooks, by its index among the tiles.
@@ -196,21 +200,23 @@ class PlanArrays(NamedTuple):
     Attributes
     ----------
     tensions : ndarray, shape (F,)
-        Tendon tensions.
+        Tendon tensions [N].
     drives : ndarray, shape (3, F)
-        Torque and current of each motor, angle of each winch.
+        Torque [N·m] and current [A] of each motor, angle of each winch [rad].
     loads : ndarray, shape (T, 3)
-        Shear, normal and lateral load of each tile.
+        Shear, normal and lateral load of each tile [N].
     forces, points : ndarray, shape (T + H, 3)
-        Contact forces of all tiles, then of all palms, and the points where they act.
+        Contact forces of all tiles, then of all palms [N], and the points where they act [m].
     axes : ndarray, shape (T, 3, 3)
         Rows: unit forces of each tile's shear, normal and lateral load.
     tile_utilisations, engagement : ndarray, shape (T,)
+        Utilisation of each tile, and share of its spines that are on the rock.
     palm_moments : ndarray, shape (H, 3)
-    palm_utilisations : ndarray, shape (H,)
+        Moment of each palm about the point where its force acts [N·m].
+    palm_utilisations, utilisations : ndarray, shape (H,)
+        Largest utilisation of each palm's limits, and of all limits of its hand.
     wrenches : ndarray, shape (H, 6)
-        Wrench of each hand on the rock.
-    utilisations : ndarray, shape (H,)
+        Wrench of each hand on the rock [N, N·m].
     tiles : tuple of tuple of SettledTile
         Finger, phalanx and contact state of each hand's tiles.
     half_planes : tuple of tuple of HalfPlane
@@ -218,6 +224,7 @@ class PlanArrays(NamedTuple):
     engaged : tuple of sequence of int
         Indices of each palm's tiles that are on the rock.
     wrists : tuple of WristPlan or None
+        Planned pose of each wrist; None for a fixed wrist.
     """
 
     tensions: Array
@@ -268,7 +275,7 @@ class PlanArrays(NamedTuple):
     def hands(
         self, limbs: Sequence[str], known: HandBatch, spaces: Sequence[WrenchSpace]
     ) -> tuple[HandPlan, ...]:
-        """Split the arrays into plans of hands with fixed wrists; the plans share memory with them.
+        """Split the arrays into plans of hands with fixed wrists, which share the arrays' memory.
 
         Parameters
         ----------

@@ -328,7 +328,8 @@ def recover_floating_hand(
     space : WrenchSpace
         Set of the hand, linearised at the pose.
     y : ndarray, shape (m,)
-        Pose in the set's columns: twist from rest [m, rad], of a compliant hand tensions [N] first.
+        The set's loads y: twist of the wrist from rest [m, rad]; for a compliant hand, tensions
+        [N] and then the twist.
     pose : WristPlan
         Planned wrist pose; whether the wrist is driven, the tiles' stretches, pose target and
         stiffness are filled in.

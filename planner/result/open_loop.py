@@ -12,21 +12,21 @@ __all__ = ["OpenLoop", "OpenLoopSample"]
 
 
 class OpenLoopSample(Struct, frozen=True):
-    """Outcome of one sample of displaced hands; None for what does not exist without equilibrium.
+    """Outcome of one sample of displaced hands; without an equilibrium, numbers are None.
 
     Attributes
     ----------
     found : bool
         Whether all hands can be closed, and a stable equilibrium of wrists and body was found.
     holds : bool
-        Whether there everything holds: the utilisation is within the cap, and no tile is dragged
-        backwards, nor another hard row of a finger violated.
+        Whether the equilibrium keeps all limits: the utilisation is within the cap, no tile is
+        dragged backwards, and no other hard row of a finger is violated.
     utilisation : float or None
         Largest load over capacity of all limits, as of a plan.
     limb : str or None
         Limb of the hand with the largest utilisation.
     dragged : float or None
-        Force by which a tile is dragged backwards, the largest over all tiles; 0 if none is [N].
+        Largest force by which a tile is dragged backwards [N]; 0 if no tile is.
     body_twist : list of float, length 6, or None
         Twist of the body frame B from its given pose, in B [m, rad].
     """
@@ -45,12 +45,13 @@ class OpenLoop(Struct, frozen=True):
     In each sample every hand is displaced on its rock, on its own, and closes there. Its pose in
     the body frame B stays: the rock moves instead. Tensions go to the planned ones, and each limb
     pulls its wrist toward the planned pose target with the stance's limb stiffness. Body and wrists
-    settle where they balance the body wrench. Each equilibrium is verified, its stability is not;
-    one that does not pass counts as none. Quantiles and shares are statistics of the samples.
+    settle where they balance the body wrench. Each equilibrium is verified, except its stability;
+    one that fails the check counts as none. Quantiles and shares are statistics of the samples.
 
     Attributes
     ----------
     samples : list of OpenLoopSample
+        Outcome of each sample.
     seed : int
         Seed of the displacements.
     position, height : float
@@ -61,7 +62,7 @@ class OpenLoop(Struct, frozen=True):
         10, 50 and 90 % quantile of the utilisation, which is infinite in a sample without an
         equilibrium; None for an infinite quantile.
     holds : float
-        Share of the samples in which everything holds.
+        Share of the samples whose equilibrium keeps all limits.
     dragged, without : int
         Number of samples in which a tile is dragged backwards, and of samples without a stable
         equilibrium.
@@ -104,7 +105,9 @@ class OpenLoop(Struct, frozen=True):
         Parameters
         ----------
         samples : sequence of OpenLoopSample
+            Outcome of each sample.
         seed : int
+            Seed of the displacements.
         ranges : tuple of float
             Position, height [m], tilt and yaw [rad].
         refused, reasons : mapping

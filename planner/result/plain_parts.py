@@ -40,6 +40,7 @@ class LimitName(Struct, frozen=True):
     Attributes
     ----------
     limb : str
+        Limb that has the limit, or whose hand has it.
     finger, phalanx : str or None
         None if the limit is not a finger's, or not a tile's.
     limit : str
@@ -130,7 +131,8 @@ class Solver(Struct, frozen=True):
     name, status : str
         Name of the solver, and its status as CVXPY names it.
     iterations : int
-        Zero if the plan follows from the active limits of an earlier plan, without the solver.
+        Number of iterations; zero if the plan follows from the active limits of an earlier plan,
+        without the solver.
     """
 
     name: str
@@ -208,12 +210,12 @@ class Distance(Struct, frozen=True):
     Attributes
     ----------
     between : list of str
-        Names of the two, such as ``hand of front_left``, ``rock of front_left``, ``body``; a link
-        has its name, or that of the joint that moves it.
+        Names of the two things, such as ``hand of front_left``, ``rock of front_left``, ``body``;
+        a link has its name, or that of the joint that moves it.
     distance : float
         Least distance [m]; if negative, the depth of the overlap.
     points : list of (list of float)
-        Nearest point of each of the two, in the world frame W [m].
+        Nearest point of each of the two things, in the world frame W [m].
     """
 
     between: list[str]
@@ -229,13 +231,13 @@ class Clearance(Struct, frozen=True, kw_only=True):
     Attributes
     ----------
     link_rock : Distance or None
-        From a limb's link to rock.
+        Distance of a limb's link from rock.
     link_link : Distance or None
-        From a limb's link to another link, the body or another limb's hand.
+        Distance of a limb's link from another link, the body or another limb's hand.
     hand_hand, hand_body : Distance or None
-        From a hand to another hand, and to the body.
+        Distance of a hand from another hand, and from the body.
     body_rock : Distance or None
-        From the body to rock.
+        Distance of the body from rock.
     unchecked : list of str
         What was not measured, and why.
     """
@@ -254,10 +256,11 @@ class Palm(Struct, Generic[AnyVector], frozen=True, kw_only=True, eq=False):
     Attributes
     ----------
     position, force, moment : vector, length 3
-        [m], [N], [N·m]
+        Contact point [m], force on the rock [N], and moment about the contact point [N·m].
     engaged : sequence of int
         Indices of the palm's tiles that are on the rock.
     utilisation : float
+        Largest load over capacity of the palm's limits.
     """
 
     position: AnyVector
@@ -281,8 +284,9 @@ class Tile(Struct, frozen=True):
         ``face``; ``edge``; ``frame``: the phalanx only presses on rock beside the tile; ``nail``;
         ``none``: the tile touches nothing and carries no load.
     position : list of float, length 3
+        Point of contact [m].
     force : list of float, length 3
-        shear·shear_axis + normal·normal_axis + lateral·lateral_axis.
+        shear·shear_axis + normal·normal_axis + lateral·lateral_axis [N].
     shear, normal, lateral : float
         Components of the force along the three axes [N].
     shear_axis, normal_axis, lateral_axis : list of float, length 3
@@ -321,18 +325,19 @@ class Finger(Struct, frozen=True):
     Attributes
     ----------
     name : str
+        Name of the finger.
     closure : str
         How the finger ended its closing: ``laid``, ``hooked``, ``wedged``, ``curled``, ``stopped``
         or ``straight``.
     tendon_tension : float
-        [N]
+        Tension of the finger's tendon [N].
     motor_torque, motor_current : float
-        Of the motor while it tightens the tendon [N·m], [A].
+        Torque [N·m] and current [A] of the motor while it tightens the tendon.
     winch_angle : float
         Rotation of the winch from the open finger to the planned tension [rad]; for a floating
         hand, to the preload at which its motor stands still.
     tiles : list of Tile
-        From the base outward.
+        Tiles of the finger, from its base outward.
     """
 
     name: str

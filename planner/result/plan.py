@@ -52,6 +52,7 @@ class Plan:
     Attributes
     ----------
     status : {'optimal', 'overloaded', 'infeasible', 'failed'}
+        Whether there is a plan within the cap, one beyond it, none, or no answer.
     body_wrench : ndarray, shape (6,)
         Body wrench that is planned for, in the body frame B [N, N·m].
     utilisation : float or None
@@ -95,7 +96,9 @@ class Plan:
     warnings : tuple of str
         Messages of ``findings``, hands that touch nothing, and what a deadline left unfinished.
     solver : Solver
+        Solver of the plan's program, with its status.
     time : Time
+        Time that the answer took, by parts.
     findings : tuple of Finding
         What is odd about the stance as a scene, and may be a mistake.
     unfinished : tuple of str
@@ -183,15 +186,15 @@ class SetPoints:
     utilisation : float or None
         Largest utilisation of all limits.
     gap : float or None
-        Proven bound: no plan has a utilisation that is less by more than this. With compliant
-        wrists a bound of plans nearby, in the sets linearised at the wrists' poses.
+        Proven bound on how much lower the utilisation of another plan can be. With compliant
+        wrists it covers plans nearby only: those in the sets linearised at the wrists' poses.
     tensions : ndarray, shape (hands, 4), or None
         Tendon tensions [N].
     wrenches : ndarray, shape (hands, 6), or None
         Wrench of each hand on the rock, in H [N, N·m].
     loads : ndarray, shape (hands, m), or None
-        Loads y of each hand, in the order of `WrenchStream.columns`, then zeros [N]; of a compliant
-        wrist the twist, too [m, rad].
+        Loads y of each hand, in the order of `WrenchStream.columns`, then zeros [N]; those of a
+        compliant wrist include its twist [m, rad].
     source : {'interpolated', 'blended', 'solved'}
         ``interpolated``: from known plans; ``solved``: for this wrench alone; ``blended``: a
         mixture of both.

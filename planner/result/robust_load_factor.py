@@ -14,10 +14,10 @@ class RobustQuantiles(Struct, frozen=True):
     ----------
     tenth : float
         10 % quantile: the load factor is larger in nine of ten draws.
-    tenth_interval : list of float, length 2
     hundredth : float
         1 % quantile: the load factor is larger in 99 of a hundred draws.
-    hundredth_interval : list of float, length 2
+    tenth_interval, hundredth_interval : list of float, length 2
+        Lower and upper end of the confidence interval of the quantile.
     """
 
     tenth: float
@@ -33,8 +33,8 @@ class RobustLoadFactor(Struct, frozen=True):
     sequence seeded by the limb's name. Poses of all hands are combined at random; each combination
     is a draw. The hand frame H stays in the world frame W, with body and joints; the rock moves
     instead. Quantiles are over all draws. In a draw where a hand cannot be closed, or nothing can
-    be held, the load factor is zero. A hand that was placed by contact comes to rest anew at each
-    of its poses along x, y and turned about z, and is then moved by what contact leaves.
+    be held, the load factor is zero. A hand that was placed by contact is displaced along x and y
+    and turned about z, comes to rest anew there, and then gets a small further displacement.
 
     Tensions, and where compliant wrists go, are planned anew for every draw: the load factor is
     that of a robot that knows where its hands are. With compliant wrists each draw has places of
@@ -61,10 +61,10 @@ class RobustLoadFactor(Struct, frozen=True):
     reasons : dict of str to str
         Why a hand cannot be closed at the first pose where it cannot, by limb.
     replanned : RobustQuantiles
-        Of the load factors of draws whose tensions are planned anew.
+        Quantiles of the load factor, with tensions planned anew for each draw.
     contact_position, contact_angle : float or None
-        Half width of what contact leaves, along z of H [m] and about x and y [rad], in place of
-        ``position`` and ``angle`` there; None where no hand was placed by contact.
+        Half width of the further displacement of hands placed by contact: along z of H [m], and
+        about x and y [rad], in place of ``position`` and ``angle``. None without such hands.
     """
 
     draws: int

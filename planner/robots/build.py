@@ -130,7 +130,7 @@ def build_model(
     Returns
     -------
     model : pinocchio.Model
-        Its gravity is zero: gravity is given as an acceleration of the root link.
+        The model; its gravity is zero, as gravity is given as an acceleration of the root link.
     root : Pose
         Pose of B in the root link.
     chains : dict of str to Chain

@@ -77,6 +77,7 @@ def capsules_of(model: Any, described: RobotDescription, chains: Mapping[str, Ch
     Parameters
     ----------
     model : pinocchio.Model
+        Pinocchio's model of the robot.
     described : RobotDescription
         Content of the robot's file, with its capsules and radii.
     chains : mapping of str to Chain

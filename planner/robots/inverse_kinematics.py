@@ -31,10 +31,9 @@ class UnreachableError(InvalidInputError):
     Parameters
     ----------
     missing : mapping of str to float
-        By limb: the distance by which the hand does not reach its position [m].
+        Distance by which the hand does not reach its position, by limb [m].
     turned : mapping of str to float
-        By limb, for hands that reach their position, but not with the given orientation: the angle
-        to that orientation [rad].
+        Angle to the given orientation, by limb, for hands that reach only their position [rad].
     field : str, optional
         Field of the question that has the poses.
     """
@@ -75,6 +74,7 @@ def solve_limbs(
     Parameters
     ----------
     robot : Robot
+        Robot whose limbs carry the hands.
     poses : mapping of str to Pose
         Target pose of H in B, by limb.
     loads : mapping of str to ndarray, shape (6,)

@@ -24,6 +24,7 @@ class LimbBatch:
     Parameters
     ----------
     robot : Robot
+        Robot whose limbs carry the hands.
     poses : mapping of str to Pose
         Target pose of H in B, by limb.
     loads : mapping of str to ndarray, shape (6,)

@@ -65,6 +65,7 @@ def limb_joints(
     Parameters
     ----------
     tree : Urdf
+        Links and joints of the robot's URDF.
     described : RobotDescription
         Content of the robot's file.
     locked : collection of str

@@ -50,10 +50,12 @@ class LinkTree:
     Parameters
     ----------
     robot : Robot
+        Robot whose links are placed.
 
     Attributes
     ----------
     robot : Robot
+        Robot whose links are placed.
     links : list of Link
         Links of the URDF, the root link first.
     """

@@ -45,6 +45,7 @@ def starts_beside(batch: LimbBatch, i: int, best: Array) -> tuple[LimbBatch, Seq
     Parameters
     ----------
     batch : LimbBatch
+        Limbs, with target poses and loads of their hands.
     i : int
         Index of the limb in the batch.
     best : ndarray, shape (n,)

@@ -122,9 +122,11 @@ def carriers(
     Parameters
     ----------
     robot : Robot
+        Robot that carries the payloads.
     angles : mapping of str to ndarray, shape (n,)
         Joint angles, by limb [rad, or m].
     payloads : sequence of Payload
+        Payloads on links or in hands.
 
     Returns
     -------

@@ -93,6 +93,7 @@ def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array
     Parameters
     ----------
     batch : LimbBatch
+        Limbs, with target poses and loads of their hands.
     angles : ndarray, shape (S, L, m)
         Joint angles of S postures [rad].
     errors : ndarray, shape (S, L, 6)
@@ -137,6 +138,7 @@ def postures_near(batch: LimbBatch, i: int, count: int) -> Array:
     Parameters
     ----------
     batch : LimbBatch
+        Limbs, with target poses and loads of their hands.
     i : int
         Index of the limb in the batch.
     count : int

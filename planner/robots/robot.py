@@ -161,6 +161,7 @@ class Robot:
         body : Pose
             Pose of B in the world frame W.
         limbs : sequence of str, length n
+            Name of the limb of each hand.
         hands : sequence of Pose, length n
             Pose of each limb's hand frame H in W.
 
@@ -373,6 +374,7 @@ def robot_of(file: RobotFile, hand_numbers: ParameterTable | None = None) -> Rob
     Parameters
     ----------
     file : RobotFile
+        Texts of the robot's file and of its URDF.
     hand_numbers : ParameterTable, optional
         All parameters of the hands; the bundled ones by default.
 

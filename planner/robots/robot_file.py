@@ -219,7 +219,9 @@ def _named(name: str, field: str) -> None:
 def _mapping(value: Any, field: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         got = type(value).__name__
-        raise InvalidInputError(f"a section of entries is needed, got {got}", field=field)
+        raise InvalidInputError(
+            f"a section of entries is needed, got {got}; write them under [{field}]", field=field
+        )
     return value
 
 

@@ -67,8 +67,11 @@ class Route:
     Attributes
     ----------
     name : str
+        Name of the climb.
     start : Stance
+        Stance from which the climb starts.
     moves : tuple of Move
+        Moves in climbing order.
     load : Load
         Mass, payloads and acceleration of the body, the same in every stage.
     limits : Limits
@@ -105,6 +108,7 @@ class RouteStage:
     move : int
         Number of its move, from one; zero for the start.
     phase : {'start', 'shift', 'lift', 'place'}
+        Part of the move: shift of the body, lift of the limb, or place of its hand.
     limb : str or None
         Limb that moves; None for the start.
     question : Question
@@ -154,7 +158,9 @@ class RouteResult:
     Attributes
     ----------
     route : Route
+        The climb.
     stages : tuple of RouteStage
+        Stances of the climb, in climbing order.
     plans : tuple of Plan or OutOfReach
         Answer for each stage.
     """

@@ -29,6 +29,7 @@ def evaluate(
     Parameters
     ----------
     route : Route
+        Climb whose stages are planned.
     workers : int, optional
         Number of worker processes. By default the number of cores for routes of at least 100
         stages, else one. With one, this process plans all stages itself.
@@ -38,8 +39,8 @@ def evaluate(
     Returns
     -------
     RouteResult
-        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. Of
-        a finding of which a plan has at most one, the largest of all stages is left.
+        A plan for each stage, or `OutOfReach` if inverse kinematics finds no joint angles. Kinds
+        of findings that a plan has at most once remain only in the stage with the largest value.
 
     Raises
     ------

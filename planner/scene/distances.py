@@ -47,6 +47,7 @@ def clearance(scene: Scene, angles: Mapping[str, Array] | None) -> Clearance:
     Parameters
     ----------
     scene : Scene
+        Geometry of the stance in the body frame B.
     angles : mapping of str to ndarray, shape (n,), or None
         Joint angles of every limb [rad, or m]; None if unknown: links are not measured then.
     """
@@ -82,6 +83,7 @@ def link_findings(scene: Scene, angles: Mapping[str, Array]) -> tuple[Finding, .
     Parameters
     ----------
     scene : Scene
+        Geometry of the stance in the body frame B.
     angles : mapping of str to ndarray, shape (n,)
         Joint angles of every limb [rad, or m].
     """

@@ -44,6 +44,7 @@ class Scene:
     Attributes
     ----------
     stance : Stance
+        The stance itself.
     hands : tuple of HandOnHold
         The hands of the stance.
     swept : tuple of Swept or None
@@ -67,7 +68,9 @@ class Scene:
     rocks: tuple[Pose, ...]
 
     def smooth_depths(self, hands: Sequence[int], points: Array) -> Array:
-        """Return the depth of points in the rock of hands on smooth holds, shape (k, n) [m].
+        """Return how deep points are in the smooth holds of some hands, shape (k, n) [m].
+
+        Depths are negative outside the rock, and lower bounds for an ellipsoid.
 
         Parameters
         ----------
@@ -108,6 +111,7 @@ def scene_of(stance: Stance, settled: Sequence[SettledHand]) -> Scene:
     Parameters
     ----------
     stance : Stance
+        Poses of the body and of the hands on their holds.
     settled : sequence of SettledHand
         The stance's hands, closed on their holds.
     """

@@ -59,6 +59,7 @@ def capsule_solids(names: Iterable[str], ends: Array, radii: Array) -> tuple[Sol
     Parameters
     ----------
     names : iterable of str, length n
+        Names of the capsules in messages.
     ends : ndarray, shape (n, 2, 3)
         Ends of the capsules' segments, in B [m].
     radii : ndarray, shape (n,)

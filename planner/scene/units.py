@@ -30,7 +30,7 @@ def unit_findings(question: Question) -> tuple[Finding, ...]:
     Parameters
     ----------
     question : Question
-        Its body wrench is not checked: see `wrench_findings`.
+        Question to check, except for its body wrench: see `wrench_findings`.
     """
     stance = question.stance
     robot = tuple(_robot(stance.robot))

@@ -127,6 +127,7 @@ class Rows(NamedTuple):
         Returns
         -------
         ndarray of bool, shape (k,)
+            True for active rows.
         """
         active = self.room(z, u) <= TOLERANCES.row
         active[: self.equations] = True
@@ -134,7 +135,7 @@ class Rows(NamedTuple):
 
 
 class ApartError(Exception):
-    """Error of active rows that have no common point, or of an iteration that does not converge."""
+    """Error: the active rows have no common point, or Newton's iteration does not converge."""
 
 
 class ActiveFace:
@@ -143,6 +144,7 @@ class ActiveFace:
     Parameters
     ----------
     rows : Rows
+        All rows of the stance.
     Q : ndarray, shape (M,)
         Diagonal of the curvature at a weight of 1.
     active : ndarray of bool, shape (k,)
@@ -260,6 +262,7 @@ def optimum(
     Parameters
     ----------
     rows : Rows
+        All rows of the stance.
     Q : ndarray, shape (M,)
         Diagonal of the curvature at a weight of 1.
     start : Point

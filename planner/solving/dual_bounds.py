@@ -69,6 +69,7 @@ def unique_bound(data: StanceData, outcome: Outcome, share: float = 1.0) -> floa
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     outcome : Outcome
         Outcome of `programs.unique`.
     share : float, optional
@@ -93,6 +94,7 @@ def convex_bound(
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     outcome : Outcome
         Outcome of the program that minimises f, with its multipliers.
     value : float

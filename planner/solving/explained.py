@@ -71,7 +71,9 @@ def explained_plan(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     checks : Checks
+        Recovery and checks of the stance's loads.
     answer : Answer
         Verified loads, a proof of infeasibility, or a failure.
     factor : LoadFactor
@@ -111,7 +113,9 @@ def explained_plan(
         parts["open_loop"] = find_open_loop(prepared, answer.by_hand(), checks.idle_use, passes)
         unfinished += late("open_loop") if parts["open_loop"] is None else ()
     if "spread" in question.want:
-        parts["spread"] = find_spread(prepared, checks.idle, solution, attempt)
+        hands = answer.by_hand() if isinstance(answer, Verified) else ()
+        passes = partial(execution_passes, prepared)
+        parts["spread"] = find_spread(prepared, checks.idle, solution, attempt, hands, passes)
         unfinished += late("spread") if parts["spread"] is None else ()
     if "clearance" in question.want:
         parts["clearance"] = _clearance(prepared)
@@ -164,8 +168,11 @@ def reason_beyond(prepared: PreparedStance, checks: Checks, answer: Answer) -> s
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     checks : Checks
+        Recovery and checks of the stance's loads.
     answer : Answer
+        Verified loads, a proof of infeasibility, or a failure.
     """
     if not isinstance(answer, Verified):
         return _reason_of_none(prepared, answer)
@@ -229,6 +236,7 @@ def unexplained(prepared: PreparedStance, proof: Certificate) -> tuple[Unfinishe
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     proof : Certificate
         Complete if it has both an irreducible infeasible subset and sufficient changes.
     """

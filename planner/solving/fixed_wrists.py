@@ -59,6 +59,7 @@ class FixedSolution(Solution):
         Parameters
         ----------
         prepared : PreparedStance
+            The question's stance, with hands on their holds and their sets.
         sets : Sets
             Wrench spaces of the hands and rows of the programs.
         least : Outcome
@@ -122,7 +123,7 @@ class FixedSolution(Solution):
     def load_factor(
         self, prepared: PreparedStance, budget: Budget
     ) -> tuple[LoadFactor, FixedSolution]:
-        """Return the load factor: the largest multiple of the body wrench at utilisation 1."""
+        """Return the largest multiple of the body wrench at utilisation 1, and this solution."""
         factor = most_of_fixed(prepared.hands, self.sets.data)
         return LoadFactor(factor, unfinished=factor is None and deadline.expired()), self
 
@@ -139,6 +140,7 @@ def fixed_solutions(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     near : Solution, optional
         Solution for the same hands at another body wrench, as a warm start.
     """
@@ -209,11 +211,12 @@ def nearest_solutions(
 ) -> Iterator[FixedSolution]:
     """Yield candidate plans for the feasible body wrench nearest to the one of the question.
 
-    For a body wrench that is infeasible only by rounding.
+    It serves body wrenches that are infeasible only by rounding.
 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     found : Solution
         Solution for the body wrench of the question.
     nearest : Outcome
@@ -234,6 +237,7 @@ def most_of_fixed(hands: HandSets, data: StanceData) -> float | None:
     Parameters
     ----------
     hands : HandSets
+        Hands of the stance, with their sets at any pose of their wrists.
     data : StanceData
         Rows of the hands' wrench spaces, and the body wrench.
     """

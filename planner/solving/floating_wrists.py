@@ -101,7 +101,10 @@ class FloatingSolution(Solution):
     def load_factor(
         self, prepared: PreparedStance, budget: Budget
     ) -> tuple[LoadFactor, FloatingSolution]:
-        """Search for the load factor; it is a lower bound if no plan was found beyond it."""
+        """Search for the load factor; return it with the best solution found on the way.
+
+        The factor is marked as a lower bound if no plan was found beyond it.
+        """
         most, search = most_load(prepared.hands, self.usual, self.factor, budget)
         found = self
         if search is not self.usual and self.objective is MAX_MARGIN:
@@ -127,6 +130,7 @@ def floating_solution(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     budget : Budget
         Number of programs that the search may solve.
     near : Solution, optional
@@ -135,7 +139,7 @@ def floating_solution(
     Returns
     -------
     FloatingSolution
-        Without loads if no equilibrium was found.
+        Solution; it has no loads if no equilibrium was found.
     """
     begin = near.usual if isinstance(near, FloatingSolution) and near.usual.exact else None
     search, factor = least_use(prepared.hands, budget, begin)
@@ -145,11 +149,12 @@ def floating_solution(
 def next_solution(
     prepared: PreparedStance, budget: Budget, near: FloatingSolution
 ) -> FloatingSolution | None:
-    """Return the solution close to that of another body wrench, within the cap; None without one.
+    """Return a solution within the cap close to that for another body wrench; None without one.
 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     budget : Budget
         Number of programs that may be solved.
     near : FloatingSolution

@@ -25,9 +25,9 @@ class PalmLoadFactors(NamedTuple):
     Attributes
     ----------
     without_shear : float or None
-        Palms press, and carry no shear.
+        Load factor if palms press, and carry no shear.
     without_pressing : float or None
-        Palms carry shear, and do not press.
+        Load factor if palms carry shear, and do not press.
     """
 
     without_shear: float | None
@@ -43,6 +43,7 @@ def load_factors_without_palm_loads(question: Question) -> PalmLoadFactors | Non
     Parameters
     ----------
     question : Question
+        Question whose stance is planned with each of the two loads left out.
 
     Returns
     -------

@@ -86,6 +86,7 @@ def find_robust_load_factor(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     idle : sequence of LimitUse
         Limits of limbs without a hand, the same in every sample.
     usual : Solution

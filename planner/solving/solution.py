@@ -36,7 +36,8 @@ class Solution:
     sets : Sets
         Wrench spaces of the hands and rows of the programs, linearised about the loads.
     loads : tuple of ndarray, shape (m,)
-        Loads y of each hand [N], of a floating wrist [m, rad]; empty without a solution.
+        Loads y of each hand [N]; of a floating wrist its twist [m, rad], of a compliant one
+        tensions and twist. Empty without a solution.
     least : Outcome
         Outcome of the program of least utilisation.
     objective : Objective
@@ -86,7 +87,9 @@ class Solution:
         Parameters
         ----------
         objective : CappedObjective
+            Objective to be minimised.
         prepared : PreparedStance
+            The question's stance, with hands on their holds and their sets.
         budget : Budget
             Number of programs that a search for wrist poses may still solve.
         """
@@ -95,11 +98,12 @@ class Solution:
     def load_factor(self, prepared: PreparedStance, budget: Budget) -> tuple[LoadFactor, Solution]:
         """Return the load factor: the largest multiple of the body wrench at utilisation 1.
 
-        And the solution, or a better one that the search has come upon, not verified.
+        Returned with it: this solution, or a better one that the search found, not verified.
 
         Parameters
         ----------
         prepared : PreparedStance
+            The question's stance, with hands on their holds and their sets.
         budget : Budget
             Number of programs that a search for wrist poses may still solve.
         """
@@ -116,6 +120,7 @@ class Failed:
     Attributes
     ----------
     solution : Solution
+        The solution that is no plan.
     reason : str
         Sentence that says why the solution is no plan.
     utilisation, whole : float
@@ -137,6 +142,7 @@ class Infeasible:
     solution : Solution
         The solution without a balance.
     proof : Certificate
+        Certificate that proves it.
     utilisation, whole : float
         Infinite, as for every answer without a plan.
     """
@@ -158,6 +164,7 @@ class Verified:
     Attributes
     ----------
     solution : Solution
+        Solution that was checked.
     arrays : PlanArrays
         The plan's numbers, in arrays over all hands.
     used : ndarray, shape (sum of nl,)
@@ -190,13 +197,15 @@ def load_factor_of(
 ) -> tuple[LoadFactor, Solution]:
     """Return the load factor: the largest multiple of the body wrench at utilisation 1.
 
-    And the answer's solution, or a better one that the search has come upon, not verified. Without
-    a body wrench the factor is unbounded, if the stance is feasible at utilisation 1.
+    Returned with it: the answer's solution, or a better one that the search found, not verified. If
+    the body wrench is zero and the stance feasible at utilisation 1, the factor is unbounded.
 
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     answer : Answer
+        Verified loads, a proof of infeasibility, or a failure.
     budget : Budget
         Number of programs that a search for wrist poses may still solve.
     overloaded : bool

@@ -52,7 +52,7 @@ def plan(question: Question) -> Plan:
     Returns
     -------
     Plan
-        Its status is ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
+        Plan with the status ``optimal``, ``overloaded``, ``infeasible`` or ``failed``.
 
     Raises
     ------
@@ -348,7 +348,7 @@ class KnownStance:
         Parameters
         ----------
         body_wrench : ndarray, shape (6,)
-            As of `plan`, which also says when an error is raised.
+            Body wrench as for `plan`, which also says when an error is raised.
         start : float
             Time at which the answer was begun, on the clock of `time.perf_counter` [s].
         """

@@ -56,6 +56,7 @@ def spare_hands(data: StanceData, exact: Outcome, trade: TensionTrade) -> tuple[
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     exact : Outcome
         Outcome of the program of least utilisation, with exact multipliers.
     trade : TensionTrade
@@ -96,9 +97,11 @@ def at_closing(
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     trade : TensionTrade
         Utilisation that the plan may give away for less tension.
     spare : sequence of SpareHand
+        The spare hands.
     closing : sequence of float
         Closing tension of every hand [N].
     """
@@ -125,6 +128,7 @@ def less_tense(
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     least : Outcome
         Outcome of the program of least utilisation.
     trade : TensionTrade

@@ -4,7 +4,8 @@ A sample changes the hands and the strength of their tiles. Body, poses of the h
 body wrench stay the same. A hand with a seat is closed at the seat of the sample's hand: H stays
 where it is, and the rock is elsewhere. A hand whose best seat was searched for keeps that seat. The
 search for floating wrists starts from the solution for the question's hands. A sample's plan has no
-certificate, no prices and no explanation.
+certificate, no prices and no explanation. Beside it stands what the question's own plan does in the
+sample, its tensions kept or balanced by feedback (`planner.execution`).
 
 The contact stiffness on rock is uncertain, too, but counts only where wrists move: samples have it
 if a wrist that is compliant or floating is on another surface than that of the calibration.
@@ -15,25 +16,55 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+import scipy
 
 from hand_models.base import InvalidInputError
 from hand_models.hand import Placement, PlacementKey, SettledHand, settle_hands
-from hand_models.parameters import FITTED_SURFACE
+from hand_models.parameters import FITTED_SURFACE, ParameterTable, draw_table, surface_table
+from hand_models.tile import Surface
 from planner import deadline
-from planner.advice import Attempt
+from planner.advice import Attempt, StanceTrial
 from planner.deadline import DeadlineError
+from planner.execution import Passes, execute_closed, sent_plans, without_margins
 from planner.explanation import LimitUse
 from planner.prepare import PreparedStance
 from planner.programs import CAP_SLACK
 from planner.question import DrawnHand, drawn_hands, drawn_quantities
-from planner.result import DrawnPlan, Spread
+from planner.result import DrawnPlan, HandPlan, SentPlan, Spread, StrengthThreshold
 from planner.solving.solution import Solution
 
 __all__ = ["find_spread"]
 
+ALL_PLANNED: Final = "all samples were planned"
+"""What a deadline may leave unfinished."""
+
+ROCK_PRESET: Final = "rock"
+"""Preset surface whose strength has an assumed range."""
+
+
+@dataclass(frozen=True, slots=True)
+class ThresholdSettings:
+    """Settings of the search for the least strength of rock."""
+
+    accuracy: float = 0.01  # of the strength, far below what is known of any rock
+    none: float = 10.0
+    """Utilisation beyond the cap that stands for no plan: finite, so that it can be bracketed."""
+
+
+THRESHOLD_SETTINGS: Final = ThresholdSettings()
+
 
 def find_spread(
-    prepared: PreparedStance, idle: Sequence[LimitUse], usual: Solution, attempt: Attempt
+    prepared: PreparedStance,
+    idle: Sequence[LimitUse],
+    usual: Solution,
+    attempt: Attempt,
+    hands: Sequence[HandPlan] = (),
+    passes: Passes = lambda *_: True,
 ) -> Spread | None:
     """Return the plans of a stance over all samples of uncertain parameters (Monte Carlo).
 
@@ -46,46 +77,133 @@ def find_spread(
         Solution for the question's hands, from which searches for floating wrists start.
     attempt : callable
         Plans the stance of a sample (`try_stance`).
+    hands : sequence of HandPlan, optional
+        Verified plan for the question's hands, whose set-points are judged in all samples.
+    passes : callable, optional
+        Check of each equilibrium of hands whose wrists move, as of `find_open_loop`.
 
     Returns
     -------
     Spread or None
         None if the deadline passed before all samples were planned.
     """
-    question, plans = prepared.question, []
-    surfaces = frozenset(hand.surface.name for hand in question.stance.hands)
+    question, stance = prepared.question, prepared.question.stance
+    surfaces = frozenset(hand.surface.name for hand in stance.hands)
     moving = any(
-        hand.wrist != "fixed" and hand.surface.name != FITTED_SURFACE
-        for hand in question.stance.hands
+        hand.wrist != "fixed" and hand.surface.name != FITTED_SURFACE for hand in stance.hands
     )
-    limbs = tuple(sorted(hand.limb for hand in question.stance.hands))
-    drawn = drawn_hands(question.stance.robot.hand, question.draws, wrists_move=moving, limbs=limbs)
-    refused: Counter[str] = Counter()
+    limbs = tuple(sorted(hand.limb for hand in stance.hands))
+    drawn = drawn_hands(stance.robot.hand, question.draws, wrists_move=moving, limbs=limbs)
+    fixed = len(hands) > 0 and not prepared.floating
+    limbs_hold = len(prepared.floating) == len(hands) > 0 and stance.limb_stiffness is not None
+    bare, tensions = without_margins(prepared), [hand.tensions for hand in hands]
+    used = max([each.utilisation for each in idle], default=0.0)
+    plans, refused = [DrawnPlan()] * len(drawn), Counter[str]()
+    kept, feedback = [SentPlan()] * len(drawn), [SentPlan()] * len(drawn)
+    closed: dict[int, list[SettledHand]] = {}
     try:
-        for each in drawn:
-            deadline.check("all samples were planned")
+        for k, each in enumerate(drawn):
+            deadline.check(ALL_PLANNED)
             outcomes = _settled(prepared, each)
-            there = [hand for hand in outcomes if isinstance(hand, SettledHand)]
+            own = [hand for hand in outcomes if isinstance(hand, SettledHand)]
             pairs = zip(prepared.limbs, outcomes, strict=True)
             refused.update(limb for limb, hand in pairs if not isinstance(hand, SettledHand))
-            whole = len(there) == len(outcomes)
-            plans.append(_planned(prepared, there, idle, usual, attempt) if whole else DrawnPlan())
-        deadline.check("all samples were planned")
+            there = _with_hands(prepared, own) if len(own) == len(outcomes) else None
+            if there is None:
+                continue
+            closed[k] = own
+            plans[k] = _planned(_tried(prepared, there, idle, usual, attempt))
+            if fixed:
+                sent = there if bare is prepared else bare.with_hands(own)
+                kept[k], feedback[k] = sent_plans(sent, tensions, used)
+        if limbs_hold:
+            found = execute_closed(prepared, hands, list(closed.values()), used, passes)
+            for k, sample in zip(closed, found, strict=True):
+                kept[k] = SentPlan(sample.utilisation, sample.holds)
+        own_samples = question.draws is not None
+        threshold = None if own_samples else _threshold(prepared, idle, usual, attempt)
+        deadline.check(ALL_PLANNED)
     except DeadlineError:
         return None
-    cap = question.limits.utilisation
-    return Spread.of(plans, cap, refused, drawn_quantities(drawn, surfaces))
+    quantities = drawn_quantities(drawn, surfaces)
+    return Spread.of(
+        plans,
+        question.limits.utilisation,
+        refused,
+        quantities,
+        kept if fixed or limbs_hold else None,
+        feedback if fixed else None,
+        threshold,
+        {name: _source(drawn[0], name) for name in quantities},
+    )
+
+
+def _source(drawn: DrawnHand, name: str) -> str:
+    """Return the source of an uncertain parameter, by its name in `drawn_quantities`."""
+    section, _, entry = name.partition(".")
+    if section == "discrepancy" or entry == "half_planes":
+        return draw_table().quantity("ranges", section if entry != "half_planes" else entry).source
+    entry, table = entry.split("[")[0], drawn.model.table
+    if section not in table.sections:
+        table = drawn.surfaces
+        section = section if entry in table.sections.get(section, {}) else "defaults"
+    return table.quantity(section, entry).source
+
+
+def _threshold(
+    prepared: PreparedStance, idle: Sequence[LimitUse], usual: Solution, attempt: Attempt
+) -> StrengthThreshold | None:
+    """Return the least strength of rock in its assumed range with which the stance is feasible."""
+    stance, table = prepared.question.stance, surface_table()
+    sandpaper = table.scalar(FITTED_SURFACE, "shear_limit")
+    least, most = draw_table().vector("ranges", "rock_ratio")
+    cap = prepared.question.limits.utilisation + CAP_SLACK
+
+    def on_rock(ratio: float) -> DrawnHand:
+        strength = table.quantity(ROCK_PRESET, "shear_limit").changed(ratio * sandpaper)
+        own = ParameterTable({ROCK_PRESET: {"shear_limit": strength}})
+        return DrawnHand(stance.robot.hand, table.replaced(own))
+
+    @cache
+    def beyond(weakness: float) -> float:
+        """Return by how much the utilisation exceeds the cap on rock of 1 / weakness."""
+        deadline.check(ALL_PLANNED)
+        own = [
+            hand
+            for hand in _settled(prepared, on_rock(1.0 / weakness))
+            if isinstance(hand, SettledHand)
+        ]
+        there = _with_hands(prepared, own) if len(own) == len(stance.hands) else None
+        if there is None:
+            return THRESHOLD_SETTINGS.none
+        used = _tried(prepared, there, idle, usual, attempt).utilisation
+        return min(used - cap, THRESHOLD_SETTINGS.none)
+
+    weakest = on_rock(least)
+    if all(weakest.surface(hand.surface) == hand.surface for hand in stance.hands):
+        return None
+    ratio: float | None = least
+    if beyond(1.0 / most) > 0.0:
+        ratio = None
+    elif beyond(1.0 / least) > 0.0:
+        # the utilisation is nearly linear in the weakness
+        accuracy = THRESHOLD_SETTINGS.accuracy / most
+        ratio = 1.0 / float(scipy.optimize.brentq(beyond, 1.0 / most, 1.0 / least, xtol=accuracy))
+    share = 0.0 if ratio is None else (most - ratio) / (most - least)
+    strength = None if ratio is None else ratio * sandpaper
+    return StrengthThreshold(ROCK_PRESET, strength, ratio, [least, most], share)
 
 
 def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | InvalidInputError]:
     """Return the hands closed as those of a draw; errors in place of those that cannot be."""
-    placements = {}
-    keys = []
+    placements, surfaces, keys = {}, dict[Surface, Surface](), list[PlacementKey]()
     for hand, usual in zip(prepared.question.stance.hands, prepared.batch.hands, strict=True):
         seat, at = hand.placed_hold(), hand.at
         if hand.seat == "best":
             seat, at = usual.seating.pose, None
-        placement = Placement(hand.hold, drawn.surface(hand.surface), hand.grasp, seat, at)
+        if hand.surface not in surfaces:
+            surfaces[hand.surface] = drawn.surface(hand.surface)
+        placement = Placement(hand.hold, surfaces[hand.surface], hand.grasp, seat, at)
         keys.append(PlacementKey(placement))
         placements[keys[-1]] = placement
     # hands that close alike close once
@@ -97,24 +215,32 @@ def _settled(prepared: PreparedStance, drawn: DrawnHand) -> list[SettledHand | I
     ]
 
 
-def _planned(
+def _with_hands(prepared: PreparedStance, settled: Sequence[SettledHand]) -> PreparedStance | None:
+    """Return the stance with a draw's hands; None if one does not hold the preload that it has."""
+    try:
+        return prepared.with_hands(settled)
+    except InvalidInputError:
+        return None
+
+
+def _tried(
     prepared: PreparedStance,
-    settled: Sequence[SettledHand],
+    there: PreparedStance,
     idle: Sequence[LimitUse],
     usual: Solution,
     attempt: Attempt,
-) -> DrawnPlan:
-    """Return what the verified plan says of the same stance with a draw's hands."""
-    try:
-        there = prepared.with_hands(settled)
-    except InvalidInputError:
-        # a preload that a floating hand does not hold
-        return DrawnPlan()
-    pairs = zip(settled, prepared.batch.hands, strict=True)
+) -> StanceTrial:
+    """Return the plan of the same stance with other hands."""
+    pairs = zip(there.batch.hands, prepared.batch.hands, strict=True)
     # with its palms, a hand has other ways to carry
     alike = all(drawn.palm.engaged == own.palm.engaged for drawn, own in pairs)
-    trial = attempt(there, idle, usual if prepared.hands.floating and alike else None)
+    return attempt(there, idle, usual if prepared.hands.floating and alike else None)
+
+
+def _planned(trial: StanceTrial) -> DrawnPlan:
+    """Return what the verified plan says of the same stance with a draw's hands."""
     used, factor = trial.utilisation, trial.load_factor().factor
     if math.isinf(used):
         return DrawnPlan(load_factor=factor)
-    return DrawnPlan(used, factor, used <= there.question.limits.utilisation + CAP_SLACK)
+    cap = trial.prepared.question.limits.utilisation
+    return DrawnPlan(used, factor, used <= cap + CAP_SLACK)

@@ -145,6 +145,7 @@ def active_set_optimum(
     Parameters
     ----------
     data : StanceData
+        Scaled rows of all hands, and the wrench that they must balance.
     near : Outcome
         Solved outcome of the same program, or of the same hands at another body wrench.
     share : float, optional

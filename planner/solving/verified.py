@@ -78,6 +78,7 @@ class Checks(NamedTuple):
         Parameters
         ----------
         prepared : PreparedStance
+            The question's stance, with hands on their holds and their sets.
         idle : sequence of LimitUse, optional
             Utilisation of the joints of limbs without a hand; computed by default.
         """
@@ -119,9 +120,11 @@ def recover(prepared: PreparedStance, checks: Checks, solution: Solution) -> Ver
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     checks : Checks
+        Recovery and checks of the stance's loads.
     solution : Solution
-        With loads.
+        A solution that has loads.
     """
     spaces, data = solution.sets
     if checks.recovery is not None:
@@ -158,7 +161,9 @@ def verify(prepared: PreparedStance, checks: Checks, recovered: Verified) -> Ver
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     checks : Checks
+        Recovery and checks of the stance's loads.
     recovered : Verified
         Numbers from `recover`.
     """
@@ -188,6 +193,7 @@ def execution_passes(
     Parameters
     ----------
     prepared : PreparedStance
+        The question's stance, with hands on their holds and their sets.
     closed : sequence of SettledHand
         The hands, displaced and closed.
     hands : sequence of HandPlan

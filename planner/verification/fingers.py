@@ -134,10 +134,9 @@ class NailLimits:
     Attributes
     ----------
     tiles : ndarray of int, shape (k,)
-        For each nail in contact, the index in the list of all hands' tiles of the entry that
-        stands for the nail.
+        Index of each nail that hooks, among the tiles and nails of all hands.
     fingers : ndarray of int, shape (k,)
-        Index of its finger in the list of all hands' fingers.
+        Index of each such nail's finger, among the fingers of all hands.
     """
 
     def __init__(self, names: PartNames) -> None:

@@ -34,7 +34,7 @@ __all__ = ["recompute_floating"]
 def moved(place: Array, wrist: WristPlan) -> Array:
     """Return the displacement of a point of the hand under a wrist's twist, shape (3,) [m].
 
-    To second order in the rotation, like the model.
+    The rotation counts to second order, as in the model.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ class HandLimits(ResidualLimits):
         ]
 
     def recompute_curved(self, arrays: PlanArrays, loads: Array, wrenches: Array) -> list[Residual]:
-        """Return by how much the program's linear bounds exceed the size of each hand's force.
+        """Return by how much the program's linear bounds exceed the size of each hand's force [N].
 
         Only the part of the force across and away from the rock counts. The bound is the largest
         product of the force with `HELD_DIRECTIONS`; it must not be below the size.

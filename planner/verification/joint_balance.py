@@ -69,6 +69,7 @@ def tendons_of(places: TileIndex, hand: HandModel) -> tuple[Array, Array, Array,
     places : TileIndex
         Index of the tiles of all hands.
     hand : HandModel
+        Model of all the hands.
 
     Returns
     -------

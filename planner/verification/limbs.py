@@ -59,6 +59,7 @@ def check_limbs(
     found : list of str
         Error messages so far; further ones are appended.
     question : Question
+        Stance, load, limits and objective.
     wrenches : mapping of str to ndarray, shape (6,)
         Wrench of each hand on the rock in its H, by limb [N, N·m].
     body_wrench : ndarray, shape (6,)
@@ -109,6 +110,7 @@ def recompute_joints(limb: str, h: int, use: JointUse) -> list[Residual]:
     Parameters
     ----------
     limb : str
+        Name of the limb.
     h : int
         Index of the limb's hand.
     use : JointUse
@@ -233,6 +235,7 @@ class AskedLimits(ResidualLimits):
     Parameters
     ----------
     question : Question
+        Stance, load, limits and objective.
     names : PartNames
         Names of the hands' parts.
     tiles : TileLimits
@@ -262,6 +265,15 @@ class AskedLimits(ResidualLimits):
         self._most = limits.tension_change or 0.0
         self._tiles, self._margin, self._least = tiles, limits.hold_margin, limits.least_tension
         self._hand = np.arange(len(hands)).repeat(FINGER_COUNT)
+        self._palm_margin = limits.palm_margin
+        self._palms = np.array(
+            [
+                h
+                for h, (place, hand) in enumerate(zip(hands, names.known.hands, strict=True))
+                if place.wrist == "fixed" and hand.palm.engaged
+            ],
+            dtype=np.intp,
+        )
 
     def recompute(self, again: Recomputed) -> list[Residual]:
         """Return the residuals of the question's limits on tensions, forces and wrenches."""
@@ -272,6 +284,11 @@ class AskedLimits(ResidualLimits):
             text = f" is {{:.6g}} N, less than {self._least:g}"
             left = tensions - self._least
             residuals.append(Residual("least", left, self._hand, name, text, (tensions,)))
+        if self._palm_margin and len(self._palms):
+            presses, limb = again.arrays.palms[self._palms, 2], self._names.limb_of(self._palms)
+            text = f"its palm presses with {{:.6g}} N, less than {self._palm_margin:g}"
+            left = presses - self._palm_margin
+            residuals.append(Residual("least", left, self._palms, limb, text, (presses,)))
         for cap in self._caps:
             force, limb = wrenches[cap.hand[0], :3], self._names.limb_of(cap.hand)
             residuals.append(Residual("use", (cap.use @ force)[None], cap.hand))

@@ -264,7 +264,7 @@ class PartNames(NamedTuple):
         return f"{self.limbs[h]}: "
 
     def tile(self, t: int) -> str:
-        """Return the name of tile t of all hands; indices after the tiles are palms."""
+        """Return the name of a tile from its index t over all hands; after the tiles come palms."""
         places = self.known.places
         if t >= len(places.hand):
             return f"{self.limbs[t - len(places.hand)]}: palm"
@@ -274,7 +274,7 @@ class PartNames(NamedTuple):
         return f"{self.limbs[h]}: {what} of {tile.finger}"
 
     def limb_of(self, hands: Indices) -> Callable[[int], str]:
-        """Return a function that names the limb of the hand ``hands[i]``."""
+        """Return a function of i that names the limb of the hand with index ``hands[i]``."""
         return lambda i: self.limb(int(hands[i]))
 
     def finger(self, what: str, finger: int) -> str:
@@ -291,5 +291,5 @@ class PartNames(NamedTuple):
         return f"{self.limbs[h]}: {what} of {FINGERS[i]}"
 
     def of_fingers(self, what: str, fingers: Indices) -> Callable[[int], str]:
-        """Return a function that names the part ``what`` of the finger ``fingers[i]``."""
+        """Return a function of i that names the part ``what`` of the finger ``fingers[i]``."""
         return lambda i: self.finger(what, int(fingers[i]))

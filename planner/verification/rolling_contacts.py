@@ -98,7 +98,7 @@ class RestingContact(NamedTuple):
     touches : float
         Position along the face at which it touches the rock [m].
     bears : float or None
-        Centre of pressure along the face, of one that rolls [m]; None of one that slides.
+        Centre of pressure along a face that rolls on the rock [m]; None if the face slides.
     """
 
     section: Section
@@ -134,16 +134,17 @@ class RestingContact(NamedTuple):
         point : ndarray, shape (2,)
             Contact point after the motion, in the finger's plane (x, z) [m].
         along : float
-            Its position along the phalanx [m].
+            Position of that point along the phalanx [m].
         way : ndarray, shape (2,)
             Unit vector along the face after the motion.
 
         Returns
         -------
         slip : float or None
-            None where the rock is neither a circle nor a line near the contact.
+            Slip along the rock [m]; None where the rock near the contact is neither a circle nor a
+            line.
         off : float
-            Distance along the phalanx from the reported contact to the recomputed one.
+            Distance along the phalanx from the reported contact to the recomputed one [m].
         """
         face, radius = self.face, self.radius
         if radius is None:

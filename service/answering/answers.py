@@ -79,6 +79,7 @@ class Planned(NamedTuple):
         Returns
         -------
         Planned
+            Question, plan and the new reply.
         """
         reply: replies.PlanReply | replies.BriefPlanReply
         if detail == "full":
@@ -102,6 +103,7 @@ class Planned(NamedTuple):
         Returns
         -------
         Planned
+            Question, plan and the new reply.
         """
         return Planned.of(self.question, self.plan, self.reply.id, detail, model=model)
 
@@ -204,6 +206,7 @@ def brief_plan_reply(
     Returns
     -------
     BriefPlanReply
+        The brief reply; infinite numbers are None in it.
     """
     points = None if answer.hands is None else [_set_points(h, hands) for h in answer.hands]
     reply = replies.BriefPlanReply(

@@ -1,4 +1,4 @@
-"""Read the mesh files that requests name, so that requests contain whole meshes."""
+"""Read the mesh files that requests name, through a cache, so that requests contain meshes."""
 
 from __future__ import annotations
 

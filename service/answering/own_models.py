@@ -1,10 +1,10 @@
-"""Put the caller's hand parameters and robot file into requests.
+"""Put the caller's hand parameters and robot file into requests: overrides and defaults.
 
 Hand parameters travel as ``{section: {entry: {value, unit, source, note}}}``. An entry may be given
 in several places; the first of these counts: the command line, the stance's file or request, the
-service's hand, the bundled hand. A robot's file stays where plans are made: only the robot's name
-travels over the network. A stance that names no robot is planned for the robot that is served; a
-stance that names an unknown robot is refused.
+service's hand, the bundled hand, which has a default for each entry. A robot's file stays where
+plans are made: only the robot's name travels over the network. A stance that names no robot is
+planned for the robot that is served; a stance that names an unknown robot is refused.
 """
 
 from __future__ import annotations

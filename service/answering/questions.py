@@ -81,6 +81,7 @@ def route_of(request: requests.RouteRequest, robots: Robots = BUNDLED_ROBOTS) ->
     Returns
     -------
     Route
+        Stances, load, limits and objective of the climb.
 
     Raises
     ------

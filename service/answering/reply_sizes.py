@@ -21,7 +21,7 @@ __all__ = ["fitted"]
 def fitted(request: Request, found: Reply | Planned, form: Format) -> tuple[Reply, bytes]:
     """Encode a reply so that it takes no more bytes than the request's ``max_reply_bytes``.
 
-    Where the request gives no ``detail``, the reply has the most detail that fits.
+    Where the request gives no ``detail``, the reply has as much detail as fits.
 
     Parameters
     ----------

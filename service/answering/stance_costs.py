@@ -11,17 +11,18 @@ __all__ = ["check_costs"]
 
 
 def check_costs(stance: requests.Stance) -> None:
-    """Check that the hands of a stance do not cost too much.
+    """Refuse a stance whose hands have too many half-planes or outline points in all.
 
     Parameters
     ----------
     stance : requests.Stance
+        Stance of the request.
 
     Raises
     ------
     LimitError
-        If they have too many half-planes or points of outlines; the field is relative to the
-        stance.
+        If the half-planes, or the points of outlines, are more than a request may have; the field
+        is relative to the stance.
     """
     # a plan of wrists that move is found in several rounds
     rounds = 4

@@ -45,6 +45,7 @@ def stance(message: requests.Stance, robots: Robots = BUNDLED_ROBOTS) -> Stance:
     Returns
     -------
     Stance
+        Hands on holds, body, gravity, robot and joints.
 
     Raises
     ------

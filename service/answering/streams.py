@@ -181,6 +181,7 @@ class Streams:
         Returns
         -------
         SetPointsReply
+            Set-points by hand, with status, utilisation and reason.
 
         Raises
         ------

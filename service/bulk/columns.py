@@ -82,6 +82,7 @@ def columns_of(limbs: Sequence[str], explained: bool = False) -> tuple[Column, .
     Returns
     -------
     tuple of Column
+        Columns in the order of the table, ``index`` first.
     """
     return tuple(_columns(limbs, explained))
 
@@ -188,7 +189,7 @@ def chosen_columns(
     Returns
     -------
     tuple of Column
-        In the usual order of the table.
+        Selected columns, in the usual order of the table.
 
     Raises
     ------

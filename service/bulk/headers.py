@@ -112,6 +112,7 @@ def new_header(
     Returns
     -------
     Header
+        Header with this version of crux, and with digests of hand and robot.
     """
     own_robot = None if robot is None else digest_of((robot.toml, robot.urdf))
     own_hand = None if hand is None else digest_of(sorted(hand.sections.items()))

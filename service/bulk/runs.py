@@ -102,7 +102,7 @@ class Run(ABC):
             yield
 
     def write(self, question: bytes, payload: bytes, seconds: float) -> None:
-        """Append the reply to the first request without one to the file, and count it.
+        """Append a reply to the file, as the reply to the next request without one, and count it.
 
         Parameters
         ----------

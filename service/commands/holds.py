@@ -149,8 +149,8 @@ def holds_command(
 
     A hand is closed at every point of a grid, at several angles of its wrist; it approaches against
     the mean normal of the rock under its palm. Holds are sorted by the pull-off, with every other
-    force and moment zero, that nine in ten samples of where the hand comes to the rock hold. Each
-    has a `place` for a request's hand whose hold is this rock.
+    force and moment zero, that is held in nine of ten samples of where the hand comes to the rock.
+    Each hold has a `place`, for the hand of a request whose rock this is.
     """
     from hand_models import fixed_wrist, parameters
     from hand_models.rock import Mesh, read_mesh

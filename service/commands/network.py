@@ -87,8 +87,8 @@ def serve_command(
     """Answer questions on zenoh until SIGTERM or Ctrl-C.
 
     Without -l only programs on this machine can ask. The hand of --hand is that of every question;
-    a question's own numbers go on top. The robot of --robot is the only one that is planned for,
-    and gives the keys its name.
+    numbers that a question gives replace the hand's. The robot of --robot is the only one that is
+    planned for, and gives the keys its name.
     """
     stop = _StopSignal()
     # a client that does not read blocks one of these threads while zenoh waits for it
@@ -182,7 +182,7 @@ def query_command(
 ) -> int:
     """Ask a running service for a plan.
 
-    It has to serve the robot that the stance or --robot names.
+    The service has to be for the robot that the stance or --robot names.
     """
     request = options.with_extras(own.asked(stances.read_request(stance)), whole=not as_json)
     serving.start_zenoh_log()

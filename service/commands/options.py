@@ -169,7 +169,7 @@ class WorkersOption(NamedTuple):
     dask: str | None
 
     def place(self, plans: int) -> tuple[str, int | None]:
-        """Return where to do work that takes as long as a number of ``plans``.
+        """Return where to do work that takes as long as so many ``plans`` of stances.
 
         Returns
         -------
@@ -271,7 +271,7 @@ def _check_folder(_: click.Context, __: click.Parameter, path: Path) -> Path:
 def beginning_so(
     names: Iterable[str], *, files: bool = False
 ) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
-    """Return a shell completion for click of names, and with ``files`` also of file paths."""
+    """Return the function that completes a name in the shell; with ``files``, a path, too."""
 
     def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
         found = [CompletionItem(name) for name in names if name.startswith(begun)]

@@ -58,10 +58,10 @@ def route_command(
     """Evaluate climbs: every stance, and every one with a limb in the air.
 
     ROUTE is the path of a JSON file, - for standard input, the name of a bundled route, or a
-    folder: all files in it that end in .json. Many routes are answered in order, errors in their
-    places.
+    folder: all files in it that end in .json. Many routes are answered in order, with an error in
+    the place of each route that has one.
 
-    Exit status of many: the worst of theirs, as of crux batch.
+    The exit status of many routes is the worst that one of them has, as for crux batch.
     """
     if output.suffix.lower() in {".jsonl", ".csv", ".parquet"}:
         for option, asked_for in (("--spread", wanted.spread), ("--draws", wanted.draws)):

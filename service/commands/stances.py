@@ -63,7 +63,7 @@ def read_request(source: str) -> requests.PlanRequest:
     Returns
     -------
     PlanRequest
-        With the vertices and faces of the mesh files that it names.
+        The request, with the vertices and faces of the mesh files that it names.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def read_with_text(source: str) -> tuple[requests.PlanRequest, Given[requests.Pl
     Returns
     -------
     request : PlanRequest
-        With the vertices and faces of the mesh files that it names.
+        The request, with the vertices and faces of the mesh files that it names.
     given : Given
         The request as the user wrote it.
     """
@@ -97,7 +97,7 @@ def read_route(source: str) -> requests.RouteRequest:
     Returns
     -------
     RouteRequest
-        With the vertices and faces of the mesh files that it names.
+        The request, with the vertices and faces of the mesh files that it names.
 
     Raises
     ------

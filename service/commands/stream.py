@@ -34,9 +34,9 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first
     [N, N·m]; blank lines are skipped. Plans are prepared first about the body wrench or the load of
-    STANCE; of compliant wrists each is solved, and only --json has their poses. Floating wrists are
-    refused. A line that is no body wrench is reported on standard error, with --json by an error in
-    its place, and the next line is read.
+    STANCE; with compliant wrists each line is solved by itself, and only --json has their poses.
+    Floating wrists are refused. A line that is no body wrench is reported on standard error, with
+    --json by an error in its place, and the next line is read.
 
     Exit status: 2 where a line was bad, or else 1 where one failed, or else 3 where one is
     overloaded or infeasible.

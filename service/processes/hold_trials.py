@@ -46,7 +46,7 @@ class HoldTrials:
     placing : {'given', 'contact'}, optional
         Whether a hand stays where it is seated, or is moved to where it rests on the rock.
     force : float
-        Force that a hand is to hold at sampled places, for their share that does [N].
+        Force for which the share of sampled places that hold it is computed [N].
     on : str or distributed.Client, optional
         Where trials run: ``processes`` of this machine, ``here`` for this process alone,
         ``tcp://HOST:PORT`` of a Dask scheduler or its client, ``dask:local`` for a Dask cluster on

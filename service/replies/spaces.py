@@ -35,7 +35,7 @@ class ContactReply(Struct):
       the tile is on no phalanx.
     - ``position``: point of contact in H [m].
     - ``engagement``: share of the tile's spines that reach the rock, by its area.
-    - ``across``: distance of the contact from the finger's plane, along z of H × the finger [m]:
+    - ``across``: distance of the contact from the finger's plane, along (z of H) × (finger) [m]:
       a tile that bears on one side only has its contact there.
     - ``shear_axis``: unit force of the shear load on the rock, in H.
     - ``normal_axis``: unit force of the normal load on the rock, in H.
@@ -150,9 +150,9 @@ class RobustCapability(Struct, kw_only=True):
     - ``without``: number of these places where the hand cannot be, or holds nothing.
     - ``position``: largest shift to either side along each axis of H [m].
     - ``angle``: largest turn to either side about each axis of H [rad].
-    - ``contact_position``, ``contact_angle``: of a hand that was placed by contact, what contact
-      leaves along z [m] and about x and y of H [rad], in place of the two above; else null. The
-      hand comes to rest anew at each place.
+    - ``contact_position``, ``contact_angle``: largest displacement along z [m] and about x and y of
+      H [rad], in place of the two above, of a hand placed by contact, which comes to rest anew at
+      each place; else null.
     - ``seed``: seed of the samples.
     - ``worst``: deprecated, the same as ``hundredth``.
     - ``tenth``: ``extent`` that the hand exceeds at nine in ten places; null where it is not

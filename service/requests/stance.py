@@ -99,15 +99,15 @@ class Hand(Strict, frozen=True, kw_only=True):
     - ``hold``: the rock under the hand.
     - ``surface``: name of a bundled surface, or numbers of a surface of the caller's own.
     - ``grasp``: how the hand closes: fingers, palm and fingernails.
-    - ``wrist``: ``fixed``; ``floating``, a compliant wrist with motors that stand still; or
-      ``compliant``, a compliant wrist with driven tendons.
+    - ``wrist``: ``fixed``; ``floating``, the wrist moves and the motors stand still; or
+      ``compliant``, the wrist moves and the tendons are driven.
     - ``wrist_travel``: range in which a compliant wrist may come to rest.
     - ``tendon_preload``: tensions of the four tendons of a floating hand at rest [N]; by default
       the closing tension.
     - ``wrench``: wrench that the hand must exert on the rock, in H [N, N·m]; the plan chooses
       components that are null.
-    - ``seat``: how a hand without a pose is seated: ``rest`` as its grasp has it, ``best`` at the
-      nearby pose with the strongest grip.
+    - ``seat``: how a hand is seated whose hold has no pose: ``rest`` as its grasp has it, ``best``
+      at the nearby pose with the strongest grip.
     - ``seat_direction``: wrench on the rock, in H, in which the ``best`` seat is strongest; by
       default the pull-off.
     - ``placing``: ``given``, the hand is where it is put or seated; ``contact``, it is moved along

@@ -1,4 +1,4 @@
-"""Define a typed client of the plan service: one method for each kind of request."""
+"""Define a typed client of the plan service: one method for each kind of request, one retry."""
 
 from __future__ import annotations
 

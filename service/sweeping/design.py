@@ -179,6 +179,7 @@ class Design:
         Returns
         -------
         bytes
+            The request of the sweep, with the values of the point in it.
         """
         varied: list[Steps] = []
         for target, value in zip(self.targets, point, strict=True):

@@ -56,7 +56,8 @@ class Paths:
     document : dict
         A plan request as plain lists and dicts; changed in place.
     presets : dict of Steps to str
-        Names of surface presets that were replaced by their numbers, by the place of the surface.
+        Names of surface presets that were replaced by their numbers, by the steps that lead to the
+        surface.
     """
 
     document: dict[str, Any]
@@ -64,7 +65,7 @@ class Paths:
 
     @classmethod
     def into(cls, request: PlanRequest) -> Paths:
-        """Convert a plan request into a document, without samples (``draws``, ``open_loop``)."""
+        """Return the lookup in a plan request's document, without ``draws`` and ``open_loop``."""
         document = _filled(request)
         del document["draws"]
         document.pop("open_loop", None)
@@ -83,6 +84,7 @@ class Paths:
         Returns
         -------
         Target
+            Steps to all places of the path, with the unit of the values.
 
         Raises
         ------

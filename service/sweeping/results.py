@@ -131,7 +131,8 @@ def with_borders(
     Returns
     -------
     Sweep
-        The search plans some more points in this process, if exactly one number varies.
+        The rows with the borders. If exactly one number varies, the search has planned some more
+        points in this process.
     """
     ask = asking(1, 1, robot)
 

@@ -103,7 +103,7 @@ class SweepRow(msgspec.Struct, frozen=True):
 
     @property
     def margin(self) -> float | None:
-        """Ratio of the utilisation to its cap, 1 at the limit; None without a utilisation."""
+        """Utilisation over cap, 1 at the limit (a ratio); None without a utilisation."""
         return None if self.utilisation is None else self.utilisation / self.cap
 
     @property
@@ -198,6 +198,7 @@ def rows_at(design: Design, points: Sequence[Point], ask: Ask) -> Iterator[Sweep
     Yields
     ------
     SweepRow
+        Result of one point, or its error.
     """
     answers = ask(design.payload(point) for point in points)
     for point, answer in zip(points, answers, strict=True):

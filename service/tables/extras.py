@@ -1,4 +1,4 @@
-"""Print the extras of a plan: advice, spread over samples, and robustness."""
+"""Print the extras of a plan: advice, spread over samples with sensitivities, robustness."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from service.tables.layout import in_order, print_rows
 __all__ = [
     "print_advice",
     "print_open_loop",
+    "print_spread",
     "robust_sentence",
-    "spread_sentence",
     "with_interval",
     "words_of",
 ]
@@ -76,34 +76,77 @@ def with_interval(value: float, spread: Quantiles | None) -> str:
     return f"{value:.{more}f} ({_interval(spread)})"
 
 
-def spread_sentence(spread: Spread) -> str:
-    """Return a sentence about a Monte Carlo study of uncertain parameters.
+def print_spread(spread: Spread, out: Console) -> None:
+    """Print what a Monte Carlo study of uncertain parameters found, and how set-points fare in it.
 
     Parameters
     ----------
     spread : Spread
-        Results over all samples.
-
-    Returns
-    -------
-    str
-        In how many samples the stance is feasible, the parameter with the largest sensitivity with
-        its Spearman rank correlation, and how many samples have no plan or no load factor.
+        Plans of all samples, and what the question's plan does in them.
+    out : Console
+        Console to print on.
     """
-    said = f"feasible in {spread.holds} of {spread.draws} samples"
-    if spread.cap < 1.0:
-        said += f" within a utilisation of {spread.cap:g}"
-    # fewer samples correlate by chance
-    if spread.sensitive_to and spread.draws >= 10:
-        most = spread.sensitive_to[0]
-        correlation = math.sqrt(most.share)
-        said += f"; most sensitive to {most.quantity} (rank correlation {correlation:.2f})"
+    for sentence in (_spread_sentence(spread), _variance_sentence(spread)):
+        if sentence:
+            out.print(sentence)
+    answers = [("planned anew", spread), ("tensions kept", spread.kept)]
+    answers += [("balanced by feedback", spread.feedback)]
+    rows = [
+        (
+            words,
+            each.holds,
+            spread.draws - each.holds - each.without,
+            each.without,
+            "none" if each.utilisation is None else _interval(each.utilisation),
+        )
+        for words, each in answers
+        if each is not None
+    ]
+    if len(rows) > 1:
+        heads = ("feasible", "overloaded", "no balance", "utilisation")
+        print_rows(rows, in_order([f"{spread.draws} samples"], heads), out)
+
+
+def _spread_sentence(spread: Spread) -> str:
+    """Return in a sentence on which rock a stance is feasible, else in how many samples."""
+    limit, said = spread.threshold, f"feasible in {spread.holds} of {spread.draws} samples"
+    within = f" within a utilisation of {spread.cap:g}" if spread.cap < 1.0 else ""
+    if limit is not None:
+        least, most = (f"{ratio:g}" for ratio in limit.range)
+        rocks = f"the assumed range of {limit.surface}s ({least} to {most} times sandpaper)"
+        said = f"feasible{within} on none of {rocks}"
+        if limit.shear_limit is not None and limit.ratio is not None:
+            said = (
+                f"feasible{within} where a tile on this {limit.surface} holds at least "
+                f"{limit.shear_limit:.2g} N, {limit.ratio:.2g} times sandpaper: "
+                f"{limit.share:.0%} of the assumed range"
+            )
+            if limit.share == 1.0:
+                said = f"feasible{within} on all of {rocks}"
+    else:
+        said += within
     if spread.without:
-        said += f"; {spread.without} without a plan"
+        said += f"; {spread.without} samples without a plan"
     lost = spread.load_factors.count(None)
     if lost > spread.without:
         said += f"; {lost} without a load factor"
     return said + _refused(spread.refused)
+
+
+def _variance_sentence(spread: Spread) -> str:
+    """Return in a sentence what the load factor's variance goes with: rock, then other numbers."""
+    parts = []
+    if spread.rock_share:
+        parts.append(f"{spread.rock_share:.0%} by the rock's strength")
+    # thirty samples tell a share to about a tenth
+    others = [
+        f"{round(each.share, 1):.0%} by {each.quantity} "
+        f"({'fitted' if each.source == 'calibrated' else 'prior'})"
+        for each in spread.rock_apart
+    ]
+    if others:
+        parts.append(("of the rest " if parts else "") + ", ".join(others))
+    return f"variance of the load factor: {'; '.join(parts)}" if parts else ""
 
 
 def robust_sentence(robust: RobustLoadFactor) -> str:

@@ -41,13 +41,14 @@ Pair = tuple[HoldTrial, FoundHold]
 
 
 def hold_json(trial: HoldTrial, found: FoundHold, placing: Placing) -> dict[str, Any]:
-    """Return a hold as JSON values [m, rad, N].
+    """Return a hold as JSON values in SI units: place, grasp, and what the hand can hold.
 
     Parameters
     ----------
     trial : HoldTrial
         Place and grasp, in the rock's frame.
     found : FoundHold
+        What the hand can hold there.
     placing : {'given', 'contact'}
         Placing of the hand in a request.
     """
@@ -86,13 +87,14 @@ def _by_way(values: Array) -> dict[str, float | None]:
 def refusals_json(
     trials: Sequence[HoldTrial], outcomes: Mapping[int, FoundHold | InvalidInputError]
 ) -> dict[str, Any]:
-    """Return why hands cannot be at places, as JSON values.
+    """Return why a hand cannot be at the places that were refused, as JSON values.
 
     Parameters
     ----------
     trials : sequence of HoldTrial
+        Places and grasps that were tried.
     outcomes : mapping of int to FoundHold or InvalidInputError
-        What has come of the trials, by index.
+        Outcome of each trial, by its index.
 
     Returns
     -------
@@ -139,13 +141,14 @@ def print_holds(
     shown: int,
     out: Console,
 ) -> None:
-    """Print the best holds, and why hands cannot be at other places.
+    """Print the best holds, and why a hand cannot be at other places.
 
     Parameters
     ----------
     result : mapping
-        What the file has: numbers of trials, how holds are sorted, reasons and warnings.
+        Content of the file: numbers of trials, how holds are sorted, reasons and warnings.
     trials : sequence of HoldTrial
+        Places and grasps that were tried.
     found : sequence of (HoldTrial, FoundHold)
         Holds, the best first.
     shown : int

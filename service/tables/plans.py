@@ -17,8 +17,8 @@ import planner
 from service import replies
 from service.tables.extras import (
     print_open_loop,
+    print_spread,
     robust_sentence,
-    spread_sentence,
     with_interval,
 )
 from service.tables.layout import (
@@ -65,7 +65,7 @@ def print_plan(
     known = [f"   {part}" for part in _first_line(reply, spread)]
     out.print(Text.assemble(in_colour(reply.status, reply.status.upper()), *known))
     if spread is not None:
-        out.print(spread_sentence(spread))
+        print_spread(spread, out)
     out.print(reply.reason)
     if brief:
         _print_displaced(reply, out)

@@ -170,7 +170,7 @@ def _unwritten(error: OSError, path: Path | str | None, field: str) -> CruxError
 
 
 class Progress(Protocol):
-    """Protocol of a function that reports progress: work done, total, and a few words if wanted."""
+    """Protocol of a function that shows progress, from work done, total and optional words."""
 
     def __call__(self, done: int, total: int, words: str = "") -> None: ...
 

@@ -58,7 +58,7 @@ class Format(Enum):
         Parameters
         ----------
         encoding : str
-            Such as ``application/json;crux.PlanReply@1``. An empty encoding, and zenoh's default
+            Name such as ``application/json;crux.PlanReply@1``. An empty name, and zenoh's default
             ``zenoh/bytes``, mean JSON.
 
         Raises
@@ -269,6 +269,7 @@ def check_size(size: int, kind: type) -> None:
     Raises
     ------
     LimitError
+        If the payload has more bytes than `most_bytes` of the type.
     """
     most = most_bytes(kind)
     if size > most:

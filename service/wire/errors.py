@@ -21,7 +21,7 @@ REQUEST_KINDS: Final = frozenset({"malformed", "invalid", "unsupported", "limit"
 
 
 class BusyError(CruxError):
-    """The service's queue is full; the client should retry later.
+    """Error: the service's queue is full, and the client should retry later.
 
     Parameters
     ----------
@@ -44,13 +44,13 @@ class BusyError(CruxError):
 
 
 class MalformedError(InvalidInputError):
-    """The request is not in the encoding that it claims to be in, or its structure is broken."""
+    """Error: the request is not in the encoding that it claims, or its structure is broken."""
 
     kind = "malformed"
 
 
 class ServiceError(CruxError):
-    """An error reply of the service, raised at the client.
+    """Error that the client raises for an error reply of the service.
 
     Parameters
     ----------
@@ -89,18 +89,18 @@ class ServiceError(CruxError):
 
 
 class LostError(CruxError):
-    """Every worker that got the request died before it answered."""
+    """Error: every worker that got the request died before it answered."""
 
     kind = "lost"
 
 
 class NoServiceError(CruxError):
-    """No service can be reached, or the service ended before it answered."""
+    """Error: no service can be reached, or the service ended before it answered."""
 
     kind = "no_service"
 
 
 class ServiceTimeout(CruxError):  # noqa: N818 - a timeout says what it is
-    """The service did not answer before the client's timeout."""
+    """Error: the service did not answer before the client's timeout."""
 
     kind = "timeout"

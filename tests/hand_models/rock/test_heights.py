@@ -10,13 +10,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hand_models.rock import Mesh
-from hand_models.rock.compiled_heights import (
-    heights_across,
-    least_heights,
-    raised_outlines,
-    rock_ends,
-    seen_outlines,
-)
+from hand_models.rock.compiled_heights import facing_triangles, heights_across, rock_ends
+from hand_models.rock.compiled_outlines import least_heights, raised_outlines, seen_outlines
 from hand_models.rock.surface import Triangles
 from hand_models.rock.triangles import weld
 from tests.suite.helpers.rocks import fractal_wall
@@ -30,7 +25,8 @@ LEVEL = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 def heights(rock: Triangles, plane: np.ndarray, some: np.ndarray | None = None) -> np.ndarray:
     some = np.arange(len(rock.faces)) if some is None else some
-    return heights_across(*rock, some, plane, PLACES, HALVES, LINES, 1e-9)
+    seen = facing_triangles(*rock, some, plane, HALVES.max(), 0.1)
+    return heights_across(seen, PLACES, HALVES, LINES, 1e-9)
 
 
 def tilted(rng: np.random.Generator) -> np.ndarray:
@@ -171,7 +167,8 @@ def test_rock_ends_where_its_triangles_do(turn: float) -> None:
         np.array([[0, 1, 2], [0, 2, 3]]),
     )
     least = heights(plate, LEVEL)[1]
-    ends = rock_ends(*plate, np.arange(2), LEVEL, PLACES, half, least, 0.005)
+    seen = facing_triangles(*plate, np.arange(2), LEVEL, half, 0.1)
+    ends = rock_ends(seen, PLACES, half, least, 0.005)
     (last,) = np.flatnonzero(~np.isnan(ends[1, :, 0]))
     assert np.isnan(ends[0]).all()
     # its edge is the line s cos + y sin = end

@@ -93,3 +93,11 @@ def test_what_is_empty_is_not_finite(tmp_path):
     scan = read_scan(path)
     np.testing.assert_array_equal(scan.points, [[1.5, 2, 3], [5, 6, 7], [8, 9, 1]])
     assert scan.dropped == 1
+
+
+def test_a_first_line_of_missing_numbers_is_a_point_not_names(tmp_path):
+    path = tmp_path / "cloud.xyz"
+    path.write_text("nan nan nan\n1 2 3\n4 5 6\n7 8 1\n", encoding="utf-8")
+    scan = read_scan(path)
+    np.testing.assert_array_equal(scan.points, [[1, 2, 3], [4, 5, 6], [7, 8, 1]])
+    assert scan.dropped == 1

@@ -262,3 +262,12 @@ def test_the_pose_puts_the_rock_where_the_scan_has_it(tmp_path):
     again = Pose.from_quaternion(rock.pose.position, rock.pose.quaternion())
     x, y, z = again.apply(rock.vertices).T
     np.testing.assert_allclose(y, 1.0 - relief(x, z), atol=1e-9)
+
+
+def test_strays_a_thousand_kilometres_off_are_refused_by_number_and_distance(tmp_path):
+    points = np.vstack([wall(), [[1e6, 0.0, 0.0], [0.0, -1e5, 0.0]]])
+    with pytest.raises(InvalidInputError, match=r"2 of 3723 points .* the farthest 1e") as error:
+        meshed(points, tmp_path, {"view": (0, 1, 0)})
+    assert error.value.field == "file"
+    far = wall() + np.array([5e6, 4e5, 0.0])
+    assert len(meshed(far, tmp_path, {"view": (0, 1, 0)}).faces) == 2 * 60**2

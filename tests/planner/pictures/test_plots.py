@@ -590,8 +590,18 @@ def test_a_plans_spread_is_drawn_where_it_was_asked_for():
                 factors = [f for f in answer.spread.load_factors if f is not None]
                 assert sum(round(height) for height in heights[1:]) == len(factors)
                 assert each.get_ylabel() == "samples"
-        return [each.get_title() for each in axes]
+            if each.get_xlabel() == "samples":
+                answers = [answer.spread, answer.spread.kept, answer.spread.feedback]
+                holds, over, without = ([bar.get_width() for bar in c] for c in each.containers)
+                assert holds == [each.holds for each in answers]
+                assert without == [each.without for each in answers]
+                assert np.sum([holds, over, without], axis=0).tolist() == [answer.spread.draws] * 3
+        assert len(axes) == before + 2 * ("spread" in want)
+        return [each.get_title("left") for each in axes]
 
-    (told,) = (title for title in titles("spread", "load_factor") if "samples" in title)
-    assert re.fullmatch(r"feasible in \d+ of \d+ samples; most sensitive to rock.shear_limit", told)
-    assert not any("samples" in title for title in titles("load_factor"))
+    before = len(draw_plan(solve.plan(ask(on_wall())), ask(on_wall())).axes)
+    (told,) = (title for title in titles("spread", "load_factor") if "feasible" in title)
+    assert re.fullmatch(
+        r"feasible where a tile on rock holds \d+ N or more: \d+% of its range", told
+    )
+    assert not any("feasible" in title for title in titles("load_factor"))

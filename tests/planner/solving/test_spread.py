@@ -15,6 +15,7 @@ from hand_models.parameters import (
     ParameterSample,
     ParameterTable,
     bundled_draws,
+    draw_table,
     own_draw,
     own_hand,
     own_surfaces,
@@ -23,7 +24,7 @@ from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.capability import BodySpace
 from planner.prepare import prepare_stance, settle_hand
-from planner.question import Limits, Question, Stance
+from planner.question import Limits, Question, Stance, drawn_hands, drawn_quantities
 from planner.result import DrawnPlan, Quantiles, Spread
 from planner.robots import robosimian
 from planner.solving import KnownStance, plan, spread
@@ -211,7 +212,8 @@ def test_bundled_samples_of_compliant_wrists_have_it_and_name_it():
 )
 def test_only_wrists_that_move_on_rock_draw_its_stiffness(wrist, surface, moves, monkeypatch):
     asked = with_wrists("overhang", wrist, surface=Surface.named(surface))
-    seen = []
+    # with samples of the caller, no threshold is sought
+    asked, seen = replace(asked, draws=STRENGTHS), []
 
     def none(hand, draws, *, wrists_move, limbs):
         seen.append(wrists_move)
@@ -376,6 +378,97 @@ def test_shares_are_squared_rank_correlations():
     assert len(told) == 3
     for name in told.keys() & shares.keys():
         assert told[name] == pytest.approx(shares[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "cap"), [("wall-300", 1.0), ("wall-300", 0.8), pytest.param("ledge", 1.0)]
+)
+def test_the_threshold_is_the_least_rock_that_holds(name, cap):
+    asked = replace(asked_of(name), limits=Limits(utilisation=cap))
+    limit = plan(asked).spread.threshold
+    for factor, status in ((1.02, "optimal"), (0.98, "overloaded")):
+        rock = Surface.from_values({"shear_limit": factor * limit.shear_limit})
+        hands = tuple(replace(hand, surface=rock) for hand in asked.stance.hands)
+        there = replace(asked, stance=replace(asked.stance, hands=hands), want=frozenset())
+        assert plan(there).status == status
+    sandpaper = Surface.named("sandpaper-36").shear_limit
+    assert limit.ratio == pytest.approx(limit.shear_limit / sandpaper)
+    assert limit.range == [2.0, 5.0]
+    assert limit.share == pytest.approx((5.0 - limit.ratio) / 3.0)
+
+
+@pytest.mark.parametrize(("mass", "share"), [(20.0, 1.0), (300.0, 0.0)])
+def test_a_light_robot_holds_on_all_rock_of_the_range_and_a_heavy_one_on_none(mass, share):
+    asked = asked_of("wall-300")
+    limit = plan(replace(asked, load=structs.replace(asked.load, mass=mass))).spread.threshold
+    assert limit.share == share
+    assert limit.ratio == (2.0 if share else None)
+
+
+def test_rock_that_is_known_has_no_threshold():
+    assert plan(ask(on_wall(surface=TILE_60N), "spread")).spread.threshold is None
+    assert plan(ask(on_wall(), "spread", draws=FEW)).spread.threshold is None
+    assert (
+        plan(ask(on_wall(surface=Surface.named("concrete-fine")), "spread")).spread.threshold
+        is None
+    )
+
+
+def test_shares_with_the_rock_apart_are_of_the_variance_that_it_leaves():
+    rng = np.random.default_rng(3)
+    rock, a, b, c = rng.random((4, 40))
+    a += 0.5 * rock
+    factors = 2.0 * rock - 0.5 * rock**2 + 0.1 * a - 0.05 * b + 0.01 * rng.random(40)
+    values = {
+        "finger.a": a,
+        "rock.shear_limit": rock,
+        "tile.b": b,
+        "tile.c": c,
+        "tile.again": 2 * b,
+    }
+    found = Spread.of(
+        [DrawnPlan(load_factor=factor) for factor in factors],
+        1.0,
+        {},
+        values,
+        sources={"finger.a": "assumed", "tile.b": "calibrated"},
+    )
+
+    def rest(each):
+        return each - np.polyval(np.polyfit(rock, each, 2), rock)
+
+    left = rest(factors)
+    assert found.rock_share == pytest.approx(1.0 - left.var() / factors.var())
+    shares = {
+        name: np.corrcoef(rest(values[name]), left)[0, 1] ** 2 for name in ("finger.a", "tile.b")
+    }
+    told = {each.quantity: each.share for each in found.rock_apart}
+    assert told == pytest.approx(shares)
+    assert [each.source for each in found.rock_apart] == ["assumed", "calibrated"]
+    # of a few samples none is left to explain anything
+    few = Spread.of(
+        [DrawnPlan(load_factor=f) for f in factors[:4]], 1.0, {}, {"rock.shear_limit": rock[:4]}
+    )
+    assert few.rock_share is None
+
+
+def test_what_was_fitted_is_told_from_what_was_assumed():
+    hands = drawn_hands(on_wall().robot.hand, limbs=("front_left",))
+    named = drawn_quantities(hands, frozenset(["rock"]))
+    sources = {name: spread._source(hands[0], name) for name in named}
+    for name in ("finger.pulley_radii[1]", "tile.contact_stiffness[0]", "defaults.friction"):
+        assert sources[name] == "calibrated"
+    for name in ("finger.seated_contact", "rock.shear_limit", "tile.engagement_exponent"):
+        assert sources[name] == "assumed"
+    assert sources["tile.half_planes"] == sources["palm.contact_stiffness[0]"] == "assumed"
+    ranges = draw_table().sections["ranges"]
+    assert sources["discrepancy.common"] == ranges["discrepancy"].source
+    assert sources["discrepancy.front_left"] == ranges["discrepancy"].source
+    found = plan(asked_of("ledge")).spread
+    for each in (*found.rock_apart, *found.sensitive_to):
+        if not each.quantity.startswith("discrepancy"):
+            assert each.source == sources[each.quantity]
+    assert 0.2 < found.rock_share < 1.0
 
 
 def test_of_few_numbers_all_are_told_and_of_many_their_quantiles():

@@ -373,7 +373,9 @@ def test_a_plans_spread_over_draws_of_the_callers_own_travels():
         low, usual, high = reply["spread"]["load_factors"]
         assert low < usual < high
         assert usual == pytest.approx(reply["load_factor"], rel=1e-6)
-        assert reply["spread"]["sensitive_to"] == [{"quantity": "rock.shear_limit", "share": 1.0}]
+        assert reply["spread"]["sensitive_to"] == [
+            {"quantity": "rock.shear_limit", "share": 1.0, "source": "measured"}
+        ]
         assert reply["spread"]["hangs_on"] == reply["spread"]["sensitive_to"]
 
 

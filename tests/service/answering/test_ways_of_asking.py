@@ -128,6 +128,7 @@ VARIANTS: dict[str, list[dict[str, Any]]] = {
         {"limits.tension_change": 30.0, "present": {RIGHT: [60.0, 80.0, 80.0, 60.0]}}
     ],
     "Limits.hold_margin": [{"limits.hold_margin": 4.0}],
+    "Limits.palm_margin": [{"limits.palm_margin": 60.0}],
     "Limits.least_tension": [{"limits.least_tension": 35.0}],
     "ForceCap.largest_force": [
         {"limits.per_hand": {RIGHT: {"largest_force": [[-400, 400], None, [-50, 200]]}}}

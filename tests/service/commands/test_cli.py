@@ -170,10 +170,15 @@ def test_a_plan_says_how_sure_it_is(pull, digits, stance_file, capfd):
     assert 0.1**digits < ends["high"] - ends["low"] < 0.1 ** (digits - 1)
     interval = f"({ends['low']:.{digits}f} to {ends['high']:.{digits}f})"
     assert f"load factor {reply['load_factor']:.{digits + 1}f} {interval}" in out
-    most = spread["sensitive_to"][0]
     out = " ".join(out.split())
-    assert f"feasible in {spread['holds']} of {spread['draws']} samples; most sensitive to " in out
-    assert f"{most['quantity']} (rank correlation {most['share'] ** 0.5:.2f})" in out
+    assert spread["threshold"]["share"] == 0.0
+    assert "feasible on none of the assumed range of rocks (2 to 5 times sandpaper)" in out
+    most, rock = spread["rock_apart"][0], spread["rock_share"]
+    assert f"variance of the load factor: {rock:.0%} by the rock's strength; of the rest" in out
+    assert f"{round(most['share'], 1):.0%} by {most['quantity']} (" in out
+    for name in ("kept", "feedback"):
+        assert spread[name]["holds"] + spread[name]["without"] <= spread["draws"]
+    assert f"tensions kept {spread['kept']['holds']}" in out
     run_command_line(["plan", path])
     assert "samples" not in capfd.readouterr().out
 
