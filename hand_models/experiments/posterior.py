@@ -37,7 +37,7 @@ class PosteriorSettings:
 
     first_sets: int = 1600
     """Number of sets about the recorded one at which the model is computed first."""
-    waves: int = 1
+    waves: int = 2
     wave_sets: int = 150
     """Number of further waves, and of sets of each for every choice of data."""
     last_sets: int = 450
