@@ -8,8 +8,11 @@ from .force_limits import (
 )
 from .gripper_fit import (
     FIT_TOLERANCES as FIT_TOLERANCES,
+    FITTED_FIGURES as FITTED_FIGURES,
+    READING_ERRORS as READING_ERRORS,
     Datum as Datum,
     GripperFit as GripperFit,
+    ReadingErrors as ReadingErrors,
 )
 from .hard_stop import PalmExperiment as PalmExperiment
 from .pictures import (
@@ -19,6 +22,12 @@ from .pictures import (
     label_solid as label_solid,
     legend as legend,
     panels as panels,
+)
+from .posterior import (
+    POSTERIOR_SETTINGS as POSTERIOR_SETTINGS,
+    Posterior as Posterior,
+    PosteriorSettings as PosteriorSettings,
+    Sampled as Sampled,
 )
 from .pulling import (
     Pulled as Pulled,
@@ -53,6 +62,7 @@ from .wrench_hull import (
     edge as edge,
     extents as extents,
     in_paper_signs as in_paper_signs,
+    reach_toward as reach_toward,
     section as section,
     vertices as vertices,
     volume as volume,

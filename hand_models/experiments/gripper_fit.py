@@ -1,11 +1,10 @@
-"""Data of Figs. 12 to 14 on the paper's gripper, and the residuals of the model's parameters.
+"""Data of Figs. 12 to 14 on the paper's gripper, and the model's values of them.
 
-Each datum has a tolerance, and a residual is the model's difference from the datum in tolerances.
-First come the ends of Fig. 12's lines (a tenth, or 0.3 N), the extents of Fig. 13 (a tenth) and the
-edge of its surface seen along F_z (0.2 N·m everywhere, 0.1 on average); the misfit of a set of
-parameters is the largest of these residuals. Further data, with wide tolerances, do not count in
-the misfit: the surface's side view and the best planes of loading. Wrenches are those really held,
-as far as the paper's surface goes: none that press more than that.
+Wrenches are those of straight pulls, as in the paper's experiment: the direction is held until a
+tile slips. Data of Fig. 13 are the model's reach over the figure's, 1 where they agree, along the
+axes, toward the edge of its surface seen along F_z and toward the edge of its side view. A datum's
+variance is e² + (δ s)², with e the error with which its figure can be read, s the datum's magnitude
+and δ the model's discrepancy, its relative error.
 """
 
 from __future__ import annotations
@@ -17,52 +16,72 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from hand_models.base import Array, CruxError, SolverError
-from hand_models.compliance import PLANAR_COMPONENTS, Gripper, boundary, gripper_table, linear_box
-from hand_models.experiments.pulling import held_wrenches, pulled_off_poses
+from hand_models.compliance import Gripper, gripper_table
+from hand_models.experiments.pulling import pull, pulled_off_poses
 from hand_models.experiments.sweep_axis import Axis, Conditions
-from hand_models.experiments.wrench_hull import edge, extents, in_paper_signs, with_mirrored
+from hand_models.experiments.wrench_hull import extents, reach_toward, with_mirrored
 from hand_models.finger import PHALANGES
 from hand_models.parameters import ParameterTable, experiment_table
 
-__all__ = ["FIT_TOLERANCES", "Datum", "FitTolerances", "GripperFit"]
+__all__ = [
+    "FITTED_FIGURES",
+    "FIT_TOLERANCES",
+    "READING_ERRORS",
+    "Datum",
+    "FitTolerances",
+    "GripperFit",
+    "ReadingErrors",
+]
+
+FITTED_FIGURES: Final = ("fig12", "fig13", "fig14")
+"""Figures of the paper whose data are fitted."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingErrors:
+    """Standard deviations with which data are read off the paper's figures.
+
+    A figure that is good to ± w has w / √3, as of an even distribution.
+    """
+
+    force: float = 0.17
+    """Of a force of Fig. 12, whose lines are good to 0.3 N [N]."""
+    extent: float = 0.012
+    """Of an extent of Fig. 13, good to 2 % of the axis."""
+    edge: float = 0.075
+    """Of a moment of the edge of Fig. 13's surface, good to 0.13 N·m [N·m]."""
+    side: float = 0.4 / 3.0**0.5
+    """Of a force of Fig. 13's side view, good to 2 % of 20 N [N]."""
+    ratio: float = 0.15
+    """Of a best ratio of Fig. 14, which is printed as about, as a share: good to a quarter."""
+
+
+READING_ERRORS: Final = ReadingErrors()
 
 
 @dataclass(frozen=True, slots=True)
 class FitTolerances:
-    """Tolerances of the data that are read off Figs. 12 and 13."""
+    """Tolerances within which a claim of Fig. 12 or 13 counts as met."""
 
     force_share: float = 0.1
-    """Tolerance of a force of Fig. 12 or an extent of Fig. 13, as a share of its value."""
+    """Of a force of Fig. 12 or an extent of Fig. 13, as a share of its value."""
     least_force: float = 0.3
     """Least tolerance of a force of Fig. 12 [N]."""
     edge: float = 0.2
     edge_on_average: float = 0.1
-    """Tolerances of the edge of Fig. 13's surface, at every point and on average [N·m]."""
+    """Of the edge of Fig. 13's surface, at every point and on average [N·m]."""
 
 
 FIT_TOLERANCES: Final = FitTolerances()
 
-DATA_DIRECTIONS: Final = np.array(
-    [
-        (1.0, 0.0, 0.0),
-        (1.0, 0.0, 0.5),
-        (1.0, 0.0, 1.0),
-        (0.5, 0.0, 1.0),
-        (0.3, 0.0, 1.0),
-        (0.0, 0.0, 1.0),
-        (-0.5, 0.0, 1.0),
-        (-1.0, 0.0, 1.0),
-        (-1.0, 0.0, 0.5),
-        (1.0, 0.0, -0.3),
-        (0.0, -1.0, 0.0),
-        (0.5, -1.0, 0.0),
-        (1.0, -1.0, 0.0),
-        (1.0, -0.5, 0.0),
-        (1.0, -0.5, 0.3),
-    ]
-)
-"""Directions (15, 3) along F_x, F_z and M_y over the extents of Fig. 13, in the paper's signs, in
-which `GripperFit.wrenches` searches.
+LEAST_SIZE: Final = 2.0
+"""Least magnitude of a force of Fig. 12: of what differs in it from phalanx to phalanx [N]."""
+
+PULL_ANGLES: Final = np.radians([*range(-30, 0, 15), *range(0, 100, 8), *range(105, 150, 15)])
+PULL_DEPTHS: Final = (0.0, -0.15, -0.4)
+"""Directions of straight pulls: angles from F_x to M_y and shares of F_z, over Fig. 13's extents.
+
+Steps of 8 degrees, where the best ratios are: a parabola through three of them is good to 1 %.
 """
 
 
@@ -71,19 +90,16 @@ class Datum(NamedTuple):
 
     Attributes
     ----------
-    label, unit : str
-        Text for the datum, and unit of its value.
-    wanted, tolerance : float
-        Value in the figure, and its tolerance, in the unit.
-    first : bool
-        True if the datum counts in the misfit.
+    label, unit, figure : str
+    wanted, reading : float
+        Value in the figure, and the standard deviation of reading it, in the unit.
     """
 
     label: str
     unit: str
+    figure: str
     wanted: float
-    tolerance: float
-    first: bool
+    reading: float
 
 
 def _numbers() -> tuple[Axis, ...]:
@@ -106,26 +122,26 @@ def _numbers() -> tuple[Axis, ...]:
 
 
 class GripperFit:
-    """Residuals of the paper's data as functions of the gripper's uncertain parameters.
+    """The paper's data as functions of the gripper's uncertain parameters.
 
     A set of parameters is x, shape (n,): each parameter as a share, 0 to 1, of its plausible range.
 
     Parameters
     ----------
     table : ParameterTable, optional
-        All parameters of the gripper, of which some are fitted; `gripper_table` by default.
+        From `gripper_table`, with all other parameters.
 
     Attributes
     ----------
     numbers : tuple of Axis, length n
-        The fitted parameters, with the ends of their plausible ranges.
+        The parameters, with the ends of their plausible ranges.
     names : list of str, length n
-        Name of each parameter without its section, such as ``pulley_radii[1]``.
     low, width : ndarray, shape (n,)
         Lower end and width of each range, in SI units.
     data : tuple of Datum, length k
-    wanted, tolerance, first : ndarray, shape (k,)
-        Attributes of the data, as arrays.
+    wanted, reading, size : ndarray, shape (k,)
+        Values, errors of reading and magnitudes s of the data, in their units.
+    figures : ndarray of str, shape (k,)
     """
 
     def __init__(self, table: ParameterTable | None = None) -> None:
@@ -135,41 +151,45 @@ class GripperFit:
         self.low, high = np.array([number.values for number in self.numbers]).T
         self.width = high - self.low
         self._settings = settings = experiment_table()
-        self._edge_at = np.array(settings.vector("fig13", "edge_force_x"))
-        self._edge = np.array(settings.vector("fig13", "edge_moment"))
+        self._size = np.array([settings.scalar("fig13", n) for n in ("force_x", "moment")])
+        self._depth = abs(settings.scalar("fig13", "force_z"))
+        self._edge = np.column_stack(
+            [settings.vector("fig13", n) for n in ("edge_force_x", "edge_moment")]
+        )
+        self._side = np.array(
+            [[settings.scalar("fig13", n) for n in ("side_force_x", "side_force_z")]]
+        )
         self.data = tuple(self._data())
         self.wanted = np.array([datum.wanted for datum in self.data])
-        self.tolerance = np.array([datum.tolerance for datum in self.data])
-        self.first = np.array([datum.first for datum in self.data])
+        self.reading = np.array([datum.reading for datum in self.data])
+        self.figures = np.array([datum.figure for datum in self.data])
+        of_12 = np.array([datum.unit == "N" for datum in self.data])
+        # a small force is the difference of large ones
+        self.size = np.maximum(np.abs(self.wanted), np.where(of_12, LEAST_SIZE, 0.0))
 
     def _data(self) -> Iterable[Datum]:
-        settings, near = self._settings, FIT_TOLERANCES
+        settings, near = self._settings, READING_ERRORS
         for end in ("unloaded", "pulled"):
             for kind in ("shear", "normal"):
                 values = settings.vector("fig12", f"{kind}_{end}")
                 for phalanx, value in zip(PHALANGES, values, strict=True):
-                    tolerance = max(near.force_share * abs(value), near.least_force)
-                    yield Datum(f"{phalanx} {kind}, {end}", "N", value, tolerance, True)
-        for name, words, unit in (
-            ("force_x", "F_x", "N"),
-            ("force_z", "F_z", "N"),
-            ("moment", "M_y", "N·m"),
-        ):
-            value = settings.scalar("fig13", name)
-            yield Datum(f"extent of {words}", unit, value, near.force_share * abs(value), True)
-        for force, moment in zip(self._edge_at.tolist(), self._edge.tolist(), strict=True):
-            yield Datum(f"edge at F_x = {force:g} N", "N·m", moment, near.edge, True)
-        yield Datum("edge, off on average", "N·m", 0.0, near.edge_on_average, True)
-        side = settings.scalar("fig13", "side_force_z")
-        words = f"pull-off at F_x = {settings.scalar('fig13', 'side_force_x'):g} N"
-        # neither counts in the misfit: the side view may be off by all of it, an arm by 0.4
-        yield Datum(words, "N", side, abs(side), False)
+                    yield Datum(f"{phalanx} {kind}, {end}", "N", "fig12", value, near.force)
+        for words in ("F_x", "F_z", "M_y"):
+            yield Datum(f"extent of {words}", "1", "fig13", 1.0, near.extent)
+        moment, depth = self._size[1], self._depth
+        for place in self._edge:
+            far = float(np.linalg.norm(place / self._size))
+            words = f"edge at F_x = {place[0]:g} N, M_y = {place[1]:g} N·m"
+            yield Datum(words, "1", "fig13", 1.0, near.edge / moment / far)
+        far = float(np.linalg.norm(self._side[0] / (self._size[0], depth)))
+        words = "side at F_x = {:g} N, F_z = {:g} N".format(*self._side[0])
+        yield Datum(words, "1", "fig13", 1.0, near.side / depth / far)
         for kind in ("force", "moment"):
             arm = 1.0 / settings.scalar("fig14", f"{kind}_ratio")
-            yield Datum(f"M_y : F_x best for {kind}", "m", arm, 0.4 * arm, False)
+            yield Datum(f"M_y : F_x best for {kind}", "m", "fig14", arm, near.ratio * arm)
 
     def start(self) -> Array:
-        """Return the parameters' values in ``table`` as shares x, (n,), of their plausible ranges.
+        """Return the values in `table` as shares x, shape (n,), of their plausible ranges.
 
         Values outside a range are clipped to its ends, 0 and 1.
         """
@@ -198,46 +218,35 @@ class GripperFit:
             table = number.set(table, value)
         return Conditions.of_figure("fig13").gripper(table, settings.scalar("fig13", "top"))
 
-    def wrenches(self, gripper: Gripper, *, fine: bool = False) -> Array:
-        """Return the outermost wrenches that a gripper holds, (F_x, F_z, M_y) in the paper's signs.
-
-        Parameters
-        ----------
-        gripper : Gripper
-        fine : bool, optional
-            True to search on the grid of the studies; False to follow rays, which is faster and
-            some per cent less accurate.
+    def pulled(self, gripper: Gripper) -> Array:
+        """Return the last wrenches of straight pulls that hold, with their mirror images.
 
         Returns
         -------
-        ndarray, shape (k, 3)
-            Wrenches, with their mirror images [N, N, N·m].
-        """
-        if fine:
-            return held_wrenches(gripper)
-        toward = np.zeros((len(DATA_DIRECTIONS), 6))
-        size = [self._settings.scalar("fig13", n) for n in ("force_x", "force_z", "moment")]
-        toward[:, PLANAR_COMPONENTS] = DATA_DIRECTIONS / np.abs(size) * (1.0, 1.0, -1.0)
-        found = boundary(
-            gripper, linear_box(gripper), 350, toward
-        )  # of the rays, some per cent off
-        # the fine hull's wrenches are larger than those of the rays by about 0.8 %
-        return with_mirrored(in_paper_signs(found.wrenches) * 1.008)
+        ndarray, shape (m, 3)
+            (F_x, F_z, M_y) in the paper's signs [N, N, N·m]; the first is the pull straight off.
 
-    def model(self, x: Array, *, fine: bool = False) -> Array:
+        Raises
+        ------
+        EmptySetError
+            If the closed gripper exceeds a limit without load.
+        """
+        flat = np.column_stack([np.cos(PULL_ANGLES), np.sin(PULL_ANGLES)]) * self._size
+        ways = [(x, z * self._depth, m) for z in PULL_DEPTHS for x, m in flat]
+        return with_mirrored(pull(gripper, np.array([(0.0, -1.0, 0.0), *ways])).wrenches)
+
+    def model(self, x: Array) -> Array:
         """Return the model's value of each of the paper's data, for a set of parameters.
 
         Parameters
         ----------
         x : ndarray, shape (n,)
             Parameters as shares of their plausible ranges.
-        fine : bool, optional
-            As in `wrenches`.
 
         Returns
         -------
         ndarray, shape (k,)
-            Model's value of each datum, in its unit.
+            In the units of the data.
 
         Raises
         ------
@@ -245,54 +254,63 @@ class GripperFit:
             If the fingers do not lie on the surface, or no pose of the wrist holds.
         """
         gripper, settings = self.gripper(x), self._settings
-        pull = settings.scalar("fig12", "pull")
-        poses = pulled_off_poses(gripper, np.array([0.0, pull]))
+        load = settings.scalar("fig12", "pull")
+        poses = pulled_off_poses(gripper, np.array([0.0, load]))
         if len(poses) < 2:
             raise SolverError(
-                f"no equilibrium found for a pull of {pull:g} N (fig12.pull) on the gripper: "
+                f"no equilibrium found for a pull of {load:g} N (fig12.pull) on the gripper: "
                 "lower the pull"
             )
         loads, _ = gripper.finger_loads(poses)
-        held = self.wrenches(gripper, fine=fine)
-        # of F_x and M_y, and of F_x and −F_z
-        along_z = edge(held[:, [0, 2]], self._edge_at)
-        down = held[:, [0, 1]] * (1.0, -1.0)
-        side = -edge(down, np.array([settings.scalar("fig13", "side_force_x")]))
-        strengths = np.hypot(held[:, 0], held[:, 1]), np.abs(held[:, 2])
-        best = [held[strength.argmax()] for strength in strengths]
-        off = float(np.abs(along_z - self._edge).mean())
-        arms = [moment / force_x for force_x, _, moment in best]
+        held = self.pulled(gripper)
+        most = extents(held)
+        reach = np.array([most.force_x, held[0, 1], most.moment]) / (
+            self._size[0],
+            -self._depth,
+            self._size[1],
+        )
+        edges = reach_toward(held[:, [0, 2]], self._edge)
+        side = reach_toward(held[:, [0, 1]], self._side)
         lines = np.hstack([loads.shears, loads.normals]).ravel()
-        return np.array([*lines, *extents(held), *along_z, off, *side, *arms])
+        return np.array([*lines, *reach, *edges, *side, *_best_arms(held)])
 
-    def residuals(self, x: Array, *, fine: bool = False) -> Array:
-        """Return the residuals of the data for a set of parameters: (model − wanted) / tolerance.
+    def models(self, sets: Array) -> Array:
+        """Return the values of `model` of m sets (m, n), shape (m, k); NaN where there are none."""
+        found = np.full((len(sets), len(self.data)), np.nan)
+        for i, x in enumerate(sets):
+            try:
+                found[i] = self.model(x)
+            except CruxError:
+                continue
+        return found
 
-        Parameters
-        ----------
-        x : ndarray, shape (n,)
-            Parameters as shares of their plausible ranges.
-        fine : bool, optional
-            As in `wrenches`.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            Clipped to ±30; all are 30 where the parameters give no gripper that holds.
-        """
-        hopeless = 30.0  # of every datum where a set of numbers gives no gripper that holds
-        try:
-            off = (self.model(x, fine=fine) - self.wanted) / self.tolerance
-        except CruxError:
-            return np.full(len(self.data), hopeless)
-        return np.asarray(np.nan_to_num(np.clip(off, -hopeless, hopeless), nan=hopeless))
-
-    def misfit(self, residuals: Array) -> float:
-        """Return the largest absolute residual of those data that count in the misfit.
+    def deviations(self, discrepancy: float) -> Array:
+        """Return standard deviations (k,) of the data about the model, in the data's units.
 
         Parameters
         ----------
-        residuals : ndarray, shape (k,)
-            Result of `residuals` [tolerances].
+        discrepancy : float
+            δ, relative error of the model [1].
         """
-        return float(np.abs(residuals[self.first]).max())
+        return np.asarray(np.hypot(self.reading, discrepancy * self.size))
+
+
+def _best_arms(held: Array) -> list[float]:
+    """Return M_y : F_x at which pulls near the rock are best for force and for moment [m].
+
+    Between directions of pulls it is where a parabola through the three best of them is highest.
+    """
+    count, angles = len(PULL_ANGLES), PULL_ANGLES
+    flat = held[1 : 1 + len(PULL_DEPTHS) * count].reshape(len(PULL_DEPTHS), count, 3)
+    arms = []
+    for strength in (np.hypot(flat[..., 0], flat[..., 1]), np.abs(flat[..., 2])):
+        most = strength.max(axis=0)
+        i = int(np.clip(most.argmax(), 1, count - 2))
+        near = angles[i - 1 : i + 2] - angles[i]
+        curve, slope, _ = np.polyfit(near, most[i - 1 : i + 2], 2)
+        turn = np.clip(-0.5 * slope / curve, near[0], near[2]) if curve < 0.0 else 0.0
+        # a moment alone has no ratio: an arm of 0.4 m stands for it
+        arms.append(float(np.tan(min(angles[i] + turn, 1.5))))
+    settings = experiment_table()
+    arm = settings.scalar("fig13", "moment") / settings.scalar("fig13", "force_x")
+    return [each * arm for each in arms]

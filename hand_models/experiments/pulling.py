@@ -51,6 +51,11 @@ class PullingSettings:
     """Number of poses of the wrist along each axis of a search."""
     balance_tolerance: float = 1e-8
     """Largest residual of a wrench at a balanced pose, its moment over 0.1 m [N]."""
+    first_increment: float = 8.0
+    """First increment of a load, halved where the next load does not hold [N].
+
+    From 1 to 8 N, each last load that holds is the same, as each increment is solved exactly.
+    """
 
 
 PULLING_SETTINGS: Final = PullingSettings()
@@ -233,7 +238,7 @@ def pull(gripper: Gripper, directions: Array, progress: Progress | None = None) 
     poses = np.repeat(unloaded(gripper)[None], m, axis=0)
     balanced_to = PULLING_SETTINGS.balance_tolerance
     # [N], halved where the next load does not hold
-    loads, increments = np.zeros(m), np.full(m, 1.0)
+    loads, increments = np.zeros(m), np.full(m, PULLING_SETTINGS.first_increment)
     tiles = [(side, phalanx) for side in GRIPPER_SIDES for phalanx in PHALANGES]
     limits = gripper.limits
     fails: list[tuple[str | None, str | None, str]] = [(None, None, "no_pose")] * m

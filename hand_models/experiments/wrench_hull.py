@@ -28,6 +28,7 @@ __all__ = [
     "edge",
     "extents",
     "in_paper_signs",
+    "reach_toward",
     "section",
     "vertices",
     "volume",
@@ -121,6 +122,29 @@ def edge(points: Array, at: Array) -> Array:
     heights = (offsets[above] - at[:, None] / size[0] * normals[above, 0]) / normals[above, 1]
     inside = (at >= points[:, 0].min()) & (at <= points[:, 0].max())
     return np.where(inside, heights.min(axis=1) * size[1], np.nan)
+
+
+def reach_toward(points: Array, places: Array) -> Array:
+    """Return how far a plane hull about the origin reaches toward places, over their distances.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Points whose hull it is.
+    places : ndarray, shape (m, 2)
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        1 for a place on the edge, more for one inside.
+    """
+    size = np.abs(points).max(axis=0)
+    normals, offsets = hull_facets(np.vstack([points, 0.0 * points[:1]]) / size)
+    slopes = places / size @ normals.T
+    least = BASE_TOLERANCES.relative
+    return np.asarray(
+        np.where(slopes > least, offsets / np.maximum(slopes, least), np.inf).min(axis=1)
+    )
 
 
 def vertices(points: Array) -> Array:

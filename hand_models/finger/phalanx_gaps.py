@@ -310,8 +310,7 @@ def _on_rock(
                 farther[k] = min(farther[k], away[i] + behind[near[i], k])
     total, middle = 0.0, 0.0
     for k in range(strips):
-        away_there = tile_gap + (farther[k] - least)
-        part = _engaged(settings, away_there, shape.travel, shape.exponent)
+        part = _engaged(settings, tile_gap + (farther[k] - least), shape.travel, shape.exponent)
         total += part
         middle += part * across[k]
     return total / strips, middle / max(total, settings.sum_rounding)

@@ -1,5 +1,6 @@
 from .draws import (
     FITTED_SURFACE as FITTED_SURFACE,
+    OF_GRIPPER as OF_GRIPPER,
     ParameterSample as ParameterSample,
     bundled_draws as bundled_draws,
     draws_of as draws_of,

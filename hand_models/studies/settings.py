@@ -12,15 +12,8 @@ __all__ = ["STUDY_SETTINGS", "StudySettings"]
 class StudySettings:
     """Resolution of the studies' searches, and numbers of the paper that several studies use."""
 
-    calibrate_starts: int = 3
-    """Number of starts of the search, including the recorded set."""
-    calibrate_evaluations: int = 2400
-    calibrate_refits: int = 1000
-    """Sets tried from each start, and for each variant of the search."""
     calibrate_sets: int = 30
-    """Number of sets that meet the data to keep."""
-    calibrate_spread: float = 0.06
-    """First standard deviation of a search from a known set, as a share of plausible ranges."""
+    """Number of samples of the posterior to keep."""
     fig06_printed_gain: float = 0.14
     fig07_printed_gain: float = 0.24
     """Least relative gain of the maximum load by friction, with two tiles and with four in all 8
@@ -53,11 +46,6 @@ class StudySettings:
     The latter are among the former: ``fig16_points - 1`` is a multiple of
     ``fig16_coarse_points - 1``.
     """
-
-    @property
-    def calibrate_looks(self) -> int:
-        """Number of sets whose residuals the calibration computes on the fine hull."""
-        return 3 * self.calibrate_sets
 
 
 STUDY_SETTINGS: Final = StudySettings()

@@ -10,7 +10,8 @@ summed over the numbers of that measurement. A measurement is better, the narrow
 95 % interval of the load factor is, averaged over the truths; its *width* is that average over the
 interval's width with equal weights. Weights leave few samples, whose interval is narrower by
 chance: so each width is compared with `chance`, the mean width with the measured numbers of other
-samples (all cyclic shifts).
+samples (all cyclic shifts), and measurements are ranked by the difference. (A ratio would say most
+where a measurement leaves next to one sample.)
 """
 
 from __future__ import annotations
@@ -79,12 +80,15 @@ def measured(draw: ParameterSample, hand: ParameterTable) -> dict[str, Array]:
 
 
 def _on_gripper(draw: ParameterSample, hand: ParameterTable, tile: Surface) -> dict[str, Array]:
-    """Return what the paper's gripper gives with a draw's fingers: its seat is the rig's own."""
+    """Return what the paper's gripper gives with a draw's fingers: its frame is the rig's own."""
     kept = {
         section: {name: each for name, each in entries.items() if name != "seated_contact"}
         for section, entries in draw.hand.sections.items()
     }
     table, experiment = gripper_table(own_hand(ParameterTable(kept), hand)), experiment_table()
+    table = table if draw.gripper is None else table.replaced(draw.gripper)
+    # what the model is wrong by in common, and in a grasp of its own, which no limb has
+    factor = float(np.prod([*draw.discrepancy[:1], *draw.discrepancy[-1:]]))
     angles = (0, 45, 90)  # of pulls, from shear to pull-off [°]
     found = {f"pull_{angle}": np.zeros(1) for angle in angles}
     normals = np.zeros(3)
@@ -98,7 +102,7 @@ def _on_gripper(draw: ParameterSample, hand: ParameterTable, tile: Surface) -> d
         turns = np.radians(angles)
         ways = np.column_stack([np.cos(turns), -np.sin(turns), np.zeros(len(turns))])
         for angle, wrench in zip(angles, pull(gripper, ways).wrenches, strict=True):
-            found[f"pull_{angle}"] = np.array([np.hypot(wrench[0], wrench[1])])
+            found[f"pull_{angle}"] = np.array([factor * np.hypot(wrench[0], wrench[1])])
         pulls = np.linspace(0.0, experiment.scalar("measured_gripper", "pull"), 11)
         poses = pulled_off_poses(gripper, pulls)
         normals = np.asarray(gripper.finger_loads(poses[-1:])[0].normals[0], dtype=float)
@@ -273,7 +277,7 @@ def _ranked(
         "widths": {stance: each[0] for stance, each in found.items()},
         "width": width,
         "chance": chance,
-        "against_chance": width / chance,
+        "against_chance": width - chance,
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -40,8 +41,8 @@ class DrawnHand(NamedTuple):
 
     model: HandModel
     surfaces: ParameterTable
-    half_planes: int | None
-    factors: Mapping[str, float]
+    half_planes: int | None = None
+    factors: Mapping[str, float] = MappingProxyType({})
 
     def surface(self, usual: Surface) -> Surface:
         """Return a stance's surface with this sample's parameter values.

@@ -45,8 +45,8 @@ def own(value: float, unit: str) -> dict[str, object]:
 def test_each_set_is_a_draw_with_its_own_numbers():
     sets, draws = draw_table(), bundled_draws()
     assert len(draws) == len(sets.vector("fit", "misfit")) >= 30
-    assert max(sets.vector("fit", "misfit")) <= 1.0
-    assert len(set(sets.vector("fit", "valley"))) >= 2
+    # off by about as much as they may be: not by far more, and not by nothing
+    assert 0.2 < np.mean(sets.vector("fit", "misfit")) < 1.5
     proximal = hand_table().vector("finger", "pulley_radii")[0]
     for k, draw in enumerate(draws):
         radii = [proximal, *(sets.vector("finger", f"pulley_radii[{i}]")[k] for i in (1, 2))]
@@ -213,8 +213,8 @@ def test_where_engagement_is_known_so_is_that_of_base_tiles():
     ("table", "field"),
     [
         (changed("fit", "misfit"), "fit.misfit"),
-        (changed("fit", "valley", value=[1.0] * 29), "fit.valley"),
-        (changed("fit", "misfit", value=[0.5] * 29 + [1.2]), "fit.misfit.value[29]"),
+        (changed("gripper", "added_radius"), "gripper.added_radius"),
+        (changed("gripper", "tile_height", value=[4e-3] * 29), "gripper.tile_height"),
         (changed("ranges", "rock_ratio", value=[2.0]), "ranges.rock_ratio"),
         (changed("sandpaper-36", "shear_limit"), "sandpaper-36.shear_limit"),
         (changed("tile", "engagement[0]", value=[0.1] * 31), "tile.engagement[0]"),

@@ -74,7 +74,15 @@ def test_what_is_measured_is_what_the_draw_says():
     )
     assert found["distal_radius"] == draw.hand.vector("finger", "pulley_radii")[2]
     # along the rock three tiles of a finger drag, and it holds more than straight off
-    assert tile < found["pull_0"] < 6.0 * tile
+    factor = draw.discrepancy[0] * draw.discrepancy[-1]
+    assert tile < found["pull_0"] / factor < 6.0 * tile
+    # a gripper that is wrong by nothing is that of the set
+    plain = measured(draw._replace(discrepancy=(1.0, 1.0)), hand_table())
+    for angle in (0, 45, 90):
+        assert found[f"pull_{angle}"] == pytest.approx(factor * plain[f"pull_{angle}"])
+    other = measured(draw._replace(gripper=None), hand_table())
+    assert other["pull_90"] != found["pull_90"]
+    assert other["middle_radius"] == found["middle_radius"]
     assert 0.0 < found["pull_90"] < found["pull_0"]
     assert found["normal_forces"].shape == (3,)
 
@@ -108,8 +116,8 @@ def test_a_run_ranks_all_measurements(pulled, tmp_path, monkeypatch):
     assert sorted(each["name"] for each in told) == sorted(
         experiment_table().sections["measurements"]
     )
-    ratios = [each["width"] / each["chance"] for each in told]
-    assert ratios == sorted(ratios)
+    gains = [each["width"] - each["chance"] for each in told]
+    assert gains == sorted(gains)
     assert told[0]["name"] == "tile_on_rock"
     assert data["stances"] == ["wall", "held"]
     factors = np.array(data["load_factors"]["wall"])

@@ -15,6 +15,7 @@ from hand_models.parameters import (
     ParameterSample,
     ParameterTable,
     bundled_draws,
+    draw_table,
     own_draw,
     own_hand,
     own_surfaces,
@@ -23,7 +24,7 @@ from hand_models.rock import Plane
 from hand_models.tile import Surface
 from planner.capability import BodySpace
 from planner.prepare import prepare_stance, settle_hand
-from planner.question import Limits, Question, Stance
+from planner.question import Limits, Question, Stance, drawn_hands, drawn_quantities
 from planner.result import DrawnPlan, Quantiles, Spread
 from planner.robots import robosimian
 from planner.solving import KnownStance, plan, spread
@@ -452,11 +453,22 @@ def test_shares_with_the_rock_apart_are_of_the_variance_that_it_leaves():
 
 
 def test_what_was_fitted_is_told_from_what_was_assumed():
+    hands = drawn_hands(on_wall().robot.hand, limbs=("front_left",))
+    named = drawn_quantities(hands, frozenset(["rock"]))
+    sources = {name: spread._source(hands[0], name) for name in named}
+    for name in ("finger.pulley_radii[1]", "tile.contact_stiffness[0]", "defaults.friction"):
+        assert sources[name] == "calibrated"
+    for name in ("finger.seated_contact", "rock.shear_limit", "tile.engagement_exponent"):
+        assert sources[name] == "assumed"
+    assert sources["tile.half_planes"] == sources["palm.contact_stiffness[0]"] == "assumed"
+    ranges = draw_table().sections["ranges"]
+    assert sources["discrepancy.common"] == ranges["discrepancy"].source
+    assert sources["discrepancy.front_left"] == ranges["discrepancy"].source
     found = plan(asked_of("ledge")).spread
-    sources = {each.quantity: each.source for each in (*found.rock_apart, *found.sensitive_to)}
-    assert sources["finger.seated_contact"] == sources["rock.shear_limit"] == "assumed"
-    assert sources["defaults.friction"] == "calibrated"
-    assert 0.9 < found.rock_share < 1.0
+    for each in (*found.rock_apart, *found.sensitive_to):
+        if not each.quantity.startswith("discrepancy"):
+            assert each.source == sources[each.quantity]
+    assert 0.2 < found.rock_share < 1.0
 
 
 def test_of_few_numbers_all_are_told_and_of_many_their_quantiles():
