@@ -7,10 +7,9 @@ import pytest
 
 from hand_models.rock import Cylinder
 from planner.prepare import HandBatch, assemble
-from planner.programs import solvers
+from planner.programs import solvers, unique_bound
 from planner.result import LoadRecovery
 from planner.solving import plan
-from planner.programs import unique_bound
 from planner.verification import Check
 from service.answering.answers import plan_reply
 from tests.suite.helpers import peer
