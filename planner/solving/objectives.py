@@ -97,6 +97,9 @@ class CappedObjective(Objective):
     """
 
     late: ClassVar[Unfinished] = "least_effort"
+    dispensable: ClassVar[bool] = False
+    """True if the plan of least utilisation, with ``late`` among what is unfinished, is the answer
+    where multipliers do not prove the objective's plan; else there is none."""
 
     def on(self, prepared: PreparedStance) -> CappedObjective:
         """Return the objective with what it needs of a stance beside its rows; by default itself.
@@ -255,6 +258,7 @@ class MaxRobust(CappedObjective):
     name = "max_robust"
     words = "mean utilisation over samples"
     late = "robust_tensions"
+    dispensable = True
     own: SampleData | None = None
     samples: tuple[SampleData, ...] = ()
 
