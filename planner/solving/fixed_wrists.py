@@ -117,6 +117,8 @@ class FixedSolution(Solution):
             return replace(self, faults=(f"least {objective.words}: {best.status}",))
         bound = objective.bound(data, best, cap)
         further = unproven_sentences(objective.words, best.value, bound)
+        if further and objective.dispensable:
+            return self.late(objective.late)
         return replace(
             self,
             loads=best.loads,

@@ -88,6 +88,9 @@ class CappedObjective(Objective):
     """
 
     late: ClassVar[Unfinished] = "least_effort"
+    dispensable: ClassVar[bool] = False
+    """True if the plan of least utilisation, with ``late`` among what is unfinished, is the answer
+    where multipliers do not prove the objective's plan; else there is none."""
 
     def within(
         self, prepared: PreparedStance, sets: Sets, loads: Sequence[Array]

@@ -47,6 +47,7 @@ class MaxRobust(CappedObjective):
     name = "max_robust"
     words = "mean utilisation over samples"
     late = "robust_tensions"
+    dispensable = True
     own: SampleData | None = None
     samples: tuple[SampleData, ...] = ()
 
