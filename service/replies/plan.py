@@ -143,9 +143,8 @@ class PlanReply(StanceReply, kw_only=True):
     - ``findings``: what is odd about the stance, each with its ``field`` in the request and the
       measured value.
     - ``unfinished``: what a deadline has left out, each with a warning: ``least_utilisation`` (not
-      proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``least_hazard``,
-      ``robust_tensions``, ``load_factor``, ``path``, ``certificate``, ``explanation``, ``robust``,
-      ``open_loop``, ``spread``, ``advice``, ``com_region``, ``redundancy``, ``survival``.
+      proven that no plan uses less), ``tie_break``, ``wrists``, ``least_effort``, ``load_factor``,
+      ``path``, ``certificate``, ``explanation``, or what ``want`` names.
     - ``robust``: load factor over places of the hands near the given ones; only with ``"want":
       ["robust"]``, and not for a body wrench of zero.
     - ``open_loop``: utilisation over displaced hands if tensions and pose targets stay as planned;

@@ -9,21 +9,23 @@ from functools import cache
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from msgspec import structs
+from msgspec import UNSET, structs
 from scipy.spatial import ConvexHull
 
 from hand_models.base import InvalidInputError, Pose, turns_about
+from planner import deadline
 from planner.capability import BodySpace, ComRegion, com_region, com_solid
 from planner.question import Limits, Load, Question
 from planner.robots import Payload
 from planner.solving import plan
-from service.answering import dispatch, questions
+from service.answering import dispatch, planned, questions
+from service.answering.body_space import with_com_region
 from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from tests.suite.helpers import peer
 from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
 from tests.suite.helpers.replies import PLAN, departures, refusal
-from tests.suite.helpers.requests import wall_request
+from tests.suite.helpers.requests import plan_request, wall_request
 from tests.suite.helpers.stances import on_wall
 
 KEY = "crux/robosimian/body_space"
@@ -293,3 +295,13 @@ def test_a_plan_and_the_command_tell_it(capfd, tmp_path):
     assert solid["gap"] < 0.02
     assert run_command_line(["body-space", str(path), "--shake", "0.3"]) == BAD_INPUT
     assert "--shake requires --com" in complaint(capfd)
+
+
+def test_a_deadline_leaves_it_out():
+    answer = planned(plan_request())
+    with deadline.within(1e-9):
+        found = with_com_region(answer)
+    assert found.reply.unfinished == ["com_region"]
+    assert found.reply.com_region is UNSET
+    assert found.reply.warnings[-1].startswith("com_region: not known before the deadline")
+    assert found.reply.hands == answer.reply.hands
