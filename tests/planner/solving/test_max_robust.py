@@ -43,7 +43,11 @@ def tensions(answer: Plan) -> np.ndarray:
 
 @cache
 def bound() -> MaxRobust:
-    return MaxRobust().on(prepare_stance(ASKED))
+    prepared = prepare_stance(ASKED)
+    sets = prepared.at_rest()
+    found = MaxRobust().within(prepared, sets, programs.unique(sets.data).loads)
+    assert found is not None
+    return found
 
 
 def test_its_blocks_are_what_is_defined_and_its_value_what_the_samples_have():
