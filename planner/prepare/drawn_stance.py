@@ -40,7 +40,10 @@ def settled_as_drawn(
     # hands that close alike close once
     outcomes = settle_hands(drawn.model, list(placements.values()))
     found = dict(zip(placements, outcomes, strict=True))
-    return [found[key] for key in keys]
+    pairs = [(limb, found[key]) for limb, key in zip(prepared.limbs, keys, strict=True)]
+    return [
+        drawn.closed(each, limb) if isinstance(each, SettledHand) else each for limb, each in pairs
+    ]
 
 
 def with_drawn_hands(

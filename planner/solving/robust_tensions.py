@@ -69,7 +69,8 @@ class MaxRobust(CappedObjective):
         if float(programs.used(sets.data, loads).max()) > question.limits.utilisation + CAP_SLACK:
             return None
         bare, samples = without_margins(prepared), []
-        for drawn in drawn_hands(question.stance.robot.hand, question.draws):
+        limbs = tuple(sorted(hand.limb for hand in question.stance.hands))
+        for drawn in drawn_hands(question.stance.robot.hand, question.draws, limbs=limbs):
             there = with_drawn_hands(bare, settled_as_drawn(bare, drawn))
             if deadline.expired():
                 # the program will not be solved either

@@ -44,7 +44,7 @@ def tensions(answer: Plan) -> np.ndarray:
 @cache
 def bound() -> MaxRobust:
     prepared = prepare_stance(ASKED)
-    sets = prepared.at_rest()
+    sets = prepared.at_rest
     found = MaxRobust().within(prepared, sets, programs.unique(sets.data).loads)
     assert found is not None
     return found
@@ -196,12 +196,12 @@ def test_a_solver_that_lies_about_tensions_is_found_out(monkeypatch):
 
 
 def test_a_deadline_leaves_the_plan_of_least_utilisation(monkeypatch):
-    def late(self, prepared):
+    def late(self, *_):
         monkeypatch.setattr(deadline, "expired", lambda: True)
         return self
 
     least = plan(ask(on_wall(), load=LOAD))
-    monkeypatch.setattr(MaxRobust, "on", late)
+    monkeypatch.setattr(MaxRobust, "within", late)
     answer = plan(replace(ASKED, deadline=100.0))
     assert answer.unfinished == ("robust_tensions",)
     assert answer.warnings[-1].endswith("before the tensions that serve all samples were found")
