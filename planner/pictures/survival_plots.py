@@ -63,11 +63,12 @@ def _draw_cascade(axes: Axes, found: Survival) -> None:
                   label="the weakest of those left, afterwards")  # fmt: skip
     axes.axvline(1.0, color="0.4", linewidth=1.0, linestyle="--")
     axes.set_yticks(places, names, fontsize=8)
-    axes.set_ylim(len(names) + 0.3, -0.7)
-    end = "all hands hold" if found.cascade_holds else "the stance is lost"
-    axes.text(0.02, 0.02, f"then {end}" if names else "nothing slips", transform=axes.transAxes,
-              weight="bold")  # fmt: skip
-    axes.set(title="one cascade at fixed tensions, from above", xlabel="load over strength")
+    axes.set_ylim(len(names) + 0.3 + 0.12 * len(names), -0.7)
+    end = "then all hands hold" if found.cascade_holds else "then the stance is lost"
+    axes.set(
+        title="one cascade at fixed tensions, from above",
+        xlabel=f"load over strength; {end if names else 'nothing slips'}",
+    )
     if names:
         axes.legend(fontsize=8, loc="lower right")
 
