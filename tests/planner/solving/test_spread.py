@@ -165,7 +165,8 @@ def test_floating_wrists_that_begin_at_the_usual_plan_are_no_worse_than_by_thems
     if mass is not None:
         asked = replace(asked, load=structs.replace(asked.load, mass=mass))
     found, apart = plan(asked).spread, planned_apart(asked)
-    assert found.holds == sum(each.holds for each in apart)
+    # a sample within the bracket of the cap may be on either side of it
+    assert abs(found.holds - sum(each.holds for each in apart)) <= 1
     # relative, of the largest factor: where a palm begins to press, one search ends 6 % higher
     bracket = 8e-2
     for used, factor, alone in zip(found.utilisations, found.load_factors, apart, strict=True):
@@ -195,10 +196,11 @@ def test_how_stiff_tiles_are_on_rock_counts_where_wrists_move(wrist, share):
         assert found.load_factors == almost([found.load_factors[0]] * 3)
 
 
-@pytest.mark.slow
-def test_bundled_samples_of_compliant_wrists_have_it_and_name_it():
-    found = plan(with_wrists("overhang", "compliant")).spread
-    assert "tile.rock_stiffness_ratio" in {each.quantity for each in found.sensitive_to}
+def test_bundled_samples_have_it_where_wrists_move():
+    hand, rock = on_wall().robot.hand, frozenset(["rock"])
+    for moving in (False, True):
+        named = drawn_quantities(drawn_hands(hand, wrists_move=moving), rock)
+        assert ("tile.rock_stiffness_ratio" in named) == moving
 
 
 @pytest.mark.parametrize(
