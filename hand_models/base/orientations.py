@@ -22,8 +22,6 @@ __all__ = ["ORIENTATION_FIELDS", "check_orientation_form", "oriented_pose"]
 ORIENTATION_FIELDS: Final = ("orientation", "rpy", "x_axis", "z_axis")
 """Fields that give an orientation: the first, the second, or the last two."""
 
-ORIENTATION_FORMS: Final = "orientation (a quaternion [x, y, z, w]), rpy, or x_axis with z_axis"
-
 
 def check_orientation_form(
     orientation: object = None, rpy: object = None, x_axis: object = None, z_axis: object = None
@@ -35,17 +33,18 @@ def check_orientation_form(
     InvalidFieldError
         If no form, more than one, or only one of two axes is given.
     """
+    forms = "orientation (a quaternion [x, y, z, w]), rpy, or x_axis with z_axis"
     values = (orientation, rpy, x_axis, z_axis)
     given = [name for name, v in zip(ORIENTATION_FIELDS, values, strict=True) if v is not None]
     if not given:
-        raise InvalidFieldError(f"missing; give {ORIENTATION_FORMS}", field="orientation")
+        raise InvalidFieldError(f"missing; give {forms}", field="orientation")
     if given[0] in ("x_axis", "z_axis"):
         for name, other in (("x_axis", "z_axis"), ("z_axis", "x_axis")):
             if name not in given:
                 raise InvalidFieldError(f"missing; {other} requires {name}", field=name)
     elif len(given) > 1:
         raise InvalidFieldError(
-            f"give exactly one of {ORIENTATION_FORMS}, got {' and '.join(given)}", field=given[1]
+            f"give exactly one of {forms}, got {' and '.join(given)}", field=given[1]
         )
 
 

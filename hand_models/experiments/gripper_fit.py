@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -52,6 +52,8 @@ class ReadingErrors:
     """Of a moment of the edge of Fig. 13's surface, good to 0.13 N·m [N·m]."""
     side: float = 0.4 / 3.0**0.5
     """Of a force of Fig. 13's side view, good to 2 % of 20 N [N]."""
+    least_size: float = 2.0
+    """Least magnitude of a force of Fig. 12: of what differs in it between phalanges [N]."""
     ratio: float = 0.15
     """Of a best ratio of Fig. 14, which is printed as about, as a share: good to a quarter."""
 
@@ -74,15 +76,19 @@ class FitTolerances:
 
 FIT_TOLERANCES: Final = FitTolerances()
 
-LEAST_SIZE: Final = 2.0
-"""Least magnitude of a force of Fig. 12: of what differs in it from phalanx to phalanx [N]."""
 
-PULL_ANGLES: Final = np.radians([*range(-30, 0, 15), *range(0, 100, 8), *range(105, 150, 15)])
-PULL_DEPTHS: Final = (0.0, -0.15, -0.4)
-"""Directions of straight pulls: angles from F_x to M_y and shares of F_z, over Fig. 13's extents.
+class PullDirections:
+    """Directions of straight pulls, over Fig. 13's extents.
 
-Steps of 8 degrees, where the best ratios are: a parabola through three of them is good to 1 %.
-"""
+    Steps of 8 degrees, where the best ratios are: a parabola through three of them is good to 1 %.
+    """
+
+    angles: ClassVar[Array] = np.radians(
+        [*range(-30, 0, 15), *range(0, 100, 8), *range(105, 150, 15)]
+    )
+    """From F_x to M_y [rad]."""
+    depths: ClassVar[tuple[float, ...]] = (0.0, -0.15, -0.4)
+    """Shares of F_z."""
 
 
 class Datum(NamedTuple):
@@ -165,7 +171,7 @@ class GripperFit:
         self.figures = np.array([datum.figure for datum in self.data])
         of_12 = np.array([datum.unit == "N" for datum in self.data])
         # a small force is the difference of large ones
-        self.size = np.maximum(np.abs(self.wanted), np.where(of_12, LEAST_SIZE, 0.0))
+        self.size = np.maximum(np.abs(self.wanted), np.where(of_12, READING_ERRORS.least_size, 0.0))
 
     def _data(self) -> Iterable[Datum]:
         settings, near = self._settings, READING_ERRORS
@@ -231,8 +237,9 @@ class GripperFit:
         EmptySetError
             If the closed gripper exceeds a limit without load.
         """
-        flat = np.column_stack([np.cos(PULL_ANGLES), np.sin(PULL_ANGLES)]) * self._size
-        ways = [(x, z * self._depth, m) for z in PULL_DEPTHS for x, m in flat]
+        angles = PullDirections.angles
+        flat = np.column_stack([np.cos(angles), np.sin(angles)]) * self._size
+        ways = [(x, z * self._depth, m) for z in PullDirections.depths for x, m in flat]
         return with_mirrored(pull(gripper, np.array([(0.0, -1.0, 0.0), *ways])).wrenches)
 
     def model(self, x: Array) -> Array:
@@ -300,8 +307,9 @@ def _best_arms(held: Array) -> list[float]:
 
     Between directions of pulls it is where a parabola through the three best of them is highest.
     """
-    count, angles = len(PULL_ANGLES), PULL_ANGLES
-    flat = held[1 : 1 + len(PULL_DEPTHS) * count].reshape(len(PULL_DEPTHS), count, 3)
+    angles, depths = PullDirections.angles, len(PullDirections.depths)
+    count = len(angles)
+    flat = held[1 : 1 + depths * count].reshape(depths, count, 3)
     arms = []
     for strength in (np.hypot(flat[..., 0], flat[..., 1]), np.abs(flat[..., 2])):
         most = strength.max(axis=0)

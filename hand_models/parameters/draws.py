@@ -56,13 +56,6 @@ ENTRY_PATH: Final = re.compile(r"(\w+)(?:\[(\d+)\])?")
 """Pattern of an entry's name, or of one number of an entry that is a list, such as ``radii[1]``."""
 
 
-DRAWN_RANGES: Final = ("seated_contact", "engagement_exponent", "palm_stiffness", "half_planes")
-"""Ranges of ``draws.toml`` beside the strengths of surfaces, in the order of their quantiles."""
-
-OWN_FACTORS: Final = 8
-"""Number of limbs with a factor of their own; a body with more has some twice."""
-
-
 OF_GRIPPER: Final = {
     "base_half_spacing": "gripper",
     "added_radius": "gripper",
@@ -195,8 +188,10 @@ def draws_of(
     count = _checked_count(sets)
     known = hand.difference(hand_table())
     surfaces = len(_ranged())
-    first = surfaces + len(DRAWN_RANGES)
-    quantiles = even_quantiles(count, first + 2 + OWN_FACTORS)
+    # of seated_contact, engagement_exponent, palm_stiffness and half_planes
+    first = surfaces + 4
+    own_factors = 8  # limbs with a factor of their own; a body with more has some twice
+    quantiles = even_quantiles(count, first + 2 + own_factors)
     ratios = _stiffness_ratios(sets, known, quantiles[:, first]) if wrists_move else None
     factors = _discrepancies(sets, quantiles[:, first + 1 :]).tolist()
     planes = sets.vector("ranges", "half_planes")

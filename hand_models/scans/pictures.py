@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,9 +19,6 @@ from hand_models.rock import Triangles
 from hand_models.scans.rock import ScannedRock
 
 __all__ = ["plot_holds", "plot_rock"]
-
-REFUSAL_MARKERS: Final = ("x", "s", "^", "D", "v", "+", "o", "*", "p")
-"""Markers of points without a hold, in the order of their kinds."""
 
 
 def plot_rock(rock: ScannedRock, path: Path, title: str = "") -> None:
@@ -98,7 +95,7 @@ def plot_holds(
     axes, _ = _paint(*rock, "gray", title)
     style: dict[str, Any] = {"s": 36, "cmap": "plasma", "edgecolors": "white", "linewidths": 0.5}
     shown = axes.scatter(points[:, 1], points[:, 0], c=values, norm=_scale(values), **style)
-    for marker, (kind, at) in zip(cycle(REFUSAL_MARKERS), refused.items(), strict=False):
+    for marker, (kind, at) in zip(cycle("xs^Dv+o*p"), refused.items(), strict=False):
         size: dict[str, Any] = {"markersize": 6, "markeredgewidth": 1.5, "fillstyle": "none"}
         axes.plot(at[:, 1], at[:, 0], marker, color="tab:cyan", label=kind, **size)
     _rank(axes, best, 0.06 * float(np.ptp(rock.vertices[:, :2], axis=0).max()))

@@ -13,8 +13,6 @@ of the stretch that touches if that is longer.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from hand_models.base import BASE_TOLERANCES, Array
@@ -23,9 +21,6 @@ from hand_models.sections.section import Complexes, Face, Flags
 from hand_models.sections.settings import SECTION_SETTINGS
 
 __all__ = ["TurningFaces"]
-
-FACE_PARTS: Final = np.linspace(0.0, 1.0, 17)[:, None]
-"""Places along a face, as shares of its length, at which its distance from the rock is computed."""
 
 
 class TurningFaces:
@@ -60,7 +55,9 @@ class TurningFaces:
         clear = self._boundary.clearances(points).min(axis=0)
         cut = pierced_faces(vertices, lasts, joints, self._face, self._low).nonzero()[0]
         if len(cut):
-            points = points[0, cut] + FACE_PARTS * (points[1, cut] - points[0, cut])
+            # places along a face at which its distance from the rock is computed
+            parts = np.linspace(0.0, 1.0, 17)[:, None]
+            points = points[0, cut] + parts * (points[1, cut] - points[0, cut])
             clear[cut] = self._boundary.clearances(points).min(axis=0)
         return np.asarray(clear)
 

@@ -15,7 +15,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -36,19 +36,6 @@ from hand_models.studies.settings import STUDY_SETTINGS
 from hand_models.tile import Surface
 
 __all__ = ["as_draws", "plot", "run"]
-
-FORETOLD_DATA: Final = {
-    "fig12": "ends of Fig. 12's lines",
-    "fig13": "points of Fig. 13's outline",
-    "fig14": "best ratios of Fig. 14",
-}
-"""Data that are foretold without the figure itself, in words."""
-
-OF_HAND: Final = {
-    "finger": ("pulley_radii[1]", "pulley_radii[2]"),
-    "tile": tuple(f"{name}[{i}]" for name in ("engagement", "contact_stiffness") for i in range(3)),
-}
-"""Parameters of the gripper that its hand has as well, by section."""
 
 
 def run(progress: Progress, hand: ParameterTable) -> StudyResult:
@@ -91,6 +78,12 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
         "sets": kept,
         "numbers": _numbers(fit, best, np.array([each["at"] for each in kept])),
     }
+    # what is foretold without the figure itself
+    foretold = {
+        "fig12": "ends of Fig. 12's lines",
+        "fig13": "points of Fig. 13's outline",
+        "fig14": "best ratios of Fig. 14",
+    }
     claims = tuple(
         Claim(
             f"{words} within the 90 % interval of the other figures",
@@ -98,12 +91,12 @@ def run(progress: Progress, hand: ParameterTable) -> StudyResult:
             "{} of {}".format(*data["coverage"][figure]),
             data["coverage"][figure][0] >= 0.8 * data["coverage"][figure][1],
         )
-        for figure, words in FORETOLD_DATA.items()
+        for figure, words in foretold.items()
     )
     data["summary"] = [
         f"the model is off by {search.discrepancy:.0%} (rms) where a figure is left out",
         *(
-            f"without {figure}: {claim.got} {FORETOLD_DATA[figure]}"
+            f"without {figure}: {claim.got} {foretold[figure]}"
             for figure, claim in zip(FITTED_FIGURES, claims, strict=True)
         ),
     ]
@@ -181,7 +174,10 @@ def as_draws(data: Mapping[str, Any]) -> str:
 
     misfit = "rms of how far the data are off, over their standard deviations (study calibrate)"
     entry("misfit", [each["misfit"] for each in sets], "1", misfit)
-    for section, names in OF_HAND.items():
+    # the gripper's parameters that its hand has as well
+    of_tile = [f"{name}[{i}]" for name in ("engagement", "contact_stiffness") for i in range(3)]
+    of_hand = {"finger": ["pulley_radii[1]", "pulley_radii[2]"], "tile": of_tile}
+    for section, names in of_hand.items():
         lines += ["", f"[{section}]"]
         for name in names:
             entry(name, columns[name], units[name], "of the gripper's set")

@@ -42,13 +42,6 @@ class OwnObjective(Protocol):
 MOST_DRAWS: Final = 100
 """Largest number of samples that a caller may give: each costs a plan and a load factor."""
 
-LEAST_TOLERANCE: Final = 1e-3
-"""Least tolerance that is valid: with less, plans hardly differ, and a solver's digits count."""
-
-SCATTER_RANGE: Final = (0.05, 0.9)
-"""Least and largest scatter of a surface for ``max_reliability``, over its strength: Weibull moduli
-of 25 and 1.1. Larger powers are beyond a solver's digits, and those below 1 are not convex."""
-
 
 @cache
 def _usual_tolerance() -> float:
@@ -176,9 +169,10 @@ class Question:
                     field="tolerance",
                 )
             return
-        if tolerance is not None and not LEAST_TOLERANCE <= tolerance <= 1.0:
+        least_tolerance = 1e-3  # with less, plans hardly differ, and a solver's digits count
+        if tolerance is not None and not least_tolerance <= tolerance <= 1.0:
             raise InvalidInputError(
-                f"must be {LEAST_TOLERANCE:g} to 1, got {tolerance:g}", field="tolerance"
+                f"must be {least_tolerance:g} to 1, got {tolerance:g}", field="tolerance"
             )
         moving = [hand.limb for hand in self.stance.hands if hand.wrist != "fixed"]
         if moving:
@@ -188,7 +182,9 @@ class Question:
                 "max_margin or min_effort",
                 field="objective",
             )
-        least, most = SCATTER_RANGE
+        # Weibull moduli of 25 and 1.1: larger powers are beyond a solver's digits, and those below
+        # 1 are not convex
+        least, most = 0.05, 0.9
         for i, hand in enumerate(self.stance.hands):
             whole, scatter = hand.surface.shear_limit, hand.surface.shear_scatter
             if not least * whole <= scatter <= most * whole:

@@ -41,9 +41,6 @@ PALM_SIGNS: Final = np.array([-1.0, 1.0])
 WRENCH_ROWS: Final = 6
 """Rows of a wrench."""
 
-NO_LOAD: Final = np.zeros(1)
-"""Zero load, put before all others for hands that lack a load."""
-
 
 class _LoadLayout(NamedTuple):
     """The places of everything in the loads and in the limit rows of all hands.
@@ -242,7 +239,8 @@ class LoadRecovery:
             Σ ‖E z + e₀‖²: the sum of squared relative tensions and joint torques.
         """
         known, layout = self._known, self._layout
-        y = np.concatenate([NO_LOAD, *loads])
+        # before all others a load of zero, for hands that lack one
+        y = np.concatenate([np.zeros(1), *loads])
         np.maximum(y, layout.least, out=y)
         y[self._released] = 0.0
         scaled = y.take(layout.columns)

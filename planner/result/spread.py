@@ -39,9 +39,6 @@ class SpreadSettings:
 
 SPREAD_SETTINGS: Final = SpreadSettings()
 
-STRENGTH_SUFFIX: Final = ".shear_limit"
-"""How the names of strengths of a tile on a surface end."""
-
 
 class DrawnPlan(Struct, frozen=True):
     """Verified plan with the parameter values of one sample; None for a missing value.
@@ -347,7 +344,8 @@ def _apart(
         if np.ptp(own) == 0.0:
             continue
         own = (own - own.mean()) / own.std()
-        if name.endswith(STRENGTH_SUFFIX):
+        # strengths of tiles on surfaces
+        if name.endswith(".shear_limit"):
             columns += [own, own**2]
         else:
             # a quantity that goes with one before says the same

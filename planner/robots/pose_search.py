@@ -8,7 +8,7 @@ search restarts from another random posture whose hand is near the pose.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import scipy
@@ -20,8 +20,6 @@ from planner.robots.robot import Robot
 from planner.robots.tolerances import TOLERANCES
 
 __all__ = ["damped_step", "find_angles", "postures_near"]
-
-POSE_IDENTITY: Final = np.eye(6)
 
 
 def find_angles(batch: LimbBatch) -> Array:
@@ -113,7 +111,7 @@ def damped_step(batch: LimbBatch, angles: Array, errors: Array, jacobians: Array
     # a little is left where there is no error: a stretched limb's matrix is singular
     damping = 0.1 * (errors * errors).sum(axis=-1) + 1e-12
     inner = np.linalg.solve(
-        J @ transposed + damping[..., None, None] * POSE_IDENTITY, errors[..., None]
+        J @ transposed + damping[..., None, None] * np.eye(6), errors[..., None]
     )
     step = (transposed @ inner)[..., 0]
     most = 1.0  # [rad] that a joint turns

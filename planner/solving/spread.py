@@ -41,14 +41,13 @@ __all__ = ["find_spread"]
 ALL_PLANNED: Final = "all samples were planned"
 """What a deadline may leave unfinished."""
 
-ROCK_PRESET: Final = "rock"
-"""Preset surface whose strength has an assumed range."""
-
 
 @dataclass(frozen=True, slots=True)
 class ThresholdSettings:
     """Settings of the search for the least strength of rock."""
 
+    surface: str = "rock"
+    """Preset surface whose strength has an assumed range."""
     accuracy: float = 0.01  # of the strength, far below what is known of any rock
     none: float = 10.0
     """Utilisation beyond the cap that stands for no plan: finite, so that it can be bracketed."""
@@ -158,13 +157,13 @@ def _threshold(
 ) -> StrengthThreshold | None:
     """Return the least strength of rock in its assumed range with which the stance is feasible."""
     stance, table = prepared.question.stance, surface_table()
-    sandpaper = table.scalar(FITTED_SURFACE, "shear_limit")
+    preset, sandpaper = THRESHOLD_SETTINGS.surface, table.scalar(FITTED_SURFACE, "shear_limit")
     least, most = draw_table().vector("ranges", "rock_ratio")
     cap = prepared.question.limits.utilisation + CAP_SLACK
 
     def on_rock(ratio: float) -> DrawnHand:
-        strength = table.quantity(ROCK_PRESET, "shear_limit").changed(ratio * sandpaper)
-        own = ParameterTable({ROCK_PRESET: {"shear_limit": strength}})
+        strength = table.quantity(preset, "shear_limit").changed(ratio * sandpaper)
+        own = ParameterTable({preset: {"shear_limit": strength}})
         return DrawnHand(stance.robot.hand, table.replaced(own), None, {})
 
     @cache
@@ -189,7 +188,7 @@ def _threshold(
         ratio = 1.0 / float(scipy.optimize.brentq(beyond, 1.0 / most, 1.0 / least, xtol=accuracy))
     share = 0.0 if ratio is None else (most - ratio) / (most - least)
     strength = None if ratio is None else ratio * sandpaper
-    return StrengthThreshold(ROCK_PRESET, strength, ratio, [least, most], share)
+    return StrengthThreshold(preset, strength, ratio, [least, most], share)
 
 
 def _tried(

@@ -22,9 +22,6 @@ from planner.verification.residuals import (
 
 __all__ = ["HandLimits", "check_contacts"]
 
-PULLING_BOUNDS: Final = np.array([np.inf, np.inf, 0.0])
-"""Largest components of a hand's force that do not press."""
-
 PALM_SIGNS: Final = np.array([-1.0, 1.0])
 """Signs of a palm's shear along x and pressing along z."""
 
@@ -78,7 +75,8 @@ class HandLimits(ResidualLimits):
         product of the force with `HELD_DIRECTIONS`; it must not be below the size.
         """
         forces = wrenches[:, :3]
-        held = np.minimum(forces, PULLING_BOUNDS)
+        # what does not press
+        held = np.minimum(forces, [np.inf, np.inf, 0.0])
         size = np.sqrt(np.add.reduce(held * held, axis=1))
         left, limb = np.maximum.reduce(forces @ HELD_DIRECTIONS.T, axis=1) - size, self._names.limb
         text = "the hand holds {:.6g} N, more than its rows say"

@@ -55,10 +55,6 @@ MESSAGE_KINDS: Final[tuple[type[msgspec.Struct], ...]] = (
 )
 
 
-ALIKE: Final = frozenset({"Hand"})
-"""Names of a request's part that a reply's part has too; the reply's keeps its ending ``Reply``."""
-
-
 def schema() -> dict[str, Any]:
     """Build one JSON Schema for all messages; a document is valid if it is one of the messages.
 
@@ -118,7 +114,9 @@ def part_name(title: str) -> str:
     """
     name = title.partition("[")[0]
     short = name.removesuffix("Reply")
-    return name if short in ALIKE or name in {each.__name__ for each in MESSAGE_KINDS} else short
+    # a part of a request has this name, too
+    alike = short == "Hand"
+    return name if alike or name in {each.__name__ for each in MESSAGE_KINDS} else short
 
 
 def _renamed(part: Any, names: Mapping[str, str]) -> Any:
