@@ -127,6 +127,7 @@ class Question:
         if self.deadline is not None:
             check_positive(self.deadline, "s", "deadline")
         self._check_limits()
+        self._check_fixed_objectives()
         self._check_reliability()
         self._check_draws()
         wrists = {hand.limb: hand.wrist for hand in self.stance.hands}
@@ -160,6 +161,16 @@ class Question:
                 field="limits.tension_change",
             )
 
+    def _check_fixed_objectives(self) -> None:
+        moving = [hand.limb for hand in self.stance.hands if hand.wrist != "fixed"]
+        if moving and self.objective in ("max_reliability", "max_robust"):
+            raise UnsupportedError(
+                f"{self.objective} requires fixed wrists on all hands, as tiles' loads are not "
+                f"convex in a wrist's pose; others have {', '.join(moving)}: fix these, or ask for "
+                "max_margin or min_effort",
+                field="objective",
+            )
+
     def _check_reliability(self) -> None:
         tolerance = self.tolerance
         if self.objective != "max_reliability":
@@ -173,14 +184,6 @@ class Question:
         if tolerance is not None and not least_tolerance <= tolerance <= 1.0:
             raise InvalidInputError(
                 f"must be {least_tolerance:g} to 1, got {tolerance:g}", field="tolerance"
-            )
-        moving = [hand.limb for hand in self.stance.hands if hand.wrist != "fixed"]
-        if moving:
-            raise UnsupportedError(
-                "max_reliability requires fixed wrists on all hands, as tiles' loads are not "
-                f"convex in a wrist's pose; others have {', '.join(moving)}: fix these, or ask for "
-                "max_margin or min_effort",
-                field="objective",
             )
         # Weibull moduli of 25 and 1.1: larger powers are beyond a solver's digits, and those below
         # 1 are not convex

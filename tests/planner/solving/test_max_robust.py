@@ -164,7 +164,11 @@ def test_what_cannot_be_is_refused():
                 objective="max_robust",
             )
         )
-    assert caught.value.message.endswith("valid are max_margin, min_effort")
+    assert caught.value.message.endswith("fix these, or ask for max_margin or min_effort")
+    some = on_wall()
+    mixed = replace(some, hands=(replace(some.hands[0], wrist="floating"), *some.hands[1:]))
+    with pytest.raises(UnsupportedError, match=f"others have {some.hands[0].limb}: fix these"):
+        Question(mixed, load=LOAD, objective="max_robust")
     weak = drawn(tendon={"maximum_tension": entry(50.0, "N")})
     none = Question(on_wall(closing_tension=60.0), objective="max_robust", draws=(weak,))
     with pytest.raises(UnsupportedError, match="there is none; valid is max_margin"):
