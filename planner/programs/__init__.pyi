@@ -35,6 +35,7 @@ from .robust import (
     sample_value as sample_value,
 )
 from .set_points import (
+    SET_POINT_SETTINGS as SET_POINT_SETTINGS,
     Kept as Kept,
     LeastChange as LeastChange,
     kept as kept,

@@ -6,7 +6,7 @@ NaN where a load is free.
 
 ==============  =============================================================================
 `kept`          min u  with  y_i = f_i for each load i that is held
-`least_change`  min Σ (y_i − f_i)² over the loads i that are held; no limits
+`least_change`  min Σ (y_i − f_i)² + ε Σ y_j²  over loads i held and j free; no limits
 ==============  =============================================================================
 """
 
@@ -25,7 +25,7 @@ from planner.programs.program import Best, Residuals
 from planner.programs.stance_data import LOAD_UNIT, StanceData, parted
 from planner.programs.stance_program import Definition
 
-__all__ = ["Kept", "LeastChange", "kept", "least_change"]
+__all__ = ["SET_POINT_SETTINGS", "Kept", "LeastChange", "kept", "least_change"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,10 @@ class SetPointSettings:
     changed tensions end on hard rows, where otherwise rounding would leave no balance."""
     scale: float = LOAD_UNIT**2
     """Factor k of squared changes, which are then in N²: changes are newtons, not hundreds."""
+    reactions: float = 1e-9
+    """Weight ε of squared free loads beside squared changes. Hands can squeeze each other without
+    end; loads of a million newtons would leave no digits of the tensions on the hard rows' border.
+    Small enough that 300 N weigh as much as a change of 0.01 N."""
 
 
 SET_POINT_SETTINGS: Final = SetPointSettings()
@@ -106,7 +110,9 @@ class Kept(Best):
 
 
 class LeastChange(Best):
-    """min k Σ (z_i − f_i)² over the loads i that are held, within balance and hard rows alone.
+    """min k (Σ (z_i − f_i)² + ε Σ z_j²) within balance and hard rows alone; i held, j free.
+
+    The small weight ε of free loads keeps them finite, and so the tensions exact.
 
     Parameters
     ----------
@@ -121,7 +127,9 @@ class LeastChange(Best):
         z = np.concatenate(held) / data.rows.unit
         given = ~np.isnan(z)
         change = Residuals(np.eye(len(z))[given], z[given], SET_POINT_SETTINGS.scale)
-        super().__init__(StanceData.of(tuple(hands), data.wrench), cap=1.0, residuals=change)
+        weights = np.where(given, 0.0, SET_POINT_SETTINGS.reactions * SET_POINT_SETTINGS.scale)
+        whole = StanceData.of(tuple(hands), data.wrench)
+        super().__init__(whole, cap=1.0, weights=weights, residuals=change)
 
 
 def kept(data: StanceData, held: Sequence[Array]) -> Outcome:
@@ -153,6 +161,7 @@ def least_change(data: StanceData, held: Sequence[Array]) -> Outcome:
     Returns
     -------
     Outcome
-        ``value`` is the sum of the squared changes in newtons.
+        ``value`` is the sum of the squared changes, and of ε times the squares of the free loads,
+        in newtons; ε is ``SET_POINT_SETTINGS.reactions``.
     """
     return LeastChange(data, held).solve()

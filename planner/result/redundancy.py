@@ -50,7 +50,7 @@ class Loss(Struct, frozen=True):
     def words(self) -> str:
         """The lost part, for a sentence."""
         names = {
-            "tile": f"{self.phalanx} tile of {self.finger}",
+            "tile": f"{self.finger} {self.phalanx}",
             "finger": f"{self.finger}",
             "hand": "the hand",
         }

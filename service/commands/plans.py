@@ -153,7 +153,9 @@ def redundancy_command(stance: str, picture: Path | None, own: options.Own, as_j
     if as_json:
         tables.say(found)
     else:
-        tables.print_redundancy(found, tables.console())
+        cap = asked.limits.utilisation + planner.programs.CAP_SLACK
+        whole = found.utilisation is not None and found.utilisation <= cap
+        tables.print_redundancy(found, tables.console(), holds=whole)
     held, count = found.held["tile"]
     return tables.ExitStatus.DONE if held == count else tables.ExitStatus.OVERLOADED
 
@@ -174,7 +176,8 @@ def _print(
         brief=brief,
     )
     if isinstance(answer.reply.redundancy, planner.Redundancy):
-        tables.print_redundancy(answer.reply.redundancy, tables.console())
+        whole = answer.reply.status == "optimal"
+        tables.print_redundancy(answer.reply.redundancy, tables.console(), holds=whole)
     tables.tell_solver(answer.reply)
     sys.stdout.flush()
 

@@ -92,25 +92,28 @@ def print_spread(spread: Spread, out: Console) -> None:
             out.print(sentence)
     answers = [("planned anew", spread), ("tensions kept", spread.kept)]
     answers += [("balanced by feedback", spread.feedback)]
+    there = [(words, each) for words, each in answers if each is not None]
+    # a column has as many decimals as its narrowest interval with two ends needs
+    found = [each.utilisation for _, each in there if each.utilisation is not None]
+    digits = max((_digits(each) for each in found if each.high > each.low + 1e-3), default=3)
     rows = [
         (
             words,
             each.holds,
             spread.draws - each.holds - each.without,
             each.without,
-            "none" if each.utilisation is None else _interval(each.utilisation),
+            "none" if each.utilisation is None else _interval(each.utilisation, digits),
         )
-        for words, each in answers
-        if each is not None
+        for words, each in there
     ]
     if len(rows) > 1:
         heads = ("feasible", "overloaded", "no balance", "utilisation")
-        print_rows(rows, in_order([f"{spread.draws} samples"], heads), out)
+        print_rows(rows, in_order([_samples(spread.draws)], heads), out)
 
 
 def _spread_sentence(spread: Spread) -> str:
     """Return in a sentence on which rock a stance is feasible, else in how many samples."""
-    limit, said = spread.threshold, f"feasible in {spread.holds} of {spread.draws} samples"
+    limit, said = spread.threshold, f"feasible in {spread.holds} of {_samples(spread.draws)}"
     within = f" within a utilisation of {spread.cap:g}" if spread.cap < 1.0 else ""
     if limit is not None:
         least, most = (f"{ratio:g}" for ratio in limit.range)
@@ -127,7 +130,7 @@ def _spread_sentence(spread: Spread) -> str:
     else:
         said += within
     if spread.without:
-        said += f"; {spread.without} samples without a plan"
+        said += f"; {_samples(spread.without)} without a plan"
     lost = spread.load_factors.count(None)
     if lost > spread.without:
         said += f"; {lost} without a load factor"
@@ -263,6 +266,12 @@ def _digits(spread: Quantiles) -> int:
     return min(max(first, 1), 3)
 
 
-def _interval(spread: Quantiles) -> str:
-    digits = _digits(spread)
-    return f"{spread.low:.{digits}f} to {spread.high:.{digits}f}"
+def _interval(spread: Quantiles, digits: int | None = None) -> str:
+    """Return an interval as text, or one number where its ends do not differ."""
+    digits = _digits(spread) if digits is None else digits
+    low, high = f"{spread.low:.{digits}f}", f"{spread.high:.{digits}f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _samples(count: int) -> str:
+    return f"{count} sample" + ("" if count == 1 else "s")

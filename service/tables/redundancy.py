@@ -13,15 +13,21 @@ if TYPE_CHECKING:
 __all__ = ["print_redundancy"]
 
 
-def print_redundancy(redundancy: Redundancy, out: Console) -> None:
-    """Print the utilisation without each tile, finger and hand, and the worst of each kind.
+def print_redundancy(redundancy: Redundancy, out: Console, *, holds: bool) -> None:
+    """Print the utilisation with all parts, without each of them, and the worst of each kind.
 
     Parameters
     ----------
     redundancy : Redundancy
     out : Console
         Console to print on.
+    holds : bool
+        Whether the stance with all parts has a plan within the cap on the utilisation.
     """
+    used = redundancy.utilisation
+    said = "no plan" if used is None else f"utilisation {used:.3f}"
+    beyond = "" if holds or used is None else ", beyond the cap already"
+    out.print(f"with all parts: {said}{beyond}")
     rows: dict[tuple[str, str], dict[str, str]] = {}
     for loss in redundancy.losses:
         row = rows.setdefault((loss.limb, loss.finger or "all fingers, palm"), {})
@@ -36,7 +42,7 @@ def print_redundancy(redundancy: Redundancy, out: Console) -> None:
     columns = [name("hand"), name("finger"), *map(number, heads)]
     print_rows(shown, columns, out, "utilisation without a part; * no plan within the cap")
     for sentence in redundancy.sentences:
-        out.print(sentence, soft_wrap=True)
+        out.print(sentence)
 
 
 def _used(loss: Loss) -> str:

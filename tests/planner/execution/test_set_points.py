@@ -1,6 +1,7 @@
 """A plan's tensions on hands that are not as planned: kept, and balanced by feedback."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,17 +11,20 @@ from scipy.spatial.transform import Rotation
 
 from hand_models.base import Pose
 from hand_models.hand import FINGERS
+from hand_models.parameters import own_draw
 from planner import programs
 from planner.execution import sent_plans
 from planner.prepare import prepare_stance
-from planner.programs import Kept, LeastChange
+from planner.programs import SET_POINT_SETTINGS, Kept, LeastChange
 from planner.question import LimbStiffness, Limits, Question
 from planner.result import Spread
 from planner.solving import plan
 from service.answering.questions import question
+from service.commands.cli import run_command_line
 from service.commands.stances import read_request
-from tests.planner.solving.test_spread import STRENGTHS, drawn, entry, seat, with_wrists
+from tests.planner.solving.test_spread import STRENGTHS, drawn, entry, radii, seat, with_wrists
 from tests.suite.helpers.checks import problems
+from tests.suite.helpers.commands import DONE
 from tests.suite.helpers.stances import ask, moved, on_wall
 
 STIFFER = drawn(tile={"contact_stiffness": entry([5500.0, 6500.0, 9500.0], "N/m")})
@@ -92,11 +96,59 @@ def test_feedback_changes_tensions_by_the_least_squares_that_another_solver_find
     assert found.value > 1.0
     assert other.value == pytest.approx(found.value, rel=1e-5)
     changes = np.concatenate(found.loads) - np.concatenate(held)
-    assert np.nansum(changes**2) == pytest.approx(found.value, rel=1e-6)
+    free = np.concatenate(found.loads)[np.isnan(changes)]
+    squares = np.nansum(changes**2) + SET_POINT_SETTINGS.reactions * (free @ free)
+    assert squares == pytest.approx(found.value, rel=1e-6)
     # strengths are unknown to it
     strong = [hand._replace(L=0.1 * hand.L, l0=0.1 * hand.l0) for hand in data.hands]
     same = programs.least_change(programs.StanceData.of(tuple(strong), data.wrench), held)
     assert same.value == pytest.approx(found.value, rel=1e-9)
+
+
+def a_little(by: np.ndarray) -> Pose:
+    return Pose(by[:3], Rotation.from_rotvec(by[3:]).as_matrix())
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Question:
+    """The stance that `crux new` writes, on which hands can squeeze each other without end."""
+    file = tmp_path / "mine.toml"
+    assert run_command_line(["new", "stance", "-o", str(file)]) == DONE
+    return replace(question(read_request(str(file))), want=frozenset({"spread"}))
+
+
+def test_squeezing_hands_do_not_spoil_the_tensions_of_feedback(mine: Question):
+    weak = drawn(52.0, finger=radii(0.0028, 0.0022))
+    ratio = {"defaults": {"pull_off_ratio": entry(0.25, "1")}}
+    draws = (weak, own_draw({"surfaces": {"rock": {"shear_limit": entry(71.0, "N")}, **ratio}}))
+    found = []
+    rng = np.random.default_rng(2)
+    for size in (0.0, 1e-9, 1e-9, 1e-8):
+        hands = tuple(
+            replace(hand, pose=hand.pose @ a_little(size * rng.normal(size=6)))
+            for hand in mine.stance.hands
+        )
+        asked = replace(mine, stance=replace(mine.stance, hands=hands), draws=draws)
+        found.append(judged(asked).feedback.utilisations)
+    wall = question(read_request("wall-300"))
+    usual = replace(wall, draws=draws, want=mine.want)
+    found.append(judged(usual).feedback.utilisations)
+    for each in found:
+        assert each == pytest.approx(found[0], rel=1e-3)
+        assert max(each) < 2.0
+
+
+def test_tensions_of_feedback_go_with_loads_that_hands_can_bear(mine: Question):
+    data, held = held_in(mine, shifted(mine, -6.0))
+    found = programs.least_change(data, held)
+    assert max(abs(loads).max() for loads in found.loads) < 1e3
+
+
+def test_loads_beyond_the_box_balance_nothing(monkeypatch):
+    prepared, own = prepare_stance(ASKED), tensions_of(ASKED)
+    assert sent_plans(prepared, own, 0.0)[0].utilisation is not None
+    monkeypatch.setattr("planner.execution.set_points.LOAD_BOX", 1.0)
+    assert [each.utilisation for each in sent_plans(prepared, own, 0.0)] == [None, None]
 
 
 def test_on_the_hands_of_the_plan_its_tensions_are_its_plan():

@@ -18,9 +18,18 @@ def test_the_table_names_the_worst(capfd: pytest.CaptureFixture[str], tmp_path: 
     picture = tmp_path / "losses.png"
     assert run_command_line(["redundancy", "wall-300", "--plot", str(picture)]) == OVERLOADED
     said = capfd.readouterr().out
+    assert said.startswith("with all parts: utilisation 0.956\n")
+    assert max(map(len, said.splitlines())) <= 80
     assert "holds without 48 of 56 tiles; worst" in said
     assert "holds without 0 of 4 hands" in said
     assert picture.exists()
+
+
+def test_an_overloaded_stance_is_said_to_be(capfd: pytest.CaptureFixture[str]):
+    assert run_command_line(["redundancy", "wall-700"]) == OVERLOADED
+    first, *rest = capfd.readouterr().out.splitlines()
+    assert first == "with all parts: utilisation 1.747, beyond the cap already"
+    assert rest[-3].endswith("front_right: inner_left distal, 2.013")
 
 
 def test_a_stance_that_can_lose_any_tile_is_done(capfd: pytest.CaptureFixture[str]):
