@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
-from hand_models.base import whole_file
+from hand_models.base import Array, whole_file
 from planner.capability import BodySpace, ComRegion, ComSolid
 from planner.pictures.body_plots import draw_polygon
 from planner.pictures.settings import PICTURE_SETTINGS
@@ -75,16 +76,21 @@ def draw_com_region(
         axes.plot(x, y, "s", color=PICTURE_SETTINGS.limb, markersize=6)
         # hands above each other share a label
         named.setdefault((round(x, 2), round(y, 2)), []).append(hand.limb)
+    height = float((region.axes @ region.com)[1])
     for place, limbs in named.items():
-        axes.annotate(
+        # away from the centre of mass, and readable across the border
+        above = place[1] >= height
+        label = axes.annotate(
             ", ".join(limbs),
             place,
-            xytext=(0.0, 8.0),
+            xytext=(0.0, 8.0 if above else -8.0),
             textcoords="offset points",
             ha="center",
+            va="bottom" if above else "top",
             fontsize=8,
             color=PICTURE_SETTINGS.limb,
         )
+        label.set_path_effects([withStroke(linewidth=3.0, foreground="white")])
     axes.plot([], [], "s", color=PICTURE_SETTINGS.limb, label="hands")
     origin = region.axes @ space.question.stance.body.position
     axes.plot(*origin, "+", color="0.4", markersize=9, label="origin of B")
@@ -93,8 +99,8 @@ def draw_com_region(
         held = held and solid is not None and solid.margin >= 0.0
     mark, asked = "o" if held else "x", PICTURE_SETTINGS.asked
     axes.plot(*(region.axes @ region.com), mark, color=asked, label="centre of mass asked for")
-    along = [", ".join(f"{value:g}" for value in axis.round(3) + 0.0) for axis in region.axes]
-    axes.set(xlabel=f"along ({along[0]}) of W [m]", ylabel=f"along ({along[1]}) of W [m]")
+    across, up = (_way(axis) for axis in region.axes)
+    axes.set(xlabel=f"{across} of W [m]", ylabel=f"{up} of W [m]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
     axes.grid(alpha=0.3)
@@ -124,6 +130,14 @@ def _draw_solid(axes: Axes, region: ComRegion, solid: ComSolid | None, accelerat
         f"{1e3 * abs(solid.margin):.0f} mm {inside} the solid that is held under "
         f"{accelerations} accelerations{height}"
     )
+
+
+def _way(axis: Array) -> str:
+    """Return the name of an axis of W with its sign, or the direction."""
+    part = int(np.abs(axis).argmax())
+    if np.allclose(np.abs(axis), np.eye(3)[part], rtol=0.0, atol=1e-9):
+        return f"{'+' if axis[part] > 0.0 else '−'}{'xyz'[part]}"
+    return f"along ({', '.join(f'{value:g}' for value in axis.round(3) + 0.0)})"
 
 
 def _moves(space: BodySpace) -> bool:

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from msgspec import UNSET, structs
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
@@ -282,6 +283,29 @@ def test_the_picture_has_the_section_beside_the_region():
     assert label not in names
     assert "nothing is held under these 7 accelerations" in title
     assert "accelerations" not in drawn()[1]
+
+
+@pytest.mark.parametrize("shift", [-0.06, -0.04, -0.02, 0.02, 0.04, 0.06])
+def test_no_label_lies_on_the_centre_of_mass_and_axes_have_their_names(shift):
+    space, region = BodySpace(bundled("slab")), region_of("slab")
+    hand = space.question.stance.hands[0].pose.position
+    beside = replace(region, com=hand + shift * region.axes[1])
+    figure = draw_com_region(space, beside, "slab")
+    FigureCanvasAgg(figure).draw()
+    (axes,) = figure.axes
+    at = axes.transData.transform(region.axes @ beside.com)
+    boxes = [label.get_window_extent() for label in axes.texts]
+    assert len(boxes) == 4
+    assert not any(box.padded(3.0).contains(*at) for box in boxes)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("+x of W [m]", "+y of W [m]")
+
+
+def test_other_directions_are_written_out():
+    question = replace(bundled("slab"), load=Load(acceleration=(0.0, 1.0, 0.0)))
+    space = BodySpace(question)
+    (axes,) = draw_com_region(space, com_region(space), "slab").axes
+    assert axes.get_xlabel() == "+x of W [m]"
+    assert re.fullmatch(r"along \(0, 0\.99\d*, -0\.1\d*\) of W \[m\]", axes.get_ylabel())
 
 
 @pytest.mark.parametrize(
