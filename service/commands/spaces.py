@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, get_args
 
 import click
 import msgspec
+from click.core import ParameterSource
 
 import planner
 from service import answering, replies, requests, tables
@@ -153,6 +154,11 @@ def body_space_command(
         raise click.UsageError("give --projection or --pure, not both")
     if shake is not None and not com:
         raise click.UsageError("--shake requires --com")
+    if com:
+        context = click.get_current_context()
+        for name in ("axes", "projection", "pure"):
+            if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
+                raise click.UsageError(f"--{name} is of a plane of body wrenches: not with --com")
 
     plan = own.asked(stances.read_request(stance))
     request = requests.BodySpaceRequest(

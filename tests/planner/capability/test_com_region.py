@@ -391,6 +391,14 @@ def test_a_plan_and_the_command_tell_it(capfd, tmp_path):
     assert "--shake requires --com" in complaint(capfd)
 
 
+@pytest.mark.parametrize(
+    "given", [["--axes", "fx,fy"], ["--axes", "fx,fz"], ["--projection"], ["--pure"]]
+)
+def test_what_chooses_a_plane_of_wrenches_is_refused(given, capfd):
+    assert run_command_line(["body-space", "slab", "--com", *given]) == BAD_INPUT
+    assert f"{given[0]} is of a plane of body wrenches: not with --com" in complaint(capfd)
+
+
 def test_a_deadline_leaves_it_out():
     answer = planned(plan_request())
     with deadline.within(1e-9):
