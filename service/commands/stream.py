@@ -101,9 +101,9 @@ class _Line(Strict, frozen=True):
 
 def _line(line: bytes) -> _Line:
     """Return what a line of JSON asks for."""
+    if line.lstrip().startswith(b"{"):
+        return wire.decode_request(line, _Line)
     try:
-        if line.lstrip().startswith(b"{"):
-            return msgspec.json.decode(line, type=_Line)
         wrench: requests.Wrench = msgspec.json.decode(line, type=requests.Wrench)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         wanted = "six finite numbers up to 1e6 as [fx, fy, fz, mx, my, mz] are wanted"

@@ -21,7 +21,15 @@ from service.commands.cli import run_command_line
 from service.replies import SetPointsReply, StreamReply
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import Format, ServiceError, ServiceName, decode_request, service_key
-from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, process
+from tests.suite.helpers.commands import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    OVERLOADED,
+    complaint,
+    process,
+    result,
+)
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.replies import departures
 from tests.suite.helpers.requests import (
@@ -376,7 +384,7 @@ def test_a_failure_is_worse_than_an_overload(stance_file, monkeypatch, capfd) ->
     assert capfd.readouterr().out.splitlines()[-1].endswith("a reason")
 
 
-@pytest.mark.parametrize("line", ["[1, 2]", "x", '{"v": 1}', "[1,2,3,4,5,NaN]", "[1,2,3,4,5,1e7]"])
+@pytest.mark.parametrize("line", ["[1, 2]", "x", "[1,2,3,4,5,NaN]", "[1,2,3,4,5,1e7]"])
 def test_a_line_that_is_no_wrench_is_told_by_its_number(
     line, stance_file, monkeypatch, capfd
 ) -> None:
@@ -395,6 +403,29 @@ def test_a_line_that_is_no_wrench_is_told_by_its_number(
     out, err = capfd.readouterr()
     assert len(out.splitlines()) == 2
     assert err.splitlines()[1].startswith("crux: line 2: six finite numbers")
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "told"),
+    [
+        ({"lost": [["front_left"]]}, "lost[0]", "; an object with limb, finger, phalanx is wanted"),
+        ({"lost": [{"limb": "rear_left", "finger": 3}]}, "lost[0].finger", "expected a string"),
+        ({"v": 1}, "v", "unknown field; known are body_wrench, lost"),
+        ({"body_wrench": [1, 2]}, "body_wrench", "got length 2"),
+    ],
+)
+def test_a_lines_object_is_refused_by_its_field(
+    change, field, told, stance_file, monkeypatch, capfd
+) -> None:
+    path, line = stance_file(wall_request()), json.dumps({"body_wrench": WRENCH} | change)
+    given(monkeypatch, line)
+    assert run_command_line(["stream", path, "--json"]) == BAD_INPUT
+    error = result(capfd)["error"]
+    assert error["field"] == f"line 1: {field}"
+    assert told in error["message"]
+    given(monkeypatch, line)
+    assert run_command_line(["stream", path]) == BAD_INPUT
+    assert f"crux: line 1: {field}: {error['message']}" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -468,4 +499,4 @@ def test_a_line_says_what_has_slipped(
     assert run_command_line(["stream", "wall-300", "--json"]) == BAD_INPUT
     one, two, three = map(json.loads, capfd.readouterr().out.splitlines())
     assert (one["verified"], one["lost"], "lost" in two) == (True, lost, False)
-    assert "tile" in three["error"]["message"]
+    assert three["error"]["field"] == "line 3: tile"
