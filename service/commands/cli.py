@@ -85,7 +85,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "stream": Entry(
         "stream",
-        "Give set-points for one body wrench after another: one a line in, one a line out.",
+        "Give set-points for one body wrench after another, read line by line.",
     ),
     "study": Entry(
         "studies",
