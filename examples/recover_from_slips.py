@@ -6,6 +6,7 @@ python examples/recover_from_slips.py [tcp/127.0.0.1:7447]
 
 import random
 import sys
+from itertools import product
 
 from planner import LostTile
 from service import CruxClient, SetPointsRequest, StreamRequest
@@ -19,17 +20,18 @@ FINGERS = ("outer_left", "inner_left", "inner_right", "outer_right")
 
 def main(endpoint: str) -> None:
     """Print the answer after each slip."""
-    chance, lost = random.Random(3), list[LostTile]()
     stance = read_request("wall-300").stance
     config = zenoh_config(mode="client", connect=[endpoint], multicast=False)
     with CruxClient(config) as client:
         stream = client.stream(StreamRequest(v=1, stance=stance))
         # nine tenths of the robot's weight
         fx, fy, fz, mx, my, mz = (0.9 * part for part in stream.body_wrench)
-        for _ in range(SLIPS):
-            # here a controller would detect the slip; it tells all slips so far
-            limb = chance.choice(stream.hands).limb
-            lost.append(LostTile(limb, chance.choice(FINGERS), chance.choice(PHALANGES)))
+        limbs = [hand.limb for hand in stream.hands]
+        tiles = [LostTile(*names) for names in product(limbs, FINGERS, PHALANGES)]
+        # here a controller would detect each slip
+        slips = random.Random(3).sample(tiles, SLIPS)
+        for slipped in range(1, SLIPS + 1):
+            lost = slips[:slipped]
             asked = SetPointsRequest(
                 v=1, stream=stream.stream, body_wrench=(fx, fy, fz, mx, my, mz), lost=lost
             )

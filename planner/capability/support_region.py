@@ -98,12 +98,42 @@ class ComSolid:
         Vertices of a polytope outside which none is [m].
     gap : float
         Largest distance of a point of the outer polytope from the inner one [m].
+    margin : float
+        Distance of the centre of mass asked for from the inner polytope's surface [m], negative
+        outside.
     """
 
     accelerations: Array
     inner: Array
     outer: Array
     gap: float
+    margin: float
+
+    def section(self, region: ComRegion) -> Array | None:
+        """Return where the inner polytope is cut at the height of the centre of mass asked for.
+
+        Parameters
+        ----------
+        region : ComRegion
+            Region of the same stance: its axes, its direction up, and its centre of mass.
+
+        Returns
+        -------
+        ndarray, shape (n, 2), or None
+            Corners along the region's axes [m], counterclockwise; None where the polytope
+            has no room above it, or none below it.
+        """
+        from scipy.spatial import ConvexHull
+
+        heights = (self.inner - region.com) @ region.up
+        above, below = np.flatnonzero(heights > 0.0), np.flatnonzero(heights <= 0.0)
+        if heights.max() < LEAST_ROOM or heights.min() > -LEAST_ROOM:
+            return None
+        i, j = (part.ravel() for part in np.meshgrid(above, below))
+        share = (heights[i] / (heights[i] - heights[j]))[:, None]
+        # each corner of the section is on an edge, which joins a vertex above with one below
+        crossings = ((1.0 - share) * self.inner[i] + share * self.inner[j]) @ region.axes.T
+        return np.asarray(crossings[ConvexHull(crossings).vertices])
 
 
 def com_solid(
@@ -152,7 +182,9 @@ def com_solid(
     except EmptySetError:
         return None
     gap = max(_distance(A, b, point) for point in outer)
-    return ComSolid(whole, com + inner, com + outer, gap)
+    within = float(b.min())
+    margin = within if within >= 0.0 else -_distance(A, b, np.zeros(3))
+    return ComSolid(whole, com + inner, com + outer, gap, margin)
 
 
 def _half_spaces(

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
-from hand_models.base import whole_file
-from planner.capability import BodySpace, ComRegion
+from hand_models.base import Array, whole_file
+from planner.capability import BodySpace, ComRegion, ComSolid
 from planner.pictures.body_plots import draw_polygon
 from planner.pictures.settings import PICTURE_SETTINGS
 
-__all__ = ["plot_com_region"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["draw_com_region", "plot_com_region"]
 
 
-def plot_com_region(space: BodySpace, region: ComRegion, path: Path, title: str) -> None:
+def plot_com_region(
+    space: BodySpace,
+    region: ComRegion,
+    path: Path,
+    title: str,
+    solid: ComSolid | None = None,
+    accelerations: int = 0,
+) -> None:
     """Draw where the centre of mass may be, with the hands and the body's origin, to a file.
 
     Parameters
@@ -28,7 +40,25 @@ def plot_com_region(space: BodySpace, region: ComRegion, path: Path, title: str)
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
         Title of the picture.
+    solid : ComSolid or None, optional
+        Solid of that stance, from `planner.capability.com_solid`: its section at the height of the
+        centre of mass is drawn, too.
+    accelerations : int, optional
+        Number of accelerations under which the solid was sought; 0 if it was not.
     """
+    figure = draw_com_region(space, region, title, solid, accelerations)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=120, facecolor="white")
+
+
+def draw_com_region(
+    space: BodySpace,
+    region: ComRegion,
+    title: str,
+    solid: ComSolid | None = None,
+    accelerations: int = 0,
+) -> Figure:
+    """Return the figure of `plot_com_region`."""
     figure = Figure(figsize=(7.2, 7.2), layout="constrained")
     axes = figure.subplots()
     margin = region.margin
@@ -38,29 +68,39 @@ def plot_com_region(space: BodySpace, region: ComRegion, path: Path, title: str)
         draw_polygon(axes, region.polygon)
         inside = "within" if margin >= 0.0 else "outside"
         about = f"centre of mass {1e3 * abs(margin):.0f} mm {inside} its border"
+    if accelerations and region.polygon is not None:
+        about += f"\n{_draw_solid(axes, region, solid, accelerations)}"
     named: dict[tuple[float, float], list[str]] = {}
     for hand in space.question.stance.hands:
         x, y = (region.axes @ hand.pose.position).tolist()
         axes.plot(x, y, "s", color=PICTURE_SETTINGS.limb, markersize=6)
         # hands above each other share a label
         named.setdefault((round(x, 2), round(y, 2)), []).append(hand.limb)
+    height = float((region.axes @ region.com)[1])
     for place, limbs in named.items():
-        axes.annotate(
+        # away from the centre of mass, and readable across the border
+        above = place[1] >= height
+        label = axes.annotate(
             ", ".join(limbs),
             place,
-            xytext=(0.0, 8.0),
+            xytext=(0.0, 8.0 if above else -8.0),
             textcoords="offset points",
             ha="center",
+            va="bottom" if above else "top",
             fontsize=8,
             color=PICTURE_SETTINGS.limb,
         )
+        label.set_path_effects([withStroke(linewidth=3.0, foreground="white")])
     axes.plot([], [], "s", color=PICTURE_SETTINGS.limb, label="hands")
     origin = region.axes @ space.question.stance.body.position
     axes.plot(*origin, "+", color="0.4", markersize=9, label="origin of B")
-    mark, asked = "o" if margin is not None and margin >= 0.0 else "x", PICTURE_SETTINGS.asked
+    held = margin is not None and margin >= 0.0
+    if accelerations:
+        held = held and solid is not None and solid.margin >= 0.0
+    mark, asked = "o" if held else "x", PICTURE_SETTINGS.asked
     axes.plot(*(region.axes @ region.com), mark, color=asked, label="centre of mass asked for")
-    along = [", ".join(f"{value:g}" for value in axis.round(3) + 0.0) for axis in region.axes]
-    axes.set(xlabel=f"along ({along[0]}) of W [m]", ylabel=f"along ({along[1]}) of W [m]")
+    across, up = (_way(axis) for axis in region.axes)
+    axes.set(xlabel=f"{across} of W [m]", ylabel=f"{up} of W [m]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
     axes.grid(alpha=0.3)
@@ -71,8 +111,33 @@ def plot_com_region(space: BodySpace, region: ComRegion, path: Path, title: str)
     figure.suptitle(
         f"{title}: where the centre of mass may be, {seen}\n{about}", fontsize=11, parse_math=False
     )
-    with whole_file(path) as part:
-        figure.savefig(part, dpi=120, facecolor="white")
+    return figure
+
+
+def _draw_solid(axes: Axes, region: ComRegion, solid: ComSolid | None, accelerations: int) -> str:
+    """Draw the solid at the height of the centre of mass, and return whether it is inside."""
+    if solid is None:
+        return f"nothing is held under these {accelerations} accelerations"
+    corners = solid.section(region)
+    if corners is not None:
+        outline = np.vstack([corners, corners[:1]])
+        label = f"held under {accelerations} accelerations, at its height"
+        axes.fill(*corners.T, facecolor="none", edgecolor="tab:orange", hatch="//", alpha=0.4)
+        axes.plot(*outline.T, color="tab:orange", label=label)
+    inside = "inside" if solid.margin >= 0.0 else "outside"
+    height = "" if corners is not None else ", which does not reach its height"
+    return (
+        f"{1e3 * abs(solid.margin):.0f} mm {inside} the solid that is held under "
+        f"{accelerations} accelerations{height}"
+    )
+
+
+def _way(axis: Array) -> str:
+    """Return the name of an axis of W with its sign, or the direction."""
+    part = int(np.abs(axis).argmax())
+    if np.allclose(np.abs(axis), np.eye(3)[part], rtol=0.0, atol=1e-9):
+        return f"{'+' if axis[part] > 0.0 else '−'}{'xyz'[part]}"
+    return f"along ({', '.join(f'{value:g}' for value in axis.round(3) + 0.0)})"
 
 
 def _moves(space: BodySpace) -> bool:

@@ -208,7 +208,11 @@ def draw_answers(axes: Any, spread: Spread) -> None:
     spread : Spread
         Each of its answers is a bar: feasible, overloaded and without balance.
     """
-    answers = {"planned anew": spread, "kept": spread.kept, "feedback": spread.feedback}
+    answers = {
+        "planned anew": spread,
+        "tensions\nkept": spread.kept,
+        "balanced by\nfeedback": spread.feedback,
+    }
     there = {words: each for words, each in answers.items() if each is not None}
     holds = np.array([each.holds for each in there.values()])
     without = np.array([each.without for each in there.values()])
@@ -261,7 +265,7 @@ def draw_spread(axes: Any, spread: Spread, nominal: float | None) -> None:
         said = f"feasible where a tile on {limit.surface} holds {limit.shear_limit:.2g} N or more"
         said += f": {limit.share:.0%} of its range"
     if spread.cap < 1.0:
-        said += f" (utilisation up to {spread.cap:g})"
+        said += f"\n(utilisation up to {spread.cap:g})"
     axes.set_title(said, fontsize=9, loc="left", pad=18.0)
     axes.set(xlabel="load factor [1]", ylabel="samples")
     axes.margins(x=0.04)

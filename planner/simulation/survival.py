@@ -134,8 +134,12 @@ def _why_not(prepared: PreparedStance) -> str | None:
     """Return why slips of a stance are not simulated; None if they are."""
     moving = prepared.floating
     if moving:
+        one = len(moving) == 1
+        whose = (
+            f"{'wrist' if one else 'wrists'} of {', '.join(moving)} {'moves' if one else 'move'}"
+        )
         return (
-            f"slips are not simulated, as the wrists of {', '.join(moving)} move: where they go "
+            f"slips are not simulated, as the {whose}: where {'it goes' if one else 'they go'} "
             "once a tile slips takes a search for each state; valid is wrist 'fixed'"
         )
     nails = [
@@ -145,8 +149,9 @@ def _why_not(prepared: PreparedStance) -> str | None:
     ]
     if nails:
         return (
-            f"slips are not simulated, as {', '.join(nails)} hold with fingernails, whose scatter "
-            "nobody has measured"
+            f"slips are not simulated, as {', '.join(nails)} "
+            f"{'holds' if len(nails) == 1 else 'hold'} with fingernails, whose scatter nobody has "
+            "measured"
         )
     return None
 

@@ -15,6 +15,7 @@ from planner import (
     BodySection,
     BodySpace,
     ComRegion,
+    ComSolid,
     DeadlineError,
     End,
     Polygon,
@@ -46,12 +47,15 @@ class Explored(NamedTuple):
         Capability, section and accelerations as plain lists and numbers.
     region : ComRegion or None
         Where the centre of mass may be, if the request wants it.
+    solid : ComSolid or None
+        Where it may be under the request's ``com_accelerations``, too, if there is such a place.
     """
 
     space: BodySpace
     section: BodySection
     reply: BodySpaceReply
     region: ComRegion | None = None
+    solid: ComSolid | None = None
 
 
 def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explored:
@@ -128,8 +132,8 @@ def explore(request: BodySpaceRequest, robots: Robots = BUNDLED_ROBOTS) -> Explo
     )
     if region is not None:
         reply.com_region = _region(region, space.exact)
-        reply.com_region.solid = solid
-    return Explored(space, section, reply, region)
+        reply.com_region.solid = None if solid is None else _solid_reply(solid)
+    return Explored(space, section, reply, region, solid)
 
 
 def with_com_region(answer: Planned) -> Planned:
@@ -184,19 +188,24 @@ def _region(region: ComRegion, exact: bool) -> replies.ComRegionReply:
     return reply
 
 
-def _solid(asked: Question, request: BodySpaceRequest) -> replies.ComSolidReply | None:
+def _solid(asked: Question, request: BodySpaceRequest) -> ComSolid | None:
     given = request.com_accelerations
     if not given:
         return None
     if "com_region" not in request.want:
         raise InvalidInputError("requires com_region in want; add it", field="com_accelerations")
-    found = com_solid(asked, given)
-    if found is None:
-        return None
+    return com_solid(asked, given)
+
+
+def _solid_reply(found: ComSolid) -> replies.ComSolidReply:
     parts = (found.accelerations, found.inner, found.outer)
     accelerations, inner, outer = (part.tolist() for part in parts)
     return replies.ComSolidReply(
-        accelerations=accelerations, inner=inner, outer=outer, gap=found.gap
+        accelerations=accelerations,
+        inner=inner,
+        outer=outer,
+        gap=found.gap,
+        margin=found.margin,
     )
 
 

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import click
 
 from hand_models.base import DISTRIBUTION_NAME
-from service.tables import VERBOSITY_KEY, ExitStatus
+from service.tables import VERBOSITY_KEY, ExitStatus, note
 
 __all__ = ["COMMANDS_BY_NAME", "crux", "run_command_line"]
 
@@ -85,7 +85,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "stream": Entry(
         "stream",
-        "Give set-points for one body wrench after another: one a line in, one a line out.",
+        "Give set-points for one body wrench after another, read line by line.",
     ),
     "study": Entry(
         "studies",
@@ -149,8 +149,7 @@ class Commands(click.Group):
             # a service writes to its log only; nobody may read standard error
             if ctx.meta.get(VERBOSITY_KEY, 0) > 0 and ctx.invoked_subcommand != "serve":
                 took, used = time.perf_counter() - start, time.process_time() - used
-                times = f"took {took:.2f} s, {used:.2f} s of this process's time"
-                click.echo(f"crux: {times}", err=True)
+                note(f"took {took:.2f} s, {used:.2f} s of this process's time")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write each command with its summary into the help, without loading the command."""
@@ -232,7 +231,7 @@ def _drop_output() -> None:
 
 
 def _complain(message: str, status: int) -> int:
-    click.echo(f"crux: {' '.join(message.split())}", err=True)
+    note(message)
     return status
 
 

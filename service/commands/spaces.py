@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, get_args
 
 import click
 import msgspec
+from click.core import ParameterSource
 
 import planner
 from service import answering, replies, requests, tables
@@ -145,11 +146,19 @@ def body_space_command(
     own: options.Own,
     as_json: bool,
 ) -> int:
-    """Show what the body can bear: which wrenches, and which accelerations."""
+    """Show what the body can bear: which wrenches, and which accelerations.
+
+    With --shake, exit status 3 also where the centre of mass is not held under all of them.
+    """
     if projection and pure:
         raise click.UsageError("give --projection or --pure, not both")
     if shake is not None and not com:
         raise click.UsageError("--shake requires --com")
+    if com:
+        context = click.get_current_context()
+        for name in ("axes", "projection", "pure"):
+            if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
+                raise click.UsageError(f"--{name} is of a plane of body wrenches: not with --com")
 
     plan = own.asked(stances.read_request(stance))
     request = requests.BodySpaceRequest(
@@ -165,6 +174,8 @@ def body_space_command(
         want=["com_region"] if com else [],
         com_accelerations=_shaken(plan.load, shake),
     )
+    # that of the load is one of them
+    accelerations = 0 if shake is None else 1 + len(request.com_accelerations)
     with tables.waiting(f"exploring {stance}", plan):
         found = answering.explore(request, own.robots)
         if picture is not None:
@@ -172,9 +183,13 @@ def body_space_command(
                 if found.region is None:
                     planner.plot_body_space(found.space, found.section, picture, stance)
                 else:
-                    planner.plot_com_region(found.space, found.region, picture, stance)
+                    planner.plot_com_region(
+                        found.space, found.region, picture, stance, found.solid, accelerations
+                    )
     if as_json:
         tables.say(found.reply)
     else:
-        tables.print_body_space(found.reply, tables.console())
-    return tables.ExitStatus.of(found.reply.status)
+        tables.print_body_space(found.reply, tables.console(), accelerations)
+    falls = accelerations > 0 and (found.solid is None or found.solid.margin < 0.0)
+    status = tables.ExitStatus.of(found.reply.status)
+    return tables.ExitStatus.OVERLOADED if falls and status == tables.ExitStatus.DONE else status

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import textwrap
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import click
 import msgspec
@@ -16,6 +16,8 @@ from service import answering, replies, requests, tables, wire
 from service.commands import options, stances
 
 __all__ = ["stream_command"]
+
+_INDENT = " " * 11  # under the status
 
 
 @click.command("stream")
@@ -30,14 +32,16 @@ __all__ = ["stream_command"]
 @options.own_options
 @options.json_option
 def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) -> int:
-    """Give set-points for one body wrench after another: one a line in, one a line out.
+    """Give set-points for one body wrench after another, read line by line.
 
     Each line of standard input is a JSON list of six numbers, a body wrench in B, force first
     [N, N·m]; or an object {"body_wrench": [...], "lost": [...]} with all tiles that have slipped,
     each {"limb", "finger", "phalanx"}. Blank lines are skipped. Plans are prepared first about the
     body wrench or the load of STANCE; with compliant wrists each line is solved by itself, and only
     --json has their poses. Floating wrists are refused. A line that is no body wrench is reported
-    on standard error, with --json by an error in its place, and the next line is read.
+    on standard error, with --json by an error in its place, and the next line is read. Below
+    set-points without lost tiles, or beyond the cap, are the hand to save first, the fingers taken
+    off the rock, and the reason.
 
     Exit status: 2 where a line was bad, or else 1 where one failed, or else 3 where one is
     overloaded or infeasible.
@@ -52,7 +56,8 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
     worst = status.DONE
     with answering.opened(request, own.robots) as source:
         if not as_json:
-            _say_columns(source)
+            width = tables.console().width
+            _say_columns(source, width)
         for number, line in enumerate(sys.stdin.buffer, start=1):
             if not line.strip():
                 continue
@@ -71,7 +76,7 @@ def stream_command(stance: str, radius: float, own: options.Own, as_json: bool) 
             if as_json:
                 tables.say(reply)
             else:
-                _say_line(reply)
+                _say_line(reply, width)
             worst = min(worst, status.of(reply.status), key=worst_first.index)
     return worst
 
@@ -101,9 +106,9 @@ class _Line(Strict, frozen=True):
 
 def _line(line: bytes) -> _Line:
     """Return what a line of JSON asks for."""
+    if line.lstrip().startswith(b"{"):
+        return wire.decode_request(line, _Line)
     try:
-        if line.lstrip().startswith(b"{"):
-            return msgspec.json.decode(line, type=_Line)
         wrench: requests.Wrench = msgspec.json.decode(line, type=requests.Wrench)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         wanted = "six finite numbers up to 1e6 as [fx, fy, fz, mx, my, mz] are wanted"
@@ -117,7 +122,7 @@ def _refused(error: InvalidInputError, number: int) -> replies.ErrorReply:
     return replies.ErrorReply(error=replies.ErrorDetail(error.kind, field, error.message))
 
 
-def _say_columns(stream: planner.WrenchStream) -> None:
+def _say_columns(stream: planner.WrenchStream, width: int) -> None:
     """Write the header; write the centre and the hands' order on standard error."""
     from hand_models.hand import FINGERS
 
@@ -131,25 +136,44 @@ def _say_columns(stream: planner.WrenchStream) -> None:
         f"a hand's tensions are those of {', '.join(FINGERS)}"
     )
     head = f"{'status':<10} {'util':>6} {'gap':>5} {'source':<12}"
-    _say_cells(head, [f"{limb[:11]} [N]" for limb in stream.limbs])
+    _say_cells(head, [f"{limb[:11]} [N]" for limb in stream.limbs], width)
 
 
-def _say_cells(head: str, cells: Sequence[str]) -> None:
+def _say_cells(head: str, cells: Sequence[str], width: int) -> None:
     """Write the cells of the hands after the head, in as few lines as fit."""
-    # of four hands
-    for k in range(0, len(cells), 4):
-        row = "".join(f" {cell:<15}" for cell in cells[k : k + 4])
-        click.echo(f"{head if k == 0 else ' ' * len(head)}{row}".rstrip())
+    row = head
+    for cell in cells:
+        padded = f" {cell:<15}"
+        if len(row + padded.rstrip()) > width and row.strip():
+            click.echo(row.rstrip())
+            row = " " * len(head)
+        row += padded
+    click.echo(row.rstrip())
 
 
-def _say_line(reply: replies.SetPointsReply) -> None:
-    """Write set-points in one line: each hand's four tensions, in whole newtons."""
+def _say_line(reply: replies.SetPointsReply, width: int) -> None:
+    """Write set-points: each hand's four tensions, in whole newtons, and what a slip leaves."""
+    said = "; ".join(_remarks(reply))
     if reply.hands is None or reply.utilisation is None or reply.gap is None:
         head = f"{reply.status:<10} {'-':>6} {'-':>5} {reply.source:<12} "
-        reason = textwrap.wrap(reply.reason or "", width=100 - len(head))
-        click.echo(head + f"\n{' ' * len(head)}".join(reason))
+        click.echo(textwrap.fill(said, width, initial_indent=head, subsequent_indent=_INDENT))
         return
     _say_cells(
         f"{reply.status:<10} {reply.utilisation:6.3f} {reply.gap:5.0e} {reply.source:<12}",
         ["/".join(f"{round(tension):3d}" for tension in hand.tensions) for hand in reply.hands],
+        width,
     )
+    if said:
+        click.echo(textwrap.fill(said, width, initial_indent=_INDENT, subsequent_indent=_INDENT))
+
+
+def _remarks(reply: replies.SetPointsReply) -> Iterator[str]:
+    """Yield what to do after slips or under an overload, and why."""
+    if reply.save_first:
+        yield f"save {reply.save_first} first"
+    if reply.released:
+        yield f"released: {', '.join(f'{each.limb} {each.finger}' for each in reply.released)}"
+    elif reply.lost:
+        yield "released: none"
+    if reply.reason:
+        yield reply.reason

@@ -280,12 +280,15 @@ class ComSolidReply(Struct, kw_only=True):
     - ``inner``: vertices of a polytope, each point of which can be held under all of them [m].
     - ``outer``: vertices of a polytope outside which no point can be [m].
     - ``gap``: largest distance between the polytopes [m].
+    - ``margin``: distance of the region's ``com`` from the surface of the inner polytope [m],
+      negative outside.
     """
 
     accelerations: list[Vector]
     inner: list[Vector]
     outer: list[Vector]
     gap: float
+    margin: float
 
 
 class ComRegionReply(Struct, kw_only=True):

@@ -2,7 +2,7 @@ from .body_spaces import (
     print_body_space as print_body_space,
     print_com_region as print_com_region,
 )
-from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus
+from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus, note as note
 from .extras import (
     print_advice as print_advice,
     print_survival as print_survival,
@@ -36,7 +36,6 @@ from .redundancy import print_redundancy as print_redundancy
 from .sweeps import print_sweep as print_sweep
 from .terminal import (
     filling_folder as filling_folder,
-    note as note,
     progress as progress,
     remark as remark,
     say as say,

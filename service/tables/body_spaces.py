@@ -25,7 +25,7 @@ from service.tables.layout import (
 __all__ = ["print_body_space", "print_com_region"]
 
 
-def print_body_space(reply: BodySpaceReply, out: Console) -> None:
+def print_body_space(reply: BodySpaceReply, out: Console, accelerations: int = 0) -> None:
     """Print the body space of a stance: extents by axis, one section, and largest accelerations.
 
     If the reply has the region of the centre of mass, only this region is printed.
@@ -36,6 +36,8 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
         Body wrenches that the hands together can exert, in B [N, N·m].
     out : Console
         Console to print on.
+    accelerations : int, optional
+        Number of accelerations under which the centre of mass was sought; 0 if it was not.
     """
     used = "" if reply.utilisation is None else f"   utilisation {reply.utilisation:.3f}"
     known = f"{used}   {1e3 * reply.time.total:.0f} ms"
@@ -43,7 +45,7 @@ def print_body_space(reply: BodySpaceReply, out: Console) -> None:
     out.print(reply.reason)
     print_warnings(reply.warnings, out)
     if isinstance(reply.com_region, replies.ComRegionReply):
-        print_com_region(reply.com_region, out)
+        print_com_region(reply.com_region, out, accelerations)
         return
     asked = ", ".join(
         f"{axis} {value:z.1f}"
@@ -70,7 +72,7 @@ def _limit_words(limit: Any) -> str:
     return " ".join(part for part in parts if part is not None)
 
 
-def print_com_region(region: replies.ComRegionReply, out: Console) -> None:
+def print_com_region(region: replies.ComRegionReply, out: Console, accelerations: int = 0) -> None:
     """Print where the centre of mass may be: its range along two axes, and what lets go there.
 
     Parameters
@@ -79,6 +81,8 @@ def print_com_region(region: replies.ComRegionReply, out: Console) -> None:
         Region of a stance, in W [m].
     out : Console
         Console to print on.
+    accelerations : int, optional
+        Number of accelerations under which its solid was sought; 0 if it was not.
     """
     names = [_axis_name(axis) for axis in region.axes]
     if not region.inner or region.margin is None or region.gap is None:
@@ -88,6 +92,8 @@ def print_com_region(region: replies.ComRegionReply, out: Console) -> None:
     inside = "within" if region.margin >= 0.0 else "outside"
     where = ", ".join(f"{axis} {value:z.3f} m" for axis, value in zip(names, com, strict=True))
     out.print(f"centre of mass: {where}; {1e3 * abs(region.margin):.0f} mm {inside} its border")
+    if accelerations:
+        out.print(_shaken_words(region.solid, accelerations))
     rows = []
     for i, axis in enumerate(names):
         for sign, k in (("+", corners[:, i].argmax()), ("-", corners[:, i].argmin())):
@@ -109,12 +115,25 @@ def print_com_region(region: replies.ComRegionReply, out: Console) -> None:
             for axis, low, high in zip("xyz", spans.min(axis=0), spans.max(axis=0), strict=True)
         )
         out.print(
-            f"under {len(region.solid.accelerations)} accelerations: {len(spans)} corners, "
-            f"known to {1e3 * region.solid.gap:.2g} mm"
+            f"under {len(region.solid.accelerations)} accelerations, a solid: "
+            f"{len(spans)} corners, known to {1e3 * region.solid.gap:.2g} mm"
         )
         out.print(size)
     if not region.exact:
         out.print("wrists that move: linearised where the plan puts them")
+
+
+def _shaken_words(solid: replies.ComSolidReply | None, accelerations: int) -> Text:
+    """Return whether the centre of mass is held under all of several accelerations."""
+    if solid is None:
+        held, words = False, f"nothing is held under these {accelerations} accelerations"
+    else:
+        held = solid.margin >= 0.0
+        words = (
+            f"{1e3 * abs(solid.margin):.0f} mm {'inside' if held else 'outside'} the solid that "
+            f"is held under these {accelerations} accelerations"
+        )
+    return Text.assemble(in_colour("optimal" if held else "overloaded", "shaken:"), f" {words}")
 
 
 def _axis_name(axis: replies.Vector) -> str:

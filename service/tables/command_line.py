@@ -1,11 +1,17 @@
-"""Exit statuses of commands, and the key of their verbosity; imports no planner."""
+"""Exit statuses, messages on standard error, the key of the verbosity; imports no planner."""
 
 from __future__ import annotations
 
+import sys
+import textwrap
 from enum import IntEnum
 from typing import Final
 
-__all__ = ["VERBOSITY_KEY", "ExitStatus"]
+import click
+
+from service.tables.layout import console
+
+__all__ = ["VERBOSITY_KEY", "ExitStatus", "note"]
 
 VERBOSITY_KEY: Final = "crux.verbosity"
 """Key of the verbosity in the ``meta`` of a click context: 1 for more output, -1 for less."""
@@ -36,3 +42,12 @@ class ExitStatus(IntEnum):
                 return cls.OVERLOADED
             case _:
                 return cls.FAILED
+
+
+def note(message: str) -> None:
+    """Print a message on standard error: one line, or words wrapped to the width of a terminal."""
+    line = f"crux: {' '.join(message.split())}"
+    if sys.stderr.isatty():
+        width = console(stderr=True).width
+        line = textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)
+    click.echo(line, err=True)

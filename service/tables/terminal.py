@@ -15,12 +15,11 @@ import planner
 from hand_models.base import CruxError, InvalidInputError
 from service import answering, replies
 from service.requests import PlanRequest
-from service.tables.command_line import VERBOSITY_KEY, ExitStatus
+from service.tables.command_line import VERBOSITY_KEY, ExitStatus, note
 from service.tables.layout import console
 
 __all__ = [
     "filling_folder",
-    "note",
     "progress",
     "remark",
     "say",
@@ -42,14 +41,9 @@ def verbosity() -> int:
 
 
 def remark(message: str) -> None:
-    """Print one line on standard error, unless the verbosity is -1."""
+    """Print a message on standard error, unless the verbosity is -1."""
     if verbosity() >= 0:
         note(message)
-
-
-def note(message: str) -> None:
-    """Print one line on standard error."""
-    click.echo(f"crux: {' '.join(message.split())}", err=True)
 
 
 def say(result: object) -> None:

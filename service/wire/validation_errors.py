@@ -84,6 +84,8 @@ def validation_error(
             unit = _unit_of(places)
             message += f", in {unit}" if unit else ""
             message += _got(document, where, unit)
+        elif complaint.startswith("Expected `object`, got") and (known := field_names(types)):
+            message += f"; an object with {', '.join(known)} is wanted"
         elif where is not None and re.fullmatch(
             r"Expected `(?:array|str|object)` of length [<>= ]*\d+", complaint
         ):

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from msgspec import UNSET, structs
+from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
 
 from hand_models.base import InvalidInputError, Pose, turns_about
 from planner import deadline
-from planner.capability import BodySpace, ComRegion, com_region, com_solid
+from planner.capability import BodySpace, ComRegion, ComSolid, com_region, com_solid
+from planner.pictures.com_plots import draw_com_region
 from planner.question import Limits, Load, Question
 from planner.robots import Payload
 from planner.solving import plan
@@ -23,7 +27,7 @@ from service.answering.body_space import with_com_region
 from service.commands.cli import run_command_line
 from service.commands.stances import read_request
 from tests.suite.helpers import peer
-from tests.suite.helpers.commands import BAD_INPUT, DONE, complaint, result
+from tests.suite.helpers.commands import BAD_INPUT, DONE, OVERLOADED, complaint, result
 from tests.suite.helpers.replies import PLAN, departures, refusal
 from tests.suite.helpers.requests import plan_request, wall_request
 from tests.suite.helpers.stances import on_wall
@@ -228,6 +232,95 @@ def test_under_several_accelerations_it_is_a_solid_that_plans_confirm():
         assert not all(held(middle + (reach + 0.005 * width) * way))
 
 
+def shaken(by: float) -> tuple[ComRegion, ComSolid | None]:
+    """Region of ``wall-300``, and its solid under shaking [m/s²]."""
+    return region_of("wall-300"), com_solid(
+        bundled("wall-300"), np.vstack([by * np.eye(3), -by * np.eye(3)])
+    )
+
+
+@pytest.mark.parametrize(("by", "inside"), [(0.2, True), (0.5, False)])
+def test_the_solids_margin_is_the_distance_to_its_surface(by, inside):
+    region, solid = shaken(by)
+    facets = ConvexHull(solid.inner).equations
+    farthest = np.max(facets[:, :3] @ region.com + facets[:, 3])
+    assert (farthest < 0.0) == inside
+    # the nearest mixture of the vertices, its weights of sum 1
+    many = np.full((1, len(solid.inner)), 1e3)
+    distance = nnls(
+        np.vstack([(solid.inner - region.com).T, many]), [0, 0, 0, 1e3], maxiter=10_000
+    )[1]
+    assert solid.margin == pytest.approx(-farthest if inside else -distance, abs=1e-6)
+
+
+def test_the_section_is_the_solid_at_the_height_of_the_centre_of_mass():
+    region, solid = shaken(0.5)
+    section = solid.section(region)
+    facets = ConvexHull(solid.inner).equations
+    there = section @ region.axes + (region.com @ region.up) * region.up
+    # each corner is on the surface, and between two of them is inside
+    reach = np.max(there @ facets[:, :3].T + facets[:, 3], axis=1)
+    np.testing.assert_allclose(reach, 0.0, atol=1e-6)
+    rim = ConvexHull(region.polygon.inner).equations
+    assert np.max(section @ rim[:, :2].T + rim[:, 2]) < 1e-6
+    above = replace(region, com=region.com + 100.0 * region.up)
+    assert solid.section(above) is None
+
+
+def test_the_picture_has_the_section_beside_the_region():
+    region, solid = shaken(0.5)
+    space = BodySpace(bundled("wall-300"))
+
+    def drawn(*solids: object) -> tuple[list[str], str]:
+        figure = draw_com_region(space, region, "wall-300", *solids)
+        return figure.axes[0].get_legend_handles_labels()[1], figure.get_suptitle()
+
+    label = "held under 7 accelerations, at its height"
+    names, title = drawn(solid, 7)
+    assert label in names
+    assert f"{-1e3 * solid.margin:.0f} mm outside the solid" in title
+    names, title = drawn(None, 7)
+    assert label not in names
+    assert "nothing is held under these 7 accelerations" in title
+    assert "accelerations" not in drawn()[1]
+
+
+@pytest.mark.parametrize("shift", [-0.06, -0.04, -0.02, 0.02, 0.04, 0.06])
+def test_no_label_lies_on_the_centre_of_mass_and_axes_have_their_names(shift):
+    space, region = BodySpace(bundled("slab")), region_of("slab")
+    hand = space.question.stance.hands[0].pose.position
+    beside = replace(region, com=hand + shift * region.axes[1])
+    figure = draw_com_region(space, beside, "slab")
+    FigureCanvasAgg(figure).draw()
+    (axes,) = figure.axes
+    at = axes.transData.transform(region.axes @ beside.com)
+    boxes = [label.get_window_extent() for label in axes.texts]
+    assert len(boxes) == 4
+    assert not any(box.padded(3.0).contains(*at) for box in boxes)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("+x of W [m]", "+y of W [m]")
+
+
+def test_other_directions_are_written_out():
+    question = replace(bundled("slab"), load=Load(acceleration=(0.0, 1.0, 0.0)))
+    space = BodySpace(question)
+    (axes,) = draw_com_region(space, com_region(space), "slab").axes
+    assert axes.get_xlabel() == "+x of W [m]"
+    assert re.fullmatch(r"along \(0, 0\.99\d*, -0\.1\d*\) of W \[m\]", axes.get_ylabel())
+
+
+@pytest.mark.parametrize(
+    ("shake", "told"),
+    [
+        ("0.5", r"shaken: \d+ mm outside the solid that is held under these 7 accelerations"),
+        ("50", "shaken: nothing is held under these 7 accelerations"),
+    ],
+)
+def test_a_stance_that_falls_when_shaken_ends_with_3(shake, told, capfd, tmp_path):
+    arguments = ["body-space", "wall-300", "--com", "--shake", shake]
+    assert run_command_line([*arguments, "--plot", str(tmp_path / "com.svg")]) == OVERLOADED
+    assert re.search(told, " ".join(capfd.readouterr().out.split()))
+
+
 def test_a_solid_needs_accelerations_across_gravity_and_room():
     with pytest.raises(InvalidInputError, match="no end in height") as caught:
         com_solid(bundled("slab"), [[0.0, 0.0, 1.0]])
@@ -292,9 +385,18 @@ def test_a_plan_and_the_command_tell_it(capfd, tmp_path):
     assert run_command_line(["body-space", str(path), "--com", "--shake", "0.3", "--json"]) == DONE
     solid = result(capfd)["com_region"]["solid"]
     assert len(solid["accelerations"]) == 7
+    assert solid["margin"] > 0.0
     assert solid["gap"] < 0.02
     assert run_command_line(["body-space", str(path), "--shake", "0.3"]) == BAD_INPUT
     assert "--shake requires --com" in complaint(capfd)
+
+
+@pytest.mark.parametrize(
+    "given", [["--axes", "fx,fy"], ["--axes", "fx,fz"], ["--projection"], ["--pure"]]
+)
+def test_what_chooses_a_plane_of_wrenches_is_refused(given, capfd):
+    assert run_command_line(["body-space", "slab", "--com", *given]) == BAD_INPUT
+    assert f"{given[0]} is of a plane of body wrenches: not with --com" in complaint(capfd)
 
 
 def test_a_deadline_leaves_it_out():

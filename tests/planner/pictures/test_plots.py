@@ -13,6 +13,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.path import Path as MplPath
@@ -594,6 +595,8 @@ def test_a_plans_spread_is_drawn_where_it_was_asked_for():
                 answers = [answer.spread, answer.spread.kept, answer.spread.feedback]
                 holds, over, without = ([bar.get_width() for bar in c] for c in each.containers)
                 assert holds == [each.holds for each in answers]
+                rows = [row.get_text().replace("\n", " ") for row in each.get_yticklabels()]
+                assert rows == ["planned anew", "tensions kept", "balanced by feedback"]
                 assert without == [each.without for each in answers]
                 assert np.sum([holds, over, without], axis=0).tolist() == [answer.spread.draws] * 3
         assert len(axes) == before + 2 * ("spread" in want)
@@ -605,3 +608,15 @@ def test_a_plans_spread_is_drawn_where_it_was_asked_for():
         r"feasible where a tile on rock holds \d+ N or more: \d+% of its range", told
     )
     assert not any("feasible" in title for title in titles("load_factor"))
+
+
+def test_the_heading_of_a_spread_with_a_cap_lies_on_no_label():
+    asked = ask(on_wall(), "spread", "load_factor")
+    answer = solve.plan(asked)
+    figure = draw_plan(replace(answer, spread=structs.replace(answer.spread, cap=0.8)), asked)
+    FigureCanvasAgg(figure).draw()
+    (heading,) = (axes._left_title for axes in figure.axes if "feasible" in axes.get_title("left"))
+    assert heading.get_text().endswith("(utilisation up to 0.8)")
+    box = heading.get_window_extent()
+    labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label)]
+    assert not any(box.overlaps(label.get_window_extent()) for label in labels if label.get_text())

@@ -133,6 +133,25 @@ def test_what_is_not_simulated_says_why_and_has_the_formula_all_the_same(name, w
     assert found.strength_99 > found.strength_90 > 0.0
 
 
+@pytest.mark.parametrize(
+    ("floating", "told"),
+    [
+        (("rear_left",), "the wrist of rear_left moves: where it goes "),
+        (("rear_right", "rear_left"), "the wrists of rear_right, rear_left move: where they go "),
+    ],
+)
+def test_one_wrist_and_several_have_words_of_their_own(floating, told):
+    request = read_request("wall-300")
+    hands = [
+        msgspec.structs.replace(hand, wrist="floating" if hand.limb in floating else "fixed")
+        for hand in request.stance.hands
+    ]
+    stance = msgspec.structs.replace(request.stance, hands=hands)
+    asked = question(msgspec.structs.replace(request, stance=stance))
+    found = find_survival(asked, plan(asked).hands, SurvivalSettings(draws=1, replanned=0))
+    assert told in found.reason
+
+
 @pytest.mark.parametrize(("count", "draws"), [(0, 10), (3, 17), (400, 400), (973, 1000)])
 def test_the_interval_is_wilsons(count, draws):
     share = SurvivalShare.of(count, draws)

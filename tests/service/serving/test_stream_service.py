@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 
@@ -21,7 +22,15 @@ from service.commands.cli import run_command_line
 from service.replies import SetPointsReply, StreamReply
 from service.serving import PlanService, open_session, zenoh_config
 from service.wire import Format, ServiceError, ServiceName, decode_request, service_key
-from tests.suite.helpers.commands import BAD_INPUT, DONE, FAILED, OVERLOADED, complaint, process
+from tests.suite.helpers.commands import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    OVERLOADED,
+    complaint,
+    process,
+    result,
+)
 from tests.suite.helpers.patience import PATIENCE
 from tests.suite.helpers.replies import departures
 from tests.suite.helpers.requests import (
@@ -323,6 +332,7 @@ def given(monkeypatch: pytest.MonkeyPatch, *lines: object) -> None:
     monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
 
 
+HELD = [900.0, 0.0, 0.0, 0.0, -130.0, 0.0]
 HEAVIER = [9.81 * HEAVY, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 
@@ -349,17 +359,53 @@ def test_each_line_gives_a_line(wrenches, statuses, code, stance_file, monkeypat
     given(monkeypatch, *wrenches)
     assert run_command_line(["stream", path]) == code
     out, err = capfd.readouterr()
-    header, *lines = out.splitlines()
+    header, below, *lines = out.splitlines()
     assert err.count("\n") == 1
     assert "within 30 N, 3 N·m of the first centre [490.5, " in err
     assert "outer_left, inner_left, inner_right, outer_right" in err
-    assert "front_left [N]" in header
-    assert max(map(len, out.splitlines())) <= 100
-    assert [line.split()[0] for line in lines] == statuses
-    for line, reply in zip(lines, replies, strict=True):
+    assert "front_right [N]" in header
+    assert "front_left [N]" in below
+    assert max(map(len, out.splitlines())) <= 80
+    # a reason has the place of a status's column free, but not those of the numbers
+    numbers = [line for line in lines if not re.match(" {11}\\S", line)]
+    assert len(lines) > len(numbers) or "overloaded" not in statuses
+    assert [line.split()[0] for line in numbers[::2]] == statuses
+    for first, second, reply in zip(numbers[::2], numbers[1::2], replies, strict=True):
+        line = f"{first:<68}{second[36:]}"
         cells = [line[start : start + 16] for start in range(36, len(line), 16)]
         told = [[int(part) for part in cell.split("/")] for cell in cells]
         assert told == [[round(part) for part in hand["tensions"]] for hand in reply["hands"]]
+
+
+def test_after_slips_a_line_tells_what_to_save_and_what_is_released(monkeypatch, capfd) -> None:
+    phalanges = ("proximal", "middle", "distal")
+    lost = [{"limb": "front_left", "finger": "inner_left", "phalanx": name} for name in phalanges]
+    lines = [
+        {"body_wrench": HEAVIER, "lost": lost},
+        {"body_wrench": HELD, "lost": lost[:1]},
+        HELD,
+    ]
+    given(monkeypatch, *lines)
+    assert run_command_line(["stream", "wall-300", "--json"]) == OVERLOADED
+    first, second, third = map(json.loads, capfd.readouterr().out.splitlines())
+    given(monkeypatch, *lines)
+    assert run_command_line(["stream", "wall-300"]) == OVERLOADED
+    out = capfd.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    parts = re.split(r"^(?=overloaded|optimal|status)", out, flags=re.MULTILINE)[2:]
+    told, second_told, third_told = (" ".join(part.split()) for part in parts)
+    said = f"save {first['save_first']} first; released: front_left inner_left; {first['reason']}"
+    assert said in told
+    assert second_told.endswith(second["reason"] or "released: none")
+    assert third["reason"] is None
+    assert "released" not in third_told
+
+
+def test_a_wider_terminal_has_all_hands_in_a_line(monkeypatch, capfd) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
+    given(monkeypatch, HELD)
+    assert run_command_line(["stream", "wall-300"]) == DONE
+    assert len(capfd.readouterr().out.splitlines()) == 2
 
 
 def test_a_failure_is_worse_than_an_overload(stance_file, monkeypatch, capfd) -> None:
@@ -376,7 +422,7 @@ def test_a_failure_is_worse_than_an_overload(stance_file, monkeypatch, capfd) ->
     assert capfd.readouterr().out.splitlines()[-1].endswith("a reason")
 
 
-@pytest.mark.parametrize("line", ["[1, 2]", "x", '{"v": 1}', "[1,2,3,4,5,NaN]", "[1,2,3,4,5,1e7]"])
+@pytest.mark.parametrize("line", ["[1, 2]", "x", "[1,2,3,4,5,NaN]", "[1,2,3,4,5,1e7]"])
 def test_a_line_that_is_no_wrench_is_told_by_its_number(
     line, stance_file, monkeypatch, capfd
 ) -> None:
@@ -393,8 +439,31 @@ def test_a_line_that_is_no_wrench_is_told_by_its_number(
     given(monkeypatch, "", line, WRENCH)
     assert run_command_line(["stream", path]) == BAD_INPUT
     out, err = capfd.readouterr()
-    assert len(out.splitlines()) == 2
+    assert len(out.splitlines()) == 4
     assert err.splitlines()[1].startswith("crux: line 2: six finite numbers")
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "told"),
+    [
+        ({"lost": [["front_left"]]}, "lost[0]", "; an object with limb, finger, phalanx is wanted"),
+        ({"lost": [{"limb": "rear_left", "finger": 3}]}, "lost[0].finger", "expected a string"),
+        ({"v": 1}, "v", "unknown field; known are body_wrench, lost"),
+        ({"body_wrench": [1, 2]}, "body_wrench", "got length 2"),
+    ],
+)
+def test_a_lines_object_is_refused_by_its_field(
+    change, field, told, stance_file, monkeypatch, capfd
+) -> None:
+    path, line = stance_file(wall_request()), json.dumps({"body_wrench": WRENCH} | change)
+    given(monkeypatch, line)
+    assert run_command_line(["stream", path, "--json"]) == BAD_INPUT
+    error = result(capfd)["error"]
+    assert error["field"] == f"line 1: {field}"
+    assert told in error["message"]
+    given(monkeypatch, line)
+    assert run_command_line(["stream", path]) == BAD_INPUT
+    assert f"crux: line 1: {field}: {error['message']}" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -468,4 +537,4 @@ def test_a_line_says_what_has_slipped(
     assert run_command_line(["stream", "wall-300", "--json"]) == BAD_INPUT
     one, two, three = map(json.loads, capfd.readouterr().out.splitlines())
     assert (one["verified"], one["lost"], "lost" in two) == (True, lost, False)
-    assert "tile" in three["error"]["message"]
+    assert three["error"]["field"] == "line 3: tile"
