@@ -275,7 +275,7 @@ class _Replanned:
     def _planned(self, gone: Flags) -> Cascade | None:
         tiles, palms = gone[: self._tiles], gone[self._tiles :]
         if palms.tobytes() not in self._recoveries:
-            self._recoveries[palms.tobytes()] = Recovery(self._without_palms(palms))
+            self._recoveries[palms.tobytes()] = Recovery(self._without_palms(palms), many=True)
         lost = [self._names[t] for t in np.flatnonzero(tiles)]
         found = self._recoveries[palms.tobytes()].plan(lost)
         if found.verified is None:
