@@ -77,17 +77,20 @@ class WrenchStream:
             self._source = CompliantPoints(question)
         else:
             self._source = InterpolatedPoints(question, self.radius)
+        self._lock = threading.Lock()
+        self._last: SetPoints | None = None
+        self._closed = False
+        self._key: tuple[bytes, tuple[LostTile, ...]] = b"", ()
+        """The wrench of the last set-points, and the tiles that had slipped."""
         self._lost = tuple(lost)
         self._slips: PointsAfterSlips | UnsupportedError
         try:
             self._slips = self._source.after_slips()
         except UnsupportedError as refused:
             self._slips = refused
-        self._lock = threading.Lock()
-        self._last: SetPoints | None = None
-        self._closed = False
-        self._key: tuple[bytes, tuple[LostTile, ...]] = b"", ()
-        """The wrench of the last set-points, and the tiles that had slipped."""
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def limbs(self) -> tuple[str, ...]:

@@ -81,7 +81,7 @@ COMMANDS_BY_NAME: Final = {
     ),
     "simulate": Entry(
         "sweep",
-        "Let tiles slip at random: how often all hands hold, with new set-points or without.",
+        "Let tiles slip at random: count how often all hands hold, with new set-points or without.",
     ),
     "stream": Entry(
         "stream",

@@ -111,12 +111,16 @@ def test_no_set_points_are_better_than_a_plan_made_anew_and_feedback_balances_mo
     for name in ("wall-300", "slab"):
         found = judged(question(read_request(name)))
         assert found.kept.without > 0
-        assert found.feedback.without == 0
+        # of a sample without a plan there is none either
+        assert found.feedback.without == found.without < found.kept.without
         assert found.kept.holds <= found.feedback.holds <= found.holds
         trios = zip(
             found.utilisations, found.feedback.utilisations, found.kept.utilisations, strict=True
         )
         for anew, fed, kept in trios:
+            if anew is None:
+                assert fed is None
+                continue
             # of which a plan gives a thousandth away
             assert anew <= 1.001001 * fed
             assert kept is None or kept == fed
@@ -155,7 +159,7 @@ def test_palms_that_press_can_also_give_less():
     assert any("its palm presses with" in each for each in problems(bound, free))
     before, after = judged(asked), judged(bound)
     assert after.kept.without < before.kept.without / 2
-    assert after.kept.holds > before.kept.holds
+    assert after.kept.holds >= before.kept.holds
 
 
 def test_neither_place_nor_order_of_hands_matters():

@@ -157,7 +157,7 @@ surfaces.rock.shear_limit = { value = 90, unit = "N", source = "measured" }
 """
 
 
-@pytest.mark.parametrize(("pull", "digits"), [(5.0, 1), (10.0, 2)])
+@pytest.mark.parametrize(("pull", "digits"), [(5.0, 1), (30.0, 2)])
 def test_a_plan_says_how_sure_it_is(pull, digits, stance_file, capfd):
     path = stance_file(flat_request() | {"body_wrench": [0.0, 0.0, pull, 0.0, 0.0, 0.0]})
     run_command_line(["plan", path, "--spread", "--json"])
