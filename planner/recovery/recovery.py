@@ -7,6 +7,7 @@ program, or two, of the solver that the stance has already, and the check of the
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -21,7 +22,7 @@ from hand_models.fixed_wrist import slipped_hand, wrench_spaces
 from hand_models.hand import FINGERS, SettledHand
 from hand_models.wrench_spaces import WrenchSpace
 from planner.prepare import HandBatch, PreparedStance
-from planner.programs import Columns, ScaledRows, StanceData
+from planner.programs import Columns, ScaledRows, StanceData, unique, unique_bound
 from planner.question import LostTile
 from planner.recovery.superposition import superposed
 from planner.result import Plan
@@ -105,6 +106,10 @@ class Recovery:
     ----------
     prepared : PreparedStance
         The stance before tiles slipped; all wrists are fixed.
+    many : bool, optional
+        True for very many losses of several tiles: hands without one tile are not worked out
+        ahead, more hands are kept, that there is no plan is not proven, and a second plan is left
+        out where a bound proves that it is worse. Plans are the same.
 
     Raises
     ------
@@ -113,10 +118,10 @@ class Recovery:
         tensions of fingers that would have to be released.
     """
 
-    def __init__(self, prepared: PreparedStance) -> None:
+    def __init__(self, prepared: PreparedStance, *, many: bool = False) -> None:
         _refuse(prepared)
         self.prepared = prepared
-        self._idle = idle_joints(prepared)
+        self._many, self._idle = many, idle_joints(prepared)
         data = prepared.hands.data
         self._places = {
             (limb, tile.finger, tile.phalanx): (h, t)
@@ -125,7 +130,8 @@ class Recovery:
             if hand.touching[t]
         }
         self._pattern = _pattern(data)
-        most = 2 * len(self._places) + 16  # each tile alone, and as many losses of several
+        # each tile alone, and as many losses of several
+        most = 1024 if many else 2 * len(self._places) + 16
         self._hands: BoundedStore[_HandKey, _Hand] = BoundedStore("hands without tiles", most)
         self._stances: BoundedStore[tuple[_HandKey, ...], PreparedStance] = BoundedStore(
             "stances without tiles", 4
@@ -133,7 +139,8 @@ class Recovery:
         self._near: BoundedStore[tuple[_HandKey, ...], FixedSolution] = BoundedStore(
             "plans without tiles", 256
         )
-        self._keep([(h, (t,), (), True) for h, t in self._places.values()])
+        if not many:
+            self._keep([(h, (t,), (), True) for h, t in self._places.values()])
 
     @property
     def tiles(self) -> tuple[LostTile, ...]:
@@ -182,6 +189,11 @@ class Recovery:
         more = {finger for finger, count in counts.items() if count >= least} - {*first.released}
         if first.holds or not more:
             return first
+        if self._many and first.verified is not None:
+            # mostly the other fingers cannot do without these
+            keys = self._keys(by_hand, gone | more, off)
+            if self._bound(keys, body_wrench) > first.utilisation:
+                return first
         second = self._answer(start, lost, by_hand, gone | more, off, body_wrench)
         return second if second.utilisation < first.utilisation else first
 
@@ -217,11 +229,9 @@ class Recovery:
         body_wrench: Array | None,
     ) -> Recovered:
         keys = self._keys(by_hand, released, off)
-        prepared = self._stances.get(keys, lambda: self._prepared(keys))
-        if body_wrench is not None:
-            prepared = prepared.turned(body_wrench)
+        prepared = self._stance_without(keys, body_wrench)
         checks = Checks.of(prepared, self._idle, lost)
-        found = answer_on(prepared, start, checks, self._nearest(keys))
+        found = answer_on(prepared, start, checks, self._nearest(keys), prove=not self._many)
         solution = found.answer.solution
         if isinstance(found.answer, Verified) and isinstance(solution, FixedSolution):
             # a start is all that is needed of it
@@ -230,6 +240,18 @@ class Recovery:
             (prepared.limbs[h], finger) for h, *_ in keys for finger in _released(prepared, h)
         ]
         return Recovered(found, lost, tuple(open_fingers))
+
+    def _stance_without(
+        self, keys: tuple[_HandKey, ...], body_wrench: Array | None
+    ) -> PreparedStance:
+        prepared = self._stances.get(keys, lambda: self._prepared(keys))
+        return prepared if body_wrench is None else prepared.turned(body_wrench)
+
+    def _bound(self, keys: tuple[_HandKey, ...], body_wrench: Array | None) -> float:
+        """Return a lower bound of the least utilisation; −∞ without one."""
+        data = self._stance_without(keys, body_wrench).at_rest.data
+        outcome = unique(data)
+        return unique_bound(data, outcome) if outcome.solved else -math.inf
 
     def _nearest(self, keys: tuple[_HandKey, ...]) -> FixedSolution | None:
         """Return a solution to start from: of the same losses, or superposed from single ones."""

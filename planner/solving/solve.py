@@ -125,6 +125,8 @@ def answer_on(
     start: float,
     known: Checks | None = None,
     near: Solution | None = None,
+    *,
+    prove: bool = True,
 ) -> StanceAnswer:
     """Answer the question of a prepared stance.
 
@@ -137,6 +139,8 @@ def answer_on(
         Recovery and checks of the stance's plans; prepared here by default.
     near : Solution, optional
         Solution for the same hands at another body wrench, as a warm start.
+    prove : bool, optional
+        False to leave out the proof where nothing has passed the checks.
 
     Raises
     ------
@@ -150,7 +154,8 @@ def answer_on(
     if answer is None:
         answer = _first_verified(prepared, checks, _solutions(prepared, budget, near))
     if isinstance(answer, Failed) or _beyond_all_loads(prepared, answer):
-        answer = _second_look(prepared, checks, answer, budget)
+        proven = prove or not isinstance(answer, Failed)
+        answer = _second_look(prepared, checks, answer, budget, prove=proven)
     if isinstance(answer, Failed):
         deadline.check("a plan was found or proven infeasible")
     return StanceAnswer(prepared, checks, answer, budget, (start, modelled))
@@ -218,12 +223,7 @@ def _beyond_all_loads(prepared: PreparedStance, found: Answer) -> bool:
 
 
 def _second_look(
-    prepared: PreparedStance,
-    checks: Checks,
-    found: Answer,
-    budget: Budget,
-    *,
-    prove: bool = True,
+    prepared: PreparedStance, checks: Checks, found: Answer, budget: Budget, *, prove: bool
 ) -> Answer:
     """Return the proof that there is no balance, if that is wanted, or a plan at its border.
 

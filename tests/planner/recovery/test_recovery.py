@@ -270,3 +270,23 @@ def test_a_plan_does_not_depend_on_where_its_search_starts(recoveries, name):
         assert one.utilisation == pytest.approx(two.utilisation, abs=1e-5)
         tensions = [each.verified.arrays.tensions for each in (one, two)]
         assert tensions[0] == pytest.approx(tensions[1], abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["wall", "slab"])
+def test_plans_for_very_many_losses_are_the_same(recoveries, name):
+    """Losses far beyond the cap, where fingers are released on trial: no plan, worse or better."""
+    recovery = recoveries[name]
+    many, chance = Recovery(recovery.prepared, many=True), np.random.default_rng(4)
+    tiles, released = recovery.tiles, 0
+    for count in (1, 6, 10, 14, 18, 18):
+        lost = [tiles[i] for i in chance.choice(len(tiles), count, replace=False)]
+        plain, found = recovery.plan(lost), many.plan(lost)
+        assert found.released == plain.released
+        assert found.utilisation == pytest.approx(plain.utilisation, rel=1e-6)
+        released += len(plain.released)
+        assert (found.verified is None) == (plain.verified is None)
+        if plain.verified is not None:
+            loads = plain.verified.arrays.loads
+            near = 1e-4 * float(np.abs(loads).max())
+            np.testing.assert_allclose(found.verified.arrays.loads, loads, atol=near)
+    assert released > 0
