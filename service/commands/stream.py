@@ -17,7 +17,7 @@ from service.commands import options, stances
 
 __all__ = ["stream_command"]
 
-_INDENT = " " * 11  # under the status
+_NOTE_INDENT = " " * 11  # under the status
 
 
 @click.command("stream")
@@ -156,7 +156,7 @@ def _say_line(reply: replies.SetPointsReply, width: int) -> None:
     said = "; ".join(_remarks(reply))
     if reply.hands is None or reply.utilisation is None or reply.gap is None:
         head = f"{reply.status:<10} {'-':>6} {'-':>5} {reply.source:<12} "
-        click.echo(textwrap.fill(said, width, initial_indent=head, subsequent_indent=_INDENT))
+        click.echo(textwrap.fill(said, width, initial_indent=head, subsequent_indent=_NOTE_INDENT))
         return
     _say_cells(
         f"{reply.status:<10} {reply.utilisation:6.3f} {reply.gap:5.0e} {reply.source:<12}",
@@ -164,7 +164,9 @@ def _say_line(reply: replies.SetPointsReply, width: int) -> None:
         width,
     )
     if said:
-        click.echo(textwrap.fill(said, width, initial_indent=_INDENT, subsequent_indent=_INDENT))
+        click.echo(
+            textwrap.fill(said, width, initial_indent=_NOTE_INDENT, subsequent_indent=_NOTE_INDENT)
+        )
 
 
 def _remarks(reply: replies.SetPointsReply) -> Iterator[str]:
