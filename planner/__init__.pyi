@@ -31,6 +31,7 @@ from .pictures import (
     plot_com_region as plot_com_region,
     plot_plan as plot_plan,
     plot_redundancy as plot_redundancy,
+    plot_route_survival as plot_route_survival,
     plot_survival as plot_survival,
     plot_wrench_space as plot_wrench_space,
     summary as summary,
@@ -116,7 +117,11 @@ from .route import (
     Move as Move,
     Route as Route,
     RouteResult as RouteResult,
+    RouteShare as RouteShare,
+    RouteSurvival as RouteSurvival,
+    StageSurvival as StageSurvival,
     evaluate as evaluate,
+    find_route_survival as find_route_survival,
 )
 from .simulation import find_survival as find_survival
 from .solving import (

@@ -93,10 +93,17 @@ class StrengthScatter:
     rock: float
 
     @classmethod
-    def bundled(cls) -> StrengthScatter:
-        """Return the scatter of ``strength.toml``."""
+    def bundled(cls, hold: float | None = None, rock: float | None = None) -> StrengthScatter:
+        """Return the scatter of ``strength.toml``, with a caller's own numbers in their place."""
         table = strength_table()
-        return cls(table.scalar("factors", "hold"), table.scalar("factors", "rock"))
+        return cls(
+            table.scalar("factors", "hold") if hold is None else hold,
+            table.scalar("factors", "rock") if rock is None else rock,
+        )
+
+    def sample_rock(self, draws: int, seed: int | Sequence[int]) -> Array:
+        """Return samples of the rock's factor, of mean 1, shape (draws,)."""
+        return _factors(np.random.default_rng(seed), self.rock, (draws, 1))[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,9 +234,14 @@ class TileStrengths:
         found = rng.standard_exponential((draws, len(self.hand))) ** (1.0 / m[self.hand])
         found *= unit[self.hand]
         for spread, count in ((self.scatter.rock, 1), (self.scatter.hold, len(m))):
-            of = np.exp(spread * rng.standard_normal((draws, count)) - 0.5 * spread**2)
+            of = _factors(rng, spread, (draws, count))
             found *= of if count == 1 else of[:, self.hand]
         return np.asarray(factor * found)
+
+
+def _factors(rng: np.random.Generator, spread: float, shape: tuple[int, int]) -> Array:
+    """Return samples of log-normal factors of mean 1."""
+    return np.asarray(np.exp(spread * rng.standard_normal(shape) - 0.5 * spread**2))
 
 
 def _nodes(spread: float) -> tuple[Array, Array]:

@@ -4,4 +4,7 @@ from .hand_plots import plot_wrench_space as plot_wrench_space
 from .plan_plots import draw_plan as draw_plan, plot_plan as plot_plan
 from .redundancy_plots import plot_redundancy as plot_redundancy
 from .report import summary as summary, write_report as write_report
-from .survival_plots import plot_survival as plot_survival
+from .survival_plots import (
+    plot_route_survival as plot_route_survival,
+    plot_survival as plot_survival,
+)

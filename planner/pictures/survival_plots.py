@@ -1,4 +1,8 @@
-"""Picture of a survival: a cascade as a timeline, survival over load, predicted over simulated."""
+"""Pictures of survival.
+
+Of a stance: a cascade as a timeline, survival over load, predicted over simulated. Of a climb:
+survival stage by stage.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,18 @@ from matplotlib.figure import Figure
 
 from hand_models.base import whole_file
 from planner.result import Survival, SurvivalShare
+from planner.route import RouteSurvival
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_survival"]
+__all__ = ["plot_route_survival", "plot_survival"]
+
+DRAWN_SHARES = (
+    ("holds", "tab:blue", "all hands hold, tensions fixed"),
+    ("replanned", "tab:green", "all hands hold, new set-points after each slip"),
+)
+"""Shares that are drawn, with their colours."""
 
 
 def plot_survival(
@@ -77,11 +88,7 @@ def _draw_curves(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> Non
     """Draw the probabilities over the load, with their intervals."""
     loads = [load for load, _ in over_load]
     axes.plot(loads, [s.no_slip for _, s in over_load], color="black", label="no tile slips")
-    kinds = (
-        ("holds", "tab:blue", "all hands hold, tensions fixed"),
-        ("replanned", "tab:green", "all hands hold, new set-points after each slip"),
-    )
-    for name, colour, label in kinds:
+    for name, colour, label in DRAWN_SHARES:
         known = [(load, getattr(s, name)) for load, s in over_load]
         shares = [(load, share) for load, share in known if isinstance(share, SurvivalShare)]
         if shares:
@@ -107,3 +114,51 @@ def _draw_agreement(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> 
     axes.set(title="no tile slips", xlabel="by the formula", ylabel="simulated")
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
+
+
+def plot_route_survival(found: RouteSurvival, path: Path) -> None:
+    """Draw the survival of a climb's stages, with that of all together, to a file.
+
+    Parameters
+    ----------
+    found : RouteSurvival
+    path : Path
+        Picture file; its suffix, PNG, PDF or SVG, is the format.
+    """
+    names = [" ".join(filter(None, (f"{s.move}", s.phase, s.limb))) for s in found.stages]
+    figure = Figure(figsize=(max(7.0, 2.5 + 0.5 * len(names)), 6.2), layout="constrained")
+    axes = figure.subplots()
+    known = [(i, s.survival) for i, s in enumerate(found.stages) if s.survival is not None]
+    axes.plot([i for i, _ in known], [s.no_slip for _, s in known], "o", color="black",
+              markersize=4, label=_of_climb("no tile slips", found.no_slip))  # fmt: skip
+    for shift, (name, colour, label) in zip((-0.12, 0.12), DRAWN_SHARES, strict=True):
+        pairs = [(i, getattr(s, name)) for i, s in known]
+        shares = [(i, share) for i, share in pairs if isinstance(share, SurvivalShare)]
+        if not shares:
+            continue
+        whole = getattr(found, name)
+        label = _of_climb(label, None if whole is None else whole.all_stages.probability)
+        middle = np.array([share.probability for _, share in shares])
+        wide = [middle - [s.low for _, s in shares], [s.high for _, s in shares] - middle]
+        axes.errorbar([i + shift for i, _ in shares], middle, yerr=np.maximum(wide, 0.0), fmt="s",
+                      markersize=5, capsize=2.5, color=colour, label=label)  # fmt: skip
+    for stage in found.stages:
+        if stage.survival is None:
+            axes.axvspan(stage.index - 0.5, stage.index + 0.5, color="0.85", linewidth=0.0)
+            axes.text(stage.index, 0.5, stage.status, rotation=90, ha="center", va="center")
+    axes.axvline(found.worst, color="tab:red", linewidth=6.0, alpha=0.15)
+    axes.set_xticks(range(len(names)), names, rotation=60, ha="right", fontsize=8)
+    axes.get_xticklabels()[found.worst].set_fontweight("bold")
+    axes.set(xlim=(-0.6, len(names) - 0.4), ylim=(-0.02, 1.02), xlabel="move, phase and limb",
+             ylabel="probability, with its interval of 95 %")  # fmt: skip
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside lower center", fontsize=8)
+    title = f"{found.route}: when tiles slip, stage by stage; worst {names[found.worst]}"
+    figure.suptitle(title, fontsize=11, parse_math=False)
+    with whole_file(path) as part:
+        figure.savefig(part, dpi=120, facecolor="white")
+
+
+def _of_climb(label: str, value: float | None) -> str:
+    """Return a label with the probability of the whole climb, if it is known."""
+    return label if value is None else f"{label}; in all stages {value:.3f}"

@@ -6,3 +6,9 @@ from .climb import (
     RouteStage as RouteStage,
 )
 from .evaluation import evaluate as evaluate
+from .survival import (
+    RouteShare as RouteShare,
+    RouteSurvival as RouteSurvival,
+    StageSurvival as StageSurvival,
+    find_route_survival as find_route_survival,
+)

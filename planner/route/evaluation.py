@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from typing import TypeVar
 
 from hand_models.base import CruxError, InvalidInputError, errors_under
 from planner.explanation import ONE_OF_A_PLAN
@@ -16,7 +17,7 @@ from planner.robots import UnreachableError
 from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_route, stages
 from planner.solving import plan
 
-__all__ = ["evaluate"]
+__all__ = ["by_stage", "evaluate"]
 
 
 def evaluate(
@@ -52,7 +53,8 @@ def evaluate(
         # fewer stages are planned faster here than in processes that must first start
         workers = cores() if len(todo) >= 100 else 1
     plans: dict[int, Plan | OutOfReach] = {}
-    for i, answer in _answers(todo, min(workers, len(todo))):
+    make, count = partial(_planning, todo), min(workers, len(todo))
+    for i, answer in by_stage(make, lambda i: _plan_stage(todo[i]), len(todo), count):
         if isinstance(answer, InvalidInputError):
             raise answer
         plans[i] = answer
@@ -91,13 +93,31 @@ def _without(answer: Plan, finding: Finding) -> Plan:
 
 
 Answer = Plan | OutOfReach | InvalidInputError
+Found = TypeVar("Found")
 
 
-def _answers(todo: Sequence[RouteStage], workers: int) -> Iterator[tuple[int, Answer]]:
-    """Yield the index and the answer of each stage, as they are planned."""
-    left = dict(enumerate(todo))
+def by_stage(
+    make: Callable[[], Callable[[int], Found]],
+    here: Callable[[int], Found],
+    count: int,
+    workers: int,
+) -> Iterator[tuple[int, Found]]:
+    """Yield the index of each stage, and what is found for it, as it is found.
+
+    Parameters
+    ----------
+    make : callable
+        Factory that is called once in each process, and returns the function of an index.
+    here : callable
+        The same function, for this process.
+    count : int
+        Number of stages.
+    workers : int
+        Number of processes; with one, all is done in this process.
+    """
+    left = dict.fromkeys(range(count))
     if workers > 1:
-        with Workers(partial(_planning, todo), workers) as processes, suppress(CruxError):
+        with Workers(make, workers) as processes, suppress(CruxError):
             for i in left:
                 processes.put(i, i)
             while found := processes.collect():
@@ -106,8 +126,8 @@ def _answers(todo: Sequence[RouteStage], workers: int) -> Iterator[tuple[int, An
                         del left[i]
                         yield i, answer
     # also what has cost a process, and all where none starts
-    for i, stage in left.items():
-        yield i, _plan_stage(stage)
+    for i in left:
+        yield i, here(i)
 
 
 def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:

@@ -6,6 +6,8 @@ from .cascade import (
     unit_names as unit_names,
 )
 from .survival import (
+    Draws as Draws,
+    draw_slips as draw_slips,
     find_survival as find_survival,
     plan_loads as plan_loads,
 )

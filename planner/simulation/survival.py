@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import resources
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -23,11 +23,30 @@ from planner.recovery import Recovery
 from planner.result import HandPlan, Slip, StrengthSource, Survival, SurvivalShare
 from planner.simulation.cascade import Cascade, CascadeOutcome, Flags, Loads, unit_names
 
-__all__ = ["find_survival", "plan_loads"]
+__all__ = ["Draws", "draw_slips", "find_survival", "plan_loads"]
 
 SLIPPED_PALM: Final = 0.01
 """Part of a palm's strength in shear that is left to new set-points after it has slipped: with a
 strength of zero its rows would be scaled without bound."""
+
+
+class Draws(NamedTuple):
+    """Survival of a plan, and how each draw of strengths has ended.
+
+    Attributes
+    ----------
+    survival : Survival
+    used : ndarray, shape (T + H,)
+        Utilisation of each tile's strength and of each palm's in shear in the plan.
+    held, replanned : ndarray of bool, shape (n,)
+        Whether all hands hold at last, at fixed tensions and with new set-points after each slip;
+        empty where nothing was simulated.
+    """
+
+    survival: Survival
+    used: Array
+    held: Flags
+    replanned: Flags
 
 
 def find_survival(
@@ -48,11 +67,35 @@ def find_survival(
     DeadlineError
         If the deadline passes before all draws were simulated.
     """
-    prepared, settings = prepare_stance(question), settings or SurvivalSettings()
-    batch, usual = prepared.batch, StrengthScatter.bundled()
-    scatter = StrengthScatter(
-        usual.hold if settings.hold_scatter is None else settings.hold_scatter,
-        usual.rock if settings.rock_scatter is None else settings.rock_scatter,
+    settings = settings or SurvivalSettings()
+    return draw_slips(prepare_stance(question), hands, settings).survival
+
+
+def draw_slips(
+    prepared: PreparedStance,
+    hands: Sequence[HandPlan],
+    settings: SurvivalSettings,
+    strengths: Array | None = None,
+) -> Draws:
+    """Return the survival of a stance's plan, and how each draw has ended.
+
+    Parameters
+    ----------
+    prepared : PreparedStance
+    hands : sequence of HandPlan
+        The plan's hands, in the order of the stance.
+    settings : SurvivalSettings
+    strengths : ndarray, shape (draws, T + H), optional
+        Strength of each tile and palm over that of its surface; drawn here by default.
+
+    Raises
+    ------
+    DeadlineError
+        If the deadline passes before all draws were simulated.
+    """
+    batch, scatter = (
+        prepared.batch,
+        StrengthScatter.bundled(settings.hold_scatter, settings.rock_scatter),
     )
     hand_of = np.concatenate([batch.places.hand, np.arange(len(hands))])
     law = TileStrengths.of([hand.surface for hand in batch.hands], hand_of, scatter)
@@ -69,23 +112,25 @@ def find_survival(
         surfaces=_sources(prepared, law),
         reason=_why_not(prepared),
     )
+    none = np.zeros(0, dtype=bool)
     if found.reason is not None:
-        return found
-    strengths = law.sample(settings.draws, settings.seed, settings.strength)
+        return Draws(found, used, none, none)
+    if strengths is None:
+        strengths = law.sample(settings.draws, settings.seed, settings.strength)
     cascade, n = Cascade(prepared, plan_loads(prepared, hands)), settings.draws
     outcome = cascade.run(strengths)
     slipped = outcome.slips > 0
     names = [" ".join(part for part in each if part) for each in unit_names(prepared)]
     counts = np.bincount(outcome.first[slipped], minlength=len(names))
     likely = [int(i) for i in np.argsort(-counts, kind="stable")[:10] if counts[i]]
-    replanned = None
+    replanned, anew = None, none
     if settings.replanned:
         late_slips = math.floor(settings.delay / _interval() + 1e-9)
-        held = _Replanned(prepared, cascade, late_slips).run(strengths[: settings.replanned])
-        replanned = SurvivalShare.of(int(held.sum()), settings.replanned)
+        anew = _Replanned(prepared, cascade, late_slips).run(strengths[: settings.replanned])
+        replanned = SurvivalShare.of(int(anew.sum()), settings.replanned)
     deadline.check("all draws of strengths were simulated")
     one = int(outcome.slips.argmax())
-    return structs.replace(
+    found = structs.replace(
         found,
         holds=SurvivalShare.of(int(outcome.held.sum()), n),
         slipped=SurvivalShare.of(int(slipped.sum()), n),
@@ -94,6 +139,7 @@ def find_survival(
         cascade=list(_steps(prepared, cascade, strengths[one])),
         cascade_holds=bool(outcome.held[one]),
     )
+    return Draws(found, used, outcome.held, anew)
 
 
 def plan_loads(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Loads:

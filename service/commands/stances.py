@@ -19,7 +19,15 @@ import msgspec
 from hand_models.base import InvalidInputError
 from service import answering, requests, wire
 
-__all__ = ["Given", "bundled", "limbs_of", "read_request", "read_route", "read_with_text"]
+__all__ = [
+    "Given",
+    "bundled",
+    "limbs_of",
+    "read_request",
+    "read_route",
+    "read_stance_or_route",
+    "read_with_text",
+]
 
 RequestT = TypeVar("RequestT", bound=requests.Request)
 
@@ -109,6 +117,51 @@ def read_route(source: str) -> requests.RouteRequest:
     return _read(source, requests.RouteRequest, "ROUTE", "route")[0]
 
 
+def read_stance_or_route(source: str) -> requests.PlanRequest | requests.RouteRequest:
+    """Read what a command was given as STANCE or ROUTE; with ``moves`` it is a route.
+
+    Parameters
+    ----------
+    source : str
+        Path of a JSON or TOML file, ``-`` for standard input, or the name of a bundled stance or
+        route.
+
+    Returns
+    -------
+    PlanRequest or RouteRequest
+        The request, with the vertices and faces of the mesh files that it names.
+
+    Raises
+    ------
+    InvalidInputError
+        If the source does not exist or cannot be read, or is not a valid request.
+    """
+    given = _given(source, "STANCE")
+    if given is not None:
+        text, path = given
+        if _has_moves(text, path.name):
+            return _decoded(text, requests.RouteRequest, path)[0]
+        return _decoded(text, requests.PlanRequest, path)[0]
+    if source in bundled(requests.RouteRequest):
+        return read_route(source)
+    if source in bundled():
+        return read_request(source)
+    names = ", ".join(bundled() + bundled(requests.RouteRequest))
+    raise InvalidInputError(
+        f"no such file, and no bundled stance or route {source!r}; bundled are {names}",
+        field="STANCE",
+    )
+
+
+def _has_moves(text: bytes, name: str) -> bool:
+    """Return True if a request has moves; what cannot be read has none."""
+    try:
+        content = _from_toml(text) if _is_toml(text, name) else msgspec.json.decode(text)
+    except (wire.MalformedError, msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return False
+    return isinstance(content, dict) and "moves" in content
+
+
 def limbs_of(source: str | None) -> tuple[str, ...]:
     """Return the names of the limbs with a hand in a stance, for shell completion.
 
@@ -167,14 +220,10 @@ def _folder(kind: type[requests.Request]) -> Traversable:
 def _read(
     source: str, kind: type[RequestT], field: str, noun: str
 ) -> tuple[RequestT, Given[RequestT]]:
-    if source == "-":
-        return _decoded(sys.stdin.buffer.read(), kind, Path("-"))
-    path = Path(source)
-    if path.is_file() or path.is_fifo():
-        try:
-            return _decoded(_text(path), kind, path)
-        except OSError as error:
-            raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
+    found = _given(source, field)
+    if found is not None:
+        text, path = found
+        return _decoded(text, kind, path)
     if source in bundled(kind):
         with resources.as_file(_folder(kind)) as folder:
             path = folder / f"{source}.json"
@@ -184,6 +233,19 @@ def _read(
         f"no such file, and no bundled {noun} {source!r}; bundled are {', '.join(bundled(kind))}",
         field=field,
     )
+
+
+def _given(source: str, field: str) -> tuple[bytes, Path] | None:
+    """Return the text of standard input or of a file, and its path; None if there is no file."""
+    if source == "-":
+        return sys.stdin.buffer.read(), Path("-")
+    path = Path(source)
+    if not (path.is_file() or path.is_fifo()):
+        return None
+    try:
+        return _text(path), path
+    except OSError as error:
+        raise InvalidInputError(f"{error.strerror}: {source}", field=field) from None
 
 
 def _decoded(text: bytes, kind: type[RequestT], path: Path) -> tuple[RequestT, Given[RequestT]]:

@@ -1,4 +1,4 @@
-"""Define ``crux sweep`` and ``crux simulate``: a stance over varied fields, or random strengths."""
+"""Define ``crux sweep`` and ``crux simulate``: a stance over varied fields, or slips at random."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 import planner
 from hand_models.base import CruxError, InvalidInputError, errors_under
-from service import processes, replies, requests, sweeping, tables
+from service import answering, processes, replies, requests, sweeping, tables
 from service.commands import options, stances
 from service.commands.batch import answer_rest, writing_answers
 
@@ -145,7 +145,13 @@ def _status(result: sweeping.Sweep) -> int:
 
 
 @click.command("simulate")
-@options.stance_argument
+@click.argument(
+    "source",
+    metavar="STANCE|ROUTE",
+    shell_complete=options.beginning_so(
+        stances.bundled() + stances.bundled(requests.RouteRequest), files=True
+    ),
+)
 @click.option("--draws", type=click.IntRange(1, 1_000_000), help="Draws of strengths.")
 @click.option(
     "--replanned",
@@ -164,14 +170,17 @@ def _status(result: sweeping.Sweep) -> int:
     metavar="SECONDS",
     help="From a slip to the new set-points.",
 )
-@options.plot_option("Draw a cascade, survival over the load, and predicted against simulated.")
+@options.plot_option(
+    "Draw a cascade, survival over the load, and predicted against simulated; of a route, survival "
+    "by stage."
+)
 @click.option(
     "--workers", type=click.IntRange(min=1), help="Processes; by default one for each core."
 )
 @options.own_options
 @options.json_option
 def simulate_command(
-    stance: str,
+    source: str,
     picture: Path | None,
     workers: int | None,
     own: options.Own,
@@ -181,16 +190,62 @@ def simulate_command(
     """Let tiles slip at random: count how often all hands hold, with new set-points or without.
 
     The strengths of all tiles are drawn, and the weakest slips until all rest or a hand is lost.
-    What a STANCE says of survival counts where no option says otherwise.
+    What a STANCE says of survival counts where no option says otherwise. Of a ROUTE, a file with
+    moves, every stage is simulated at its plan, with so many draws each.
     """
-    request = own.asked(stances.read_request(stance))
-    settings = request.survival or planner.SurvivalSettings()
+    request = stances.read_stance_or_route(source)
+    settings = planner.SurvivalSettings()
+    if isinstance(request, requests.PlanRequest) and request.survival is not None:
+        settings = request.survival
     given = {name: value for name, value in chosen.items() if value is not None}
     settings = msgspec.structs.replace(settings, **given)
     if "replanned" not in given:
         settings = msgspec.structs.replace(
             settings, replanned=min(settings.replanned, settings.draws)
         )
+    if isinstance(request, requests.RouteRequest):
+        return _simulate_route(own.asked(request), settings, picture, workers, own, as_json)
+    return _simulate_stance(own.asked(request), settings, source, picture, workers, own, as_json)
+
+
+def _simulate_route(
+    request: requests.RouteRequest,
+    settings: planner.SurvivalSettings,
+    picture: Path | None,
+    workers: int | None,
+    own: options.Own,
+    as_json: bool,
+) -> int:
+    """Simulate every stage of a route, and show its survival."""
+    plain = msgspec.structs.replace(request, want=[], draws=[], explain=False)
+    climb = answering.route_of(plain, own.robots)
+    with tables.progress(f"planning {climb.name}") as progress:
+        result = planner.evaluate(climb, workers, progress)
+    with tables.progress(f"simulating {climb.name}") as progress:
+        found = planner.find_route_survival(result, settings, workers, progress)
+    if picture is not None:
+        with tables.writing(picture):
+            planner.plot_route_survival(found, picture)
+    if as_json:
+        tables.say(msgspec.to_builtins(found))
+    else:
+        tables.print_route_survival(found, tables.console())
+        tail = next((s.survival.tail for s in found.stages if s.survival and s.survival.tail), None)
+        if tail is not None:
+            tables.remark(tail)
+    return tables.ExitStatus.of(found.status)
+
+
+def _simulate_stance(
+    request: requests.PlanRequest,
+    settings: planner.SurvivalSettings,
+    stance: str,
+    picture: Path | None,
+    workers: int | None,
+    own: options.Own,
+    as_json: bool,
+) -> int:
+    """Simulate a stance in several processes, and show its survival."""
     count = planner.cores() if workers is None else workers
     first = _with(request, settings)
     parts = [_with(request, each) for each in _parts(settings, count)]

@@ -5,6 +5,7 @@ from .body_spaces import (
 from .command_line import VERBOSITY_KEY as VERBOSITY_KEY, ExitStatus as ExitStatus
 from .extras import (
     print_advice as print_advice,
+    print_route_survival as print_route_survival,
     print_survival as print_survival,
     words_of as words_of,
 )

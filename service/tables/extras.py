@@ -9,13 +9,24 @@ from types import MappingProxyType
 
 from rich.console import Console
 
-from planner import Advice, OpenLoop, Quantiles, RobustLoadFactor, Spread, Survival, SurvivalShare
+from planner import (
+    Advice,
+    OpenLoop,
+    Quantiles,
+    RobustLoadFactor,
+    RouteSurvival,
+    Spread,
+    StageSurvival,
+    Survival,
+    SurvivalShare,
+)
 from service.replies import PlanReply
 from service.tables.layout import in_order, print_rows
 
 __all__ = [
     "print_advice",
     "print_open_loop",
+    "print_route_survival",
     "print_spread",
     "print_survival",
     "robust_sentence",
@@ -243,6 +254,66 @@ def print_survival(found: Survival, out: Console) -> None:
     if found.first:
         likely = ", ".join(f"{tile} {share:.3f}" for tile, share in list(found.first.items())[:4])
         out.print(f"slips first, with a probability of: {likely}")
+
+
+def print_route_survival(found: RouteSurvival, out: Console) -> None:
+    """Print the survival of a climb: one row a stage, all stages together, and the worst.
+
+    Parameters
+    ----------
+    found : RouteSurvival
+    out : Console
+        Console to print on.
+    """
+    print_rows(
+        [_stage_row(stage) for stage in found.stages],
+        in_order(
+            ["move", "phase", "limb"],
+            ("util", "no slip", "fixed", "95 %", "new points", "95 %"),
+        ),
+        out,
+        style=lambda row: "bold" if row[:3] == _place(found.stages[found.worst]) else "",
+    )
+    out.print("all hands hold, with fixed tensions, and with new set-points after each slip")
+    if found.reason is not None:
+        out.print(found.reason)
+    if found.no_slip is not None:
+        out.print(
+            f"no tile slips in any stage with a probability of {found.no_slip:.3f}; of 0.9 with "
+            f"tiles {found.strength_90:.2f} times as strong as assumed, of 0.99 with "
+            f"{found.strength_99:.2f}"
+        )
+    for what, whole in (("tensions fixed", found.holds), ("new set-points", found.replanned)):
+        if whole is not None:
+            out.print(
+                f"all hold in every stage, {what}: {whole.all_stages.probability:.3f} "
+                f"({_ends(whole.all_stages, 3)}) of {whole.all_stages.draws} draws; at most "
+                f"{whole.least:.3f}, the least of the stages; {whole.product:.3f} if "
+                "each stage drew anew"
+            )
+    out.print(f"worst: {' '.join(str(part) for part in _place(found.stages[found.worst]) if part)}")
+
+
+def _place(stage: StageSurvival) -> tuple[int, str, str | None]:
+    return stage.move, stage.phase, stage.limb
+
+
+def _stage_row(stage: StageSurvival) -> tuple[object, ...]:
+    """Return a stage's cells; a utilisation beyond the cap has a star."""
+    there = stage.survival
+    if there is None or stage.utilisation is None:
+        return (*_place(stage), stage.status, *[None] * 5)
+    star = "" if stage.status == "optimal" else "*"
+    shares = [
+        (None, None) if share is None else (f"{share.probability:.3f}", _ends(share, 2))
+        for share in (there.holds, there.replanned)
+    ]
+    used = f"{stage.utilisation:.2f}{star}"
+    return (*_place(stage), used, f"{there.no_slip:.3f}", *shares[0], *shares[1])
+
+
+def _ends(share: SurvivalShare, digits: int) -> str:
+    return f"{share.low:.{digits}f}–{share.high:.{digits}f}"
 
 
 def _share(share: SurvivalShare) -> tuple[str, ...]:

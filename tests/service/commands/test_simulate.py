@@ -1,9 +1,14 @@
 """The command ``crux simulate``."""
 
+import json
+from importlib import resources
+
 import pytest
 from PIL import Image
 
 from service.commands.cli import run_command_line
+from service.commands.stances import read_stance_or_route
+from service.requests import PlanRequest, RouteRequest
 from tests.suite.helpers.commands import complaint, result
 
 FEW = ("--draws", "60", "--replanned", "2", "--workers", "1", "--strength", "2")
@@ -43,3 +48,52 @@ def test_a_stance_that_is_not_simulated_says_why(capfd):
 def test_bad_options_are_refused(option, value, capfd):
     assert run_command_line(["simulate", "slab", option, value]) == 2
     assert option in complaint(capfd)
+
+
+def short_route(tmp_path):
+    """The bundled route's first move: three stages."""
+    whole = json.loads((resources.files("service") / "examples/routes/six-moves.json").read_text())
+    path = tmp_path / "climb.json"
+    path.write_text(json.dumps(whole | {"moves": whole["moves"][:1]}))
+    return str(path)
+
+
+def test_a_file_with_moves_is_a_climb(capfd, tmp_path):
+    picture = tmp_path / "climb.png"
+    arguments = ["simulate", short_route(tmp_path), *FEW, "--plot", str(picture)]
+    assert run_command_line([*arguments, "--json"]) == 0
+    found = result(capfd)
+    assert [stage["phase"] for stage in found["stages"]] == ["start", "lift", "place"]
+    assert found["stages"][found["worst"]]["phase"] == "lift"
+    for name, draws in (("holds", 60), ("replanned", 2)):
+        assert found[name]["all_stages"]["draws"] == draws
+        assert found[name]["all_stages"]["probability"] <= found[name]["least"]
+        assert all(stage["survival"][name]["draws"] == draws for stage in found["stages"])
+    with Image.open(picture) as drawn:
+        assert drawn.width > 500
+
+
+def test_a_person_reads_one_row_a_stage_and_the_worst(capfd, tmp_path):
+    few = ("--draws", "30", "--replanned", "0", "--workers", "1")
+    assert run_command_line(["simulate", short_route(tmp_path), *few]) == 0
+    said = capfd.readouterr().out
+    assert "worst: 1 lift front_left" in said
+    rows = [line.split()[:3] for line in said.splitlines()]
+    assert ["1", "place", "front_left"] in rows
+    assert "if each stage drew anew" in " ".join(said.split())
+
+
+def test_a_climb_is_read_from_toml_and_by_its_name(tmp_path, capfd):
+    path = tmp_path / "climb.toml"
+    assert run_command_line(["new", "route", "-o", str(path)]) == 0
+    assert isinstance(read_stance_or_route(str(path)), RouteRequest)
+    assert isinstance(read_stance_or_route("six-moves"), RouteRequest)
+    assert isinstance(read_stance_or_route("slab"), PlanRequest)
+    capfd.readouterr()
+    assert run_command_line(["simulate", "no-such"]) == 2
+    said = complaint(capfd)
+    assert "six-moves" in said
+    assert "wall-300" in said
+    path.write_text("moves = [")
+    assert run_command_line(["simulate", str(path)]) == 2
+    assert "TOML" in complaint(capfd)
