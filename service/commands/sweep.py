@@ -195,6 +195,9 @@ def simulate_command(
     The strengths of all tiles are drawn, and the weakest slips until all rest or a hand is lost.
     What a STANCE says of survival counts where no option says otherwise. Of a ROUTE, a file with
     moves, every stage is simulated at its plan, with so many draws each.
+
+    Exit status: that of the plan, however likely slips are: 0 if it is within all limits, 3 if not,
+    2 bad input. Of a route, that of its worst stage.
     """
     request = stances.read_stance_or_route(source)
     settings = planner.SurvivalSettings()
