@@ -1,4 +1,4 @@
-"""What a plan uses of the strengths of its tiles and palms, and how these strengths scatter."""
+"""Strengths of a plan: what it uses of those of its tiles and palms, and how they scatter."""
 
 from __future__ import annotations
 

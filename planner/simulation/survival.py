@@ -37,10 +37,10 @@ SLIPPED_PALM: Final = 0.01
 """Part of a palm's strength in shear that is left to new set-points after it has slipped: with a
 strength of zero its rows would be scaled without bound."""
 
-CHUNK: Final = 50
+SEED_CHUNK: Final = 50
 """Number of draws that come from one child of the seed."""
 
-PIECE: Final = 200
+FIXED_PIECE: Final = 200
 REPLANNED_PIECE: Final = 5
 """Largest number of draws between two looks at the deadline, and that a process takes at a time:
 at fixed tensions, and with new set-points."""
@@ -124,7 +124,7 @@ class _Piece(NamedTuple):
 
 
 class _Ends(NamedTuple):
-    """How the draws of a piece have ended, (n,): of new set-points, only ``held``."""
+    """Ends of the draws of a piece, (n,); of those with new set-points only ``held``."""
 
     held: Flags
     slips: Indices
@@ -136,7 +136,7 @@ def _pieces(settings: SurvivalSettings, workers: int) -> list[_Piece]:
     alone = workers == 1 and deadline.left() is None
     found = []
     for count, most, replanned in (
-        (settings.draws, PIECE, False),
+        (settings.draws, FIXED_PIECE, False),
         (settings.replanned, REPLANNED_PIECE, True),
     ):
         size = max(1, count if alone else min(most, -(-count // workers)))
@@ -164,12 +164,12 @@ class _Simulation:
         """Return the strengths of some draws: each chunk of them has a child of the seed."""
         if self._given is not None:
             return self._given[start:end]
-        first, seed, c = start // CHUNK, self._settings.seed, self._settings.strength
+        first, seed, c = start // SEED_CHUNK, self._settings.seed, self._settings.strength
         chunks = [
-            self._law.sample(CHUNK, np.random.SeedSequence(seed, spawn_key=(k,)), c)
-            for k in range(first, -(-end // CHUNK))
+            self._law.sample(SEED_CHUNK, np.random.SeedSequence(seed, spawn_key=(k,)), c)
+            for k in range(first, -(-end // SEED_CHUNK))
         ]
-        return np.concatenate(chunks)[start - first * CHUNK : end - first * CHUNK]
+        return np.concatenate(chunks)[start - first * SEED_CHUNK : end - first * SEED_CHUNK]
 
     def ends(self, piece: _Piece) -> _Ends:
         """Return how the draws of a piece end."""
