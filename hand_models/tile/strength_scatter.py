@@ -218,13 +218,18 @@ class TileStrengths:
             held = np.exp(-np.exp(log_hazards - self.modulus * logs))
         return float(of_rock @ np.prod(np.einsum("klh,l->kh", held, of_hold), axis=1))
 
-    def sample(self, draws: int, seed: int | Sequence[int], factor: float = 1.0) -> Array:
+    def sample(
+        self,
+        draws: int,
+        seed: int | Sequence[int] | np.random.SeedSequence,
+        factor: float = 1.0,
+    ) -> Array:
         """Return samples of the strength of each tile over that of its surface, shape (draws, T).
 
         Parameters
         ----------
         draws : int
-        seed : int or sequence of int
+        seed : int, sequence of int or SeedSequence
             The same seed gives the same samples.
         factor : float, optional
             c, above 0.

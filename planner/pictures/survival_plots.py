@@ -44,14 +44,16 @@ def plot_survival(
         Picture file; its suffix, PNG, PDF or SVG, is the format.
     title : str
     """
-    figure = Figure(figsize=(17.0, 5.6), layout="constrained")
+    figure = Figure(figsize=(17.0, 6.6), layout="constrained")
     timeline, curves, agreement = figure.subplots(1, 3, width_ratios=(1.25, 1.1, 0.9))
     _draw_cascade(timeline, found)
     _draw_curves(curves, over_load)
     _draw_agreement(agreement, over_load)
-    moduli = ", ".join(f"m = {s.modulus:.3g}, {s.source}" for s in found.surfaces)
+    moduli = ", ".join(
+        f"m = {s.modulus:.3g} on {s.surface or 'own surface'} ({s.source})" for s in found.surfaces
+    )
     figure.suptitle(
-        f"{title}: when tiles slip\nWeibull modulus {moduli}; strengths {found.strength:g} times "
+        f"{title}: when tiles slip\nWeibull modulus {moduli}\nstrengths {found.strength:g} times "
         f"those assumed; scatter of holds {found.hold_scatter:g}, of the rock "
         f"{found.rock_scatter:g}",
         fontsize=11,
@@ -74,14 +76,19 @@ def _draw_cascade(axes: Axes, found: Survival) -> None:
                   label="the weakest of those left, afterwards")  # fmt: skip
     axes.axvline(1.0, color="0.4", linewidth=1.0, linestyle="--")
     axes.set_yticks(places, names, fontsize=8)
-    axes.set_ylim(len(names) + 0.3 + 0.12 * len(names), -0.7)
+    axes.set_ylim(max(len(names), 1) - 0.3, -0.7)
     end = "then all hands hold" if found.cascade_holds else "then the stance is lost"
     axes.set(
-        title="one cascade at fixed tensions, from above",
+        title="one cascade at fixed tensions, read downward",
         xlabel=f"load over strength; {end if names else 'nothing slips'}",
     )
     if names:
-        axes.legend(fontsize=8, loc="lower right")
+        _legend_below(axes)
+
+
+def _legend_below(axes: Axes) -> None:
+    """Draw the legend where it covers nothing."""
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.1), frameon=False)
 
 
 def _draw_curves(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> None:
@@ -93,14 +100,27 @@ def _draw_curves(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> Non
         shares = [(load, share) for load, share in known if isinstance(share, SurvivalShare)]
         if shares:
             at = [load for load, _ in shares]
-            axes.plot(at, [s.probability for _, s in shares], "o-", color=colour, label=label)
+            axes.plot(at, [s.probability for _, s in shares], "o-", color=colour,
+                      label=f"{label}; {_draws(shares)}")  # fmt: skip
             axes.fill_between(at, [s.low for _, s in shares], [s.high for _, s in shares],
                               color=colour, alpha=0.2, linewidth=0.0)  # fmt: skip
     axes.axvline(1.0, color="0.6", linewidth=0.8)
     axes.set(title="survival, with its interval of 95 %", xlabel="load over the one asked for",
              ylabel="probability", ylim=(-0.02, 1.02))  # fmt: skip
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="lower left")
+    _legend_below(axes)
+
+
+def _draws(shares: Sequence[tuple[float, SurvivalShare]]) -> str:
+    """Return how many draws the shares have, at the load asked for and at the others."""
+    here = {share.draws for load, share in shares if load == 1.0}
+    others = {share.draws for load, share in shares if load != 1.0}
+    said = "draws" if here == others else f"draws at load 1, {_span(others)} at others"
+    return f"{_span(here)} {said}"
+
+
+def _span(numbers: set[int]) -> str:
+    return "–".join(str(each) for each in sorted({min(numbers), max(numbers)})) if numbers else "no"
 
 
 def _draw_agreement(axes: Axes, over_load: Sequence[tuple[float, Survival]]) -> None:

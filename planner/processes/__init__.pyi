@@ -5,4 +5,9 @@ from .worker_handles import (
     resident as resident,
     starting_children as starting_children,
 )
-from .workers import Lost as Lost, Workers as Workers, cores as cores
+from .workers import (
+    Lost as Lost,
+    Workers as Workers,
+    by_index as by_index,
+    cores as cores,
+)

@@ -10,7 +10,8 @@ from __future__ import annotations
 import logging
 import os
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from typing import Generic, NamedTuple, Self, TypeVar, cast
 
@@ -19,7 +20,7 @@ from cachetools import LRUCache
 from hand_models.base import CruxError
 from planner.processes.worker_handles import SETTINGS, Make, PriorityLane, WorkerHandle
 
-__all__ = ["Lost", "Workers", "cores"]
+__all__ = ["Lost", "Workers", "by_index", "cores"]
 
 log = logging.getLogger(__name__)
 
@@ -221,3 +222,37 @@ class Workers(Generic[Input, Output]):
         for about in [about for about, one in self._knows.items() if one is lane]:
             del self._knows[about]
         return lane.handle.kill(dead=dead)
+
+
+def by_index(
+    make: Callable[[], Callable[[int], Output]],
+    here: Callable[[int], Output],
+    count: int,
+    workers: int,
+) -> Iterator[tuple[int, Output]]:
+    """Yield the index of each item, and its result, as it is found.
+
+    Parameters
+    ----------
+    make : callable
+        Factory that is called once in each process, and returns the function of an index.
+    here : callable
+        The same function, for this process.
+    count : int
+        Number of items.
+    workers : int
+        Number of processes; with one, all is done in this process.
+    """
+    left = dict.fromkeys(range(count))
+    if workers > 1:
+        with Workers(make, workers) as processes, suppress(CruxError):
+            for i in left:
+                processes.put(i, i)
+            while found := processes.collect():
+                for i, answer in found:
+                    if not isinstance(answer, Lost):
+                        del left[i]
+                        yield i, answer
+    # also what has cost a process, and all where none starts
+    for i in left:
+        yield i, here(i)

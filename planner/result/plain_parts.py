@@ -166,7 +166,8 @@ class Reliability(Struct, frozen=True):
     hazard : float
         Of the plan; comparable only between plans on the same surfaces.
     no_slip : float
-        exp(−hazard): probability that no tile slips.
+        exp(−hazard): probability that no tile slips, of tiles alone. (`Survival.no_slip` counts
+        palms and the factors of holds and rock, too.)
     utilisation_before, hazard_before : float
         Of the plan for ``max_margin``.
     moduli : list of float

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 __all__ = ["Slip", "StrengthSource", "Survival", "SurvivalShare"]
 
@@ -34,15 +32,6 @@ class SurvivalShare(Struct, frozen=True):
         wide = share * (1.0 - share) / draws + z**2 / (4.0 * draws**2)
         wide = z * math.sqrt(wide) / (1.0 + z**2 / draws)
         return cls(share, max(min(middle - wide, share), 0.0), max(middle + wide, share), draws)
-
-    @classmethod
-    def merged(cls, parts: Sequence[SurvivalShare | None]) -> SurvivalShare | None:
-        """Return the share over the draws of all parts; None if a part has none."""
-        whole = [part for part in parts if part is not None]
-        if len(whole) < len(parts):
-            return None
-        counts = [round(part.probability * part.draws) for part in whole]
-        return cls.of(sum(counts), sum(part.draws for part in whole))
 
 
 class StrengthSource(Struct, frozen=True):
@@ -99,13 +88,16 @@ class Survival(Struct, frozen=True, kw_only=True):
     Attributes
     ----------
     no_slip : float
-        Probability that no finger's tile and no palm slips, by the formula.
+        Probability that no finger's tile and no palm slips, by the formula, with the factors of
+        holds and rock. (`Reliability.no_slip` counts tiles alone, without these factors.)
     strength_90, strength_99 : float
-        Factor of all mean strengths at which ``no_slip`` is 0.9, and 0.99.
+        Factor of the assumed mean strengths, whatever ``strength`` is, at which ``no_slip`` is 0.9,
+        and 0.99.
     holds : SurvivalShare or None
-        All hands hold at last, tensions fixed; None where ``reason`` says why.
+        All hands hold at last, tensions fixed; None where ``reason`` says why, and where a deadline
+        has left no time for any draw. It may leave fewer draws than were asked for.
     replanned : SurvivalShare or None
-        All hands hold with new set-points after each slip; None where they were not asked for.
+        All hands hold with new set-points after each slip; None where they were not asked for, too.
     slipped : SurvivalShare or None
         Draws in which anything slips, to be compared with 1 − ``no_slip``.
     strength : float
@@ -142,22 +134,6 @@ class Survival(Struct, frozen=True, kw_only=True):
     cascade: list[Slip] = []
     cascade_holds: bool = True
     reason: str | None = None
-
-    @classmethod
-    def merged(cls, parts: Sequence[Survival]) -> Survival:
-        """Return the survival over the draws of all parts, of one plan and of different seeds."""
-        draws = [0 if part.holds is None else part.holds.draws for part in parts]
-        first: dict[str, float] = {}
-        for part, own in zip(parts, draws, strict=True):
-            for name, share in part.first.items():
-                first[name] = first.get(name, 0.0) + share * own / sum(draws)
-        shares = ("holds", "replanned", "slipped")
-        return replace(
-            max(parts, key=lambda part: len(part.cascade)),
-            seed=parts[0].seed,
-            first=dict(sorted(first.items(), key=lambda each: -each[1])[:10]),
-            **{name: SurvivalShare.merged([getattr(p, name) for p in parts]) for name in shares},
-        )
 
     @property
     def tail(self) -> str | None:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
 
-from hand_models.base import CruxError, InvalidInputError, errors_under
+from hand_models.base import InvalidInputError, errors_under
 from planner.explanation import ONE_OF_A_PLAN
 from planner.prepare import settle_hand
-from planner.processes import Lost, Workers, cores
+from planner.processes import by_index, cores
 from planner.result import Finding, Plan
 from planner.robots import UnreachableError
 from planner.route.climb import OutOfReach, Route, RouteResult, RouteStage, in_route, stages
 from planner.solving import plan
 
-__all__ = ["by_stage", "evaluate"]
+__all__ = ["evaluate"]
 
 
 def evaluate(
@@ -54,7 +52,7 @@ def evaluate(
         workers = cores() if len(todo) >= 100 else 1
     plans: dict[int, Plan | OutOfReach] = {}
     make, count = partial(_planning, todo), min(workers, len(todo))
-    for i, answer in by_stage(make, lambda i: _plan_stage(todo[i]), len(todo), count):
+    for i, answer in by_index(make, lambda i: _plan_stage(todo[i]), len(todo), count):
         if isinstance(answer, InvalidInputError):
             raise answer
         plans[i] = answer
@@ -93,41 +91,6 @@ def _without(answer: Plan, finding: Finding) -> Plan:
 
 
 Answer = Plan | OutOfReach | InvalidInputError
-Found = TypeVar("Found")
-
-
-def by_stage(
-    make: Callable[[], Callable[[int], Found]],
-    here: Callable[[int], Found],
-    count: int,
-    workers: int,
-) -> Iterator[tuple[int, Found]]:
-    """Yield the index of each stage, and what is found for it, as it is found.
-
-    Parameters
-    ----------
-    make : callable
-        Factory that is called once in each process, and returns the function of an index.
-    here : callable
-        The same function, for this process.
-    count : int
-        Number of stages.
-    workers : int
-        Number of processes; with one, all is done in this process.
-    """
-    left = dict.fromkeys(range(count))
-    if workers > 1:
-        with Workers(make, workers) as processes, suppress(CruxError):
-            for i in left:
-                processes.put(i, i)
-            while found := processes.collect():
-                for i, answer in found:
-                    if not isinstance(answer, Lost):
-                        del left[i]
-                        yield i, answer
-    # also what has cost a process, and all where none starts
-    for i in left:
-        yield i, here(i)
 
 
 def _planning(todo: Sequence[RouteStage]) -> Callable[[int], Answer]:

@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 from hand_models.base import Array, Indices
 from hand_models.tile import StrengthScatter, Surface, TileStrengths
 from planner.prepare import PreparedStance, prepare_stance
-from planner.processes import cores
+from planner.processes import by_index, cores
 from planner.question import SurvivalSettings
 from planner.result import Plan, Survival, SurvivalShare
 from planner.route.climb import Phase, RouteResult, RouteStage
-from planner.route.evaluation import by_stage
 from planner.simulation import Draws, draw_slips
 
 __all__ = ["RouteShare", "RouteSurvival", "StageSurvival", "find_route_survival"]
@@ -141,7 +140,7 @@ def find_route_survival(
     make = partial(_drawing, [_Stage.of(result, i) for i in planned], numbers, settings)
     found: dict[int, _Ended] = {}
     count = cores() if workers is None else workers
-    for i, ended in by_stage(make, make(), len(planned), min(count, len(planned))):
+    for i, ended in by_index(make, make(), len(planned), min(count, len(planned))):
         found[planned[i]] = ended
         if progress is not None:
             progress(len(found), len(planned))
@@ -257,8 +256,11 @@ def _of_all(
 
 def _share(held: Sequence[NDArray[np.bool_]]) -> RouteShare | None:
     """Return the share of draws that hold in all stages; None if a stage has no draws."""
-    if not all(len(each) for each in held):
+    # a deadline can leave a stage fewer draws than the others
+    draws = min(len(each) for each in held)
+    if not draws:
         return None
+    held = [each[:draws] for each in held]
     together = np.logical_and.reduce(held)
     shares = [float(each.mean()) for each in held]
     return RouteShare(

@@ -5,9 +5,9 @@ from .cascade import (
     StateLoads as StateLoads,
     unit_names as unit_names,
 )
+from .plan_strengths import plan_loads as plan_loads
 from .survival import (
     Draws as Draws,
     draw_slips as draw_slips,
     find_survival as find_survival,
-    plan_loads as plan_loads,
 )

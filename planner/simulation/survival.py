@@ -3,31 +3,47 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from typing import Final, NamedTuple
 
 import numpy as np
 from msgspec import structs
 
-from hand_models.base import Array
-from hand_models.hand import NAIL, SettledHand
-from hand_models.parameters import ParameterTable, surface_table
-from hand_models.tile import StrengthScatter, Surface, TileStrengths
+from hand_models.base import Array, Indices
+from hand_models.hand import SettledHand
+from hand_models.parameters import ParameterTable
 from planner import deadline
 from planner.prepare import PreparedStance, prepare_stance
+from planner.processes import by_index
 from planner.question import LostTile, Question, SurvivalSettings
 from planner.recovery import Recovery
-from planner.result import HandPlan, Slip, StrengthSource, Survival, SurvivalShare
+from planner.result import HandPlan, Slip, Survival, SurvivalShare
 from planner.simulation.cascade import Cascade, CascadeOutcome, Flags, Loads, unit_names
+from planner.simulation.plan_strengths import (
+    plan_loads,
+    strength_law,
+    strength_sources,
+    used_strengths,
+    why_not_simulated,
+)
 
-__all__ = ["Draws", "draw_slips", "find_survival", "plan_loads"]
+__all__ = ["Draws", "draw_slips", "find_survival"]
 
 SLIPPED_PALM: Final = 0.01
 """Part of a palm's strength in shear that is left to new set-points after it has slipped: with a
 strength of zero its rows would be scaled without bound."""
+
+SEED_CHUNK: Final = 50
+"""Number of draws that come from one child of the seed."""
+
+FIXED_PIECE: Final = 200
+REPLANNED_PIECE: Final = 5
+"""Largest number of draws between two looks at the deadline, and that a process takes at a time:
+at fixed tensions, and with new set-points."""
 
 
 class Draws(NamedTuple):
@@ -50,9 +66,13 @@ class Draws(NamedTuple):
 
 
 def find_survival(
-    question: Question, hands: Sequence[HandPlan], settings: SurvivalSettings | None = None
+    question: Question,
+    hands: Sequence[HandPlan],
+    settings: SurvivalSettings | None = None,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Survival:
-    """Return the survival of a question's plan.
+    """Return the survival of a question's plan, with the draws that a deadline leaves time for.
 
     Parameters
     ----------
@@ -61,14 +81,16 @@ def find_survival(
         The plan's hands, in the order of the stance.
     settings : SurvivalSettings, optional
         Draws of strengths; its defaults by default.
-
-    Raises
-    ------
-    DeadlineError
-        If the deadline passes before all draws were simulated.
+    workers : int, optional
+        Number of processes that share the draws; the draws are the same whatever it is.
+    progress : callable, optional
+        Called after each piece of the draws with (number of pieces simulated, number of pieces).
     """
     settings = settings or SurvivalSettings()
-    return draw_slips(prepare_stance(question), hands, settings).survival
+    pieces = _pieces(settings, workers)
+    make = partial(_simulating, question, hands, settings, pieces)
+    prepared = prepare_stance(question)
+    return _draw(prepared, hands, settings, pieces, None, make, workers, progress).survival
 
 
 def draw_slips(
@@ -79,6 +101,8 @@ def draw_slips(
 ) -> Draws:
     """Return the survival of a stance's plan, and how each draw has ended.
 
+    With a deadline there are as many draws as it leaves time for.
+
     Parameters
     ----------
     prepared : PreparedStance
@@ -87,119 +111,154 @@ def draw_slips(
     settings : SurvivalSettings
     strengths : ndarray, shape (draws, T + H), optional
         Strength of each tile and palm over that of its surface; drawn here by default.
-
-    Raises
-    ------
-    DeadlineError
-        If the deadline passes before all draws were simulated.
     """
-    batch, scatter = (
-        prepared.batch,
-        StrengthScatter.bundled(settings.hold_scatter, settings.rock_scatter),
-    )
-    hand_of = np.concatenate([batch.places.hand, np.arange(len(hands))])
-    law = TileStrengths.of([hand.surface for hand in batch.hands], hand_of, scatter)
-    used = _used(prepared, hands)
+    return _draw(prepared, hands, settings, _pieces(settings, 1), strengths)
+
+
+class _Piece(NamedTuple):
+    """Draws from ``start`` to ``end``, at fixed tensions or with new set-points."""
+
+    start: int
+    end: int
+    replanned: bool
+
+
+class _Ends(NamedTuple):
+    """Ends of the draws of a piece, (n,); of those with new set-points only ``held``."""
+
+    held: Flags
+    slips: Indices
+    first: Indices
+
+
+def _pieces(settings: SurvivalSettings, workers: int) -> list[_Piece]:
+    """Return the pieces into which draws are divided: a deadline ends them between two pieces."""
+    alone = workers == 1 and deadline.left() is None
+    found = []
+    for count, most, replanned in (
+        (settings.draws, FIXED_PIECE, False),
+        (settings.replanned, REPLANNED_PIECE, True),
+    ):
+        size = max(1, count if alone else min(most, -(-count // workers)))
+        found += [_Piece(i, min(i + size, count), replanned) for i in range(0, count, size)]
+    return found
+
+
+class _Simulation:
+    """Draws of a plan, and how they end."""
+
+    def __init__(
+        self,
+        prepared: PreparedStance,
+        hands: Sequence[HandPlan],
+        settings: SurvivalSettings,
+        strengths: Array | None,
+    ) -> None:
+        self._settings, self._given = settings, strengths
+        self._law = strength_law(prepared, settings)
+        self.cascade = Cascade(prepared, plan_loads(prepared, hands))
+        late_slips = math.floor(settings.delay / _interval() + 1e-9)
+        self._replanned = _Replanned(prepared, self.cascade, late_slips)
+
+    def strengths(self, start: int, end: int) -> Array:
+        """Return the strengths of some draws: each chunk of them has a child of the seed."""
+        if self._given is not None:
+            return self._given[start:end]
+        first, seed, c = start // SEED_CHUNK, self._settings.seed, self._settings.strength
+        chunks = [
+            self._law.sample(SEED_CHUNK, np.random.SeedSequence(seed, spawn_key=(k,)), c)
+            for k in range(first, -(-end // SEED_CHUNK))
+        ]
+        return np.concatenate(chunks)[start - first * SEED_CHUNK : end - first * SEED_CHUNK]
+
+    def ends(self, piece: _Piece) -> _Ends:
+        """Return how the draws of a piece end."""
+        deadline.check("all draws of strengths were simulated")
+        strengths = self.strengths(piece.start, piece.end)
+        if piece.replanned:
+            none = np.zeros(0, dtype=np.intp)
+            return _Ends(self._replanned.run(strengths), none, none)
+        outcome = self.cascade.run(strengths)
+        return _Ends(outcome.held, outcome.slips, outcome.first)
+
+
+def _simulating(
+    question: Question,
+    hands: Sequence[HandPlan],
+    settings: SurvivalSettings,
+    pieces: Sequence[_Piece],
+) -> Callable[[int], _Ends]:
+    """Return the function that simulates a piece by its index; called in each process."""
+    simulation = _Simulation(prepare_stance(question), hands, settings, None)
+    return lambda index: simulation.ends(pieces[index])
+
+
+def _draw(
+    prepared: PreparedStance,
+    hands: Sequence[HandPlan],
+    settings: SurvivalSettings,
+    pieces: Sequence[_Piece],
+    strengths: Array | None,
+    make: Callable[[], Callable[[int], _Ends]] | None = None,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Draws:
+    """Return the survival of a plan, from the pieces that are simulated until the deadline."""
+    law, used = strength_law(prepared, settings), used_strengths(prepared, hands)
     found = Survival(
         no_slip=law.no_slip(used, settings.strength),
         strength_90=law.factor_for(used, 0.9),
         strength_99=law.factor_for(used, 0.99),
         strength=settings.strength,
-        hold_scatter=scatter.hold,
-        rock_scatter=scatter.rock,
+        hold_scatter=law.scatter.hold,
+        rock_scatter=law.scatter.rock,
         delay=settings.delay,
         seed=settings.seed,
-        surfaces=_sources(prepared, law),
-        reason=_why_not(prepared),
+        surfaces=strength_sources(prepared, law),
+        reason=why_not_simulated(prepared),
     )
     none = np.zeros(0, dtype=bool)
     if found.reason is not None:
         return Draws(found, used, none, none)
-    if strengths is None:
-        strengths = law.sample(settings.draws, settings.seed, settings.strength)
-    cascade, n = Cascade(prepared, plan_loads(prepared, hands)), settings.draws
-    outcome = cascade.run(strengths)
-    slipped = outcome.slips > 0
+    simulation = _Simulation(prepared, hands, settings, strengths)
+
+    def here(index: int) -> _Ends:
+        return simulation.ends(pieces[index])
+
+    ended: dict[int, _Ends] = {}
+    with suppress(deadline.DeadlineError):
+        count = min(workers, len(pieces))
+        for i, ends in by_index(make or (lambda: here), here, len(pieces), count):
+            ended[i] = ends
+            if progress is not None:
+                progress(len(ended), len(pieces))
+            if count > 1:
+                deadline.check("all draws of strengths were simulated")
+    fixed = [i for i in sorted(ended) if not pieces[i].replanned]
+    anew = [none, *(ended[i].held for i in sorted(ended) if pieces[i].replanned)]
+    replanned = np.concatenate(anew)
+    if len(replanned):
+        share = SurvivalShare.of(int(replanned.sum()), len(replanned))
+        found = structs.replace(found, replanned=share)
+    if not fixed:
+        return Draws(found, used, none, replanned)
+    held, slips, first = map(np.concatenate, zip(*(ended[i] for i in fixed), strict=True))
+    number = np.concatenate([np.arange(pieces[i].start, pieces[i].end) for i in fixed])
+    slipped, n = slips > 0, len(held)
     names = [" ".join(part for part in each if part) for each in unit_names(prepared)]
-    counts = np.bincount(outcome.first[slipped], minlength=len(names))
+    counts = np.bincount(first[slipped], minlength=len(names))
     likely = [int(i) for i in np.argsort(-counts, kind="stable")[:10] if counts[i]]
-    replanned, anew = None, none
-    if settings.replanned:
-        late_slips = math.floor(settings.delay / _interval() + 1e-9)
-        anew = _Replanned(prepared, cascade, late_slips).run(strengths[: settings.replanned])
-        replanned = SurvivalShare.of(int(anew.sum()), settings.replanned)
-    deadline.check("all draws of strengths were simulated")
-    one = int(outcome.slips.argmax())
+    one = int(slips.argmax())
+    own = simulation.strengths(int(number[one]), int(number[one]) + 1)[0]
     found = structs.replace(
         found,
-        holds=SurvivalShare.of(int(outcome.held.sum()), n),
+        holds=SurvivalShare.of(int(held.sum()), n),
         slipped=SurvivalShare.of(int(slipped.sum()), n),
-        replanned=replanned,
         first={names[i]: float(counts[i] / n) for i in likely},
-        cascade=list(_steps(prepared, cascade, strengths[one])),
-        cascade_holds=bool(outcome.held[one]),
+        cascade=list(_steps(prepared, simulation.cascade, own)),
+        cascade_holds=bool(held[one]),
     )
-    return Draws(found, used, outcome.held, anew)
-
-
-def plan_loads(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Loads:
-    """Return the loads of a plan's hands over all of them."""
-    tiles = np.concatenate([hand.loads for hand in hands])
-    palms = np.array([hand.palm.force for hand in hands])
-    first = prepared.batch.places.first_of_finger
-    return Loads(
-        tiles,
-        np.add.reduceat(tiles[:, 2], first),
-        np.column_stack([-palms[:, 0], palms[:, 2]]),
-    )
-
-
-def _used(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Array:
-    """Return what the plan uses of each tile's strength and each palm's in shear, (T + H,)."""
-    tiles = np.concatenate([hand.tile_utilisations for hand in hands])
-    sheared = plan_loads(prepared, hands).palms[:, 0] / prepared.batch.palm_limits[:, 0]
-    return np.concatenate([tiles * prepared.batch.touch.touches, sheared])
-
-
-def _sources(prepared: PreparedStance, law: TileStrengths) -> list[StrengthSource]:
-    """Return the distribution of the tiles on each surface of a stance."""
-    found: dict[Surface, StrengthSource] = {}
-    sections = surface_table().sections
-    pairs = zip(prepared.batch.hands, law.modulus.tolist(), law.mean.tolist(), strict=True)
-    for hand, modulus, mean in pairs:
-        surface, source = hand.surface, "given"
-        if surface.name in sections:
-            own = sections[surface.name]
-            source = own.get("scatter_ratio", sections["defaults"]["scatter_ratio"]).source
-        variation = surface.shear_scatter / surface.shear_limit
-        found[surface] = StrengthSource(surface.name, modulus, variation, source, mean)
-    return list(found.values())
-
-
-def _why_not(prepared: PreparedStance) -> str | None:
-    """Return why slips of a stance are not simulated; None if they are."""
-    moving = prepared.floating
-    if moving:
-        one = len(moving) == 1
-        whose = (
-            f"{'wrist' if one else 'wrists'} of {', '.join(moving)} {'moves' if one else 'move'}"
-        )
-        return (
-            f"slips are not simulated, as the {whose}: where {'it goes' if one else 'they go'} "
-            "once a tile slips takes a search for each state; valid is wrist 'fixed'"
-        )
-    nails = [
-        limb
-        for limb, hand in zip(prepared.limbs, prepared.batch.hands, strict=True)
-        if hand.grasp.fingernail or any(tile.contact == NAIL for tile in hand.tiles)
-    ]
-    if nails:
-        return (
-            f"slips are not simulated, as {', '.join(nails)} "
-            f"{'holds' if len(nails) == 1 else 'hold'} with fingernails, whose scatter nobody has "
-            "measured"
-        )
-    return None
+    return Draws(found, used, held, replanned)
 
 
 def _steps(prepared: PreparedStance, cascade: Cascade, strengths: Array) -> Iterator[Slip]:

@@ -28,7 +28,7 @@ def check_survival(request: PlanRequest) -> None:
 def add_survival(
     reply: PlanReply, question: planner.Question, plan: Plan, settings: planner.SurvivalSettings
 ) -> None:
-    """Add the survival of a plan to its reply; a warning if the deadline leaves no time for it.
+    """Add the survival of a plan to its reply, with the draws that the deadline leaves time for.
 
     Parameters
     ----------
@@ -48,5 +48,13 @@ def add_survival(
         reply.warnings.append(planner.deadline.late_sentence(error.seconds, ("survival",)))
         return
     reply.survival, reply.survival_probability = found, found.no_slip
+    fixed, anew = (0 if each is None else each.draws for each in (found.holds, found.replanned))
+    if found.reason is None and (fixed < settings.draws or anew < settings.replanned):
+        reply.unfinished.append("survival")
+        late = planner.deadline.late_sentence(planner.deadline.seconds() or 0.0, ("survival",))
+        reply.warnings.append(
+            f"{late}: {fixed} of {settings.draws} at fixed tensions, {anew} of "
+            f"{settings.replanned} with new set-points"
+        )
     if found.tail is not None:
         reply.warnings.append(found.tail)

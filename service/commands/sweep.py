@@ -19,7 +19,10 @@ from service.commands.batch import answer_rest, writing_answers
 __all__ = ["simulate_command", "sweep_command"]
 
 LOAD_MULTIPLES = np.linspace(0.25, 1.25, 9).tolist()
-"""Multiples of the load for which the picture has the survival."""
+"""Multiples of the load for which the picture has the survival; 1 is one of them."""
+
+LEAST_REPLANNED = 10
+"""Draws with new set-points at other loads than that asked for, if as many are asked for."""
 
 
 @click.command("sweep")
@@ -192,6 +195,9 @@ def simulate_command(
     The strengths of all tiles are drawn, and the weakest slips until all rest or a hand is lost.
     What a STANCE says of survival counts where no option says otherwise. Of a ROUTE, a file with
     moves, every stage is simulated at its plan, with so many draws each.
+
+    Exit status: that of the plan, however likely slips are: 0 if it is within all limits, 3 if not,
+    2 bad input. Of a route, that of its worst stage.
     """
     request = stances.read_stance_or_route(source)
     settings = planner.SurvivalSettings()
@@ -248,36 +254,42 @@ def _simulate_stance(
     """Simulate a stance in several processes, and show its survival."""
     count = planner.cores() if workers is None else workers
     first = _with(request, settings)
-    parts = [_with(request, each) for each in _parts(settings, count)]
+    question, plan, reply = answering.planned(
+        msgspec.structs.replace(first, want=[], survival=None), own.robots
+    )[:3]
+    assert isinstance(reply, replies.PlanReply)
+    if plan.hands is None:
+        return tables.show(reply, as_json)
     with (
-        processes.Planners(count, robot=own.robot) as planners,
         tables.progress(f"simulating {stance}") as progress,
+        planner.deadline.within(question.deadline),
     ):
-        whole = _replies(planners.plan_many(parts, progress))
-        if whole[0].survival is msgspec.UNSET:
-            return tables.show(whole[0], as_json)
-        found = planner.Survival.merged([_survival(each) for each in whole])
-        curve = []
-        if picture is not None and found.reason is None:
-            fewer = msgspec.structs.replace(settings, replanned=settings.replanned // 4)
-            asked = [_at_load(first, whole[0], load, fewer) for load in LOAD_MULTIPLES]
+        found = planner.find_survival(question, plan.hands, settings, count, progress)
+    if picture is not None and found.holds is not None:
+        few = min(settings.replanned, max(settings.replanned // 4, LEAST_REPLANNED))
+        fewer = msgspec.structs.replace(settings, replanned=few)
+        others = [load for load in LOAD_MULTIPLES if load != 1.0]
+        with (
+            processes.Planners(count, robot=own.robot) as planners,
+            tables.progress(f"simulating {stance} at other loads") as progress,
+        ):
+            asked = [_at_load(first, reply, load, fewer) for load in others]
             answers = _replies(planners.plan_many(asked, progress))
-            curve = [
-                (load, _survival(each))
-                for load, each in zip(LOAD_MULTIPLES, answers, strict=True)
-                if each.survival is not msgspec.UNSET
-            ]
-    if picture is not None and found.reason is None:
+        curve = [(1.0, found)] + [
+            (load, each.survival)
+            for load, each in zip(others, answers, strict=True)
+            if isinstance(each.survival, planner.Survival)
+        ]
         with tables.writing(picture):
-            planner.plot_survival(found, curve, picture, Path(stance).stem)
+            planner.plot_survival(found, sorted(curve, key=lambda at: at[0]), picture, stance)
     if as_json:
-        more = {"utilisation": whole[0].utilisation, "status": whole[0].status}
+        more = {"utilisation": reply.utilisation, "status": reply.status}
         tables.say(more | msgspec.to_builtins(found))
     else:
         tables.print_survival(found, tables.console())
         if found.tail is not None:
             tables.remark(found.tail)
-    return tables.ExitStatus.of(whole[0].status)
+    return tables.ExitStatus.of(reply.status)
 
 
 def _with(
@@ -296,21 +308,6 @@ def _with(
     )
 
 
-def _parts(settings: planner.SurvivalSettings, count: int) -> list[planner.SurvivalSettings]:
-    """Return settings that share the draws between processes, each with a seed of its own."""
-    found = []
-    for i in range(min(count, settings.draws)):
-        draws, replanned = (
-            (whole + count - 1 - i) // count for whole in (settings.draws, settings.replanned)
-        )
-        found.append(
-            msgspec.structs.replace(
-                settings, draws=draws, replanned=min(replanned, draws), seed=settings.seed + i
-            )
-        )
-    return found
-
-
 def _at_load(
     request: requests.PlanRequest,
     reply: replies.PlanReply,
@@ -320,11 +317,6 @@ def _at_load(
     """Return the request for a multiple of its body wrench."""
     wrench = [load * each for each in reply.body_wrench]
     return msgspec.structs.replace(request, body_wrench=wrench, load=None, survival=settings)
-
-
-def _survival(reply: replies.PlanReply) -> planner.Survival:
-    assert isinstance(reply.survival, planner.Survival)
-    return reply.survival
 
 
 def _replies(answers: list[Any]) -> list[replies.PlanReply]:

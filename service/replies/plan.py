@@ -116,8 +116,8 @@ class PlanReply(StanceReply, kw_only=True):
     - ``load_factor_status``: ``found``; ``at_least``, where floating hands may hold more; or why
       ``load_factor`` is null: ``unbounded``, ``none`` where no multiple can be held, ``not_asked``,
       ``not_finished`` by the deadline.
-    - ``survival_probability``: probability that no tile and no palm slips, ``survival.no_slip``;
-      null where it was not asked for, or without a plan.
+    - ``survival_probability``: probability that no tile and no palm slips, with factors of holds
+      and rock: ``survival.no_slip``; null where it was not asked for, or without a plan.
     - ``limiting``: the limit that is used most; null without a plan.
     - ``hands``: one entry for each hand; null where nothing balances the body.
     - ``joints``: joint angles planned for, by limb, from the body outward [rad]; [m] for joints
@@ -158,8 +158,9 @@ class PlanReply(StanceReply, kw_only=True):
     - ``com_region``: where the centre of mass may be; if in ``want``.
     - ``redundancy``: the plan without each tile, each finger and each hand; only with ``"want":
       ["redundancy"]``.
-    - ``reliability``: probability that no tile slips; only with the objective ``max_reliability``,
-      where tiles are loaded and the limits can be kept.
+    - ``reliability``: probability that no tile slips, of tiles alone: no palms, no factors of holds
+      and rock; only with the objective ``max_reliability``, where tiles are loaded and the limits
+      can be kept.
     - ``advice``: verified changes of the request; only with ``"want": ["advice"]``. Changes that
       make the stance feasible come first, the smallest first; the rest follow by gain for their
       size.

@@ -235,28 +235,43 @@ def print_survival(found: Survival, out: Console) -> None:
     out : Console
         Console to print on.
     """
-    moduli = ", ".join(f"m = {s.modulus:.3g} ({s.source})" for s in found.surfaces)
+    moduli = ", ".join(
+        f"m = {s.modulus:.3g} on {s.surface or 'own surface'} ({s.source})" for s in found.surfaces
+    )
     out.print(
         f"strengths {found.strength:g} times those assumed, Weibull modulus {moduli}, scatter of "
         f"holds {found.hold_scatter:g}, of the rock {found.rock_scatter:g}:"
     )
-    out.print(
-        f"no tile slips with a probability of {found.no_slip:.3f}; of 0.9 with tiles "
-        f"{found.strength_90:.2f} times as strong as assumed, of 0.99 with {found.strength_99:.2f}"
-    )
+    _print_no_slip("no tile and no palm slips", found, found.strength, out)
     if found.reason is not None:
         out.print(found.reason)
         return
     simulated = (
         ("something slips", found.slipped),
         ("all hold, tensions fixed", found.holds),
-        (f"all hold, new set-points {found.delay:g} s after each slip", found.replanned),
+        (f"all hold, new set-points {_when(found.delay)} after each slip", found.replanned),
     )
     rows = [(what, *_share(share)) for what, share in simulated if share is not None]
     print_rows(rows, in_order(["simulated"], ("share", "low", "high", "draws")), out)
     if found.first:
         likely = ", ".join(f"{tile} {share:.3f}" for tile, share in list(found.first.items())[:4])
         out.print(f"slips first, with a probability of: {likely}")
+
+
+def _print_no_slip(
+    what: str, found: Survival | RouteSurvival, strength: float, out: Console
+) -> None:
+    """Print the probability of the formula, and the strengths for which it is 0.9 and 0.99."""
+    rows = [
+        (f"{strength:g}", f"{found.no_slip:.3f}"),
+        (f"{found.strength_90:.2f}", "0.9"),
+        (f"{found.strength_99:.2f}", "0.99"),
+    ]
+    print_rows(rows, in_order((), ("times the assumed strength", what)), out)
+
+
+def _when(delay: float) -> str:
+    return f"{delay:g} s" if delay else "at once"
 
 
 def print_route_survival(found: RouteSurvival, out: Console) -> None:
@@ -281,11 +296,8 @@ def print_route_survival(found: RouteSurvival, out: Console) -> None:
     if found.reason is not None:
         out.print(found.reason)
     if found.no_slip is not None:
-        out.print(
-            f"no tile slips in any stage with a probability of {found.no_slip:.3f}; of 0.9 with "
-            f"tiles {found.strength_90:.2f} times as strong as assumed, of 0.99 with "
-            f"{found.strength_99:.2f}"
-        )
+        known = [stage.survival for stage in found.stages if stage.survival is not None]
+        _print_no_slip("no slip in any stage", found, known[0].strength, out)
     for what, whole in (("tensions fixed", found.holds), ("new set-points", found.replanned)):
         if whole is not None:
             out.print(

@@ -143,7 +143,9 @@ def _first_line(reply: replies.PlanReply, spread: planner.Spread | None) -> Iter
         if reply.effort is not None:
             yield f"effort {reply.effort:.3g}"
         if isinstance(reply.reliability, planner.Reliability):
-            yield f"no slip {reply.reliability.no_slip:.3g}"
+            yield (
+                f"no tile slips (tiles alone, no common scatter) {reply.reliability.no_slip:.3g}"
+            )
         yield f"{1e3 * reply.time.total:.0f} ms"
 
 

@@ -13,7 +13,7 @@ from hand_models.tile import TileStrengths
 from planner import Plan, Question, SurvivalSettings, SurvivalShare, find_survival, plan
 from planner.prepare import prepare_stance
 from planner.result import Survival
-from planner.simulation import Cascade, plan_loads
+from planner.simulation import Cascade, draw_slips, plan_loads
 from service.answering import question
 from service.commands.stances import read_request
 from service.requests import PlanRequest
@@ -159,14 +159,31 @@ def test_the_interval_is_wilsons(count, draws):
     assert (share.low, share.high) == (pytest.approx(low), pytest.approx(high))
 
 
-def test_parts_of_different_seeds_are_merged():
-    parts = [survival("wall", draws=200, replanned=0, seed=seed) for seed in (0, 1)]
-    whole = Survival.merged(parts)
-    assert whole.holds is not None
-    assert whole.holds.draws == 400
-    shares = [part.holds.probability for part in parts if part.holds is not None]
-    assert whole.holds.probability == pytest.approx(np.mean(shares))
-    assert whole.replanned is None
+def test_processes_make_the_same_draws():
+    asked, answer = planned("slab")
+    assert answer.hands is not None
+    settings = SurvivalSettings(draws=230, replanned=7, seed=1, strength=0.9)
+    done: list[tuple[int, int]] = []
+    alone = find_survival(asked, answer.hands, settings)
+    shared = find_survival(
+        asked, answer.hands, settings, workers=2, progress=lambda *each: done.append(each)
+    )
+    assert alone == shared
+    assert alone.replanned is not None
+    assert alone.replanned.draws == 7
+    assert done == [(i, 4) for i in range(1, 5)]
+
+
+def test_more_draws_begin_with_the_same_ones():
+    asked, answer = planned("wall")
+    assert answer.hands is not None
+    prepared = prepare_stance(asked)
+    few, many = (
+        draw_slips(prepared, answer.hands, SurvivalSettings(draws=n, replanned=0)).held
+        for n in (70, 130)
+    )
+    assert few.tolist() == many[:70].tolist()
+    assert 0 < few.sum() < 70
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from planner import Survival, deadline
 from planner.deadline import DeadlineError
-from service import answering
+from planner.simulation import Cascade
 from service.answering import answer_plan
 from service.replies import PlanReply
 from service.requests import PlanRequest
@@ -86,14 +86,50 @@ def test_what_makes_no_sense_is_refused_by_its_field(more, field):
     assert kind == ("unsupported" if field == "confidence" else "invalid")
 
 
-def test_a_deadline_leaves_it_out(monkeypatch):
-    def late(*_: object) -> None:
-        raise DeadlineError(1.0, "all draws of strengths were simulated")
+def test_a_deadline_leaves_the_formula(monkeypatch):
+    whole = answer_plan(asked())
 
-    monkeypatch.setattr(answering.survival.planner, "find_survival", late)
+    def late(*_: object) -> None:
+        raise DeadlineError(60.0, "all draws of strengths were simulated")
+
+    monkeypatch.setattr(Cascade, "run", late)
     with deadline.within(60.0):
         reply = answer_plan(asked())
     assert isinstance(reply, PlanReply)
+    assert isinstance(whole, PlanReply)
     assert reply.unfinished == ["survival"]
-    assert reply.survival is msgspec.UNSET
-    assert any("strengths" in warning for warning in reply.warnings)
+    assert isinstance(reply.survival, Survival)
+    assert reply.survival_probability == whole.survival_probability
+    assert reply.survival.holds is reply.survival.replanned is None
+    assert any("0 of 50 at fixed tensions" in warning for warning in reply.warnings)
+
+
+def test_a_deadline_keeps_the_draws_made_so_far(monkeypatch):
+    several = DRAWS | {"draws": 500, "replanned": 12}
+    looks = 0
+    whole = answer_plan(asked(survival=several))
+    run = Cascade.run
+
+    def slower(*given: object, **more: object) -> object:
+        nonlocal looks
+        looks += 1
+        if looks > 2:
+            raise DeadlineError(60.0, "all draws of strengths were simulated")
+        return run(*given, **more)
+
+    monkeypatch.setattr(Cascade, "run", slower)
+    with deadline.within(60.0):
+        reply = answer_plan(asked(survival=several))
+    assert isinstance(reply, PlanReply)
+    assert isinstance(whole, PlanReply)
+    assert reply.unfinished == ["survival"]
+    assert isinstance(reply.survival, Survival)
+    assert reply.survival.holds is not None
+    assert reply.survival.holds.draws == 400
+    assert any("400 of 500 at fixed tensions, 0 of 12" in each for each in reply.warnings)
+    monkeypatch.undo()
+    fewer = answer_plan(asked(survival=several | {"draws": 400}))
+    assert isinstance(fewer, PlanReply)
+    assert isinstance(fewer.survival, Survival)
+    assert fewer.survival.holds == reply.survival.holds
+    assert "survival" not in whole.unfinished

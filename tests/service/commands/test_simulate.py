@@ -6,6 +6,7 @@ from importlib import resources
 import pytest
 from PIL import Image
 
+import planner
 from service.commands.cli import run_command_line
 from service.commands.stances import read_stance_or_route
 from service.requests import PlanRequest, RouteRequest
@@ -26,8 +27,9 @@ def test_it_tells_how_often_all_hands_hold(capfd):
 def test_a_person_reads_the_modulus_and_its_source(capfd):
     assert run_command_line(["simulate", "slab", *FEW]) == 0
     said = capfd.readouterr().out
-    assert "m = 2.99 (assumed)" in said
-    assert "no tile slips with a probability of" in said
+    assert "m = 2.99 on rock (assumed)" in " ".join(said.split())
+    assert "no tile and no palm slips" in said
+    assert "new set-points at once after each slip" in said
     assert "all hold, tensions fixed" in said
 
 
@@ -37,6 +39,20 @@ def test_a_picture_is_drawn(capfd, tmp_path):
     assert run_command_line(["simulate", "slab", *few, "--plot", str(path)]) == 0
     with Image.open(path) as picture:
         assert picture.width > 1000
+
+
+def test_a_picture_has_the_printed_numbers(capfd, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(planner, "plot_survival", lambda *given: drawn.append(given))
+    many = ("--draws", "30", "--replanned", "0", "--workers", "1", "--json")
+    path = str(tmp_path / "slips.png")
+    assert run_command_line(["simulate", "slab", *many, "--plot", path]) == 0
+    said = result(capfd)
+    ((found, curve, _, title),) = drawn
+    assert title == "slab"
+    assert dict(curve)[1.0] == found
+    assert found.holds.probability == said["holds"]["probability"]
+    assert [load for load, _ in curve] == sorted(load for load, _ in curve)
 
 
 def test_a_stance_that_is_not_simulated_says_why(capfd):
