@@ -113,3 +113,17 @@ def test_a_climb_is_read_from_toml_and_by_its_name(tmp_path, capfd):
     path.write_text("moves = [")
     assert run_command_line(["simulate", str(path)]) == 2
     assert "TOML" in complaint(capfd)
+
+
+def test_the_help_says_that_the_exit_status_is_the_plans(capfd):
+    assert run_command_line(["simulate", "--help"]) == 0
+    assert "that of the plan, however likely slips are" in " ".join(capfd.readouterr().out.split())
+
+
+def test_a_plan_of_least_hazard_says_what_its_probability_counts(capfd, tmp_path):
+    asked = json.loads((resources.files("service") / "examples/wall.json").read_text())
+    path = tmp_path / "wall.json"
+    path.write_text(json.dumps(asked | {"objective": "max_reliability"}))
+    assert run_command_line(["plan", str(path)]) in {0, 3}
+    said = " ".join(capfd.readouterr().out.split())
+    assert "no tile slips (tiles alone, no common scatter) 0.25" in said
