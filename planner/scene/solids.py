@@ -22,9 +22,6 @@ __all__ = ["Solid", "capsule_solids", "distance_between", "hand_solids", "rock_s
 ROCK_SHAPES: Final[BoundedStore[Hold, Any]] = BoundedStore("rock as shapes", 64)
 """Shapes of holds that were asked for last."""
 
-DISTANCE_REQUEST: Final = coal.DistanceRequest(True)
-"""Nearest points are wanted, too."""
-
 
 class Solid(NamedTuple):
     """A solid with its pose, for distances.
@@ -176,8 +173,7 @@ def distance_between(first: Solid, second: Solid) -> tuple[float, Sequence[Array
     points : sequence of ndarray, shape (3,)
         The nearest point of each solid, in B [m].
     """
-    result = coal.DistanceResult()
-    away = coal.distance(
-        first.shape, first.place, second.shape, second.place, DISTANCE_REQUEST, result
-    )
+    # with the nearest points, too
+    request, result = coal.DistanceRequest(True), coal.DistanceResult()
+    away = coal.distance(first.shape, first.place, second.shape, second.place, request, result)
     return float(away), (result.getNearestPoint1(), result.getNearestPoint2())

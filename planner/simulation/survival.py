@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib import resources
 from typing import Final, NamedTuple
@@ -33,17 +33,22 @@ from planner.simulation.plan_strengths import (
 
 __all__ = ["Draws", "draw_slips", "find_survival"]
 
-SLIPPED_PALM: Final = 0.01
-"""Part of a palm's strength in shear that is left to new set-points after it has slipped: with a
-strength of zero its rows would be scaled without bound."""
 
-SEED_CHUNK: Final = 50
-"""Number of draws that come from one child of the seed."""
+@dataclass(frozen=True, slots=True)
+class DrawSettings:
+    """Settings of the draws of strengths."""
 
-FIXED_PIECE: Final = 200
-REPLANNED_PIECE: Final = 5
-"""Largest number of draws between two looks at the deadline, and that a process takes at a time:
-at fixed tensions, and with new set-points."""
+    slipped_palm: float = 0.01
+    """Part of a palm's strength in shear that is left to new set-points after it has slipped [1]:
+    with a strength of zero its rows would be scaled without bound."""
+    seed_chunk: int = 50  # draws that come from one child of the seed
+    fixed_piece: int = 200
+    replanned_piece: int = 5
+    """Largest number of draws between two looks at the deadline, and that a process takes at a
+    time: at fixed tensions, and with new set-points."""
+
+
+DRAW_SETTINGS: Final = DrawSettings()
 
 
 class Draws(NamedTuple):
@@ -136,8 +141,8 @@ def _pieces(settings: SurvivalSettings, workers: int) -> list[_Piece]:
     alone = workers == 1 and deadline.left() is None
     found = []
     for count, most, replanned in (
-        (settings.draws, FIXED_PIECE, False),
-        (settings.replanned, REPLANNED_PIECE, True),
+        (settings.draws, DRAW_SETTINGS.fixed_piece, False),
+        (settings.replanned, DRAW_SETTINGS.replanned_piece, True),
     ):
         size = max(1, count if alone else min(most, -(-count // workers)))
         found += [_Piece(i, min(i + size, count), replanned) for i in range(0, count, size)]
@@ -164,12 +169,13 @@ class _Simulation:
         """Return the strengths of some draws: each chunk of them has a child of the seed."""
         if self._given is not None:
             return self._given[start:end]
-        first, seed, c = start // SEED_CHUNK, self._settings.seed, self._settings.strength
+        chunk = DRAW_SETTINGS.seed_chunk
+        first, seed, c = start // chunk, self._settings.seed, self._settings.strength
         chunks = [
-            self._law.sample(SEED_CHUNK, np.random.SeedSequence(seed, spawn_key=(k,)), c)
-            for k in range(first, -(-end // SEED_CHUNK))
+            self._law.sample(chunk, np.random.SeedSequence(seed, spawn_key=(k,)), c)
+            for k in range(first, -(-end // chunk))
         ]
-        return np.concatenate(chunks)[start - first * SEED_CHUNK : end - first * SEED_CHUNK]
+        return np.concatenate(chunks)[start - first * chunk : end - first * chunk]
 
     def ends(self, piece: _Piece) -> _Ends:
         """Return how the draws of a piece end."""
@@ -366,6 +372,8 @@ class _Replanned:
             return self._prepared
         hands: list[SettledHand] = []
         for hand, slipped in zip(self._prepared.batch.hands, palms.tolist(), strict=True):
-            weak = hand.palm._replace(shear_limit=SLIPPED_PALM * hand.palm.shear_limit)
+            weak = hand.palm._replace(
+                shear_limit=DRAW_SETTINGS.slipped_palm * hand.palm.shear_limit
+            )
             hands.append(replace(hand, palm=weak) if slipped else hand)
         return self._prepared.with_hands(hands)

@@ -18,12 +18,6 @@ from service.commands.batch import answer_rest, writing_answers
 
 __all__ = ["simulate_command", "sweep_command"]
 
-LOAD_MULTIPLES = np.linspace(0.25, 1.25, 9).tolist()
-"""Multiples of the load for which the picture has the survival; 1 is one of them."""
-
-LEAST_REPLANNED = 10
-"""Draws with new set-points at other loads than that asked for, if as many are asked for."""
-
 
 @click.command("sweep")
 @options.stance_argument
@@ -266,9 +260,9 @@ def _simulate_stance(
     ):
         found = planner.find_survival(question, plan.hands, settings, count, progress)
     if picture is not None and found.holds is not None:
-        few = min(settings.replanned, max(settings.replanned // 4, LEAST_REPLANNED))
+        few = min(settings.replanned, max(settings.replanned // 4, 10))
         fewer = msgspec.structs.replace(settings, replanned=few)
-        others = [load for load in LOAD_MULTIPLES if load != 1.0]
+        others = [load for load in np.linspace(0.25, 1.25, 9).tolist() if load != 1.0]
         with (
             processes.Planners(count, robot=own.robot) as planners,
             tables.progress(f"simulating {stance} at other loads") as progress,
