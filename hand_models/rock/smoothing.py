@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -203,8 +203,9 @@ def _reached(pieces: Sequence[Array], scale: Scale) -> list[Array]:
     return unstrung(points, ends)
 
 
-NO_OUTLINES: Final = np.zeros((0, 2)), np.zeros(0, dtype=np.intp), 0.0
-"""Result of `seen_outlines` where there is no rock in the plane."""
+def _no_outlines() -> tuple[Array, Indices, float]:
+    """Return the result of `seen_outlines` where there is no rock in the plane."""
+    return np.zeros((0, 2)), np.zeros(0, dtype=np.intp), 0.0
 
 
 class Heights(NamedTuple):
@@ -287,7 +288,7 @@ class OutlinedHold(Hold):
 
         scale, slack = self._scale, BASE_TOLERANCES.length
         middle = _reached(self._pieces(origin, s_axis, t_axis), scale)
-        points, stops, hidden = seen_outlines(*strung(middle)) if middle else NO_OUTLINES
+        points, stops, hidden = seen_outlines(*strung(middle)) if middle else _no_outlines()
         plane = np.array([origin, s_axis, t_axis], dtype=float)
         heights = self._heights(plane) if hidden <= scale.bridged_gap else None
         if heights is None:

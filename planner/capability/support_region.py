@@ -32,9 +32,6 @@ from planner.question import Question
 
 __all__ = ["ComRegion", "ComSolid", "com_region", "com_solid"]
 
-LEAST_TILT: Final = 1e-3
-"""Angle between loads below which they count as parallel [rad]: a prism of a kilometre."""
-
 LEAST_ROOM: Final = 1e-4
 """Radius of the ball that a solid has room for at least [m]: that of a polygon's gap."""
 
@@ -170,7 +167,9 @@ def com_solid(
         load = structs.replace(question.load, acceleration=(x, y, z))
         regions.append(com_region(BodySpace(replace(question, load=load, explain=False))))
     ups = np.stack([region.up for region in regions])
-    if np.linalg.norm(np.cross(ups[0], ups), axis=1).max() < LEAST_TILT:
+    if (
+        np.linalg.norm(np.cross(ups[0], ups), axis=1).max() < 1e-3
+    ):  # [rad] parallel: a prism of a kilometre
         raise InvalidInputError(
             "are all along gravity, so that the solid has no end in height; give others, too",
             field="com_accelerations",
