@@ -167,9 +167,8 @@ def com_solid(
         load = structs.replace(question.load, acceleration=(x, y, z))
         regions.append(com_region(BodySpace(replace(question, load=load, explain=False))))
     ups = np.stack([region.up for region in regions])
-    if (
-        np.linalg.norm(np.cross(ups[0], ups), axis=1).max() < 1e-3
-    ):  # [rad] parallel: a prism of a kilometre
+    least_tilt = 1e-3  # [rad] between loads that are not parallel: a prism of a kilometre
+    if np.linalg.norm(np.cross(ups[0], ups), axis=1).max() < least_tilt:
         raise InvalidInputError(
             "are all along gravity, so that the solid has no end in height; give others, too",
             field="com_accelerations",
