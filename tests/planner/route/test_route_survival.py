@@ -37,6 +37,7 @@ def survival() -> RouteSurvival:
     return find_route_survival(climbed(), FEW, workers=1)
 
 
+@pytest.mark.slow
 def test_a_hand_that_stays_keeps_its_strengths():
     start, shift, _, place = (stage.survival for stage in survival().stages)
     assert start == shift

@@ -159,6 +159,7 @@ def test_the_interval_is_wilsons(count, draws):
     assert (share.low, share.high) == (pytest.approx(low), pytest.approx(high))
 
 
+@pytest.mark.slow
 def test_processes_make_the_same_draws():
     asked, answer = planned("slab")
     assert answer.hands is not None

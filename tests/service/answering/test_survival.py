@@ -104,6 +104,7 @@ def test_a_deadline_leaves_the_formula(monkeypatch):
     assert any("0 of 50 at fixed tensions" in warning for warning in reply.warnings)
 
 
+@pytest.mark.slow
 def test_a_deadline_keeps_the_draws_made_so_far(monkeypatch):
     several = DRAWS | {"draws": 500, "replanned": 12}
     looks = 0

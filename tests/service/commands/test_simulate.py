@@ -33,6 +33,7 @@ def test_a_person_reads_the_modulus_and_its_source(capfd):
     assert "all hold, tensions fixed" in said
 
 
+@pytest.mark.slow
 def test_a_picture_is_drawn(capfd, tmp_path):
     path = tmp_path / "slips.png"
     few = ("--draws", "30", "--replanned", "0", "--workers", "1")
@@ -41,6 +42,7 @@ def test_a_picture_is_drawn(capfd, tmp_path):
         assert picture.width > 1000
 
 
+@pytest.mark.slow
 def test_a_picture_has_the_printed_numbers(capfd, tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(planner, "plot_survival", lambda *given: drawn.append(given))
@@ -89,6 +91,7 @@ def test_a_file_with_moves_is_a_climb(capfd, tmp_path):
         assert drawn.width > 500
 
 
+@pytest.mark.slow
 def test_a_person_reads_one_row_a_stage_and_the_worst(capfd, tmp_path):
     few = ("--draws", "30", "--replanned", "0", "--workers", "1")
     assert run_command_line(["simulate", short_route(tmp_path), *few]) == 0
