@@ -167,8 +167,8 @@ def test_floating_wrists_that_begin_at_the_usual_plan_are_no_worse_than_by_thems
     found, apart = plan(asked).spread, planned_apart(asked)
     # a sample within the bracket of the cap may be on either side of it
     assert abs(found.holds - sum(each.holds for each in apart)) <= 1
-    # relative, of the largest factor: where a palm begins to press, one search ends 6 % higher
-    bracket = 8e-2
+    # relative, of the largest factor: where a palm begins to press, one search ends 10 % higher
+    bracket = 0.12
     for used, factor, alone in zip(found.utilisations, found.load_factors, apart, strict=True):
         assert used <= alone.utilisation * (1.0 + bracket)
         assert factor >= alone.load_factor * (1.0 - bracket)
