@@ -198,11 +198,9 @@ def simulate_command(
     if isinstance(request, requests.PlanRequest) and request.survival is not None:
         settings = request.survival
     given = {name: value for name, value in chosen.items() if value is not None}
+    # no more than there are draws, where nobody asked for a number
+    given.setdefault("replanned", min(settings.replanned, given.get("draws", settings.draws)))
     settings = msgspec.structs.replace(settings, **given)
-    if "replanned" not in given:
-        settings = msgspec.structs.replace(
-            settings, replanned=min(settings.replanned, settings.draws)
-        )
     if isinstance(request, requests.RouteRequest):
         return _simulate_route(own.asked(request), settings, picture, workers, own, as_json)
     return _simulate_stance(own.asked(request), settings, source, picture, workers, own, as_json)

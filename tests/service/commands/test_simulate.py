@@ -130,3 +130,9 @@ def test_a_plan_of_least_hazard_says_what_its_probability_counts(capfd, tmp_path
     assert run_command_line(["plan", str(path)]) in {0, 3}
     said = " ".join(capfd.readouterr().out.split())
     assert "no tile slips (tiles alone, no common scatter) 0.25" in said
+
+
+def test_few_draws_are_replanned_no_more_often(capfd):
+    run_command_line(["simulate", "slab", "--draws", "20", "--strength", "4", "--json"])
+    survival = json.loads(capfd.readouterr().out)
+    assert survival["replanned"]["draws"] == survival["holds"]["draws"] == 20
