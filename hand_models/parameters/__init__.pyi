@@ -18,6 +18,7 @@ from .tables import (
     LONGEST_QUOTE as LONGEST_QUOTE,
     ParameterTable as ParameterTable,
     Quantity as Quantity,
+    bundled_table as bundled_table,
     draw_table as draw_table,
     experiment_table as experiment_table,
     hand_table as hand_table,

@@ -317,41 +317,50 @@ def _refusal(raw: Any, complaint: str, field: str) -> InvalidInputError:
 
 
 @cache
-def _bundled(name: str) -> ParameterTable:
-    text = resources.files("hand_models.parameters").joinpath(name).read_text(encoding="utf-8")
+def bundled_table(name: str, package: str = "hand_models.parameters") -> ParameterTable:
+    """Return the parameters of a bundled file; each file is read once.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, such as ``hand.toml``.
+    package : str, optional
+        Package in which it is.
+    """
+    text = resources.files(package).joinpath(name).read_text(encoding="utf-8")
     return ParameterTable.read(text, name)
 
 
 def hand_table() -> ParameterTable:
     """Return the bundled parameters of the SpinyHand, from ``hand.toml``."""
-    return _bundled("hand.toml")
+    return bundled_table("hand.toml")
 
 
 def surface_table() -> ParameterTable:
     """Return the bundled parameters of the surfaces, from ``surfaces.toml``."""
-    return _bundled("surfaces.toml")
+    return bundled_table("surfaces.toml")
 
 
 def experiment_table() -> ParameterTable:
     """Return the parameters of the paper's experiments, from ``experiments.toml``."""
-    return _bundled("experiments.toml")
+    return bundled_table("experiments.toml")
 
 
 def scan_table() -> ParameterTable:
     """Return the parameters for reading scanned rock, from ``scan.toml``."""
-    return _bundled("scan.toml")
+    return bundled_table("scan.toml")
 
 
 def spine_table() -> ParameterTable:
     """Return the parameters of a tile's spines and the rock's asperities, from ``spines.toml``."""
-    return _bundled("spines.toml")
+    return bundled_table("spines.toml")
 
 
 def strength_table() -> ParameterTable:
     """Return how the strengths of tiles scatter, from ``strength.toml``."""
-    return _bundled("strength.toml")
+    return bundled_table("strength.toml")
 
 
 def draw_table() -> ParameterTable:
     """Return the fitted sets and the ranges from which samples are made, from ``draws.toml``."""
-    return _bundled("draws.toml")
+    return bundled_table("draws.toml")

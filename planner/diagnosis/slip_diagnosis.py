@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib import resources
 from itertools import combinations
 from typing import NamedTuple
 
@@ -17,7 +16,7 @@ import numpy as np
 
 from hand_models.base import Array, InvalidInputError, finite_vector
 from hand_models.hand import FINGERS
-from hand_models.parameters import ParameterTable
+from hand_models.parameters import bundled_table
 from hand_models.tile import TileStrengths
 from planner.diagnosis.signatures import slip_signatures
 from planner.prepare import PreparedStance
@@ -218,13 +217,9 @@ class SlipDiagnosis:
 @cache
 def _numbers() -> dict[str, float]:
     """Return the numbers of ``diagnosis.toml`` by name."""
-    path = resources.files("planner.parameters").joinpath("diagnosis.toml")
-    table = ParameterTable.read(path.read_text("utf-8"), path.name)
+    table = bundled_table("diagnosis.toml", "planner.parameters")
     sections = (
         ("noise", ("tension", "least_tension", "winch_angle")),
-        (
-            "suspects",
-            ("credible", "least_use", "seen", "sticks"),
-        ),
+        ("suspects", ("credible", "least_use", "seen", "sticks")),
     )
     return {name: table.positive(section, name) for section, names in sections for name in names}

@@ -13,15 +13,13 @@ sample's least utilisation as a function of its tensions), with the gradient −
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
-from importlib import resources
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy
 
 from hand_models.base import Array, Indices
-from hand_models.parameters import ParameterTable
+from hand_models.parameters import bundled_table
 from planner.programs.conic import Columns, ConicProgram
 from planner.programs.program import Best, Residuals, tie_weight
 from planner.programs.stance_data import LOAD_UNIT, StanceData
@@ -35,19 +33,13 @@ from planner.programs.stance_program import (
 if TYPE_CHECKING:
     import cvxpy as cp
 
-__all__ = ["Robust", "SampleData", "feedback_price", "plan_table", "sample_value"]
-
-
-@cache
-def plan_table() -> ParameterTable:
-    """Return the parameters of plans, of the file ``plans.toml``."""
-    path = resources.files("planner.parameters").joinpath("plans.toml")
-    return ParameterTable.read(path.read_text("utf-8"), path.name)
+__all__ = ["Robust", "SampleData", "feedback_price", "sample_value"]
 
 
 def feedback_price() -> float:
     """Return the price p of a squared change of a scaled tension by feedback."""
-    return plan_table().positive("robust", "feedback_price") * LOAD_UNIT**2
+    table = bundled_table("plans.toml", "planner.parameters")
+    return table.positive("robust", "feedback_price") * LOAD_UNIT**2
 
 
 class SampleData(NamedTuple):

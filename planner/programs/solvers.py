@@ -17,10 +17,10 @@ import scipy
 from numpy.typing import NDArray
 
 from hand_models.base import Array
+from hand_models.parameters import bundled_table
 from planner import deadline
 from planner.programs.conic import OUT_OF_TIME, Outcome, Reached
 from planner.programs.program import Best, Elastic, Nearest, Reach, Residuals, tie_weight
-from planner.programs.robust import plan_table
 from planner.programs.stance_data import StanceData
 
 __all__ = [
@@ -102,7 +102,7 @@ def tension_trade(least: float, cap: float) -> TensionTrade:
 @cache
 def _tension_numbers() -> tuple[float, float]:
     """Return the part of the least utilisation that is given away at most, and w."""
-    table = plan_table()
+    table = bundled_table("plans.toml", "planner.parameters")
     return table.positive("tension", "given_away"), table.positive("tension", "weight")
 
 

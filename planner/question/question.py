@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
-from importlib import resources
 from typing import ClassVar, Final, Protocol, get_args
 
 from hand_models.base import (
@@ -17,7 +15,7 @@ from hand_models.base import (
     finite_vector,
 )
 from hand_models.hand import FINGERS
-from hand_models.parameters import ParameterSample, ParameterTable
+from hand_models.parameters import ParameterSample, bundled_table
 from planner.question.draws import drawn_hands
 from planner.question.limits import (
     BodyRange,
@@ -41,14 +39,6 @@ class OwnObjective(Protocol):
 
 MOST_DRAWS: Final = 100
 """Largest number of samples that a caller may give: each costs a plan and a load factor."""
-
-
-@cache
-def _usual_tolerance() -> float:
-    """Return the tolerance of ``plans.toml``."""
-    path = resources.files("planner.parameters").joinpath("plans.toml")
-    table = ParameterTable.read(path.read_text("utf-8"), path.name)
-    return table.positive("reliability", "tolerance")
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +190,10 @@ class Question:
     @property
     def utilisation_tolerance(self) -> float:
         """Part of the least utilisation by which a plan of 'max_reliability' may exceed it."""
-        return _usual_tolerance() if self.tolerance is None else self.tolerance
+        if self.tolerance is not None:
+            return self.tolerance
+        table = bundled_table("plans.toml", "planner.parameters")
+        return table.positive("reliability", "tolerance")
 
     def _check_draws(self) -> None:
         if "spread" not in self.want and self.objective != "max_robust":

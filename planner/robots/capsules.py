@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
-from importlib import resources
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,15 +17,13 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.base import Array, Indices
-from hand_models.parameters import ParameterTable
+from hand_models.parameters import bundled_table
 from planner.robots.build import ROOT_JOINT, Chain, pose_of
 from planner.robots.robot_file import RobotDescription
 
 __all__ = ["Capsules", "capsules_of", "scene_number"]
 
-SCENE_NUMBERS: Final = ParameterTable.read(
-    resources.files("planner.parameters").joinpath("scene.toml").read_text("utf-8"), "scene.toml"
-)
+SCENE_NUMBERS: Final = bundled_table("scene.toml", "planner.parameters")
 """Numbers of what is in the way, and of what is usual."""
 
 
