@@ -12,7 +12,7 @@ from hand_models.base import Array, Indices, SolverError, go_on
 from hand_models.wrench_spaces.linear_programs import linear_program
 from hand_models.wrench_spaces.settings import SETTINGS
 
-__all__ = ["Polytope", "distinct", "hull", "hull_facets", "polytope"]
+__all__ = ["Polytope", "distinct", "hull", "hull_facets", "largest_ball", "polytope"]
 
 
 class Polytope(NamedTuple):
@@ -75,16 +75,33 @@ def polytope(A: Array, b: Array) -> Polytope:
     A, b = A / norms[:, None], b / norms
     rows = _irredundant(A, b)
     A, b = A[rows], b[rows]
-    # the centre of the largest ball inside
-    cost = np.zeros(d + 1)
-    cost[-1] = -1.0
-    what, bounds = f"a block of {d} columns", [(None, None)] * d + [(0.0, None)]
-    ball = linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
+    ball = largest_ball(A, b, f"a block of {d} columns")
     if ball is None or ball[-1] <= SETTINGS.tolerance:
         raise _flat(d)
     go_on()
     cut = scipy.spatial.HalfspaceIntersection(np.column_stack([A, -b]), ball[:-1])
     return Polytope(middle + half * distinct(cut.intersections, SETTINGS.tolerance), rows)
+
+
+def largest_ball(A: Array, b: Array, what: str) -> Array | None:
+    """Return centre and radius of the largest ball in { y : A y ≤ b }, shape (d + 1,), or None.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n, d)
+        Rows of unit length.
+    b : ndarray, shape (n,)
+    what : str
+        Name of the set, for errors.
+
+    Raises
+    ------
+    SolverError
+        If the program is not solved.
+    """
+    d = A.shape[1]
+    cost, bounds = np.append(np.zeros(d), -1.0), [(None, None)] * d + [(0.0, None)]
+    return linear_program(cost, np.column_stack([A, np.ones(len(b))]), b, what, bounds=bounds)
 
 
 def _flat(d: int) -> SolverError:

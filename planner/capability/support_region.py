@@ -23,7 +23,7 @@ import numpy as np
 from msgspec import structs
 
 from hand_models.base import Array, EmptySetError, InvalidInputError, finite_vector, skew
-from hand_models.wrench_spaces import linear_program
+from hand_models.wrench_spaces import largest_ball
 from planner.capability.body_space import BodySpace
 from planner.capability.polygon import Polygon, SupportPoint, enclose
 from planner.prepare import posture_at
@@ -218,10 +218,7 @@ def _vertices(A: Array, b: Array) -> Array:
     """
     from scipy.spatial import HalfspaceIntersection
 
-    # the centre of the largest ball inside
-    bounds = [(None, None)] * 3 + [(0.0, None)]
-    rows, cost = np.column_stack([A, np.ones(len(b))]), np.array([0.0, 0.0, 0.0, -1.0])
-    ball = linear_program(cost, rows, b, "the region of the centre of mass", bounds=bounds)
+    ball = largest_ball(A, b, "the region of the centre of mass")
     if ball is None or ball[-1] < LEAST_ROOM:
         raise EmptySetError("the regions of the centre of mass have no room in common")
     found = HalfspaceIntersection(np.column_stack([A, -b]), ball[:3]).intersections
