@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import scipy
 
 from hand_models.base import Array, Indices, InvalidInputError
 from hand_models.parameters import strength_table
@@ -43,7 +44,7 @@ class StrengthSettings:
     nodes: int = 64  # of quadrature; with 16 an error of 0.006 is left at a scatter of 0.78
     least_scatter: float = 1e-4
     """Least coefficient of variation of a tile: less is as good as none, a modulus of 13,000."""
-    halvings: int = 60  # of a factor's logarithm, from ± 12: to 2e-17
+    most_log: float = 12.0  # of the logarithm of a factor that is sought, of either sign
 
 
 STRENGTH_SETTINGS: Final = StrengthSettings()
@@ -70,7 +71,8 @@ def weibull_modulus(variation: float) -> float:
         )
     aim = math.log1p(max(variation, STRENGTH_SETTINGS.least_scatter) ** 2)
     low, high = 0.0, 20.0  # of 1/m
-    for _ in range(STRENGTH_SETTINGS.halvings + 10):
+    # to the last digit, on which the last digits of the plan of least hazard depend
+    for _ in range(70):
         x = 0.5 * (low + high)
         if math.lgamma(1.0 + 2.0 * x) - 2.0 * math.lgamma(1.0 + x) < aim:
             low = x
@@ -201,14 +203,14 @@ class TileStrengths:
         hazards = self.log_hazards(used)
         if not np.isfinite(hazards).any():
             return 0.0
-        low, high = -12.0, 12.0
-        for _ in range(STRENGTH_SETTINGS.halvings):
-            middle = 0.5 * (low + high)
-            if self._no_slip(hazards, middle) < probability:
-                low = middle
-            else:
-                high = middle
-        return math.exp(high)
+        ends = -STRENGTH_SETTINGS.most_log, STRENGTH_SETTINGS.most_log
+
+        def short(log_factor: float) -> float:
+            return self._no_slip(hazards, log_factor) - probability
+
+        if short(ends[0]) >= 0.0 or short(ends[1]) <= 0.0:
+            return math.exp(ends[0] if short(ends[0]) >= 0.0 else ends[1])
+        return math.exp(scipy.optimize.brentq(short, *ends, xtol=1e-15, rtol=1e-15))
 
     def _no_slip(self, log_hazards: Array, log_factor: float) -> float:
         """Return the probability that no tile slips, by the logarithms of hazards and of c."""

@@ -17,14 +17,14 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from hand_models.base import Array, Indices
+from hand_models.base import Array
 from hand_models.tile import StrengthScatter, Surface, TileStrengths
 from planner.prepare import PreparedStance, prepare_stance
 from planner.processes import by_index, cores
 from planner.question import SurvivalSettings
 from planner.result import Plan, Survival, SurvivalShare
 from planner.route.climb import Phase, RouteResult, RouteStage
-from planner.simulation import Draws, draw_slips
+from planner.simulation import Draws, draw_slips, hand_of_units
 
 __all__ = ["RouteShare", "RouteSurvival", "StageSurvival", "find_route_survival"]
 
@@ -199,16 +199,10 @@ def _draw(
     strengths = _strengths(prepared, [numbers[at] for at in placed], settings)
     draws = draw_slips(prepared, plan.hands, settings, strengths)
     used = {
-        at: (hand.surface, draws.used[_units(prepared) == h])
+        at: (hand.surface, draws.used[hand_of_units(prepared) == h])
         for h, (at, hand) in enumerate(zip(placed, prepared.batch.hands, strict=True))
     }
     return _Ended(draws, used)
-
-
-def _units(prepared: PreparedStance) -> Indices:
-    """Return the hand of each tile, then of each palm, (T + H,)."""
-    batch = prepared.batch
-    return np.concatenate([batch.places.hand, np.arange(len(batch.hands))])
 
 
 def _strengths(
@@ -216,7 +210,7 @@ def _strengths(
 ) -> Array:
     """Return strengths, (draws, T + H): a hand of the same number has the same in every stage."""
     scatter = StrengthScatter.bundled(settings.hold_scatter, settings.rock_scatter)
-    of_hand, alone = _units(prepared), StrengthScatter(scatter.hold, 0.0)
+    of_hand, alone = hand_of_units(prepared), StrengthScatter(scatter.hold, 0.0)
     found = np.empty((settings.draws, len(of_hand)))
     for h, (hand, number) in enumerate(zip(prepared.batch.hands, numbers, strict=True)):
         own = of_hand == h

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from hand_models.base import Array, Indices
 from hand_models.tile import inner_half_planes
 from hand_models.wrench_spaces import WRENCH_SCALE
-from planner.prepare import PreparedStance
+from planner.prepare import HandBatch, PreparedStance
 from planner.simulation.finger_states import PHALANX_HOLDS, STATE_DIGITS, FingerStates
 from planner.simulation.passive_loads import BALANCE_SETTINGS, balanced
 
@@ -46,6 +46,12 @@ class Loads(NamedTuple):
     tiles: Array
     laterals: Array
     palms: Array
+
+    @classmethod
+    def of(cls, batch: HandBatch, tiles: Array, palms: Array) -> Loads:
+        """Return the loads of a plan from those of tiles and palms' forces in H, (H, 3) [N]."""
+        laterals = np.add.reduceat(tiles[:, 2], batch.places.first_of_finger)
+        return cls(tiles, laterals, palms[:, ::2] * [-1.0, 1.0])
 
 
 class StateLoads(NamedTuple):
@@ -195,19 +201,18 @@ class Cascade:
         batch = self._batch
         return np.zeros((draws, 2 * len(batch.places.phalanges) + len(batch.hands)), np.uint8)
 
-    def _missing(self, states: NDArray[np.uint8]) -> Array:
-        """Return the wrench that laterals and palms lack, (S, 6), with those of the plan."""
-        tiles, _ = self._planar(states)
-        holding = self._holding(states)
-        x, _, wrenches = self._laterals(holding)
-        gone = states[:, -len(self._batch.hands) :].astype(bool)
-        palms = self._palms(gone)[0]
-        planar = tiles.reshape(len(states), -1) @ self._per_load[:, :2].reshape(-1, 6)
-        passive = (x[:, None] @ wrenches)[:, 0] + palms @ self._per_palm
-        return np.asarray(self._wrench - planar - passive)
+    def _missing(self, planar: Array, laterals: Array, wrenches: Array, palms: Array) -> Array:
+        """Return the wrench that S states lack of the plan's, (S, 6), before the body moves.
 
-    def _planar(self, states: NDArray[np.uint8]) -> tuple[Array, Indices]:
-        """Return shear and normal load of each tile, (S, T, 2) [N], and the fingers' states."""
+        Shears and normal loads, (S, T, 2); each finger's lateral reaction, (S, F), and its wrench
+        per newton; and the palms' loads, (S, 2 H).
+        """
+        of_tiles = planar.reshape(len(planar), -1) @ self._per_load[:, :2].reshape(-1, 6)
+        passive = (laterals[:, None] @ wrenches)[:, 0] + palms @ self._per_palm
+        return np.asarray(self._wrench - of_tiles - passive)
+
+    def _planar(self, states: NDArray[np.uint8]) -> Array:
+        """Return shear and normal load of each tile, (S, T, 2) [N]."""
         places, F = self._batch.places, len(self._batch.places.phalanges)
         codes, row = states[:, :F].astype(np.intp), np.arange(F)
         found = np.zeros((len(states), len(self._phalanx), 2))
@@ -215,7 +220,7 @@ class Cascade:
             found[:, places.phalanges, k] = table[row, codes]
         base = states[:, F : 2 * F][:, places.base_fingers] == 0
         found[:, places.bases, 0] = base * self._loads.tiles[places.bases, 0]
-        return found, codes
+        return found
 
     def _holding(self, states: NDArray[np.uint8]) -> Flags:
         """Return which tiles hold in each state, shape (S, T)."""
@@ -257,7 +262,7 @@ class Cascade:
         states : ndarray of uint8, shape (S, 2 F + H)
         """
         batch, H = self._batch, len(self._batch.hands)
-        planar, _ = self._planar(states)
+        planar = self._planar(states)
         holding = self._holding(states)
         x, springs, wrenches = self._laterals(holding)
         gone = states[:, -H:].astype(bool)
@@ -270,7 +275,7 @@ class Cascade:
             np.hstack([springs, palm_springs, np.full_like(rubs, self._rub_stiffness)]),
             np.hstack([np.full(x.shape, -np.inf), np.zeros_like(most), -rubs]),
             np.hstack([np.full(x.shape, np.inf), most, rubs]),
-            self._missing(states),
+            self._missing(planar, x, wrenches, of_palms),
         )
         sides, palms, _ = np.split(passive, [x.shape[1], x.shape[1] + 2 * H], axis=1)
         shares = holding * self._spines

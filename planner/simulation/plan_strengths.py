@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hand_models.base import Array
+from hand_models.base import Array, Indices
 from hand_models.hand import NAIL
 from hand_models.parameters import surface_table
 from hand_models.tile import StrengthScatter, Surface, TileStrengths
@@ -15,7 +15,20 @@ from planner.question import SurvivalSettings
 from planner.result import HandPlan, StrengthSource
 from planner.simulation.cascade import Loads
 
-__all__ = ["plan_loads", "strength_law", "strength_sources", "used_strengths", "why_not_simulated"]
+__all__ = [
+    "hand_of_units",
+    "plan_loads",
+    "strength_law",
+    "strength_sources",
+    "used_strengths",
+    "why_not_simulated",
+]
+
+
+def hand_of_units(prepared: PreparedStance) -> Indices:
+    """Return the hand of each tile, then of each palm, shape (T + H,)."""
+    batch = prepared.batch
+    return np.concatenate([batch.places.hand, np.arange(len(batch.hands))])
 
 
 def strength_law(prepared: PreparedStance, settings: SurvivalSettings) -> TileStrengths:
@@ -23,7 +36,7 @@ def strength_law(prepared: PreparedStance, settings: SurvivalSettings) -> TileSt
     hands = prepared.batch.hands
     return TileStrengths.of(
         [hand.surface for hand in hands],
-        np.concatenate([prepared.batch.places.hand, np.arange(len(hands))]),
+        hand_of_units(prepared),
         StrengthScatter.bundled(settings.hold_scatter, settings.rock_scatter),
     )
 
@@ -31,13 +44,7 @@ def strength_law(prepared: PreparedStance, settings: SurvivalSettings) -> TileSt
 def plan_loads(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Loads:
     """Return the loads of a plan's hands over all of them."""
     tiles = np.concatenate([hand.loads for hand in hands])
-    palms = np.array([hand.palm.force for hand in hands])
-    first = prepared.batch.places.first_of_finger
-    return Loads(
-        tiles,
-        np.add.reduceat(tiles[:, 2], first),
-        np.column_stack([-palms[:, 0], palms[:, 2]]),
-    )
+    return Loads.of(prepared.batch, tiles, np.array([hand.palm.force for hand in hands]))
 
 
 def used_strengths(prepared: PreparedStance, hands: Sequence[HandPlan]) -> Array:

@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, partial
-from importlib import resources
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from msgspec import structs
 
 from hand_models.base import Array, Indices
 from hand_models.hand import SettledHand
-from hand_models.parameters import ParameterTable
+from hand_models.parameters import bundled_table
 from planner import deadline
 from planner.prepare import PreparedStance, prepare_stance
 from planner.processes import by_index
@@ -162,7 +161,8 @@ class _Simulation:
         self._settings, self._given = settings, strengths
         self._law = strength_law(prepared, settings)
         self.cascade = Cascade(prepared, plan_loads(prepared, hands))
-        late_slips = math.floor(settings.delay / _interval() + 1e-9)
+        table = bundled_table("slips.toml", "planner.parameters")
+        late_slips = math.floor(settings.delay / table.positive("cascade", "interval") + 1e-9)
         self._replanned = _Replanned(prepared, self.cascade, late_slips)
 
     def strengths(self, start: int, end: int) -> Array:
@@ -282,13 +282,6 @@ def _steps(prepared: PreparedStance, cascade: Cascade, strengths: Array) -> Iter
         yield Slip(*names[unit], float(over[unit]), None if there.lost[0] else most)
 
 
-@cache
-def _interval() -> float:
-    """Return the time from one slip to the next [s]."""
-    path = resources.files("planner.parameters").joinpath("slips.toml")
-    return ParameterTable.read(path.read_text("utf-8"), path.name).positive("cascade", "interval")
-
-
 class _Replanned:
     """Cascades with new set-points after each slip, a given number of slips late.
 
@@ -351,11 +344,7 @@ class _Replanned:
         if found.verified is None:
             return None
         arrays, batch = found.verified.arrays, self._prepared.batch
-        loads = Loads(
-            arrays.loads,
-            np.add.reduceat(arrays.loads[:, 2], batch.places.first_of_finger),
-            arrays.palms[:, ::2] * [-1.0, 1.0],
-        )
+        loads = Loads.of(batch, arrays.loads, arrays.palms)
         # what the plan has taken off the rock holds no more than what has slipped
         idle = np.array([t.contact == "none" for hand in arrays.tiles for t in hand])
         off = tiles | (idle & (batch.touch.touches > 0.0))
