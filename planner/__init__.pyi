@@ -114,6 +114,11 @@ from .robots import (
     robot_of as robot_of,
 )
 from .route import (
+    Climb as Climb,
+    ClimbSettings as ClimbSettings,
+    Failure as Failure,
+    HandKnot as HandKnot,
+    Knot as Knot,
     Move as Move,
     Route as Route,
     RouteResult as RouteResult,
@@ -122,6 +127,7 @@ from .route import (
     StageSurvival as StageSurvival,
     evaluate as evaluate,
     find_route_survival as find_route_survival,
+    plan_climb as plan_climb,
 )
 from .simulation import find_survival as find_survival
 from .solving import (

@@ -5,6 +5,7 @@ from .climb import (
     RouteResult as RouteResult,
     RouteStage as RouteStage,
 )
+from .climbing import plan_climb as plan_climb
 from .evaluation import evaluate as evaluate
 from .knots import (
     Climb as Climb,
@@ -12,6 +13,7 @@ from .knots import (
     HandKnot as HandKnot,
     Knot as Knot,
 )
+from .settings import ClimbSettings as ClimbSettings
 from .survival import (
     RouteShare as RouteShare,
     RouteSurvival as RouteSurvival,
