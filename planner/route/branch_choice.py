@@ -12,8 +12,10 @@ from planner.route.climb import Move, Route
 __all__ = ["bodies_until_lifted", "lasting", "start_joints"]
 
 
-def bodies_until_lifted(moves: Iterable[Move], limb: str) -> list[Pose]:
+def bodies_until_lifted(moves: Iterable[Move], limb: str) -> tuple[list[Pose], bool]:
     """Return the poses of the body, in W, while a limb's hand stays on its hold.
+
+    The second is whether the hand leaves its hold at the last of them.
 
     Parameters
     ----------
@@ -26,8 +28,8 @@ def bodies_until_lifted(moves: Iterable[Move], limb: str) -> list[Pose]:
         if move.body is not None:
             found.append(move.body)
         if move.hand.limb == limb:
-            break
-    return found
+            return found, True
+    return found, False
 
 
 def lasting(
@@ -37,6 +39,8 @@ def lasting(
     bodies: Sequence[Pose],
     joints: Mapping[str, Array],
     candidates: Iterable[Array],
+    *,
+    lifts: bool,
 ) -> Iterator[Array]:
     """Yield those of a limb's joint angles that are clear, and stay so while the body moves.
 
@@ -52,20 +56,29 @@ def lasting(
         Angles of the other limbs' joints [rad].
     candidates : iterable of ndarray, shape (n,)
         Angles that put the hand on its hold [rad].
+    lifts : bool
+        Whether the hand leaves its hold at the last of the bodies.
     """
     robot, margin = scene.robot, scene_number("motion", "margin")
+    inside = [body.inverse() @ hand for body in bodies]
+    others, ways = [each for each in robot.limbs if each != limb], [robot.limbs] * len(bodies)
+    if lifts:
+        # and back from the hold at last
+        back = scene_number("motion", "stand_off") * inside[-1].rotation[:, 2]
+        inside.append(Pose(inside[-1].position - back, inside[-1].rotation))
+        bodies, ways = [*bodies, bodies[-1]], [*ways, tuple(others)]
+    # the other limbs as they are now, though they will move with the body
+    spaces = [
+        JointSpace(scene, body, joints, (limb,), touching=touching)
+        for body, touching in zip(bodies, ways, strict=True)
+    ]
     for angles in candidates:
-        inside = [body.inverse() @ hand for body in bodies[1:]]
         try:
-            after = follow_poses(robot, limb, angles, inside) if inside else []
+            after = follow_poses(robot, limb, angles, inside[1:]) if inside[1:] else []
         except BranchEndError:
             continue
-        # the other limbs as they are now, though they will move with the body
-        spaces = [
-            JointSpace(scene, body, {**joints, limb: at}, (limb,), touching=robot.limbs)
-            for body, at in zip(bodies, [angles, *after], strict=True)
-        ]
-        if all(space.clearances(space.start[None]).min() >= margin for space in spaces):
+        pairs = zip(spaces, [angles, *after], strict=True)
+        if all(space.clearances(at[None]).min() >= margin for space, at in pairs):
             yield angles
 
 
@@ -86,8 +99,14 @@ def start_joints(route: Route, scene: CollisionScene, found: Mapping[str, Array]
             continue
         limb, here = place.limb, start.body.inverse() @ place.pose
         near = found[limb]
-        bodies = [start.body, *bodies_until_lifted(route.moves, limb)]
-        others = branches(scene.robot, limb, here, near, count=32)
-        best = next(lasting(scene, limb, place.pose, bodies, joints, [near, *others]), None)
-        joints[limb] = near if best is None else best
+        later, lifts = bodies_until_lifted(route.moves, limb)
+        found_here = [near, *branches(scene.robot, limb, here, near, count=32)]
+        for until, leaves in (([start.body, *later], lifts), ([start.body], False)):
+            clear = lasting(
+                scene, limb, place.pose, until, joints, found_here, lifts=leaves
+            )
+            best = next(clear, None)
+            if best is not None:
+                joints[limb] = best
+                break
     return joints

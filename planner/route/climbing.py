@@ -240,9 +240,9 @@ class _Planner:
             if not found:
                 solve_limbs(robot, {limb: target}, {}, np.zeros(3))
                 raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
-            left = self._route.moves[self._move :]
-            bodies = [posed.body, *bodies_until_lifted(left, limb)]
-            clear = lasting(self._scene, limb, move.hand.pose, bodies, posed.angles, found)
+            later, lifts = bodies_until_lifted(self._route.moves[self._move :], limb)
+            bodies, place = [posed.body, *later], move.hand.pose
+            clear = lasting(self._scene, limb, place, bodies, posed.angles, found, lifts=lifts)
             goals = [*islice(clear, 6)] or found[:6]
         way = swing(self._scene, posed.body, posed.angles, limb, goals)
         assert posed.moving is not None
@@ -287,15 +287,17 @@ class _Planner:
 
     def _plan(self, posed: Posed, *, stage: bool = False) -> Held:
         """Return the plan of a posture; between stages palms press, so that they can settle."""
-        held = None
-        if not stage:
+        press = self._numbers.press
+        for least in (0.0,) if stage else (press, 0.25 * press, 0.0):
             try:
-                held = hold_as_planned(posed, self._near, self._numbers.press)
+                held = hold_as_planned(posed, self._near, least)
             except NoPlanError:
-                pass  # palms cannot press so much
-        held = held or hold_as_planned(posed, self._near)
-        self._near = held.solution
-        return held
+                if not least:
+                    raise
+            else:
+                self._near = held.solution
+                return held
+        raise AssertionError  # the last one returns or raises
 
     def _shifted(self, posed: Posed, body: Pose) -> Posed:
         """Return a posture with the body elsewhere and all hands where they are."""
@@ -311,7 +313,8 @@ class _Planner:
         start, numbers = self._at, self._numbers
         passage = Passage(start, end, numbers.excess)
         bound, top = passage.bound(), max(start.utilisation, end.utilisation)
-        near = bound <= (1.0 + numbers.excess) * top + numbers.excess_floor
+        cap = self._route.limits.utilisation + CAP_SLACK
+        near = bound <= min((1.0 + numbers.excess) * top + numbers.excess_floor, cap)
         if not passage.still and left and not (near and passage.slack() <= numbers.slack):
             middle = passage.posed(0.5)
             if middle.body is not start.posed.body:
@@ -319,7 +322,7 @@ class _Planner:
             self._go(self._plan(middle), halvings=left - 1)
             self._go(end, stage=stage, halvings=left - 1)
             return
-        if not bound <= self._route.limits.utilisation + CAP_SLACK:
+        if not bound <= cap:
             raise NoPlanError(
                 "between two knots passive reactions do not balance the way of the centre of mass"
                 if math.isinf(bound)
