@@ -159,14 +159,19 @@ class Passage:
         rows, changing = self._rows, self._rows.changing
         middle = self.posed(0.5)
         moving = [held.posed.moving for held in (self.start, self.end)]
-        most = max([0.0, *(each.utilisation for each in moving if each is not None and each.on_rock)])
+        most = max(
+            [0.0, *(each.utilisation for each in moving if each is not None and each.on_rock)]
+        )
         ball, box = self._ball, self._box
         d, e = np.zeros(len(rows.used)), np.zeros(len(rows.used))
         if ball.any() or box.any():
             if not self._balances(ball) or not self._balances(box):
                 return math.inf
             d, e = self._beyond(rows.used)
-            slack = [rows.most - rows.hard @ np.concatenate(held.loads) for held in (self.start, self.end)]
+            slack = [
+                rows.most - rows.hard @ np.concatenate(held.loads)
+                for held in (self.start, self.end)
+            ]
             out, wide = self._beyond(rows.hard)
             if (_room(slack[0] - wide, slack[1] - wide) < out - 1e-9).any():
                 return math.inf

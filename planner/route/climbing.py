@@ -22,7 +22,6 @@ from planner.motion import (
     BranchEndError,
     CollisionScene,
     NoWayError,
-    branches,
     rocks_of,
     shift_postures,
     swing,
@@ -31,7 +30,7 @@ from planner.prepare import posture, settle_each
 from planner.programs import CAP_SLACK
 from planner.robots import UnreachableError, solve_limbs
 from planner.route.between import Passage
-from planner.route.branch_choice import bodies_until_lifted, lasting, start_joints
+from planner.route.branch_choice import bodies_until_lifted, candidates_on, lasting, start_joints
 from planner.route.climb import Move, Route, RouteStage, in_route, stages
 from planner.route.evaluation import must_touch
 from planner.route.held import Held, MovingHand, NoPlanError, Posed, hold_as_planned, hold_with
@@ -236,12 +235,12 @@ class _Planner:
         if isinstance(given, np.ndarray):
             goals: Sequence[Array] = [given]
         else:
-            found = branches(robot, limb, target, posed.angles[limb], count=32)
+            later, lifts = bodies_until_lifted(self._route.moves[self._move :], limb)
+            bodies, place = [posed.body, *later], move.hand.pose
+            found = candidates_on(robot, limb, place, bodies, posed.angles[limb])
             if not found:
                 solve_limbs(robot, {limb: target}, {}, np.zeros(3))
                 raise NoPlanError(f"no joint angles were found for {limb} on its new hold")
-            later, lifts = bodies_until_lifted(self._route.moves[self._move :], limb)
-            bodies, place = [posed.body, *later], move.hand.pose
             clear = lasting(self._scene, limb, place, bodies, posed.angles, found, lifts=lifts)
             goals = [*islice(clear, 6)] or found[:6]
         way = swing(self._scene, posed.body, posed.angles, limb, goals)

@@ -105,9 +105,7 @@ class Posed:
         weight, moving = self._whole.needed_wrench(self.posture.weights), self.moving
         if moving is None or not moving.on_rock:
             return weight
-        return np.asarray(
-            weight + wrench_transport(self.hand_poses[moving.limb]) @ moving.wrench
-        )
+        return np.asarray(weight + wrench_transport(self.hand_poses[moving.limb]) @ moving.wrench)
 
     @cached_property
     def prepared(self) -> PreparedStance:
@@ -255,11 +253,12 @@ def hold_as_planned(posed: Posed, near: Solution | None = None, press: float = 0
     asked = _pressing(prepared, press) if press > 0.0 else prepared
     found = answer_on(asked, time.perf_counter(), checks, near, prove=press == 0.0)
     answer = found.answer
-    if not isinstance(answer, Verified) or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK:
+    if (
+        not isinstance(answer, Verified)
+        or answer.utilisation > prepared.question.limits.utilisation + CAP_SLACK
+    ):
         raise NoPlanError(found.reason or "no plan passes the checks")
-    held = Held(
-        posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution
-    )
+    held = Held(posed, prepared, answer.solution.loads, answer.arrays, answer.used, answer.solution)
     return _checked(held)
 
 
