@@ -110,6 +110,8 @@ class Passage:
                 wrench=_mixed(first.wrench, moving.wrench, t),
                 utilisation=max(first.utilisation, moving.utilisation),
             )
+        if self.still:
+            return start.beside(moving)
         return Posed(start.route, start.hands, body, angles, moving)
 
     def hold(self, t: float) -> Held:
@@ -185,9 +187,10 @@ class Passage:
     def _idle(self, middle: Posed) -> float:
         """Return the largest utilisation of the joints of limbs whose hand is not in the sets."""
         most, box = 0.0, self._deviation
-        for limb in middle.posture.idle(middle.prepared.question.stance):
-            shares = []
-            for posed in (self.start.posed, middle, self.end.posed):
+        times = [self.start.posed, middle, self.end.posed]
+        for limb in middle.idle:
+            shares, mine = [], False
+            for posed in times:
                 own, moving = posed.posture.joints[limb].driven, posed.moving
                 mine = moving is not None and moving.limb == limb
                 wrench = moving.wrench if moving is not None and mine else np.zeros(6)

@@ -216,14 +216,14 @@ class _Planner:
             state = states[k]
             after = states[k + 1] if k + 1 < len(states) else None
             if after is None or np.abs(after.tensions - state.tensions).max() > 1e-6:
-                self._go(self._plan(replace(self._at.posed, moving=state)))
+                self._go(self._plan(self._at.posed.beside(state)))
                 k += 1
                 continue
             # spines let go or catch at one tension: all others keep theirs
             middle = replace(state, wrench=0.5 * (state.wrench + after.wrench))
-            held = self._plan(replace(self._at.posed, moving=middle))
+            held = self._plan(self._at.posed.beside(middle))
             for each in (state, after):
-                posed = replace(held.posed, moving=each)
+                posed = held.posed.beside(each)
                 self._go(hold_with(posed, Passage(held, held).settled(0.0, posed)))
             k += 2
 
@@ -249,7 +249,7 @@ class _Planner:
         for k, angles in enumerate(way.path[1:], start=1):
             # on the first way from the rock its wrench goes, somehow
             moving = replace(air, deviation=np.abs(posed.moving.wrench)) if k == 1 else air
-            at = replace(self._at.posed, angles={**posed.angles, limb: angles}, moving=moving)
+            at = self._at.posed.beside(moving, angles)
             self._go(self._plan(at, stage=k == way.retreat), stage=k == way.retreat)
 
     def _arrived(self, place: HandOnHold) -> tuple[Posed, list[MovingHand]]:

@@ -14,7 +14,7 @@ from hand_models.base import Array, Pose, wrench_transport
 from hand_models.fixed_wrist import PALM_PRESSING, PALM_SHEAR
 from hand_models.hand import FINGERS
 from planner.explanation import joint_name, limit_name
-from planner.prepare import Posture, PreparedStance, assemble, posture_at
+from planner.prepare import JointLoads, Posture, PreparedStance, assemble, posture_at
 from planner.programs import CAP_SLACK, LOAD_UNIT
 from planner.question import HandOnHold, Question, Stance
 from planner.result import LimitName, LoadRecovery, PlanArrays
@@ -116,6 +116,32 @@ class Posed:
         parts = assemble(question, self.posture, self.needed)
         return PreparedStance(question, self.posture, *parts, self.needed)
 
+    def beside(self, moving: MovingHand | None, angles: Array | None = None) -> Posed:
+        """Return the posture with another state of the moving hand, while all others hold still.
+
+        ``angles``, shape (n,), are new joint angles of its limb [rad]. What the others can carry is
+        not computed again.
+        """
+        joints = self.angles
+        if angles is not None and moving is not None:
+            joints = {**joints, moving.limb: angles}
+        found = replace(self, moving=moving, angles=joints)
+        if angles is None:
+            found.__dict__["posture"] = self.posture
+        question = found._whole
+        if moving is not None and moving.on_rock:
+            question = replace(question, body_wrench=found.needed)
+        before = self.prepared
+        found.__dict__["prepared"] = PreparedStance(
+            question, found.posture, before.batch, before.hands.turned(found.needed), found.needed
+        )
+        return found
+
+    @property
+    def idle(self) -> dict[str, JointLoads]:
+        """Joint loads of the limbs whose hands do not hold the robot, by limb."""
+        return self.posture.idle(self._whole.stance)
+
     @cached_property
     def hand_poses(self) -> dict[str, Pose]:
         """Pose of each limb's hand frame H in B: where its hand is held, or its joints put it."""
@@ -161,16 +187,14 @@ class Held:
     @cached_property
     def joint_torque(self) -> dict[str, Array]:
         """Joint torques of every limb, shape (n,) [N·m]."""
-        where = self.prepared.where
-        assert where is not None
-        return {limb: own.torques(self.wrenches[limb]) for limb, own in where.joints.items()}
+        joints = self.posed.posture.joints
+        return {limb: own.torques(self.wrenches[limb]) for limb, own in joints.items()}
 
     @cached_property
     def idle(self) -> list[tuple[float, LimitName]]:
         """Utilisation of the joints of limbs whose hand is not in the set of the stance."""
-        where, found = self.prepared.where, list[tuple[float, LimitName]]()
-        assert where is not None
-        for limb, own in where.idle(self.prepared.question.stance).items():
+        found = list[tuple[float, LimitName]]()
+        for limb, own in self.posed.idle.items():
             driven = own.driven
             shares = np.abs(driven.torques(self.wrenches[limb])) / driven.limits
             names = zip(driven.names, driven.sliding.tolist(), strict=True)
