@@ -7,7 +7,7 @@ import pytest
 import scipy
 from scipy.spatial.transform import Rotation
 
-from hand_models.base import InvalidInputError, Pose, UnsupportedError, wrench_transport
+from hand_models.base import Pose, wrench_transport
 from hand_models.hand import FINGERS
 from planner import ClimbSettings, Load, Question, Route, Stance, plan_climb, robosimian
 from planner.prepare import posture, prepare_stance
@@ -24,7 +24,7 @@ def route() -> Route:
     """One move of the bundled route, after a small shift of the body."""
     bundled = questions.route_of(read_route("six-moves"))
     first, body = bundled.moves[0], bundled.start.body
-    shifted = Pose(body.position + [0.0, -0.02, 0.02], body.rotation)
+    shifted = Pose(body.position + np.array([0.0, -0.02, 0.02]), body.rotation)
     return replace(bundled, moves=(replace(first, body=shifted),))
 
 
@@ -103,7 +103,7 @@ def test_the_leaving_hand_opens_and_the_other_hands_stay(climb):
                 assert two.on_rock
             assert one.pose.position == pytest.approx(two.pose.position, abs=1e-9)
     swing = [knot for knot in climb.knots if knot.phase == "swing"]
-    leaving = [hand for hand in swing[-2].hands if hand.limb == "front_left"][0]
+    leaving = next(hand for hand in swing[-2].hands if hand.limb == "front_left")
     assert not leaving.on_rock
     assert not leaving.tensions.any()
     assert not leaving.wrench.any()
@@ -133,7 +133,8 @@ def least_utilisation(route, hands, moving, body, joints, tensions, wrench):
         carried = wrench_transport(into_body @ hand.pose)
         balance.append(carried @ space.generators)
         given = given - carried @ space.origin
-        fixed = dict(zip([f"{finger}/tension" for finger in FINGERS], tensions[hand.limb]))
+        names = [f"{finger}/tension" for finger in FINGERS]
+        fixed = dict(zip(names, tensions[hand.limb], strict=True))
         bounds += [(fixed.get(name), fixed.get(name)) for name in space.columns]
         before += len(space.columns)
     found = scipy.optimize.linprog(
