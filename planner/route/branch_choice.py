@@ -86,7 +86,7 @@ def lasting(
     ]
     for angles in candidates:
         try:
-            after = follow_poses(robot, limb, angles, inside[1:])
+            after = [*follow_poses(robot, limb, angles, inside[1:])] if inside[1:] else []
         except BranchEndError:
             continue
         pairs = zip(spaces, [angles, *after], strict=True)
