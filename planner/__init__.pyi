@@ -114,14 +114,20 @@ from .robots import (
     robot_of as robot_of,
 )
 from .route import (
+    Climb as Climb,
+    Failure as Failure,
+    HandKnot as HandKnot,
+    Knot as Knot,
     Move as Move,
     Route as Route,
     RouteResult as RouteResult,
     RouteShare as RouteShare,
+    RouteStage as RouteStage,
     RouteSurvival as RouteSurvival,
     StageSurvival as StageSurvival,
     evaluate as evaluate,
     find_route_survival as find_route_survival,
+    stages as stages,
 )
 from .simulation import find_survival as find_survival
 from .solving import (

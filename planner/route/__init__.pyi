@@ -4,6 +4,7 @@ from .climb import (
     Route as Route,
     RouteResult as RouteResult,
     RouteStage as RouteStage,
+    stages as stages,
 )
 from .evaluation import evaluate as evaluate
 from .knots import (
@@ -11,6 +12,7 @@ from .knots import (
     Failure as Failure,
     HandKnot as HandKnot,
     Knot as Knot,
+    KnotPhase as KnotPhase,
 )
 from .survival import (
     RouteShare as RouteShare,

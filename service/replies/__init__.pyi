@@ -1,3 +1,8 @@
+from .climb import (
+    ClimbSetPoints as ClimbSetPoints,
+    HandKnotReply as HandKnotReply,
+    KnotReply as KnotReply,
+)
 from .diagnosis import DiagnosisReply as DiagnosisReply, SuspectReply as SuspectReply
 from .plan import (
     BriefPlanReply as BriefPlanReply,
