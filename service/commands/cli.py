@@ -61,6 +61,10 @@ COMMANDS_BY_NAME: Final = {
         "Write a commented start of a stance, a route, a robot or a hand, as TOML that runs.",
     ),
     "plan": Entry("plans", "Make one plan, without the network."),
+    "play": Entry(
+        "network",
+        "Send the set-points of a climb to a robot: publish them in time, until the end or Ctrl-C.",
+    ),
     "query": Entry("network", "Ask a running service for a plan."),
     "redundancy": Entry(
         "plans",
